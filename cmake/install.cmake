@@ -1,0 +1,29 @@
+# What `cmake --install` puts where, and the package that find_package(partiemc) finds.
+include(CMakePackageConfigHelpers)
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/partiemc)
+
+# One export set per component, so that the core is found where no gRPC is installed.
+set(PARTIEMC_COMPONENTS core)
+install(TARGETS partiemc_core EXPORT partiemcCore)
+install(DIRECTORY core/include/ TYPE INCLUDE)
+install(EXPORT partiemcCore NAMESPACE partiemc:: DESTINATION ${package_dir})
+
+if(PARTIEMC_SERVICE)
+  list(APPEND PARTIEMC_COMPONENTS client)
+  # The client library is static: it drags along what it is made of, the codec without a header,
+  # the messages with theirs, as programs without our client library speak the protocol too.
+  install(TARGETS partiemc_proto partiemc_wire partiemc_client EXPORT partiemcClient)
+  install(DIRECTORY client/include/ TYPE INCLUDE)
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/partiemc TYPE INCLUDE
+    FILES_MATCHING PATTERN reconstruction.*.h)
+  install(FILES proto/partiemc/v1/reconstruction.proto
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/partiemc/proto/partiemc/v1)
+  install(EXPORT partiemcClient NAMESPACE partiemc:: DESTINATION ${package_dir})
+endif()
+
+configure_package_config_file(cmake/partiemcConfig.cmake.in partiemcConfig.cmake
+  INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(partiemcConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/partiemcConfig.cmake
+  ${PROJECT_BINARY_DIR}/partiemcConfigVersion.cmake DESTINATION ${package_dir})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

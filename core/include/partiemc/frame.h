@@ -1,0 +1,36 @@
+// One frame of particles, as the caller holds it. Nothing here owns memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <variant>
+
+namespace partiemc {
+
+/// Particles of one instant, each array in the same order. Views must outlive the call only.
+struct Frame {
+  /// Interleaved coordinates, `components` per particle, in world units. Finite.
+  std::variant<std::span<const float>, std::span<const double>> positions;
+
+  /// 2 (x, y) or 3 (x, y, z). With 3, all particles must lie in one plane parallel to the one
+  /// that ReconstructionParameters::plane names.
+  int components = 2;
+
+  /// Area that each particle stands for, in world units squared, positive and finite. Empty: h^2.
+  std::span<const float> volumes = {};
+
+  std::size_t ParticleCount() const {
+    return std::visit([](auto view) { return view.size(); }, positions) /
+           static_cast<std::size_t>(components);
+  }
+};
+
+/// What a frame may cost. A frame beyond a limit is refused before anything is allocated for it.
+struct FrameLimits {
+  std::size_t max_particles = 16'000'000;
+  /// Tiles of 32 x 32 lattice nodes that particles reach; a tile costs about 10 kB of memory.
+  std::size_t max_tiles = 131'072;
+};
+
+}  // namespace partiemc

@@ -1,0 +1,95 @@
+// The parameters of a reconstruction: fixed for a stream, checked once when it opens.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "absl/status/status.h"
+
+namespace partiemc {
+
+/// Where the vertices of the isoline go (paper, sections 3.4-3.5; core/METHOD.md, "Placements").
+enum class Placement : std::uint8_t {
+  kMarchingSquares,   ///< Linear interpolation of the level set on lattice edges.
+  kQef,               ///< Marching squares plus one vertex per cell that minimises Eq. 14.
+  kFarthestParticle,  ///< Section 3.5 to the letter: the farthest particle above the plane.
+  kVirtualPlane,      ///< The default: one vertex per cell moved along the stabilised normal.
+};
+
+/// How the inside of the isoline is filled with triangles (paper, sections 3.7-3.8).
+enum class Fill : std::uint8_t {
+  kNone,        ///< No mesh at all.
+  kGrid,        ///< Two triangles for each interior cell: the paper's "before".
+  kGreedy,      ///< Interior cells merged into rectangles: the paper's "after".
+  kConforming,  ///< As few triangles as greedy, and no T-junction.
+  kPolygon,     ///< The rings triangulated, without any interior vertex.
+};
+
+/// Where the particle spacing h comes from when the caller does not give it.
+enum class SpacingRule : std::uint8_t {
+  kFirstFrame,  ///< Estimated from the first frame with two distinct positions, then kept.
+  kEveryFrame,  ///< Estimated in each frame; it changes the radii, never the lattice.
+};
+
+/// Which two of three coordinates span the plane of the particles.
+enum class Plane : std::uint8_t { kXy, kXz, kYz };
+
+struct ReconstructionParameters {
+  Placement placement = Placement::kVirtualPlane;
+  Fill fill = Fill::kGreedy;
+
+  /// Particle spacing h in world units, in [1e-60, 1e60]. The normal case: a simulator knows it.
+  /// Every other length below is a multiple of it. Absent: estimated as `spacing_rule` says.
+  std::optional<double> spacing = std::nullopt;
+  SpacingRule spacing_rule = SpacingRule::kFirstFrame;
+
+  /// Kernel radius R in spacings, in [1.5, 8]. More smooths the outline and costs its square;
+  /// less follows single particles.
+  double kernel_radius = 3.0;
+
+  /// Lattice spacing in spacings, in [0.25, 4]. Less resolves more and costs its inverse square.
+  double cell_size = 1.0;
+
+  /// Reference radius r of the level set in spacings, in (0, kernel_radius): more moves the outline
+  /// outward by as much. Absent: calibrated for the placement and kernel radius, so that a flat
+  /// boundary lies h/2 outside the outermost layer of particles (core/METHOD.md, "Calibration").
+  std::optional<double> reference_radius = std::nullopt;
+
+  /// `farthest-particle` only: vertices move outward by this many spacings, in [-1, 1]. 0 is the
+  /// paper; 0.5 puts the outline where the volume is.
+  double surface_offset = 0.0;
+
+  /// Orient the cell normals by those of the frame before (Eq. 11); otherwise by the isoline alone.
+  bool normal_memory = true;
+
+  /// Drop holes smaller than six particles and components that hold no particle. Absent: as the
+  /// placement wants it (on for `virtual-plane`, off for the others).
+  std::optional<bool> clean = std::nullopt;
+
+  /// The plane of positions with three components; positions with two are taken as they are.
+  Plane plane = Plane::kXy;
+
+  friend bool operator==(const ReconstructionParameters&,
+                         const ReconstructionParameters&) = default;
+};
+
+/// OK, or INVALID_ARGUMENT with the Violation of the first field that breaks its rule.
+absl::Status Validate(const ReconstructionParameters& parameters);
+
+/// `parameters` with every absent optional but `spacing` replaced by the value that will be used.
+/// Requires: Validate(parameters).ok().
+ReconstructionParameters Resolve(ReconstructionParameters parameters);
+
+/// The names used on command lines, in files and in reports: "marching-squares", "greedy", ...
+std::string_view Name(Placement placement);
+std::string_view Name(Fill fill);
+std::string_view Name(SpacingRule rule);
+std::string_view Name(Plane plane);
+std::span<const Placement> AllPlacements();
+std::span<const Fill> AllFills();
+std::optional<Placement> FindPlacement(std::string_view name);
+std::optional<Fill> FindFill(std::string_view name);
+
+}  // namespace partiemc

@@ -1,0 +1,21 @@
+// PartiEMC: temporally stable isolines and light meshes from particles, frame by frame.
+//
+//   auto reconstructor = partiemc::Reconstructor::Create({.spacing = 0.01});
+//   partiemc::State state;          // one per stream
+//   partiemc::Workspace workspace;  // one per worker
+//   partiemc::Result result;
+//   partiemc::Frame frame{.positions = std::span<const float>(xy)};
+//   if (auto status = reconstructor->Reconstruct(frame, state, workspace, result); !status.ok())
+//   ...
+//
+// core/METHOD.md tells the method; ARCHITECTURE.md tells where each stage lives.
+#pragma once
+
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/reconstructor.h"
+#include "partiemc/result.h"
+#include "partiemc/stage.h"
+#include "partiemc/state.h"
+#include "partiemc/status.h"
+#include "partiemc/validate.h"

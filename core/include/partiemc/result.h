@@ -1,0 +1,98 @@
+// What a frame becomes: rings, mesh and statistics.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace partiemc {
+
+/// Marks an outer ring in Rings::outer_of.
+inline constexpr std::uint32_t kNoRing = 0xffffffff;
+
+struct RingMeasures {
+  double area = 0;       ///< World units squared; positive for outer rings, negative for holes.
+  double perimeter = 0;  ///< World units.
+  double centroid_x = 0, centroid_y = 0;  ///< Of the area that the ring encloses, world units.
+  std::uint64_t particle_count = 0;       ///< Particles of the ring's component; 0 for holes.
+  std::uint64_t identity = 0;  ///< Which ring of earlier frames this one continues; 0: not tracked.
+
+  friend bool operator==(const RingMeasures&, const RingMeasures&) = default;
+};
+
+/// Closed polylines. Guarantees, but for `farthest-particle` (core/METHOD.md, "Guarantees"):
+///   R1 every ring has at least 3 points, all finite, none repeated; its end is not stored twice;
+///   R2 rings are simple and do not touch each other;
+///   R3 the inside lies on the left: outer rings counter-clockwise, holes clockwise;
+///   R4 each hole lies inside the outer ring that `outer_of` names.
+struct Rings {
+  std::vector<double> points;                ///< x0, y0, x1, y1, ... in world units.
+  std::vector<std::uint32_t> offsets = {0};  ///< Ring k has points [offsets[k], offsets[k + 1]).
+  std::vector<std::uint32_t> outer_of;       ///< Per ring: its outer ring, or kNoRing.
+  std::vector<RingMeasures> measures;        ///< Per ring.
+  std::vector<float> normals;                ///< Per point: outward unit normal, interleaved.
+
+  std::size_t RingCount() const { return outer_of.size(); }
+  std::size_t PointCount() const { return points.size() / 2; }
+  std::span<const double> RingPoints(std::size_t ring) const {
+    return std::span(points).subspan(2 * std::size_t{offsets[ring]},
+                                     2 * std::size_t{offsets[ring + 1] - offsets[ring]});
+  }
+  void Clear();
+  friend bool operator==(const Rings&, const Rings&) = default;
+};
+
+enum class TriangleClass : std::uint8_t {
+  kBoundary,  ///< In the band between the rings and the interior cells.
+  kInterior,  ///< A piece of an interior cell, or of several merged ones.
+};
+
+/// Triangles that cover the inside of the rings. Guarantees, but for `farthest-particle`:
+///   M1 every triangle is counter-clockwise, none is folded or degenerate;
+///   M2 triangles do not overlap and together cover exactly the inside of the rings;
+///   M3 its first points are the points of the rings, bit for bit, in their order.
+struct Mesh {
+  std::vector<double> points;            ///< x0, y0, x1, y1, ... in world units.
+  std::vector<std::uint32_t> triangles;  ///< Three point indices each.
+  std::vector<TriangleClass> classes;    ///< Per triangle.
+
+  std::size_t PointCount() const { return points.size() / 2; }
+  std::size_t TriangleCount() const { return classes.size(); }
+  void Clear();
+  friend bool operator==(const Mesh&, const Mesh&) = default;
+};
+
+struct FrameStatistics {
+  std::uint64_t particles = 0;
+  std::uint64_t tiles = 0;               ///< Tiles of 32 x 32 nodes that were allocated.
+  std::uint64_t active_cells = 0;        ///< Cells that the isoline runs through.
+  std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
+  std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
+  std::uint64_t triangles = 0;           ///< Triangles of the mesh.
+  std::uint64_t triangles_grid = 0;      ///< What `grid` would have made of the same rings.
+  std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.
+  std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
+  double area = 0;       ///< Sum over rings of their signed areas, world units squared.
+  double perimeter = 0;  ///< Sum over rings, world units.
+  double spacing = 0;    ///< Spacing used in this frame, world units; 0 while undecided.
+  double cell_size = 0;  ///< Lattice spacing of the stream, world units; 0 while undecided.
+
+  friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
+};
+
+struct Result {
+  Rings rings;
+  Mesh mesh;  ///< Empty for Fill::kNone.
+  FrameStatistics statistics;
+
+  void Clear();
+  friend bool operator==(const Result&, const Result&) = default;
+};
+
+/// 64-bit digests of the canonical little-endian form of the geometry: equal digests mean equal
+/// bits (proto/PROTOCOL.md gives the definition, so that any client can compute them).
+std::uint64_t DigestRings(const Rings& rings);
+std::uint64_t DigestMesh(const Mesh& mesh);
+
+}  // namespace partiemc

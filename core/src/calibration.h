@@ -1,0 +1,12 @@
+// The reference radius that puts a flat boundary h/2 outside the outermost particles.
+#pragma once
+
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+/// alpha_r of Eq. 7 in spacings for a kernel radius of `kernel_radius` spacings: the value for an
+/// axis-aligned lattice (core/METHOD.md, "Calibration") times the factor of the placement.
+double CalibratedReferenceRadius(Placement placement, double kernel_radius);
+
+}  // namespace partiemc

@@ -1,0 +1,66 @@
+// Connected components of the inside nodes: which polygon a node, a ring or a particle belongs to.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bins.h"
+#include "crossings.h"
+
+namespace partiemc {
+
+/// Inside nodes joined along lattice edges and through the saddles whose inside corners are
+/// joined: exactly the connectivity of the isoline, so that each component has one outer ring.
+class Components {
+ public:
+  /// Labels the inside nodes of `crossings`. Components are numbered in the order of their first
+  /// nodes by tile, row, column. Cost: linear in runs of inside nodes.
+  void Label(const TileDirectory& directory, const Crossings& crossings);
+
+  std::uint32_t size() const { return count_; }
+
+  /// Component of an inside node.
+  std::uint32_t At(const Crossings& crossings, const TilePlace& node) const;
+
+  /// Calls visit(tile, j, mask, component) for each run of inside nodes.
+  template <typename Visit>
+  void ForEachRun(const Crossings& crossings, Visit visit) const;
+
+  /// Adds the particles of each component to `counts`, which has size() elements. A particle
+  /// belongs to the inside corner of its cell that is nearest to it; none: to nobody.
+  void CountParticles(const ParticleBins& bins, const Crossings& crossings,
+                      std::span<std::uint64_t> counts) const;
+
+ private:
+  std::uint32_t RunAt(const Crossings& crossings, const TilePlace& node) const;
+  std::uint32_t Root(std::uint32_t run);
+  void Unite(std::uint32_t a, std::uint32_t b);
+  void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
+
+  std::vector<std::uint32_t> first_run_;  // By tile * 32 + row.
+  std::vector<std::uint32_t> label_;      // By run: parent while uniting, then the component.
+  std::uint32_t count_ = 0;
+};
+
+/// The bits of a row at which a run of ones begins.
+inline std::uint32_t RunStarts(std::uint32_t row) { return row & ~(row << 1); }
+
+/// The run of ones of `row` that begins at its lowest set bit.
+inline std::uint32_t LowestRun(std::uint32_t row) { return row & ~(row + (row & -row)); }
+
+template <typename Visit>
+void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
+  std::uint32_t run = 0;
+  for (std::uint32_t tile = 0; tile < crossings.tiles.size(); ++tile) {
+    for (int j = 0; j < kTileSize; ++j) {
+      for (std::uint32_t row = crossings.tiles[tile].inside[j]; row != 0;) {
+        const std::uint32_t mask = LowestRun(row);
+        visit(tile, j, mask, label_[run++]);
+        row &= ~mask;
+      }
+    }
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,92 @@
+// Stage 3 of 7: level set -> active cells and the segments of the isoline through them.
+//
+//    3--2--2     Corners and edges of a cell. Bit k of a cell's case is set where corner k is
+//    |     |     inside (F < 0). A value of exactly 0 counts as outside, in every stage, so that
+//    3     1     an isoline never runs through a node.
+//    |     |
+//    0--0--1     A segment enters the cell through one edge and leaves through another, with the
+//                inside on its left. Cases 5 and 10 have two segments; the asymptotic decider
+//                (Nielson and Hamann 1991) tells whether they join or part the inside corners.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "field.h"
+#include "lattice.h"
+
+namespace partiemc {
+
+struct ActiveCell {
+  std::uint32_t tile = 0;
+  std::uint8_t i = 0, j = 0;
+  std::uint8_t corners = 0;         ///< The case, 1 to 14.
+  std::uint8_t joined = 0;          ///< Saddles only: 1 if the inside corners are joined.
+  std::uint32_t first_segment = 0;  ///< Its segments are this one and, in a saddle, the next.
+
+  bool IsSaddle() const { return corners == 5 || corners == 10; }
+};
+
+struct Segment {
+  std::uint32_t cell = 0;
+  std::uint8_t entry = 0, exit = 0;  ///< Edges of the cell.
+};
+
+/// A point in cells, in lattice coordinates of the world.
+struct LatticePoint {
+  double x = 0, y = 0;
+};
+
+/// Rows of bits of a tile.
+struct TileBits {
+  BitRows inside{};              ///< Node is inside.
+  BitRows active{};              ///< Cell has inside and outside corners.
+  BitRows interior{};            ///< All four corners of the cell are inside.
+  std::uint32_t first_cell = 0;  ///< Index of the tile's first active cell.
+};
+
+struct Crossings {
+  std::vector<TileBits> tiles;
+  std::vector<ActiveCell> cells;  ///< By tile, row, column.
+  std::vector<Segment> segments;  ///< By cell.
+};
+
+/// Finds the active cells of a level set and their segments.
+/// Deterministic, in parallel over tiles: count, prefix sum, fill. Cost: linear in nodes.
+void FindCrossings(const TileDirectory& directory, const LevelSet& level_set, Crossings& crossings);
+
+/// The interior cells that follow from `inside` rows after they were changed by cleaning.
+void MarkInteriorCells(const TileDirectory& directory, Crossings& crossings);
+
+/// Whether a node exists and is inside.
+inline bool IsInside(const Crossings& crossings, const TilePlace& node) {
+  return node.tile != kNoTile && (crossings.tiles[node.tile].inside[node.j] >> node.i & 1) != 0;
+}
+
+/// The node row `j` of a tile, 0 <= j <= 32, together with its right neighbour's first bit:
+/// bit i of `right` is node i + 1.
+struct NodeRow {
+  std::uint32_t left = 0, right = 0;
+};
+NodeRow InsideRow(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                  std::uint32_t tile, int j);
+
+/// Index of the active cell at a place that is known to be active.
+std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
+
+/// The segment that the isoline takes after `segment`: the one that enters the neighbouring cell
+/// through the edge that this one leaves by.
+std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,
+                          std::uint32_t segment);
+
+/// Where the isoline crosses `edge` of `cell` by linear interpolation of F. The two cells that
+/// share an edge get the same bits. Kept 2^-12 away from the nodes, so that no rounding to world
+/// coordinates can move it onto or past one.
+LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
+                          const ActiveCell& cell, int edge);
+
+/// Lower left node of a cell.
+LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell);
+
+}  // namespace partiemc

@@ -1,0 +1,54 @@
+// The 64-bit digests of proto/PROTOCOL.md: FNV-1a taken a 64-bit word at a time, with a shift that
+// carries high bits down. Not cryptographic: it tells equal bits from different ones.
+#include <bit>
+#include <cstdint>
+#include <span>
+
+#include "partiemc/result.h"
+
+namespace partiemc {
+namespace {
+
+class Digest {
+ public:
+  void Add(std::uint64_t word) {
+    hash_ = (hash_ ^ word) * 0x00000100000001b3u;
+    hash_ ^= hash_ >> 32;
+  }
+  // An array is its number of elements, then each of them as one word.
+  void Add(std::span<const double> values) {
+    Add(values.size());
+    for (const double value : values) Add(std::bit_cast<std::uint64_t>(value));
+  }
+  void Add(std::span<const std::uint32_t> values) {
+    Add(values.size());
+    for (const std::uint32_t value : values) Add(std::uint64_t{value});
+  }
+  std::uint64_t value() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325u;
+};
+
+}  // namespace
+
+std::uint64_t DigestRings(const Rings& rings) {
+  Digest digest;
+  digest.Add(rings.points);
+  digest.Add(rings.offsets);
+  digest.Add(rings.outer_of);
+  return digest.value();
+}
+
+std::uint64_t DigestMesh(const Mesh& mesh) {
+  Digest digest;
+  digest.Add(mesh.points);
+  digest.Add(mesh.triangles);
+  digest.Add(mesh.classes.size());
+  for (const TriangleClass triangle_class : mesh.classes) {
+    digest.Add(static_cast<std::uint64_t>(triangle_class));
+  }
+  return digest.value();
+}
+
+}  // namespace partiemc

@@ -1,0 +1,136 @@
+#include "interior.h"
+
+#include <bit>
+
+namespace partiemc {
+namespace {
+
+enum Heading { kEast = 0, kNorth = 1, kWest = 2, kSouth = 3 };
+
+constexpr int kStepX[4] = {1, 0, -1, 0};
+constexpr int kStepY[4] = {0, 1, 0, -1};
+// Cells ahead of a node on the left and on the right, relative to the node, by heading.
+constexpr int kLeftX[4] = {0, -1, -1, 0};
+constexpr int kLeftY[4] = {0, 0, -1, -1};
+constexpr int kRightX[4] = {0, 0, -1, -1};
+constexpr int kRightY[4] = {-1, 0, 0, -1};
+
+bool IsInterior(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                const TilePlace& node, int dx, int dy) {
+  const TilePlace cell = Normalise(directory, node.tile, node.i + dx, node.j + dy);
+  return cell.tile != kNoTile && (tiles[cell.tile].interior[cell.j] >> cell.i & 1) != 0;
+}
+
+std::uint32_t BottomEdges(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                          std::uint32_t tile, int j) {
+  const TilePlace below = Normalise(directory, tile, 0, j - 1);
+  const std::uint32_t under = below.tile == kNoTile ? 0 : tiles[below.tile].interior[below.j];
+  return tiles[tile].interior[j] & ~under;
+}
+
+// Walks one loop that starts eastward along the bottom edge of the cell at `start`.
+void TraceLoop(const TileDirectory& directory, const std::vector<TileBits>& tiles, TilePlace start,
+               Staircases& staircases) {
+  TilePlace node = start;
+  int heading = kEast;
+  do {
+    if (heading == kEast) {
+      staircases.visited[node.tile][node.j] |= std::uint32_t{1} << node.i;
+    }
+    node = Normalise(directory, node.tile, node.i + kStepX[heading], node.j + kStepY[heading]);
+    const bool left = IsInterior(directory, tiles, node, kLeftX[heading], kLeftY[heading]);
+    const bool right = IsInterior(directory, tiles, node, kRightX[heading], kRightY[heading]);
+    if (left && !right) continue;  // Straight on: `continue` still tests the loop's end.
+    if (right && !left) ++staircases.pinches;
+    heading = (heading + (left ? 3 : 1)) & 3;
+    staircases.corners.push_back(node);
+  } while (node.tile != start.tile || node.i != start.i || node.j != start.j || heading != kEast);
+  staircases.offsets.push_back(static_cast<std::uint32_t>(staircases.corners.size()));
+}
+
+// Takes the free cells of row j from (tile, i) eastward into `span`, across tiles; returns their
+// number.
+std::int64_t TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t tile,
+                     int i, int j) {
+  std::int64_t width = 0;
+  scratch.span.clear();
+  while (true) {
+    const std::uint32_t row = scratch.free[tile][j] >> i;
+    const int length = std::countr_one(row);
+    if (length == 0) return width;
+    const std::uint32_t mask = (0xffffffffu >> (kTileSize - length)) << i;
+    scratch.free[tile][j] &= ~mask;
+    scratch.span.emplace_back(tile, mask);
+    width += length;
+    if (i + length < kTileSize) return width;
+    tile = directory.neighbours(tile)[5];
+    i = 0;
+    if (tile == kNoTile) return width;
+  }
+}
+
+// Takes the row above the span's if all of its cells are free. Moves the span there.
+bool TakeRowAbove(const TileDirectory& directory, MergeScratch& scratch, int row) {
+  const bool next_tiles = row % kTileSize == 0;
+  const int j = row % kTileSize;
+  for (const auto& [tile, mask] : scratch.span) {
+    const std::uint32_t above = next_tiles ? directory.neighbours(tile)[7] : tile;
+    if (above == kNoTile || (scratch.free[above][j] & mask) != mask) return false;
+  }
+  for (auto& [tile, mask] : scratch.span) {
+    if (next_tiles) tile = directory.neighbours(tile)[7];
+    scratch.free[tile][j] &= ~mask;
+  }
+  return true;
+}
+
+}  // namespace
+
+void TraceStaircases(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                     Staircases& staircases) {
+  staircases.corners.clear();
+  staircases.offsets.assign(1, 0);
+  staircases.pinches = 0;
+  staircases.visited.assign(tiles.size(), BitRows{});
+  for (std::uint32_t tile = 0; tile < tiles.size(); ++tile) {
+    for (int j = 0; j < kTileSize; ++j) {
+      const std::uint32_t edges = BottomEdges(directory, tiles, tile, j);
+      while (const std::uint32_t rest = edges & ~staircases.visited[tile][j]) {
+        TraceLoop(directory, tiles, {tile, std::countr_zero(rest), j}, staircases);
+      }
+    }
+  }
+  staircases.pinches /= 2;  // Each was passed by both of its cells.
+}
+
+void MergeCells(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                MergeScratch& scratch, std::vector<CellRectangle>& rectangles) {
+  scratch.free.resize(tiles.size());
+  for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
+    scratch.free[tile] = tiles[tile].interior;
+  }
+  // Tiles are sorted by row: scanning each row of cells through all tiles of a tile row keeps the
+  // scan in reading order, so that tile borders leave no trace in the rectangles.
+  for (std::uint32_t first = 0; first < tiles.size();) {
+    std::uint32_t last = first;
+    while (last < tiles.size() && directory[last].y == directory[first].y) ++last;
+    for (int j = 0; j < kTileSize; ++j) {
+      for (std::uint32_t tile = first; tile < last; ++tile) {
+        while (scratch.free[tile][j] != 0) {
+          const int i = std::countr_zero(scratch.free[tile][j]);
+          CellRectangle rectangle;
+          rectangle.x0 = (std::int64_t{directory[tile].x} << kTileShift) + i;
+          rectangle.y0 = (std::int64_t{directory[tile].y} << kTileShift) + j;
+          rectangle.x1 = rectangle.x0 + TakeRow(directory, scratch, tile, i, j);
+          int row = j + 1;
+          while (TakeRowAbove(directory, scratch, row)) ++row;
+          rectangle.y1 = rectangle.y0 + (row - j);
+          rectangles.push_back(rectangle);
+        }
+      }
+    }
+    first = last;
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,45 @@
+// Counts where closed polylines cross or touch, themselves or each other.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "point.h"
+
+namespace partiemc {
+
+/// Buffers of CountTouchingPairs, kept warm from call to call; they carry nothing from one to the
+/// next. Memory: about 75 bytes per segment, whatever the input.
+struct TouchingPairsBuffers {
+  struct Segment {
+    Point a, b;
+    std::uint64_t cell = 0;          // Where it lies in the grid of its size (intersections.cc).
+    std::uint32_t previous = 0;      // The segment that ends at `a`.
+    std::uint32_t next_in_slot = 0;  // A list of segments whose cells share a slot.
+    int level = 0;                   // Of its grid.
+  };
+  std::vector<Segment> segments;
+  std::vector<std::uint32_t> slots;
+
+  /// A pair that was counted, each segment named by the point that it begins at. Only to be read
+  /// when the count was not zero.
+  std::uint32_t example_first = 0, example_second = 0;
+};
+
+/// The number of pairs of segments that have a point in common, over all segments of all rings.
+/// Ring k has the points [ring_offsets[k], ring_offsets[k + 1]) of the interleaved `points` and is
+/// closed by a segment from its last point to its first. Segments that follow each other on a ring
+/// have their common end in common anyway: they count only if they overlap (the ring folds back).
+/// Exact, by SegmentsTouch.
+///
+/// Requires: offsets ascend from 0 to points.size() / 2; coordinates in the domain of predicates.h.
+/// Allocates nothing for an input no larger than one that `buffers` has seen.
+/// Cost: near-linear when few segments are near each other compared to their length, as on
+/// contours; quadratic at worst, when most boxes around segments of like size overlap.
+std::size_t CountTouchingPairs(std::span<const double> points,
+                               std::span<const std::uint32_t> ring_offsets,
+                               TouchingPairsBuffers& buffers);
+
+}  // namespace partiemc

@@ -1,0 +1,78 @@
+// The lattice: world-anchored, sparse, in tiles of 32 x 32 nodes.
+//
+// Node (i, j) lies at (i, j) * cell_size in world coordinates. Tile (x, y) owns the nodes
+// [32 x, 32 x + 32) x [32 y, 32 y + 32) and the cells whose lower left node it owns. A row of a
+// tile is a 32-bit word in which bit i stands for node or cell i of that row.
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace partiemc {
+
+inline constexpr int kTileShift = 5;
+inline constexpr int kTileSize = 1 << kTileShift;
+inline constexpr int kTileNodes = kTileSize * kTileSize;
+
+using BitRows = std::array<std::uint32_t, kTileSize>;
+
+struct TileCoordinate {
+  std::int32_t y = 0, x = 0;  // In this order: tiles are sorted by row, then column.
+  friend auto operator<=>(const TileCoordinate&, const TileCoordinate&) = default;
+};
+
+/// Index of a tile that does not exist; all its nodes are outside.
+inline constexpr std::uint32_t kNoTile = std::numeric_limits<std::uint32_t>::max();
+
+/// Neighbours of a tile, by (dy + 1) * 3 + (dx + 1); the tile itself in the middle.
+using Neighbourhood = std::array<std::uint32_t, 9>;
+
+/// The tiles of a frame, sorted, with their neighbours.
+class TileDirectory {
+ public:
+  /// Forgets all tiles, keeps the memory.
+  void Clear();
+
+  /// Adds a tile unless it is there. Cost: constant on average.
+  void Insert(TileCoordinate tile);
+
+  /// Sorts the tiles and links neighbours. Afterwards indices are positions in the sorted order.
+  void Seal();
+
+  std::size_t size() const { return tiles_.size(); }
+  std::span<const TileCoordinate> tiles() const { return tiles_; }
+  const TileCoordinate& operator[](std::size_t tile) const { return tiles_[tile]; }
+  const Neighbourhood& neighbours(std::size_t tile) const { return neighbours_[tile]; }
+
+  /// Index of a tile after Seal, or kNoTile.
+  std::uint32_t Find(TileCoordinate tile) const;
+
+ private:
+  std::size_t Slot(TileCoordinate tile) const;
+  void Grow();
+
+  std::vector<TileCoordinate> tiles_;
+  std::vector<Neighbourhood> neighbours_;
+  std::vector<std::uint32_t> slots_;  // Open addressing, linear probing; kNoTile marks a free slot.
+};
+
+/// A node or cell by its tile and its place in it, 0 <= i, j < 32.
+struct TilePlace {
+  std::uint32_t tile;
+  int i, j;
+};
+
+/// The place (i, j) of `tile`, -32 <= i, j < 64, in the tile that owns it (tile kNoTile if none).
+inline TilePlace Normalise(const TileDirectory& directory, std::uint32_t tile, int i, int j) {
+  const int dx = i >> kTileShift;
+  const int dy = j >> kTileShift;
+  const std::uint32_t owner = directory.neighbours(tile)[(dy + 1) * 3 + dx + 1];
+  return {owner, i & (kTileSize - 1), j & (kTileSize - 1)};
+}
+
+}  // namespace partiemc

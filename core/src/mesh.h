@@ -1,0 +1,55 @@
+// Stage 7 of 7: rings and interior cells -> triangles (paper, sections 3.7-3.8).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "crossings.h"
+#include "interior.h"
+#include "normals.h"
+#include "partiemc/parameters.h"
+#include "partiemc/result.h"
+#include "rings.h"
+#include "triangulate.h"
+#include "vertices.h"
+
+namespace partiemc {
+
+/// Warm buffers of BuildMesh.
+struct MeshScratch {
+  Staircases staircases;
+  MergeScratch merge;
+  std::vector<CellRectangle> rectangles;
+  Triangulator triangulator;
+  std::vector<std::uint32_t> loop_points, loop_offsets;
+  std::vector<std::uint32_t> vertex_of_node;  // By tile * 1024 + node; only touched ones are set.
+  std::vector<std::uint32_t> touched_nodes;
+  std::vector<double> points;  // Of a connectivity that is not yet the mesh's.
+  std::vector<std::uint32_t> triangles;
+};
+
+struct MeshInput {
+  const TileDirectory& directory;
+  const Crossings& crossings;
+  const RingTopology& topology;
+  const std::vector<CellPlane>& planes;
+  const PlacedVertices& placed;
+  const Rings& rings;
+  const ReconstructionParameters& parameters;
+  const Scale& scale;
+};
+
+/// Fills the rings with triangles as parameters.fill says and sets `triangles`, `triangles_grid`
+/// and `folded_triangles` of the statistics.
+///
+/// The band between the rings and the staircase of the interior cells is triangulated without new
+/// points, and is the same for grid, greedy and conforming. `farthest-particle` takes its
+/// connectivity from the middles of the segments and only then moves the vertices, so that a
+/// triangle folds where the vertices do.
+/// Errors: INTERNAL if the rings cannot be triangulated, which is a bug.
+/// Cost: n log n in the points of rings and staircases, linear in cells.
+absl::Status BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
+                       FrameStatistics& statistics);
+
+}  // namespace partiemc

@@ -1,0 +1,161 @@
+#include "normals.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace partiemc {
+namespace {
+
+auto KeyOf(const CellNormal& normal) { return std::tuple(normal.row, normal.column); }
+
+CellNormal KeyOf(const TileDirectory& directory, const ActiveCell& cell) {
+  const TileCoordinate& tile = directory[cell.tile];
+  CellNormal key;
+  key.column = (tile.x << kTileShift) + cell.i;
+  key.row = (tile.y << kTileShift) + cell.j;
+  return key;
+}
+
+// The normal that a cell had in the frame before, or nullptr. A saddle has two planes and so no
+// normal of its own to remember.
+const CellNormal* FindPrevious(std::span<const CellNormal> previous, const TileDirectory& directory,
+                               const ActiveCell& cell) {
+  if (cell.IsSaddle()) return nullptr;
+  const CellNormal key = KeyOf(directory, cell);
+  const auto it = std::lower_bound(
+      previous.begin(), previous.end(), key,
+      [](const CellNormal& a, const CellNormal& b) { return KeyOf(a) < KeyOf(b); });
+  return it != previous.end() && KeyOf(*it) == KeyOf(key) ? &*it : nullptr;
+}
+
+void SetNormal(double x, double y, CellPlane& plane) {
+  const double length = std::sqrt(x * x + y * y);
+  plane.normal_x = x / length;
+  plane.normal_y = y / length;
+}
+
+// Samples F at the middle of the segment.
+void SampleAtMiddle(const TileDirectory& directory, const PointField& field, const ActiveCell& cell,
+                    CellPlane& plane) {
+  plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
+  const LatticePoint origin = CellOrigin(directory, cell);
+  const FieldSample sample =
+      field.Sample(cell.tile, plane.point.x - origin.x + cell.i, plane.point.y - origin.y + cell.j);
+  plane.value = sample.value;
+  plane.gradient_x = sample.gradient_x;
+  plane.gradient_y = sample.gradient_y;
+}
+
+// The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
+// no particle reaches the point the gradient stays 0, hence weak.
+void SampleAtMean(const TileDirectory& directory, const PointField& field, const ActiveCell& cell,
+                  CellPlane& plane) {
+  const double centre_x = cell.i + 0.5;
+  const double centre_y = cell.j + 0.5;
+  const FieldSample centre = field.Sample(cell.tile, centre_x, centre_y);
+  const LatticePoint origin = CellOrigin(directory, cell);
+  plane.point = {origin.x + 0.5 + centre.mean_x, origin.y + 0.5 + centre.mean_y};
+  plane.gradient_x = plane.gradient_y = 0;
+  plane.value = centre.value;
+  const double mean_x = centre_x + centre.mean_x;
+  const double mean_y = centre_y + centre.mean_y;
+  const int i = static_cast<int>(std::floor(mean_x));
+  const int j = static_cast<int>(std::floor(mean_y));
+  const TilePlace place = Normalise(directory, cell.tile, i, j);
+  if (place.tile == kNoTile) return;
+  const FieldSample mean = field.Sample(place.tile, place.i + (mean_x - i), place.j + (mean_y - j));
+  plane.gradient_x = mean.phi_x;
+  plane.gradient_y = mean.phi_y;
+}
+
+void Orient(const CellNormal* reference, CellPlane& plane) {
+  const double along = reference != nullptr
+                           ? plane.normal_x * reference->x + plane.normal_y * reference->y
+                           : plane.normal_x * plane.OutwardX() + plane.normal_y * plane.OutwardY();
+  if (along >= 0) return;
+  plane.normal_x = -plane.normal_x;
+  plane.normal_y = -plane.normal_y;
+}
+
+// Replaces the weak normals of one ring. Reliable ones were set before.
+void MendWeakNormals(const TileDirectory& directory, const Crossings& crossings,
+                     std::span<const std::uint32_t> segments, std::span<const CellNormal> previous,
+                     std::span<CellPlane> planes) {
+  const std::size_t count = planes.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    CellPlane& plane = planes[k];
+    if (!plane.is_weak) continue;
+    const ActiveCell& cell = crossings.cells[crossings.segments[segments[k]].cell];
+    if (const CellNormal* memory = FindPrevious(previous, directory, cell)) {
+      SetNormal(memory->x, memory->y, plane);
+      continue;
+    }
+    double x = 0, y = 0;
+    for (const std::size_t near : {(k + count - 1) % count, (k + 1) % count}) {
+      if (planes[near].is_weak) continue;
+      x += planes[near].normal_x;
+      y += planes[near].normal_y;
+    }
+    if (x * x + y * y < kWeakGradientSquare) {
+      x = plane.OutwardX();
+      y = plane.OutwardY();
+    }
+    SetNormal(x, y, plane);
+  }
+}
+
+// The cell normals to remember, one for each cell with one segment.
+void Remember(const TileDirectory& directory, const Crossings& crossings, const RingTopology& rings,
+              std::span<const CellPlane> planes, std::vector<CellNormal>& next) {
+  next.clear();
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    const ActiveCell& cell = crossings.cells[crossings.segments[rings.segments[k]].cell];
+    if (cell.IsSaddle()) continue;
+    CellNormal normal = KeyOf(directory, cell);
+    normal.x = static_cast<float>(planes[k].normal_x);
+    normal.y = static_cast<float>(planes[k].normal_y);
+    next.push_back(normal);
+  }
+  std::sort(next.begin(), next.end(),
+            [](const CellNormal& a, const CellNormal& b) { return KeyOf(a) < KeyOf(b); });
+}
+
+}  // namespace
+
+void EstimateNormals(const ParticleBins& bins, const LevelSet& level_set,
+                     const Crossings& crossings, const RingTopology& rings, const PointField& field,
+                     const ReconstructionParameters& parameters,
+                     std::span<const CellNormal> previous, std::vector<CellPlane>& planes,
+                     std::vector<CellNormal>& next) {
+  if (!parameters.normal_memory) previous = {};
+  planes.resize(rings.segments.size());
+  tbb::parallel_for(std::size_t{0}, planes.size(), [&](std::size_t k) {
+    CellPlane& plane = planes[k];
+    const Segment& segment = crossings.segments[rings.segments[k]];
+    const ActiveCell& cell = crossings.cells[segment.cell];
+    plane.entry = EdgeCrossing(bins.tiles, level_set, cell, segment.entry);
+    plane.exit = EdgeCrossing(bins.tiles, level_set, cell, segment.exit);
+    if (parameters.placement == Placement::kFarthestParticle) {
+      SampleAtMean(bins.tiles, field, cell, plane);
+    } else {
+      SampleAtMiddle(bins.tiles, field, cell, plane);
+    }
+    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
+                    kWeakGradientSquare;
+    if (plane.is_weak) return;
+    SetNormal(plane.gradient_x, plane.gradient_y, plane);
+    Orient(FindPrevious(previous, bins.tiles, cell), plane);
+  });
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const std::size_t first = rings.offsets[ring];
+    const std::size_t count = rings.offsets[ring + 1] - first;
+    MendWeakNormals(bins.tiles, crossings, std::span(rings.segments).subspan(first, count),
+                    previous, std::span(planes).subspan(first, count));
+  }
+  Remember(bins.tiles, crossings, rings, planes, next);
+}
+
+}  // namespace partiemc

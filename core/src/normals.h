@@ -1,0 +1,46 @@
+// Stage 5 of 7: segments -> stabilised cell normals (paper, Eq. 9-11).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "crossings.h"
+#include "partiemc/parameters.h"
+#include "partiemc/state.h"
+#include "point_field.h"
+#include "rings.h"
+
+namespace partiemc {
+
+/// What is known at the representative point of one segment. The point is the weighted mean at the
+/// cell's centre for `farthest-particle` (the paper's), the middle of the segment for the others.
+struct CellPlane {
+  LatticePoint point;        ///< Lattice coordinates of the world, in cells.
+  LatticePoint entry, exit;  ///< The segment's ends: linear crossings of lattice edges.
+  double value = 0;          ///< F at the point.
+  double gradient_x = 0, gradient_y = 0;  ///< Of F; of phi for `farthest-particle`.
+  double normal_x = 0, normal_y = 0;      ///< Unit, oriented (Eq. 11).
+  bool is_weak = false;                   ///< The gradient was too small; the normal is a fallback.
+
+  /// Outward direction of the segment itself, not normalised: the inside lies on its left.
+  double OutwardX() const { return exit.y - entry.y; }
+  double OutwardY() const { return entry.x - exit.x; }
+};
+
+/// Below this squared length a gradient of F or phi says nothing about direction (METHOD, 14).
+inline constexpr double kWeakGradientSquare = 1e-3;
+
+/// One plane per segment of `rings`, in their order. `previous` are the cell normals of the frame
+/// before (State::normals); `next` receives those of this one, sorted the same way.
+/// Orientation: by the previous normal of the cell where there is one and parameters ask for it,
+/// else by the segment. Weak gradients take the previous normal, else the mean of the ring's
+/// neighbouring reliable ones, else the segment's own.
+/// Deterministic, in parallel over segments. Cost: a field sample per segment.
+void EstimateNormals(const ParticleBins& bins, const LevelSet& level_set,
+                     const Crossings& crossings, const RingTopology& rings, const PointField& field,
+                     const ReconstructionParameters& parameters,
+                     std::span<const CellNormal> previous, std::vector<CellPlane>& planes,
+                     std::vector<CellNormal>& next);
+
+}  // namespace partiemc

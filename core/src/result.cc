@@ -1,0 +1,25 @@
+#include "partiemc/result.h"
+
+namespace partiemc {
+
+void Rings::Clear() {
+  points.clear();
+  offsets.assign(1, 0);
+  outer_of.clear();
+  measures.clear();
+  normals.clear();
+}
+
+void Mesh::Clear() {
+  points.clear();
+  triangles.clear();
+  classes.clear();
+}
+
+void Result::Clear() {
+  rings.Clear();
+  mesh.Clear();
+  statistics = {};
+}
+
+}  // namespace partiemc

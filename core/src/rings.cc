@@ -1,0 +1,185 @@
+#include "rings.h"
+
+#include <algorithm>
+
+#include "partiemc/result.h"
+
+namespace partiemc {
+namespace {
+
+// Holes of less area than this many particles have are dents of the level set, not voids of the
+// fluid (core/METHOD.md, "Cleaning").
+constexpr double kMinHoleParticles = 6;
+static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
+
+void Trace(const TileDirectory& directory, const Crossings& crossings,
+           std::vector<std::uint8_t>& visited, RingTopology& rings) {
+  rings.segments.clear();
+  rings.offsets.assign(1, 0);
+  visited.assign(crossings.segments.size(), 0);
+  for (std::uint32_t first = 0; first < crossings.segments.size(); ++first) {
+    if (visited[first]) continue;
+    for (std::uint32_t segment = first; !visited[segment];
+         segment = NextSegment(directory, crossings, segment)) {
+      visited[segment] = 1;
+      rings.segments.push_back(segment);
+    }
+    rings.offsets.push_back(static_cast<std::uint32_t>(rings.segments.size()));
+  }
+}
+
+// The lattice edge through which a segment enters its cell, by its two nodes.
+struct EdgeNodes {
+  TilePlace inside, outside;
+};
+
+EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
+                     std::uint32_t segment) {
+  constexpr int kCornerX[4] = {0, 1, 1, 0};
+  constexpr int kCornerY[4] = {0, 0, 1, 1};
+  const Segment& here = crossings.segments[segment];
+  const ActiveCell& cell = crossings.cells[here.cell];
+  const auto node = [&](int corner) {
+    return Normalise(directory, cell.tile, cell.i + kCornerX[corner], cell.j + kCornerY[corner]);
+  };
+  // Edge k joins corners k and k + 1. Entering the cell, the inside is on the left: the edge's
+  // first corner, counter-clockwise round the cell.
+  return {node(here.entry), node((here.entry + 1) & 3)};
+}
+
+// Signed area of a ring through its edge crossings, in cells.
+double AreaOf(const ParticleBins& bins, const LevelSet& level_set, const Crossings& crossings,
+              const RingTopology& rings, std::size_t ring, std::vector<LatticePoint>& points) {
+  points.clear();
+  for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+    const Segment& segment = crossings.segments[rings.segments[k]];
+    points.push_back(
+        EdgeCrossing(bins.tiles, level_set, crossings.cells[segment.cell], segment.entry));
+  }
+  double twice_area = 0;
+  const LatticePoint origin = points[0];
+  for (std::size_t k = 1; k + 1 < points.size(); ++k) {
+    twice_area += (points[k].x - origin.x) * (points[k + 1].y - origin.y) -
+                  (points[k + 1].x - origin.x) * (points[k].y - origin.y);
+  }
+  return twice_area / 2;
+}
+
+// Clears the nodes of components without a particle.
+void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopology& rings) {
+  scratch.components.ForEachRun(
+      crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
+        // ForEachRun has already read this row: clearing its bits does not disturb it.
+        if (scratch.particle_count[component] == 0) crossings.tiles[tile].inside[j] &= ~mask;
+      });
+  rings.dropped_components = static_cast<std::uint64_t>(
+      std::count(scratch.particle_count.begin(), scratch.particle_count.end(), 0u));
+}
+
+// Sets every node that the ring encloses. The ring crosses a row of the lattice in pairs of
+// horizontal edges; the nodes between the two of a pair are enclosed.
+void FillRing(const TileDirectory& directory, const RingTopology& rings, std::size_t ring,
+              Crossings& crossings) {
+  std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
+  for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+    const Segment& segment = crossings.segments[rings.segments[k]];
+    if (segment.entry & 1) continue;  // A vertical edge.
+    const ActiveCell& cell = crossings.cells[segment.cell];
+    const TileCoordinate& tile = directory[cell.tile];
+    edges.emplace_back((std::int64_t{tile.y} << kTileShift) + cell.j + (segment.entry == 2),
+                       (std::int64_t{tile.x} << kTileShift) + cell.i);
+  }
+  std::sort(edges.begin(), edges.end());
+  for (std::size_t k = 0; k + 1 < edges.size(); k += 2) {
+    const auto row = edges[k].first;
+    for (std::int64_t column = edges[k].second + 1; column <= edges[k + 1].second; ++column) {
+      const std::uint32_t tile = directory.Find({static_cast<std::int32_t>(row >> kTileShift),
+                                                 static_cast<std::int32_t>(column >> kTileShift)});
+      crossings.tiles[tile].inside[row & (kTileSize - 1)] |= std::uint32_t{1}
+                                                             << (column & (kTileSize - 1));
+    }
+  }
+}
+
+// Removes the rings that no longer separate an inside node from an outside one.
+void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings,
+                   RingTopology& rings) {
+  std::size_t kept = 0;
+  std::uint32_t end = 0;
+  for (std::size_t ring = 0; ring + 1 < rings.offsets.size(); ++ring) {
+    const std::uint32_t first = rings.offsets[ring];
+    const std::uint32_t last = rings.offsets[ring + 1];
+    const EdgeNodes nodes = EntryNodes(directory, crossings, rings.segments[first]);
+    if (IsInside(crossings, nodes.inside) == IsInside(crossings, nodes.outside)) continue;
+    std::copy(rings.segments.begin() + first, rings.segments.begin() + last,
+              rings.segments.begin() + end);
+    rings.offsets[kept++] = end;
+    end += last - first;
+  }
+  rings.segments.resize(end);
+  rings.offsets.resize(kept + 1);
+  rings.offsets[kept] = end;
+}
+
+void CountComponents(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch) {
+  scratch.components.Label(bins.tiles, crossings);
+  scratch.particle_count.assign(scratch.components.size(), 0);
+  scratch.components.CountParticles(bins, crossings, scratch.particle_count);
+}
+
+void Clean(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
+           Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
+  DropEmptyComponents(scratch, crossings, rings);
+  if (rings.dropped_components > 0) KeepSurvivors(bins.tiles, crossings, rings);
+  const double min_area = kMinHoleParticles * scale.spacing * scale.spacing;
+  for (std::size_t ring = 0; ring + 1 < rings.offsets.size(); ++ring) {
+    const double area = AreaOf(bins, level_set, crossings, rings, ring, scratch.points);
+    if (area < 0 && -area < min_area) {
+      FillRing(bins.tiles, rings, ring, crossings);
+      ++rings.dropped_holes;
+    }
+  }
+  if (rings.dropped_holes > 0) KeepSurvivors(bins.tiles, crossings, rings);
+  if (rings.dropped_holes + rings.dropped_components > 0) {
+    MarkInteriorCells(bins.tiles, crossings);
+    CountComponents(bins, crossings, scratch);
+  }
+}
+
+// Assigns holes and particles: the rings of one component are one outer ring and its holes.
+void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& crossings,
+          RingScratch& scratch, RingTopology& rings) {
+  const std::size_t ring_count = rings.offsets.size() - 1;
+  std::vector<std::uint32_t> outer_ring(scratch.components.size(), kNoRing);
+  std::vector<std::uint32_t> component(ring_count);
+  std::vector<bool> is_hole(ring_count);
+  for (std::size_t ring = 0; ring < ring_count; ++ring) {
+    const EdgeNodes nodes = EntryNodes(bins.tiles, crossings, rings.segments[rings.offsets[ring]]);
+    component[ring] = scratch.components.At(crossings, nodes.inside);
+    is_hole[ring] = AreaOf(bins, level_set, crossings, rings, ring, scratch.points) < 0;
+    if (!is_hole[ring]) outer_ring[component[ring]] = static_cast<std::uint32_t>(ring);
+  }
+  rings.outer_of.assign(ring_count, kNoRing);
+  rings.particle_count.assign(ring_count, 0);
+  for (std::size_t ring = 0; ring < ring_count; ++ring) {
+    if (is_hole[ring]) {
+      rings.outer_of[ring] = outer_ring[component[ring]];
+    } else {
+      rings.particle_count[ring] = scratch.particle_count[component[ring]];
+    }
+  }
+}
+
+}  // namespace
+
+void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale, bool clean,
+                Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
+  rings.dropped_holes = 0;
+  rings.dropped_components = 0;
+  Trace(bins.tiles, crossings, scratch.visited, rings);
+  CountComponents(bins, crossings, scratch);
+  if (clean) Clean(bins, level_set, scale, crossings, scratch, rings);
+  Nest(bins, level_set, crossings, scratch, rings);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,42 @@
+#include "scale.h"
+
+#include <algorithm>
+
+namespace partiemc {
+namespace {
+
+// The kernel (1 - s^2)^3 integrates to pi R^2 / 4 over the plane.
+constexpr double kFourOverPi = 1.27323954473516268615;
+
+// The guard against spurious contours (core/METHOD.md, "Spurious contour"): g = 0.9 / beta^2 is
+// 0.10 at beta = 3, above what the void between two components has, below a lone particle's f.
+constexpr double kGuardFactor = 0.9;
+// A lone particle must survive, hence never more than this share of the lightest one's own f.
+constexpr double kGuardShareOfLightest = 0.7;
+// Slope of f across a flat boundary, measured in 1 / R: makes F a length on both branches.
+constexpr double kBoundarySlope = 1.164;
+
+}  // namespace
+
+double Scale::VoidValue() const {
+  return std::max(kernel_radius - reference_radius, guard * guard_slope);
+}
+
+Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
+                double lightest_volume) {
+  Scale scale;
+  scale.cell_size = cell_size;
+  scale.spacing = spacing / cell_size;
+  scale.kernel_radius = parameters.kernel_radius * scale.spacing;
+  scale.reference_radius = *parameters.reference_radius * scale.spacing;
+  scale.weight_per_volume = kFourOverPi / (scale.kernel_radius * scale.kernel_radius);
+  scale.uniform_weight = scale.weight_per_volume * scale.spacing * scale.spacing;
+  const double lightest_weight =
+      scale.weight_per_volume * (lightest_volume / cell_size / cell_size);
+  const double beta = parameters.kernel_radius;
+  scale.guard = std::min(kGuardFactor / (beta * beta), kGuardShareOfLightest * lightest_weight);
+  scale.guard_slope = scale.kernel_radius / kBoundarySlope;
+  return scale;
+}
+
+}  // namespace partiemc

@@ -1,0 +1,29 @@
+// The lengths of one frame, in cells of the lattice.
+#pragma once
+
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+/// Everything that the stages need to know of parameters, spacing and lattice. Lengths in cells
+/// (lattice spacings) unless a comment says otherwise: inside, the lattice has spacing 1.
+struct Scale {
+  double cell_size = 0;          ///< World units.
+  double spacing = 0;            ///< h.
+  double kernel_radius = 0;      ///< R = beta h.
+  double reference_radius = 0;   ///< r = alpha_r h.
+  double uniform_weight = 0;     ///< w of a particle of volume h^2, so that f is about 1 inside.
+  double weight_per_volume = 0;  ///< w of a particle of volume 1 cell^2.
+  double guard = 0;              ///< g: where f is below it there is no inside.
+  double guard_slope = 0;        ///< R / 1.164: turns a lack of density into a length.
+
+  /// Value of the level set where no particle reaches.
+  double VoidValue() const;
+};
+
+/// `spacing` and `cell_size` in world units; `lightest_volume` in world units squared (h^2 where
+/// particles have no volumes). Requires: resolved parameters.
+Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
+                double lightest_volume);
+
+}  // namespace partiemc

@@ -1,0 +1,103 @@
+#include "spacing.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace partiemc {
+namespace {
+
+// About this many particles are asked for their neighbours: the median of so many is within a
+// percent of that of all.
+constexpr std::size_t kSampleSize = 1 << 14;
+
+// A particle whose nearest neighbour is this many medians away is spray and says nothing about the
+// spacing; within a body of fluid distances stay below two medians.
+constexpr double kLonelyRatio = 4;
+
+using Positions = std::vector<WorldPosition>;
+
+double Along(const WorldPosition& position, int axis) {
+  return axis == 0 ? position.x : position.y;
+}
+
+// Orders positions into an implicit balanced k-d tree: the middle of a range splits it.
+void BuildTree(std::span<WorldPosition> positions, int axis) {
+  while (positions.size() > 1) {
+    const std::size_t middle = positions.size() / 2;
+    std::nth_element(positions.begin(), positions.begin() + middle, positions.end(),
+                     [axis](const WorldPosition& a, const WorldPosition& b) {
+                       return Along(a, axis) < Along(b, axis);
+                     });
+    BuildTree(positions.first(middle), 1 - axis);
+    positions = positions.subspan(middle + 1);
+    axis = 1 - axis;
+  }
+}
+
+// Squared distance from `query` to the nearest other position, at most `best`.
+double NearestSquare(std::span<const WorldPosition> tree, const WorldPosition& query, int axis,
+                     double best) {
+  if (tree.empty()) return best;
+  const std::size_t middle = tree.size() / 2;
+  const double dx = tree[middle].x - query.x;
+  const double dy = tree[middle].y - query.y;
+  const double square = dx * dx + dy * dy;
+  if (square > 0) best = std::min(best, square);
+  const double across = Along(query, axis) - Along(tree[middle], axis);
+  const auto lower = tree.first(middle);
+  const auto upper = tree.subspan(middle + 1);
+  best = NearestSquare(across < 0 ? lower : upper, query, 1 - axis, best);
+  if (across * across < best) {
+    best = NearestSquare(across < 0 ? upper : lower, query, 1 - axis, best);
+  }
+  return best;
+}
+
+std::uint64_t HashOf(const WorldPosition& position) {
+  // + 0.0 makes one zero of the two.
+  std::uint64_t hash = std::bit_cast<std::uint64_t>(position.x + 0.0) * 0x9e3779b97f4a7c15u;
+  hash ^= hash >> 32;
+  hash = (hash ^ std::bit_cast<std::uint64_t>(position.y + 0.0)) * 0xc2b2ae3d27d4eb4fu;
+  return hash ^ hash >> 29;
+}
+
+double MedianOf(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::optional<double> EstimateSpacing(const Frame& frame, Plane plane) {
+  const std::size_t count = frame.ParticleCount();
+  Positions positions(count);
+  for (std::size_t k = 0; k < count; ++k) positions[k] = PositionOf(frame, plane, k);
+  // Sorted and without duplicates: the tree is the same for any order of the particles, and no
+  // query wades through a million copies of itself.
+  std::sort(positions.begin(), positions.end(),
+            [](const auto& a, const auto& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
+  positions.erase(std::unique(positions.begin(), positions.end(), same), positions.end());
+  BuildTree(positions, 0);
+
+  const std::uint64_t stride = std::max<std::size_t>(1, positions.size() / kSampleSize);
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::vector<double> distances;
+  for (const WorldPosition& position : positions) {
+    if (HashOf(position) % stride != 0) continue;
+    const double square = NearestSquare(positions, position, 0, infinity);
+    if (square < infinity) distances.push_back(std::sqrt(square));
+  }
+  if (distances.empty()) return std::nullopt;
+  const double median = MedianOf(distances);
+  std::erase_if(distances, [&](double distance) { return distance > kLonelyRatio * median; });
+  return MedianOf(distances);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,169 @@
+#include "vertices.h"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+
+#include "placement.h"
+
+namespace partiemc {
+namespace {
+
+void Store(LatticePoint point, double cell_size, double* target) {
+  target[0] = point.x * cell_size;
+  target[1] = point.y * cell_size;
+}
+
+// The vertices of segment k of the topology, `per_segment` of them.
+void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
+  const CellPlane& plane = input.planes[k];
+  const std::uint32_t segment = input.topology.segments[k];
+  const double cell_size = input.scale.cell_size;
+  switch (input.parameters.placement) {
+    case Placement::kMarchingSquares:
+      Store(plane.entry, cell_size, target);
+      break;
+    case Placement::kQef:
+      Store(plane.entry, cell_size, target);
+      Store(
+          ClampToCell(input.bins.tiles, input.crossings, segment, QefVertex(input, segment, plane)),
+          cell_size, target + 2);
+      break;
+    case Placement::kFarthestParticle: {
+      const WorldPosition vertex = FarthestParticleVertex(input, segment, plane);
+      target[0] = vertex.x;
+      target[1] = vertex.y;
+      break;
+    }
+    case Placement::kVirtualPlane:
+      Store(ClampToCell(input.bins.tiles, input.crossings, segment, VirtualPlaneVertex(plane)),
+            cell_size, target);
+      break;
+  }
+}
+
+// Outward normals of the cell and of its entry edge, which it shares with the segment before.
+void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>& normals) {
+  double square = x * x + y * y;
+  if (square < kWeakGradientSquare) {
+    x = plane.OutwardX();
+    y = plane.OutwardY();
+    square = x * x + y * y;
+  }
+  const double length = std::sqrt(square);
+  normals.push_back(static_cast<float>(x / length));
+  normals.push_back(static_cast<float>(y / length));
+}
+
+// +1 or -1: what turns the plane's normal outward. The memory of earlier frames may have turned a
+// cell's normal inward; what is told to the outside is always outward.
+double OutwardSign(const CellPlane& plane) {
+  return plane.normal_x * plane.OutwardX() + plane.normal_y * plane.OutwardY() < 0 ? -1 : 1;
+}
+
+void AppendNormals(const VertexInput& input, std::size_t before, std::size_t here, Rings& rings) {
+  const CellPlane& a = input.planes[before];
+  const CellPlane& b = input.planes[here];
+  const double sa = OutwardSign(a);
+  const double sb = OutwardSign(b);
+  const Placement placement = input.parameters.placement;
+  if (placement == Placement::kMarchingSquares || placement == Placement::kQef) {
+    AppendNormal(sa * a.normal_x + sb * b.normal_x, sa * a.normal_y + sb * b.normal_y, b,
+                 rings.normals);
+  }
+  if (placement != Placement::kMarchingSquares) {
+    AppendNormal(sb * b.normal_x, sb * b.normal_y, b, rings.normals);
+  }
+}
+
+bool AreEqual(const double* a, const double* b) { return a[0] == b[0] && a[1] == b[1]; }
+
+// Appends one ring's points without consecutive duplicates. Takes it back and returns false if
+// fewer than three remain.
+bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment, PlacedVertices& placed,
+                Rings& rings) {
+  const std::size_t first = input.topology.offsets[ring];
+  const std::size_t last = input.topology.offsets[ring + 1];
+  const std::size_t start = rings.PointCount();
+  for (std::size_t k = first; k < last; ++k) {
+    const double* source = placed.points.data() + 2 * per_segment * k;
+    const bool repeats = rings.PointCount() > start &&
+                         AreEqual(source, rings.points.data() + rings.points.size() - 2);
+    if (!repeats) {
+      rings.points.insert(rings.points.end(), source, source + 2 * per_segment);
+      AppendNormals(input, k == first ? last - 1 : k - 1, k, rings);
+    }
+    placed.point_of_segment[k] = static_cast<std::uint32_t>(rings.PointCount() - 1);
+  }
+  // The ring is closed: its last point may repeat the first.
+  std::size_t end = rings.PointCount();
+  while (end > start + 1 &&
+         AreEqual(rings.points.data() + 2 * (end - 1), rings.points.data() + 2 * start)) {
+    --end;
+  }
+  const bool keep = end - start >= 3;
+  for (std::size_t k = first; k < last; ++k) {
+    std::uint32_t& point = placed.point_of_segment[k];
+    if (!keep) {
+      point = kNoPoint;
+    } else if (point >= end) {
+      point = static_cast<std::uint32_t>(start);
+    }
+  }
+  rings.points.resize(2 * (keep ? end : start));
+  rings.normals.resize(2 * (keep ? end : start));
+  return keep;
+}
+
+RingMeasures Measure(std::span<const double> points) {
+  RingMeasures measures;
+  const double x0 = points[0];
+  const double y0 = points[1];
+  const std::size_t count = points.size() / 2;
+  double twice_area = 0, moment_x = 0, moment_y = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t next = k + 1 < count ? k + 1 : 0;
+    const double ax = points[2 * k] - x0, ay = points[2 * k + 1] - y0;
+    const double bx = points[2 * next] - x0, by = points[2 * next + 1] - y0;
+    const double cross = ax * by - bx * ay;
+    twice_area += cross;
+    moment_x += (ax + bx) * cross;
+    moment_y += (ay + by) * cross;
+    measures.perimeter += std::sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay));
+  }
+  measures.area = twice_area / 2;
+  const bool flat = twice_area == 0;
+  measures.centroid_x = x0 + (flat ? 0 : moment_x / (3 * twice_area));
+  measures.centroid_y = y0 + (flat ? 0 : moment_y / (3 * twice_area));
+  return measures;
+}
+
+}  // namespace
+
+void PlaceVertices(const VertexInput& input, PlacedVertices& placed, Rings& rings) {
+  rings.Clear();
+  const RingTopology& topology = input.topology;
+  const int per_segment = input.parameters.placement == Placement::kQef ? 2 : 1;
+  placed.points.resize(2 * per_segment * topology.segments.size());
+  placed.point_of_segment.resize(topology.segments.size());
+  tbb::parallel_for(std::size_t{0}, topology.segments.size(), [&](std::size_t k) {
+    PlaceSegment(input, k, placed.points.data() + 2 * per_segment * k);
+  });
+
+  std::vector<std::uint32_t> kept_as(topology.RingCount(), kNoRing);
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    if (!AppendRing(input, ring, per_segment, placed, rings)) continue;
+    kept_as[ring] = static_cast<std::uint32_t>(rings.measures.size());
+    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
+    rings.outer_of.push_back(topology.outer_of[ring]);
+    const std::size_t start = rings.offsets[rings.offsets.size() - 2];
+    rings.measures.push_back(Measure(std::span(rings.points).subspan(2 * start)));
+    rings.measures.back().particle_count = topology.particle_count[ring];
+  }
+  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
+  for (std::uint32_t& outer : rings.outer_of) {
+    if (outer != kNoRing) outer = kept_as[outer];
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,52 @@
+// Stage 6 of 7: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "normals.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/result.h"
+#include "point_field.h"
+#include "rings.h"
+
+namespace partiemc {
+
+/// Marks a segment whose ring was dropped in PlacedVertices::point_of_segment.
+inline constexpr std::uint32_t kNoPoint = 0xffffffff;
+
+/// Warm buffers of PlaceVertices, and how its points belong to segments.
+struct PlacedVertices {
+  std::vector<double> points;  ///< One or two per segment, in world units, before duplicates go.
+  /// Per segment of RingTopology: index in Rings::points of the vertex of its cell (of its entry
+  /// crossing for `marching-squares`), or kNoPoint.
+  std::vector<std::uint32_t> point_of_segment;
+};
+
+/// What the placements need of the stages before.
+struct VertexInput {
+  const Frame& frame;
+  const ParticleBins& bins;
+  const LevelSet& level_set;
+  const Crossings& crossings;
+  const RingTopology& topology;
+  const PointField& field;
+  const std::vector<CellPlane>& planes;
+  const ReconstructionParameters& parameters;
+  const Scale& scale;
+};
+
+/// Places the vertices of every ring and measures the rings.
+///   marching-squares   the crossings of lattice edges, by linear interpolation of F;
+///   qef                those, and in each cell the minimiser of Eq. 14, kept in the cell;
+///   farthest-particle  section 3.5: the particle farthest along the normal, one cell around;
+///   virtual-plane      one vertex per cell: from the middle of the segment along the gradient to
+///                      the level set, kept in the cell (in a saddle: in its segment's half).
+/// All but farthest-particle keep every vertex in its cell or on its edge, so that rings are
+/// simple by construction (core/METHOD.md, "Why rings are simple"). farthest-particle drops
+/// consecutive equal vertices, and rings of which fewer than three points remain.
+/// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
+void PlaceVertices(const VertexInput& input, PlacedVertices& placed, Rings& rings);
+
+}  // namespace partiemc

@@ -1,0 +1,33 @@
+// The buffers of all stages, kept warm from frame to frame.
+#pragma once
+
+#include <vector>
+
+#include "bins.h"
+#include "crossings.h"
+#include "field.h"
+#include "intersections.h"
+#include "mesh.h"
+#include "normals.h"
+#include "partiemc/reconstructor.h"
+#include "point_field.h"
+#include "rings.h"
+#include "vertices.h"
+
+namespace partiemc {
+
+struct Workspace::Buffers {
+  ParticleBins bins;
+  LevelSet level_set;
+  Crossings crossings;
+  RingScratch ring_scratch;
+  RingTopology topology;
+  PointField point_field;
+  std::vector<CellPlane> planes;
+  std::vector<CellNormal> next_normals;
+  PlacedVertices placed;
+  MeshScratch mesh_scratch;
+  TouchingPairsBuffers intersections;
+};
+
+}  // namespace partiemc
