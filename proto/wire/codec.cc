@@ -1,0 +1,319 @@
+#include "wire/codec.h"
+
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "wire/bytes.h"
+
+namespace partiemc::wire {
+namespace {
+
+absl::Status Invalid(std::string_view reason, std::string field, std::string value,
+                     std::string rule) {
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(reason), std::move(field), std::move(value), std::move(rule)});
+}
+
+absl::Status UnknownEnum(std::string field, int value) {
+  return Invalid(kReasonUnsupported, std::move(field), absl::StrCat(value),
+                 "must be a value that this version knows");
+}
+
+std::optional<Placement> FromWire(v1::Placement placement) {
+  switch (placement) {
+    case v1::PLACEMENT_UNSPECIFIED:
+      return ReconstructionParameters{}.placement;
+    case v1::PLACEMENT_MARCHING_SQUARES:
+      return Placement::kMarchingSquares;
+    case v1::PLACEMENT_QEF:
+      return Placement::kQef;
+    case v1::PLACEMENT_FARTHEST_PARTICLE:
+      return Placement::kFarthestParticle;
+    case v1::PLACEMENT_VIRTUAL_PLANE:
+      return Placement::kVirtualPlane;
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Fill> FromWire(v1::Fill fill) {
+  switch (fill) {
+    case v1::FILL_UNSPECIFIED:
+      return ReconstructionParameters{}.fill;
+    case v1::FILL_NONE:
+      return Fill::kNone;
+    case v1::FILL_GRID:
+      return Fill::kGrid;
+    case v1::FILL_GREEDY:
+      return Fill::kGreedy;
+    case v1::FILL_CONFORMING:
+      return Fill::kConforming;
+    case v1::FILL_POLYGON:
+      return Fill::kPolygon;
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<SpacingRule> FromWire(v1::SpacingRule rule) {
+  switch (rule) {
+    case v1::SPACING_RULE_UNSPECIFIED:
+      return ReconstructionParameters{}.spacing_rule;
+    case v1::SPACING_RULE_FIRST_FRAME:
+      return SpacingRule::kFirstFrame;
+    case v1::SPACING_RULE_EVERY_FRAME:
+      return SpacingRule::kEveryFrame;
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Plane> FromWire(v1::Plane plane) {
+  switch (plane) {
+    case v1::PLANE_UNSPECIFIED:
+      return ReconstructionParameters{}.plane;
+    case v1::PLANE_XY:
+      return Plane::kXy;
+    case v1::PLANE_XZ:
+      return Plane::kXz;
+    case v1::PLANE_YZ:
+      return Plane::kYz;
+    default:
+      return std::nullopt;
+  }
+}
+
+v1::SpacingRule ToWire(SpacingRule rule) {
+  return rule == SpacingRule::kFirstFrame ? v1::SPACING_RULE_FIRST_FRAME
+                                          : v1::SPACING_RULE_EVERY_FRAME;
+}
+
+v1::Plane ToWire(Plane plane) {
+  switch (plane) {
+    case Plane::kXy:
+      return v1::PLANE_XY;
+    case Plane::kXz:
+      return v1::PLANE_XZ;
+    case Plane::kYz:
+      return v1::PLANE_YZ;
+  }
+  return v1::PLANE_UNSPECIFIED;
+}
+
+// How a PositionFormat lays out a particle; 0 components for a format that is not known.
+struct PositionLayout {
+  int components = 0;
+  std::size_t component_bytes = 0;
+
+  std::size_t ParticleBytes() const {
+    return static_cast<std::size_t>(components) * component_bytes;
+  }
+};
+
+PositionLayout LayoutOf(v1::PositionFormat format) {
+  switch (format) {
+    case v1::POSITION_FORMAT_FLOAT32_2:
+      return {2, sizeof(float)};
+    case v1::POSITION_FORMAT_FLOAT64_2:
+      return {2, sizeof(double)};
+    case v1::POSITION_FORMAT_FLOAT32_3:
+      return {3, sizeof(float)};
+    case v1::POSITION_FORMAT_FLOAT64_3:
+      return {3, sizeof(double)};
+    default:
+      return {};
+  }
+}
+
+v1::PositionFormat FormatOf(const Frame& frame) {
+  const bool is_float = std::holds_alternative<std::span<const float>>(frame.positions);
+  if (frame.components == 3) {
+    return is_float ? v1::POSITION_FORMAT_FLOAT32_3 : v1::POSITION_FORMAT_FLOAT64_3;
+  }
+  return is_float ? v1::POSITION_FORMAT_FLOAT32_2 : v1::POSITION_FORMAT_FLOAT64_2;
+}
+
+// `bytes` is empty or has `particle_bytes` for each of `particles`.
+absl::Status CheckOptionalArray(std::string field, const std::string& bytes, std::size_t particles,
+                                std::size_t particle_bytes) {
+  if (bytes.empty() || bytes.size() == particles * particle_bytes) return absl::OkStatus();
+  return Invalid(kReasonByteCount, std::move(field), absl::StrCat(bytes.size(), " bytes"),
+                 absl::StrCat("must be empty or ", particle_bytes, " bytes for each of ", particles,
+                              " particles"));
+}
+
+absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, std::size_t particles) {
+  if (auto status = CheckOptionalArray("ids", message.ids(), particles, 8); !status.ok()) {
+    return status;
+  }
+  if (auto status = CheckOptionalArray("volumes", message.volumes(), particles, 4); !status.ok()) {
+    return status;
+  }
+  if (auto status = CheckOptionalArray("velocities", message.velocities(), particles, 8);
+      !status.ok()) {
+    return status;
+  }
+  for (int i = 0; i < message.scalars_size(); ++i) {
+    auto status = CheckOptionalArray(absl::StrCat("scalars[", i, "].values"),
+                                     message.scalars(i).values(), particles, 4);
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+v1::Placement ToWire(Placement placement) {
+  switch (placement) {
+    case Placement::kMarchingSquares:
+      return v1::PLACEMENT_MARCHING_SQUARES;
+    case Placement::kQef:
+      return v1::PLACEMENT_QEF;
+    case Placement::kFarthestParticle:
+      return v1::PLACEMENT_FARTHEST_PARTICLE;
+    case Placement::kVirtualPlane:
+      return v1::PLACEMENT_VIRTUAL_PLANE;
+  }
+  return v1::PLACEMENT_UNSPECIFIED;
+}
+
+v1::Fill ToWire(Fill fill) {
+  switch (fill) {
+    case Fill::kNone:
+      return v1::FILL_NONE;
+    case Fill::kGrid:
+      return v1::FILL_GRID;
+    case Fill::kGreedy:
+      return v1::FILL_GREEDY;
+    case Fill::kConforming:
+      return v1::FILL_CONFORMING;
+    case Fill::kPolygon:
+      return v1::FILL_POLYGON;
+  }
+  return v1::FILL_UNSPECIFIED;
+}
+
+absl::StatusOr<ReconstructionParameters> DecodeParameters(
+    const v1::ReconstructionParameters& message) {
+  const auto placement = FromWire(message.placement());
+  if (!placement) return UnknownEnum("parameters.placement", message.placement());
+  const auto fill = FromWire(message.fill());
+  if (!fill) return UnknownEnum("parameters.fill", message.fill());
+  const auto spacing_rule = FromWire(message.spacing_rule());
+  if (!spacing_rule) return UnknownEnum("parameters.spacing_rule", message.spacing_rule());
+  const auto plane = FromWire(message.plane());
+  if (!plane) return UnknownEnum("parameters.plane", message.plane());
+
+  ReconstructionParameters parameters;
+  parameters.placement = *placement;
+  parameters.fill = *fill;
+  parameters.spacing_rule = *spacing_rule;
+  parameters.plane = *plane;
+  if (message.has_spacing()) parameters.spacing = message.spacing();
+  if (message.has_kernel_radius()) parameters.kernel_radius = message.kernel_radius();
+  if (message.has_cell_size()) parameters.cell_size = message.cell_size();
+  if (message.has_reference_radius()) parameters.reference_radius = message.reference_radius();
+  if (message.has_surface_offset()) parameters.surface_offset = message.surface_offset();
+  if (message.has_normal_memory()) parameters.normal_memory = message.normal_memory();
+  if (message.has_clean()) parameters.clean = message.clean();
+  return parameters;
+}
+
+void EncodeParameters(const ReconstructionParameters& parameters,
+                      v1::ReconstructionParameters& message) {
+  message.Clear();
+  message.set_placement(ToWire(parameters.placement));
+  message.set_fill(ToWire(parameters.fill));
+  if (parameters.spacing) message.set_spacing(*parameters.spacing);
+  message.set_spacing_rule(ToWire(parameters.spacing_rule));
+  message.set_kernel_radius(parameters.kernel_radius);
+  message.set_cell_size(parameters.cell_size);
+  if (parameters.reference_radius) message.set_reference_radius(*parameters.reference_radius);
+  message.set_surface_offset(parameters.surface_offset);
+  message.set_normal_memory(parameters.normal_memory);
+  if (parameters.clean) message.set_clean(*parameters.clean);
+  message.set_plane(ToWire(parameters.plane));
+}
+
+absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {
+  if (!present) return Outputs{};
+  if (message.attributes_size() > 0) {
+    return Invalid(kReasonUnsupported, "outputs.attributes",
+                   absl::StrCat(message.attributes_size(), " names"),
+                   "must be empty: this server lacks the capability \"attributes\"");
+  }
+  if (message.echo_particles()) {
+    return Invalid(kReasonUnsupported, "outputs.echo_particles", "true",
+                   "must be false: this server lacks the capability \"watch\"");
+  }
+  if (!v1::CoordinateFormat_IsValid(message.coordinate_format())) {
+    return UnknownEnum("outputs.coordinate_format", message.coordinate_format());
+  }
+  return Outputs{
+      .rings = message.rings(),
+      .mesh = message.mesh(),
+      .normals = message.normals(),
+      .relative_float32 = message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE};
+}
+
+void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
+  message.Clear();
+  message.set_rings(outputs.rings);
+  message.set_mesh(outputs.mesh);
+  message.set_normals(outputs.normals);
+  message.set_coordinate_format(outputs.relative_float32 ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
+                                                         : v1::COORDINATE_FORMAT_FLOAT64);
+}
+
+absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message) {
+  const PositionLayout layout = LayoutOf(message.position_format());
+  if (layout.components == 0) {
+    return Invalid(kReasonUnsupported, "position_format", absl::StrCat(message.position_format()),
+                   "must be FLOAT32_2, FLOAT64_2, FLOAT32_3 or FLOAT64_3");
+  }
+  const std::string& positions = message.positions();
+  if (positions.size() % layout.ParticleBytes() != 0) {
+    return Invalid(kReasonByteCount, "positions", absl::StrCat(positions.size(), " bytes"),
+                   absl::StrCat("must be a multiple of ", layout.ParticleBytes(),
+                                " bytes, as position_format says"));
+  }
+  const std::size_t particles = positions.size() / layout.ParticleBytes();
+  if (auto status = CheckOptionalArrays(message, particles); !status.ok()) return status;
+
+  Frame frame;
+  frame.components = layout.components;
+  frame.volumes = ViewBytes<float>(message.volumes());
+  if (layout.component_bytes == sizeof(float)) {
+    frame.positions = ViewBytes<float>(positions);
+  } else {
+    frame.positions = ViewBytes<double>(positions);
+  }
+  return frame;
+}
+
+void EncodeFrame(const Frame& frame, v1::ParticleFrame& message) {
+  message.set_position_format(FormatOf(frame));
+  std::visit([&](auto view) { AssignBytes(view, *message.mutable_positions()); }, frame.positions);
+  AssignBytes(frame.volumes, *message.mutable_volumes());
+}
+
+void EncodeFrameError(const absl::Status& status, std::uint64_t sequence,
+                      std::uint64_t next_sequence, v1::FrameError& message) {
+  message.Clear();
+  message.set_sequence(sequence);
+  message.set_next_sequence(next_sequence);
+  message.set_message(std::string(status.message()));
+  if (auto violation = FindViolation(status)) {
+    message.set_reason(std::move(violation->reason));
+    message.set_field(std::move(violation->field));
+    message.set_value(std::move(violation->value));
+    message.set_rule(std::move(violation->rule));
+  } else {
+    message.set_reason(absl::StatusCodeToString(status.code()));
+  }
+}
+
+}  // namespace partiemc::wire
