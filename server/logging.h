@@ -1,0 +1,14 @@
+// The log: one line per event of the server or of a stream, to standard error.
+#pragma once
+
+#include <string>
+
+namespace partiemc::server {
+
+enum class LogFormat { kText, kJson };
+
+/// Sets up spdlog's default logger, and has gRPC's own messages go there at level debug.
+/// `level` is one of trace, debug, info, warn, error, off. Called once, before threads start.
+void SetUpLogging(const std::string& level, LogFormat format);
+
+}  // namespace partiemc::server

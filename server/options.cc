@@ -1,0 +1,183 @@
+#include "server/options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <thread>
+#include <utility>
+
+namespace partiemc::server {
+namespace {
+
+constexpr char kDescription[] =
+    "Serves partiemc.v1: streams of particle frames in, isolines and meshes out.\n"
+    "\n"
+    "  partiemc-server                                   on 127.0.0.1:50051, this machine only\n"
+    "  partiemc-server --address unix:/run/partiemc.sock\n"
+    "  partiemc-server --address 0.0.0.0:50051 --insecure   for a network that is trusted\n"
+    "  partiemc-server --health-check                    is one running? Exit code 0 or 1\n"
+    "\n"
+    "SIGTERM or SIGINT drains it: what clients have sent is answered, then it leaves.\n";
+
+constexpr char kFooter[] =
+    "\nEvery option can also stand in the file of --config (TOML or INI, `max-streams = 8`) or in "
+    "the\n"
+    "environment variable that is named with it. The command line counts most, then the file.\n"
+    "Exit codes: 0 good, 1 failed, 2 wrong command line.";
+
+// What the flags fill in, before it is checked as a whole.
+struct Raw {
+  std::string address = "127.0.0.1:50051";
+  std::string health_check;
+  std::string port_file;
+  std::uint64_t max_frame_bytes = 0;
+  double grace_seconds = 4;
+  std::string log_format = "text";
+  CommandLine line;
+};
+
+// Beyond this the receive limit of 1.25 times would not fit into gRPC's int.
+constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
+
+void AddServingOptions(CLI::App& app, Raw& raw) {
+  app.add_option("--address", raw.address,
+                 "HOST:PORT, [IPV6]:PORT or unix:PATH to listen on; port 0 takes any that is free")
+      ->capture_default_str()
+      ->type_name("ADDRESS")
+      ->envname("PARTIEMC_ADDRESS");
+  app.add_flag("--insecure", raw.line.server.insecure,
+               "Listen on an address that other machines reach, although all travels in the clear")
+      ->envname("PARTIEMC_INSECURE");
+  app.add_option("--port-file", raw.port_file,
+                 "Write the address that was bound to this file once the server serves")
+      ->type_name("FILE")
+      ->envname("PARTIEMC_PORT_FILE");
+  app.add_option("--threads", raw.line.server.threads,
+                 "Threads that compute, all streams together; results do not depend on it")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_THREADS");
+  app.add_option("--grace-seconds", raw.grace_seconds,
+                 "After SIGTERM, cancel what is not done within this time")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str()
+      ->type_name("SECONDS")
+      ->envname("PARTIEMC_GRACE_SECONDS");
+}
+
+void AddLimits(CLI::App& app, Raw& raw) {
+  ServerLimits& limits = raw.line.server.limits;
+  const char* const kGroup = "Limits";
+  app.add_option("--max-streams", limits.max_streams,
+                 "Streams open at once; one too many is refused at once")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_STREAMS")
+      ->group(kGroup);
+  app.add_option("--frames-in-flight", limits.frames_in_flight,
+                 "Frames of a stream that are read ahead of its client's taking the answers")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_FRAMES_IN_FLIGHT")
+      ->group(kGroup);
+  app.add_option("--max-particles", limits.frame.max_particles, "Particles of one frame")
+      ->check(CLI::Range(1, 1'000'000'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_PARTICLES")
+      ->group(kGroup);
+  app.add_option("--max-tiles", limits.frame.max_tiles,
+                 "Tiles of 32 x 32 lattice nodes that one frame may reach, 10 kB of memory each")
+      ->check(CLI::Range(1, 100'000'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_TILES")
+      ->group(kGroup);
+  app.add_option("--max-frame-bytes", raw.max_frame_bytes,
+                 "Bytes of one serialised frame, units as in 200MB allowed (default: 48 for each "
+                 "of --max-particles). Streams hold at most max-streams x frames-in-flight x this")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{1}, kMaxFrameBytes))
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_MAX_FRAME_BYTES")
+      ->group(kGroup);
+}
+
+void AddLogging(CLI::App& app, Raw& raw) {
+  const char* const kGroup = "Log (to standard error)";
+  app.add_option("--log-level", raw.line.log_level, "How much: one line per stream event at info")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
+      ->capture_default_str()
+      ->type_name("LEVEL")
+      ->envname("PARTIEMC_LOG_LEVEL")
+      ->group(kGroup);
+  app.add_option("--log-format", raw.log_format, "text, or json: one object a line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str()
+      ->type_name("FORMAT")
+      ->envname("PARTIEMC_LOG_FORMAT")
+      ->group(kGroup);
+}
+
+Leave Wrong(const std::string& message) {
+  std::string line = message;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  return {2, "partiemc-server: " + line + "; see --help\n"};
+}
+
+std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
+  const auto address = ParseAddress(raw.address);
+  if (!address.ok()) return Wrong(std::string(address.status().message()));
+  raw.line.server.address = *address;
+  if (app.count("--health-check") > 0) {
+    const auto asked = raw.health_check.empty() ? address : ParseAddress(raw.health_check);
+    if (!asked.ok()) return Wrong(std::string(asked.status().message()));
+    raw.line.health_check = *asked;
+  }
+  raw.line.log_format = raw.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
+  if (!raw.port_file.empty()) raw.line.port_file = raw.port_file;
+  raw.line.grace = std::chrono::milliseconds(static_cast<std::int64_t>(raw.grace_seconds * 1000));
+  ServerLimits& limits = raw.line.server.limits;
+  limits.max_frame_bytes =
+      raw.max_frame_bytes != 0
+          ? raw.max_frame_bytes
+          : std::min(ServerLimits::DefaultFrameBytes(limits.frame.max_particles), kMaxFrameBytes);
+  return raw.line;
+}
+
+}  // namespace
+
+std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* argv) {
+  CLI::App app(kDescription, "partiemc-server");
+  app.footer(kFooter);
+  Raw raw;
+  raw.line.server.threads = std::max(1u, std::thread::hardware_concurrency());
+  AddServingOptions(app, raw);
+  AddLimits(app, raw);
+  AddLogging(app, raw);
+  app.add_option("--health-check", raw.health_check,
+                 "Ask the server at this address (default: --address) whether it serves, and leave")
+      ->expected(0, 1)
+      ->type_name("[ADDRESS]")
+      ->configurable(false);
+  app.set_config("--config", "", "Read options from this file")->envname("PARTIEMC_CONFIG");
+  // A misspelt option in the file would otherwise pass in silence.
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  app.set_version_flag("--version", "partiemc-server " PARTIEMC_VERSION);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    return Leave{0, app.help()};
+  } catch (const CLI::CallForVersion&) {
+    return Leave{0, "partiemc-server " PARTIEMC_VERSION "\n"};
+  } catch (const CLI::ParseError& error) {
+    return Wrong(error.what());
+  }
+  return Check(std::move(raw), app);
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,34 @@
+// The command line of partiemc-server, its environment variables and its config file.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "server/logging.h"
+#include "server/server.h"
+
+namespace partiemc::server {
+
+struct CommandLine {
+  ServerOptions server;
+  /// Finished frames are delivered and streams are ended within this time of SIGTERM.
+  std::chrono::milliseconds grace{4000};
+  /// Where the address that was bound is written, once the server serves.
+  std::optional<std::string> port_file;
+  /// Only ask the server at this address whether it serves.
+  std::optional<Address> health_check;
+  std::string log_level = "info";
+  LogFormat log_format = LogFormat::kText;
+};
+
+/// Nothing is left to do but to print `text` and to leave with `code`.
+struct Leave {
+  int code = 0;      ///< 0 for --help and --version, 2 for a wrong command line.
+  std::string text;  ///< For standard output if `code` is 0, else one line for standard error.
+};
+
+std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* argv);
+
+}  // namespace partiemc::server

@@ -1,0 +1,88 @@
+#include "server/reconstruct_reactor.h"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+
+#include "server/grpc_status.h"
+
+namespace partiemc::server {
+namespace {
+
+void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
+            const absl::Status& status) {
+  const std::string code = absl::StatusCodeToString(status.code());
+  if (!stream) {
+    spdlog::warn("stream refused peer={} status={} message=\"{}\"", peer, code,
+                 std::string(status.message()));
+    return;
+  }
+  const std::chrono::duration<double> open = std::chrono::steady_clock::now() - stream->opened;
+  spdlog::info("stream closed id={} name={} frames={} frame_errors={} seconds={:.3f} status={}",
+               stream->id, stream->description.name, stream->counts.frames,
+               stream->counts.frame_errors, open.count(), code);
+}
+
+}  // namespace
+
+ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
+                                       const ServerLimits& limits, StreamRegistry& registry,
+                                       ComputePool& pool)
+    : context_(context),
+      registry_(registry),
+      messages_(limits, registry),
+      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool,
+                                         limits.frames_in_flight)) {
+  if (auto status = registry_.Enter(flow_); !status.ok()) {
+    Finish(status);
+  } else {
+    flow_->Start();
+  }
+}
+
+void ReconstructReactor::OnReadDone(bool ok) {
+  if (ok) {
+    flow_->ReadDone(messages_.Kind(read_slot_));
+  } else {
+    flow_->ReadEnded();
+  }
+}
+
+void ReconstructReactor::OnWriteDone(bool ok) { flow_->WriteDone(ok); }
+
+void ReconstructReactor::OnCancel() { flow_->Cancelled(); }
+
+void ReconstructReactor::OnDone() { delete this; }
+
+void ReconstructReactor::StartRead(std::size_t slot) {
+  read_slot_ = slot;
+  ServerBidiReactor::StartRead(&messages_.request(slot));
+}
+
+void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
+  ServerBidiReactor::StartWrite(&messages_.response(what, slot));
+}
+
+absl::Status ReconstructReactor::Open(std::size_t slot) {
+  auto status = messages_.Open(slot, *flow_);
+  if (status.ok()) {
+    const v1::StreamOpened& opened = messages_.response(Outgoing::kOpened, slot).opened();
+    spdlog::info("stream opened id={} name={} peer={} placement={} fill={}", opened.stream_id(),
+                 messages_.request(slot).open().stream_name(), context_.peer(),
+                 v1::Placement_Name(opened.parameters().placement()),
+                 v1::Fill_Name(opened.parameters().fill()));
+  }
+  return status;
+}
+
+Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
+  return messages_.Answer(slot, worker);
+}
+
+void ReconstructReactor::Finish(const absl::Status& status) {
+  // Out of the registry first: a client that sees the end may open the same name again at once.
+  LogEnd(registry_.Leave(*flow_), context_.peer(), status);
+  ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
+}
+
+}  // namespace partiemc::server

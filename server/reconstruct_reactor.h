@@ -1,0 +1,47 @@
+// The gRPC door of a producer's stream: translates between gRPC's callbacks and a StreamFlow.
+#pragma once
+
+#include <grpcpp/support/server_callback.h>
+
+#include <cstddef>
+#include <memory>
+
+#include "absl/status/status.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "server/compute_pool.h"
+#include "server/limits.h"
+#include "server/stream_flow.h"
+#include "server/stream_messages.h"
+#include "server/stream_registry.h"
+
+namespace partiemc::server {
+
+/// Deletes itself when gRPC is done with it. No callback of it blocks.
+class ReconstructReactor final
+    : public grpc::ServerBidiReactor<v1::ReconstructRequest, v1::ReconstructResponse>,
+      private StreamDoor {
+ public:
+  /// The arguments outlive the call.
+  ReconstructReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
+                     StreamRegistry& registry, ComputePool& pool);
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override;
+  void OnDone() override;
+
+ private:
+  void StartRead(std::size_t slot) override;
+  void StartWrite(Outgoing what, std::size_t slot) override;
+  absl::Status Open(std::size_t slot) override;
+  Answered Answer(std::size_t slot, Worker& worker) override;
+  void Finish(const absl::Status& status) override;
+
+  grpc::CallbackServerContext& context_;
+  StreamRegistry& registry_;
+  StreamMessages messages_;
+  std::size_t read_slot_ = 0;  // Of the read that is going on.
+  std::shared_ptr<StreamFlow> flow_;
+};
+
+}  // namespace partiemc::server

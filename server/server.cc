@@ -1,0 +1,94 @@
+#include "server/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "server/service.h"
+
+namespace partiemc::server {
+namespace {
+
+// gRPC ends a stream whose message is larger than it may receive, so it may receive somewhat more
+// than was announced: a frame that is slightly too large is answered by a FrameError instead.
+int ReceiveLimit(std::uint64_t max_frame_bytes) {
+  const std::uint64_t limit = max_frame_bytes + max_frame_bytes / 4;
+  return static_cast<int>(std::min<std::uint64_t>(limit, std::numeric_limits<int>::max()));
+}
+
+absl::Status CheckSecurity(const ServerOptions& options) {
+  if (options.insecure || options.address.IsLocal()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("address ", options.address.ToString(),
+                   " can be reached from other machines, and everything would travel in the clear; "
+                   "listen on 127.0.0.1, or add --insecure if the network is trusted"));
+}
+
+}  // namespace
+
+Server::Server(const ServerOptions& options)
+    : options_(options),
+      address_(options.address),
+      registry_(options.limits.max_streams),
+      pool_(options.threads),
+      service_(std::make_unique<Service>(options_.limits, registry_, pool_)) {}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
+  if (auto status = CheckSecurity(options); !status.ok()) return status;
+  if (auto status = CheckCanListen(options.address); !status.ok()) return status;
+  std::unique_ptr<Server> server(new Server(options));
+  if (auto status = server->Listen(); !status.ok()) return status;
+  return server;
+}
+
+absl::Status Server::Listen() {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(address_.ToString(), grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(service_.get());
+  builder.SetMaxReceiveMessageSize(ReceiveLimit(options_.limits.max_frame_bytes));
+  // Otherwise two servers share a port without noticing, and clients reach one of them.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  server_ = builder.BuildAndStart();
+  if (server_ == nullptr) {
+    return absl::UnavailableError(absl::StrCat("cannot listen on ", address_.ToString(),
+                                               ": gRPC refuses it; choose another --address"));
+  }
+  if (address_.unix_path.empty()) address_.port = static_cast<std::uint16_t>(port);
+  server_->GetHealthCheckService()->SetServingStatus(v1::ReconstructionService::service_full_name(),
+                                                     true);
+  return absl::OkStatus();
+}
+
+Server::~Server() {
+  if (server_ == nullptr) return;
+  server_->Shutdown(std::chrono::system_clock::now());
+  server_->Wait();
+}
+
+std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);
+  return server_->InProcessChannel(arguments);
+}
+
+void Server::Drain(std::chrono::milliseconds grace) {
+  const auto deadline = std::chrono::steady_clock::now() + grace;
+  server_->GetHealthCheckService()->SetServingStatus(false);
+  registry_.Drain();
+  // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first.
+  registry_.WaitUntilEmpty(deadline);
+  const auto left = std::max(deadline - std::chrono::steady_clock::now(),
+                             std::chrono::steady_clock::duration::zero());
+  server_->Shutdown(std::chrono::system_clock::now() + left);
+  server_->Wait();
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,45 @@
+// partiemc.v1.ReconstructionService over gRPC's callback API.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string_view>
+
+#include "partiemc/v1/reconstruction.grpc.pb.h"
+#include "server/compute_pool.h"
+#include "server/limits.h"
+#include "server/stream_registry.h"
+
+namespace partiemc::server {
+
+/// The reason of RESOURCE_EXHAUSTED for a ReconstructFrame too many (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
+
+class Service final : public v1::ReconstructionService::CallbackService {
+ public:
+  /// The arguments outlive the service.
+  Service(const ServerLimits& limits, StreamRegistry& registry, ComputePool& pool)
+      : limits_(limits), registry_(registry), pool_(pool) {}
+
+  grpc::ServerBidiReactor<v1::ReconstructRequest, v1::ReconstructResponse>* Reconstruct(
+      grpc::CallbackServerContext* context) override;
+  grpc::ServerUnaryReactor* ReconstructFrame(grpc::CallbackServerContext* context,
+                                             const v1::ReconstructFrameRequest* request,
+                                             v1::ReconstructFrameResponse* response) override;
+  grpc::ServerBidiReactor<v1::WatchStreamRequest, v1::WatchStreamResponse>* WatchStream(
+      grpc::CallbackServerContext* context) override;
+  grpc::ServerUnaryReactor* ListStreams(grpc::CallbackServerContext* context,
+                                        const v1::ListStreamsRequest* request,
+                                        v1::ListStreamsResponse* response) override;
+  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
+                                          const v1::GetServerInfoRequest* request,
+                                          v1::GetServerInfoResponse* response) override;
+
+ private:
+  const ServerLimits& limits_;
+  StreamRegistry& registry_;
+  ComputePool& pool_;
+  std::atomic<std::uint32_t> calls_ = 0;  // Of ReconstructFrame, going on.
+};
+
+}  // namespace partiemc::server

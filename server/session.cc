@@ -1,0 +1,56 @@
+#include "server/session.h"
+
+#include <new>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+
+absl::StatusOr<Session> Session::Open(const ReconstructionParameters& parameters,
+                                      const FrameLimits& limits) {
+  auto reconstructor = Reconstructor::Create(parameters, limits);
+  if (!reconstructor.ok()) return reconstructor.status();
+  return Session(*std::move(reconstructor));
+}
+
+absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
+                             Worker& worker, Deliver deliver) {
+  if (sequence != next_sequence_) {
+    const bool gap = sequence > next_sequence_;
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(gap ? kReasonSequenceGap : kReasonSequenceDuplicate), "sequence",
+         absl::StrCat(sequence),
+         absl::StrCat("must be ", next_sequence_,
+                      gap ? "; a frame before it is missing" : "; this number has been used")});
+  }
+  ++next_sequence_;
+  if (!frame.ok()) return frame.status();
+  try {
+    return Reconstruct(*frame, worker, deliver);
+  } catch (const std::bad_alloc&) {
+    // What the workspace holds is anybody's guess now, and its memory is wanted.
+    worker = Worker();
+    return ViolationError(
+        absl::StatusCode::kResourceExhausted,
+        {std::string(kReasonOutOfMemory), "frame",
+         absl::StrCat(frame->ParticleCount(), " particles"),
+         "must fit into the server's memory; send a smaller frame or try again later"});
+  }
+}
+
+absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver) {
+  // The core commits a frame that it accepts, but `deliver` may still refuse it: work on a copy.
+  worker.next_state = state_;
+  StageClock clock;
+  absl::Status status =
+      reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result, &clock);
+  if (status.ok()) status = deliver(worker.result, clock);
+  if (status.ok()) std::swap(state_, worker.next_state);
+  return status;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,86 @@
+// A stream as the method sees it: parameters that are fixed, a state that moves from frame to
+// frame, and the rule that decides which frame may come next. Knows no messages and no threads.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <string_view>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/reconstructor.h"
+#include "partiemc/result.h"
+#include "partiemc/stage.h"
+#include "partiemc/state.h"
+#include "server/compute_pool.h"
+
+namespace partiemc::server {
+
+/// The reasons that sessions give, beside the core's (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonSequenceGap = "SEQUENCE_GAP";
+inline constexpr std::string_view kReasonSequenceDuplicate = "SEQUENCE_DUPLICATE";
+inline constexpr std::string_view kReasonOutOfMemory = "OUT_OF_MEMORY";
+
+/// Reads the clock for the core, which has none.
+class StageClock final : public StageObserver {
+ public:
+  /// Wall time of each stage in milliseconds; 0 for one that did not run.
+  const std::array<double, kStageCount>& stages_ms() const { return stages_ms_; }
+  /// Since the clock was made.
+  double TotalMs() const { return MillisecondsSince(start_); }
+
+  void StageBegins(Stage) override { stage_start_ = Clock::now(); }
+  void StageEnds(Stage stage) override {
+    stages_ms_[static_cast<std::size_t>(stage)] += MillisecondsSince(stage_start_);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double MillisecondsSince(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  }
+
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point stage_start_;
+  std::array<double, kStageCount> stages_ms_{};
+};
+
+/// Not thread-safe: one frame at a time, as the method needs it anyway.
+class Session {
+ public:
+  /// Writes a result where its reader wants it. An error refuses the frame.
+  using Deliver = absl::FunctionRef<absl::Status(const Result&, const StageClock&)>;
+
+  /// Errors: those of Reconstructor::Create.
+  static absl::StatusOr<Session> Open(const ReconstructionParameters& parameters,
+                                      const FrameLimits& limits);
+
+  /// Reconstructs the frame and hands the result to `deliver`. `frame` is an error where the frame
+  /// could not be decoded.
+  /// Errors, each with a Violation, after which the state is as if the frame had never come:
+  ///   a `sequence` other than next_sequence() (SEQUENCE_GAP, SEQUENCE_DUPLICATE) uses up nothing;
+  ///   the error of `frame`, of the core or of `deliver`, or memory that ran out (OUT_OF_MEMORY)
+  ///   uses up the sequence number.
+  absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
+                      Deliver deliver);
+
+  /// 1 for a new stream.
+  std::uint64_t next_sequence() const { return next_sequence_; }
+  /// As resolved.
+  const ReconstructionParameters& parameters() const { return reconstructor_.parameters(); }
+
+ private:
+  explicit Session(Reconstructor reconstructor) : reconstructor_(std::move(reconstructor)) {}
+
+  absl::Status Reconstruct(const Frame& frame, Worker& worker, Deliver deliver);
+
+  Reconstructor reconstructor_;
+  State state_;
+  std::uint64_t next_sequence_ = 1;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,139 @@
+// How the messages of one stream flow: what may be read, computed and written when. It knows
+// neither what the messages are nor how they travel; a door (gRPC, or a test's memory) does.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "server/compute_pool.h"
+
+namespace partiemc::server {
+
+/// The reasons for which the flow ends a stream (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonProtocol = "PROTOCOL";
+inline constexpr std::string_view kReasonDraining = "DRAINING";
+
+/// UNAVAILABLE with the Violation that a draining server gives everybody.
+absl::Status DrainingError();
+
+/// What a request turned out to be.
+enum class RequestKind { kEmpty, kOpen, kFrame };
+
+/// What StreamDoor::StartWrite is to send.
+enum class Outgoing { kOpened, kAnswer, kDraining };
+
+/// What became of a frame.
+struct Answered {
+  bool is_result = false;           ///< Or a frame error.
+  std::uint64_t last_sequence = 0;  ///< The last number that the stream has used up.
+};
+
+/// Where a stream's messages come in and go out. It has `window` slots, each a request and the
+/// answer to it. StreamFlow never has more than one read, one write and one computation going on,
+/// these on different slots, and never calls the door with a lock held.
+class StreamDoor {
+ public:
+  virtual ~StreamDoor() = default;
+
+  /// Begins to read the next request into `slot`; ends in StreamFlow::ReadDone or ReadEnded.
+  virtual void StartRead(std::size_t slot) = 0;
+  /// Begins to write; ends in StreamFlow::WriteDone. `slot` counts for kAnswer only.
+  virtual void StartWrite(Outgoing what, std::size_t slot) = 0;
+  /// Opens the stream as the request in `slot` asks and prepares Outgoing::kOpened. Quick. An
+  /// error ends the stream.
+  virtual absl::Status Open(std::size_t slot) = 0;
+  /// Turns the frame in `slot` into its answer. Called by a worker, one frame of a stream at a time
+  /// and in their order.
+  virtual Answered Answer(std::size_t slot, Worker& worker) = 0;
+  /// The last call that the door gets; a read may still be going on, nothing else. OK, or why the
+  /// stream ended.
+  virtual void Finish(const absl::Status& status) = 0;
+};
+
+/// Seen from outside while the stream goes on.
+struct StreamCounts {
+  std::uint64_t frames = 0;        ///< Answered by a result.
+  std::uint64_t frame_errors = 0;  ///< Answered by a frame error.
+  std::uint64_t last_sequence = 0;
+  std::chrono::steady_clock::time_point last_activity = std::chrono::steady_clock::now();
+};
+
+/// The state machine of one stream:
+///
+///   opening --open--> streaming --half-close, broken protocol, drain--> ending ----> finished
+///      |                  |                                                |            ^
+///      |                  +----------- cancelled, write failed ------------+-> abandoned
+///      +-- no open, or refused: ending, with nothing to answer
+///
+/// While streaming, frame n lives in slot n % window from the start of its reading to the end of
+/// its answer's writing, so that a client that does not read its answers is not read from either.
+/// Ending answers what was read; abandoned answers nothing more. Safe from any thread.
+class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
+ public:
+  /// `door` lives until its Finish returns, `pool` longer. Held by shared_ptr only.
+  StreamFlow(StreamDoor& door, ComputePool& pool, std::size_t window);
+
+  /// Begins with the first read. Called once.
+  void Start();
+
+  /// The read that was begun last has brought a request of this kind.
+  void ReadDone(RequestKind kind);
+  /// The read that was begun last has found that no request will come any more.
+  void ReadEnded();
+  void WriteDone(bool ok);
+  /// Nobody waits for answers any more.
+  void Cancelled();
+  /// The server is going away: reads no further frame, sends Outgoing::kDraining, answers what was
+  /// read and ends the stream with UNAVAILABLE.
+  void Drain();
+
+  StreamCounts counts() const;
+
+ private:
+  enum class Phase { kOpening, kStreaming, kEnding, kAbandoned, kFinished };
+
+  // What to do once the lock is released; the flags of what is going on are set already.
+  struct Actions {
+    std::optional<std::size_t> read, compute;  // Into or of this slot.
+    std::optional<Outgoing> write;
+    std::size_t write_slot = 0;
+    std::optional<absl::Status> finish;
+  };
+
+  // With the lock held:
+  Actions Decide();
+  void DecideWrite(Actions& actions);
+  void TakeRequest(RequestKind kind);
+  void End(absl::Status status);
+  void Abandon();
+  // Without:
+  template <typename Event>
+  void On(Event event);
+  void Perform(Actions actions);
+  void Open();
+  void Compute(std::size_t slot, Worker& worker);
+
+  StreamDoor& door_;
+  ComputePool& pool_;
+  const std::size_t window_;
+
+  mutable std::mutex mutex_;  // Guards everything below.
+  Phase phase_ = Phase::kOpening;
+  absl::Status status_;  // Of the end, from kEnding on.
+  // Frames so far: written_ <= computed_ <= read_ <= written_ + window_.
+  std::uint64_t read_ = 0, computed_ = 0, written_ = 0;
+  bool reading_ = false, computing_ = false, writing_ = false, opening_ = false;
+  // Between the decision to read and the return of the door's StartRead: the door has to stay.
+  bool starting_read_ = false;
+  bool owes_opened_ = false, owes_notice_ = false;
+  Outgoing in_flight_ = Outgoing::kAnswer;  // What is being written.
+  StreamCounts counts_;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,164 @@
+#include "server/stream_registry.h"
+
+#include <algorithm>
+#include <random>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::size_t kMaxNameBytes = 128;
+constexpr std::size_t kMaxLabels = 16;
+constexpr std::size_t kMaxLabelBytes = 128;
+
+absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string field,
+                     std::string value, std::string rule) {
+  return ViolationError(code,
+                        {std::string(reason), std::move(field), std::move(value), std::move(rule)});
+}
+
+// Text of a client as it may stand in a message or in a log: short, and one line.
+std::string Quoted(const std::string& text) {
+  constexpr std::size_t kShown = 40;
+  return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
+                      text.size() > kShown ? "..." : "");
+}
+
+bool IsNameCharacter(char c) {
+  return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';
+}
+
+absl::Status CheckName(const std::string& name) {
+  if (name.size() <= kMaxNameBytes && std::all_of(name.begin(), name.end(), IsNameCharacter)) {
+    return absl::OkStatus();
+  }
+  return Refused(absl::StatusCode::kInvalidArgument, kReasonName, "open.stream_name", Quoted(name),
+                 "must be at most 128 characters of [A-Za-z0-9._-]");
+}
+
+absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
+  if (labels.size() > kMaxLabels) {
+    return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels",
+                   absl::StrCat(labels.size(), " labels"), "must be at most 16");
+  }
+  for (const auto& [key, value] : labels) {
+    if (key.size() > kMaxLabelBytes || value.size() > kMaxLabelBytes) {
+      return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels", Quoted(key),
+                     "must have a key and a value of at most 128 bytes each");
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+StreamRegistry::StreamRegistry(std::uint32_t max_streams)
+    : max_streams_(max_streams),
+      id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
+
+absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow) {
+  const std::lock_guard lock(mutex_);
+  if (draining_) return DrainingError();
+  const StreamFlow* key = flow.get();
+  entries_[key].flow = std::move(flow);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> StreamRegistry::Open(const StreamFlow& flow,
+                                                 StreamDescription description) {
+  if (auto status = CheckName(description.name); !status.ok()) return status;
+  if (auto status = CheckLabels(description.labels); !status.ok()) return status;
+
+  const std::lock_guard lock(mutex_);
+  if (draining_) return DrainingError();
+  std::uint32_t open_streams = 0;
+  for (const auto& [key, entry] : entries_) {
+    if (!entry.stream) continue;
+    ++open_streams;
+    if (!description.name.empty() && entry.stream->description.name == description.name) {
+      return Refused(absl::StatusCode::kAlreadyExists, kReasonNameInUse, "open.stream_name",
+                     Quoted(description.name),
+                     "must not be the name of an open stream; choose another, or none");
+    }
+  }
+  if (open_streams >= max_streams_) {
+    return Refused(absl::StatusCode::kResourceExhausted, kReasonTooManyStreams, "streams",
+                   absl::StrCat(open_streams, " open"),
+                   absl::StrCat("must be at most ", max_streams_,
+                                "; try again when one has ended, or start the server with a larger "
+                                "--max-streams"));
+  }
+  Entry& entry = entries_.at(&flow);
+  entry.stream.emplace();
+  entry.stream->number = ++opened_;
+  entry.stream->id = absl::StrCat(id_prefix_, entry.stream->number);
+  entry.stream->opened = std::chrono::steady_clock::now();
+  entry.stream->description = std::move(description);
+  if (entry.stream->description.name.empty()) {
+    entry.stream->description.name = absl::StrCat("stream-", entry.stream->id);
+  }
+  return entry.stream->id;
+}
+
+std::optional<StreamSummary> StreamRegistry::Leave(const StreamFlow& flow) {
+  std::optional<StreamSummary> summary;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = entries_.find(&flow);
+    if (found == entries_.end()) return std::nullopt;
+    summary = std::move(found->second.stream);
+    entries_.erase(found);
+  }
+  left_.notify_all();
+  if (summary) summary->counts = flow.counts();
+  return summary;
+}
+
+std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count) const {
+  std::vector<StreamSummary> summaries;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [flow, entry] : entries_) {
+    if (!entry.stream || entry.stream->number <= after) continue;
+    summaries.push_back(*entry.stream);
+    summaries.back().counts = flow->counts();
+  }
+  std::sort(summaries.begin(), summaries.end(),
+            [](const auto& a, const auto& b) { return a.number < b.number; });
+  if (summaries.size() > count) summaries.resize(count);
+  return summaries;
+}
+
+std::size_t StreamRegistry::OpenCount() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(
+      std::count_if(entries_.begin(), entries_.end(),
+                    [](const auto& item) { return item.second.stream.has_value(); }));
+}
+
+void StreamRegistry::Drain() {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+    for (const auto& [key, entry] : entries_) flows.push_back(entry.flow);
+  }
+  // Without the lock: a flow that drains may leave at once.
+  for (const auto& flow : flows) flow->Drain();
+}
+
+bool StreamRegistry::draining() const {
+  const std::lock_guard lock(mutex_);
+  return draining_;
+}
+
+bool StreamRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return left_.wait_until(lock, deadline, [this] { return entries_.empty(); });
+}
+
+}  // namespace partiemc::server

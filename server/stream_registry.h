@@ -1,0 +1,84 @@
+// The streams of this server: who may come in, who is there, and how all are sent home.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/parameters.h"
+#include "server/stream_flow.h"
+
+namespace partiemc::server {
+
+/// The reasons for which a stream is not opened, beside those of the core (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonName = "NAME";
+inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
+inline constexpr std::string_view kReasonLabels = "LABELS";
+inline constexpr std::string_view kReasonTooManyStreams = "TOO_MANY_STREAMS";
+
+struct StreamDescription {
+  std::string name;  ///< Empty: the registry makes one up.
+  std::map<std::string, std::string> labels;
+  ReconstructionParameters parameters;  ///< As resolved.
+};
+
+struct StreamSummary {
+  std::string id;
+  std::uint64_t number = 0;  ///< 1 for the first stream that was opened, then one more each.
+  StreamDescription description;
+  StreamCounts counts;
+  std::chrono::steady_clock::time_point opened;
+};
+
+/// Safe from any thread.
+class StreamRegistry {
+ public:
+  explicit StreamRegistry(std::uint32_t max_streams);
+
+  /// A flow comes in, not open yet. Errors: UNAVAILABLE (DRAINING).
+  absl::Status Enter(std::shared_ptr<StreamFlow> flow);
+
+  /// Opens the stream of a flow that has entered and gives its id.
+  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS), ALREADY_EXISTS (NAME_IN_USE),
+  /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS), UNAVAILABLE (DRAINING).
+  absl::StatusOr<std::string> Open(const StreamFlow& flow, StreamDescription description);
+
+  /// The flow has gone, and its name with it. What it was, if it had been opened.
+  std::optional<StreamSummary> Leave(const StreamFlow& flow);
+
+  /// The open streams in the order of their numbers: at most `count`, with numbers above `after`.
+  std::vector<StreamSummary> List(std::uint64_t after, std::size_t count) const;
+  std::size_t OpenCount() const;
+
+  /// Lets nobody in any more and drains every flow.
+  void Drain();
+  bool draining() const;
+  /// Whether all flows have left before the deadline.
+  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
+
+ private:
+  struct Entry {
+    std::shared_ptr<StreamFlow> flow;
+    std::optional<StreamSummary> stream;  // Once open; its counts are asked of the flow.
+  };
+
+  const std::uint32_t max_streams_;
+  const std::string id_prefix_;  // Tells the ids of one run of a server from those of another.
+
+  mutable std::mutex mutex_;  // Guards everything below.
+  std::condition_variable left_;
+  std::map<const StreamFlow*, Entry> entries_;
+  std::uint64_t opened_ = 0;
+  bool draining_ = false;
+};
+
+}  // namespace partiemc::server
