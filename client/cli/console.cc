@@ -1,0 +1,62 @@
+#include "cli/console.h"
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+
+namespace partiemc::client {
+namespace {
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler writes it");
+
+void OnSignal(int) { interrupted = true; }
+
+}  // namespace
+
+std::string OneLine(std::string_view text) {
+  std::string line;
+  for (const char c : text) {
+    if (c == '\n') {
+      line += "\\n";
+    } else {
+      line += c == '\r' || c == '\t' ? ' ' : c;
+    }
+  }
+  return line;
+}
+
+std::string OneLine(const absl::Status& status) {
+  return OneLine(std::string_view(status.message().data(), status.message().size()));
+}
+
+int Complain(ExitCode code, std::string_view message) {
+  const std::string line = "partiemc: " + OneLine(message) + "\n";
+  std::fwrite(line.data(), 1, line.size(), stderr);
+  return code;
+}
+
+int Complain(ExitCode code, const absl::Status& status) { return Complain(code, OneLine(status)); }
+
+std::string AsFlag(const absl::Status& status) {
+  std::string line = OneLine(status);
+  constexpr std::string_view kPrefix = "parameters.";
+  if (!line.starts_with(kPrefix)) return line;
+  line.replace(0, kPrefix.size(), "--");
+  for (std::size_t k = 0; k < line.size() && line[k] != ':'; ++k) {
+    if (line[k] == '_') line[k] = '-';
+  }
+  return line;
+}
+
+void CatchInterrupts() {
+  struct sigaction action = {};
+  action.sa_handler = OnSignal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+bool Interrupted() { return interrupted; }
+
+}  // namespace partiemc::client

@@ -1,0 +1,28 @@
+// What the command line says, and how it is interrupted.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "cli/exit_code.h"
+
+namespace partiemc::client {
+
+/// Prints "partiemc: MESSAGE" as one line on standard error and returns `code`.
+int Complain(ExitCode code, std::string_view message);
+int Complain(ExitCode code, const absl::Status& status);
+
+/// One line for a status: line breaks in names become \n.
+std::string OneLine(std::string_view text);
+std::string OneLine(const absl::Status& status);
+
+/// A field of ReconstructionParameters in a message becomes the flag that a person gave:
+/// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...".
+std::string AsFlag(const absl::Status& status);
+
+/// From here on SIGINT and SIGTERM only set a flag, the second one ends the program at once.
+void CatchInterrupts();
+bool Interrupted();
+
+}  // namespace partiemc::client

@@ -1,0 +1,126 @@
+#include "cli/convert.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "cli/console.h"
+#include "cli/input_source.h"
+#include "cli/replay_flags.h"
+#include "output/progress.h"
+#include "output/text.h"
+#include "recording/recording.h"
+
+namespace partiemc::client {
+namespace {
+
+// Copies all frames; what ends it early is told.
+ExitCode CopyFrames(Sequence& input, RecordingWriter& writer, Progress& progress) {
+  RecordedFrame frame;
+  while (!Interrupted()) {
+    const auto more = input.Next(frame);
+    if (!more.ok()) {
+      progress.Note("partiemc: " + OneLine(more.status()));
+      return kInput;
+    }
+    if (!*more) return kGood;
+    const absl::Status added = writer.Add(frame);
+    if (!added.ok()) {
+      progress.Note("partiemc: " + OneLine(added));
+      return added.code() == absl::StatusCode::kInvalidArgument ? kInput : kFailed;
+    }
+    progress.Update(writer.frame_count());
+  }
+  progress.Note("partiemc: interrupted; nothing was written");
+  return kInterrupted;
+}
+
+}  // namespace
+
+CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
+  CLI::App* verb = app.add_subcommand("convert", "Turn any input into a recording (.pemc)");
+  verb->add_option("INPUT", flags.input, "File, directory or quoted pattern of particle frames")
+      ->type_name("")
+      ->required();
+  verb->add_option("OUTPUT", flags.output, "Recording to write: FILE.pemc")
+      ->type_name("")
+      ->required();
+  verb->add_option("--select", flags.sequence.select,
+                   "Keep the particles with COLUMN=VALUE: type=1")
+      ->type_name("COLUMN=VALUE")
+      ->allow_extra_args(false);
+  verb->add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
+      ->type_name("NAMES");
+  verb->add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
+      ->type_name("FILE");
+  verb->add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
+      ->type_name("A:B");
+  verb->add_option("--spacing", flags.spacing,
+                   "Particle spacing in world units, kept in the recording for replay")
+      ->type_name("S");
+  verb->add_option("--title", flags.title, "A few words on what this is, kept in the recording")
+      ->type_name("TEXT");
+  verb->add_flag("--float64", flags.float64, "Positions as float64 instead of float32");
+  verb->add_option("--compression-level", flags.compression_level, "1 (fast) to 19 (small)")
+      ->check(CLI::Range(1, 19))
+      ->capture_default_str();
+  verb->add_flag("--quiet", flags.quiet, "No progress");
+  verb->footer(
+      "Examples:\n"
+      "  partiemc convert frames/ dam_break.pemc --spacing 0.0303\n"
+      "  partiemc convert drum.lammpstrj.gz drum.pemc --select type=1 --frames 0:100\n"
+      "A recording holds time, position, id, volume and velocity of the particles, compressed;\n"
+      "if it is cut off, only its last frames are lost.");
+  verb->parse_complete_callback([&flags] {
+    if (!std::string_view(flags.output).ends_with(".pemc")) {
+      throw CLI::ValidationError(
+          Concat("OUTPUT: '", flags.output, "'; must end in .pemc, the recording's own format"));
+    }
+    if (!flags.spacing.empty() && !PositiveNumber(flags.spacing)) {
+      throw CLI::ValidationError(
+          Concat("--spacing: '", flags.spacing, "'; must be a positive length"));
+    }
+  });
+  return verb;
+}
+
+int Convert(const ConvertFlags& flags) {
+  const auto input = OpenInput(flags.input, flags.sequence);
+  if (!input.ok()) {
+    const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kInput, input.status());
+  }
+  const auto writer = RecordingWriter::Create(
+      flags.output,
+      {.spacing = flags.spacing.empty() ? input->spacing : PositiveNumber(flags.spacing),
+       .title = flags.title.empty() ? BaseName(flags.input) : flags.title},
+      {.float64 = flags.float64, .compression_level = flags.compression_level});
+  if (!writer.ok()) return Complain(kFailed, writer.status());
+
+  CatchInterrupts();
+  Progress::Options progress_options = Progress::ForStandardError();
+  progress_options.quiet = flags.quiet;
+  progress_options.total = input->frames->FrameCount();
+  Progress progress(std::move(progress_options));
+  const ExitCode ended = CopyFrames(*input->frames, **writer, progress);
+  progress.Finish();
+  for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
+  if (ended != kGood) return ended;
+  if ((*writer)->frame_count() == 0) {
+    return Complain(kInput, Concat(flags.input, ": has no frame to convert; look at --frames"));
+  }
+  const absl::Status finished = (*writer)->Finish();
+  if (!finished.ok()) return Complain(kFailed, finished);
+  if (!flags.quiet) {
+    std::error_code unknown;
+    const auto bytes = std::filesystem::file_size(flags.output, unknown);
+    std::fputs(Concat(flags.output, ": ", (*writer)->frame_count(), " frames, ",
+                      unknown ? 0 : bytes, " bytes\n")
+                   .c_str(),
+               stdout);
+  }
+  return kGood;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,27 @@
+// `partiemc convert`: any input as a recording of our own.
+#pragma once
+
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "client/input/sequence.h"
+
+namespace partiemc::client {
+
+struct ConvertFlags {
+  std::string input;
+  std::string output;
+  SequenceOptions sequence;
+  std::string spacing;  ///< World units; empty: what the input knows.
+  std::string title;    ///< Empty: the input's name.
+  bool float64 = false;
+  int compression_level = 3;
+  bool quiet = false;
+};
+
+CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags);
+
+/// Returns the exit code.
+int Convert(const ConvertFlags& flags);
+
+}  // namespace partiemc::client

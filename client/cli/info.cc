@@ -1,0 +1,127 @@
+#include "cli/info.h"
+
+#include <chrono>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+#include "cli/console.h"
+#include "output/text.h"
+
+namespace partiemc::client {
+namespace {
+
+std::string JsonString(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      AppendAll(out, '\\', c);
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      constexpr std::string_view kDigits = "0123456789abcdef";
+      AppendAll(out, "\\u00", kDigits[static_cast<std::size_t>(c >> 4)],
+                kDigits[static_cast<std::size_t>(c & 15)]);
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+std::vector<std::string> NamesOf(const auto& values) {
+  std::vector<std::string> names;
+  for (const auto value : values) names.emplace_back(Name(value));
+  return names;
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  if (words.empty()) return "none";
+  std::string line;
+  for (const std::string& word : words) AppendAll(line, line.empty() ? "" : ", ", OneLine(word));
+  return line;
+}
+
+std::string JsonArray(const std::vector<std::string>& words) {
+  std::string array = "[";
+  for (const std::string& word : words) {
+    AppendAll(array, array.size() == 1 ? "" : ",", JsonString(word));
+  }
+  return array + "]";
+}
+
+}  // namespace
+
+std::string InfoText(const ServerInfo& info, const std::string& address) {
+  const std::vector<std::pair<std::string_view, std::string>> lines = {
+      {"server", address},
+      {"version", OneLine(info.version)},
+      {"method version", Concat(info.method_version)},
+      {"state", info.draining ? "draining: takes no new streams" : "serving"},
+      {"streams", Concat(info.open_streams, " open, at most ", info.max_streams)},
+      {"frames in flight", Concat(info.frames_in_flight, " per stream")},
+      {"compute threads", Concat(info.compute_threads)},
+      {"particles", Concat("at most ", info.limits.max_particles_per_frame, " per frame")},
+      {"bytes", Concat("at most ", info.limits.max_frame_bytes, " per frame")},
+      {"tiles", Concat("at most ", info.limits.max_tiles_per_frame, " per frame")},
+      {"watchers", Concat("at most ", info.max_watchers)},
+      {"idle timeout",
+       info.idle_timeout_seconds == 0 ? "none" : Concat(info.idle_timeout_seconds, " s")},
+      {"placements", Joined(NamesOf(info.placements))},
+      {"fills", Joined(NamesOf(info.fills))},
+      {"capabilities", Joined(info.capabilities)},
+  };
+  constexpr std::size_t kColumn = 18;  // The longest name and two blanks.
+  std::string text;
+  for (const auto& [name, value] : lines) {
+    AppendAll(text, name, std::string(kColumn - name.size(), ' '), value, "\n");
+  }
+  return text;
+}
+
+std::string InfoJson(const ServerInfo& info, const std::string& address) {
+  return Concat("{\"server\":", JsonString(address), ",\"version\":", JsonString(info.version),
+                ",\"method_version\":", info.method_version,
+                ",\"draining\":", info.draining ? "true" : "false",
+                ",\"open_streams\":", info.open_streams, ",\"max_streams\":", info.max_streams,
+                ",\"frames_in_flight\":", info.frames_in_flight,
+                ",\"compute_threads\":", info.compute_threads,
+                ",\"max_particles_per_frame\":", info.limits.max_particles_per_frame,
+                ",\"max_frame_bytes\":", info.limits.max_frame_bytes,
+                ",\"max_tiles_per_frame\":", info.limits.max_tiles_per_frame,
+                ",\"max_watchers\":", info.max_watchers,
+                ",\"idle_timeout_seconds\":", info.idle_timeout_seconds,
+                ",\"placements\":", JsonArray(NamesOf(info.placements)),
+                ",\"fills\":", JsonArray(NamesOf(info.fills)),
+                ",\"capabilities\":", JsonArray(info.capabilities), "}\n");
+}
+
+CLI::App* AddInfo(CLI::App& app, InfoFlags& flags) {
+  CLI::App* verb = app.add_subcommand("info", "Ask a server for its version and limits");
+  verb->add_option("--server", flags.server, "Server: HOST:PORT or unix:PATH")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  verb->add_option("--deadline", flags.deadline_seconds, "Seconds that the answer may take")
+      ->check(CLI::Range(0.001, 86400.0))
+      ->capture_default_str();
+  verb->add_flag("--json", flags.json, "One JSON object on one line");
+  verb->footer(
+      "Examples:\n"
+      "  partiemc info --server 127.0.0.1:50051\n"
+      "  partiemc info --server unix:/run/partiemc.sock --json");
+  return verb;
+}
+
+int Info(const InfoFlags& flags) {
+  const auto info =
+      GetServerInfo(flags.server, std::chrono::duration_cast<std::chrono::milliseconds>(
+                                      std::chrono::duration<double>(flags.deadline_seconds)));
+  if (!info.ok()) {
+    const bool wrong_flag = info.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kServer, info.status());
+  }
+  const std::string text =
+      flags.json ? InfoJson(*info, flags.server) : InfoText(*info, flags.server);
+  std::fputs(text.c_str(), stdout);
+  return kGood;
+}
+
+}  // namespace partiemc::client

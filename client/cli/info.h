@@ -1,0 +1,28 @@
+// `partiemc info`: what a server is and what it allows.
+#pragma once
+
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "partiemc/client/server_info.h"
+
+namespace partiemc::client {
+
+struct InfoFlags {
+  std::string server = "127.0.0.1:50051";
+  double deadline_seconds = 5;
+  bool json = false;
+};
+
+CLI::App* AddInfo(CLI::App& app, InfoFlags& flags);
+
+/// Returns the exit code.
+int Info(const InfoFlags& flags);
+
+/// Aligned lines for a person; every line ends in '\n'.
+std::string InfoText(const ServerInfo& info, const std::string& address);
+
+/// One JSON object on one line.
+std::string InfoJson(const ServerInfo& info, const std::string& address);
+
+}  // namespace partiemc::client

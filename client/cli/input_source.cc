@@ -1,0 +1,39 @@
+#include "cli/input_source.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "recording/recording.h"
+
+namespace partiemc::client {
+
+absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options) {
+  if (!IsRecording(input)) {
+    auto sequence = Sequence::Open(input, options);
+    if (!sequence.ok()) return sequence.status();
+    return InputSource{.frames = *std::move(sequence)};
+  }
+  const char* refused = !options.select.empty()    ? "--select"
+                        : !options.columns.empty() ? "--columns"
+                        : !options.times.empty()   ? "--times"
+                                                   : nullptr;
+  if (refused != nullptr) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(refused, ": ", input,
+                     " is a recording, which has no columns and knows its times; leave it out, or "
+                     "give it to `partiemc convert` with the original"));
+  }
+  auto reader = RecordingReader::Open(input, options.frames);
+  if (!reader.ok()) return reader.status();
+  const auto spacing = (*reader)->header().spacing;
+  return InputSource{.frames = *std::move(reader), .spacing = spacing};
+}
+
+std::string BaseName(const std::string& path) {
+  std::filesystem::path name = std::filesystem::path(path).lexically_normal();
+  if (!name.has_filename()) name = name.parent_path();  // "folder/"
+  return name.filename().string();
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,24 @@
+// An input as a person names it: a recording of our own, or anything else that Sequence reads.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/input/sequence.h"
+
+namespace partiemc::client {
+
+struct InputSource {
+  std::unique_ptr<Sequence> frames;
+  std::optional<double> spacing = {};  ///< World units, where the recording knows it.
+};
+
+/// Errors: those of Sequence::Open.
+absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
+
+/// The last part of a path: "dam_break.pemc" of "client/recordings/dam_break.pemc".
+std::string BaseName(const std::string& path);
+
+}  // namespace partiemc::client

@@ -1,0 +1,45 @@
+// `partiemc`: the command line. Only wires flags to verbs.
+#include "CLI/CLI.hpp"
+#include "cli/console.h"
+#include "cli/convert.h"
+#include "cli/info.h"
+#include "cli/replay.h"
+
+namespace {
+
+using partiemc::client::Complain;
+
+// A wrong flag: what is wrong, and where the right ones are told.
+int ComplainUsage(const CLI::App& app, const CLI::ParseError& error) {
+  std::string help = "partiemc";
+  for (const CLI::App* verb : app.get_subcommands()) help += " " + verb->get_name();
+  return Complain(partiemc::client::kUsage,
+                  std::string(error.what()) + "; see `" + help + " --help`");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Outlines and meshes of streamed particle frames (SPH, granular), stable over time.",
+               "partiemc");
+  app.set_version_flag("--version", "partiemc " PARTIEMC_VERSION);
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(32);
+  app.footer("`partiemc VERB --help` tells more and has examples.");
+  partiemc::client::ReplayFlags replay;
+  partiemc::client::InfoFlags info;
+  partiemc::client::ConvertFlags convert;
+  const CLI::App* replay_verb = AddReplay(app, replay);
+  const CLI::App* info_verb = AddInfo(app, info);
+  AddConvert(app, convert);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return ComplainUsage(app, error);
+  }
+  if (replay_verb->parsed()) return Replay(replay);
+  if (info_verb->parsed()) return Info(info);
+  return Convert(convert);
+}

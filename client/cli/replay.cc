@@ -1,0 +1,344 @@
+#include "cli/replay.h"
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "cli/console.h"
+#include "cli/frame_feeder.h"
+#include "cli/input_source.h"
+#include "cli/replay_flags.h"
+#include "cli/replay_outputs.h"
+#include "output/progress.h"
+#include "output/text.h"
+#include "partiemc/client/local_stream.h"
+#include "partiemc/client/stream.h"
+#include "partiemc/validate.h"
+
+namespace partiemc::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// How soon Ctrl-C is seen while no answer comes.
+constexpr std::chrono::milliseconds kPollInterval(100);
+
+std::string Plural(std::uint64_t count, std::string_view noun) {
+  return Concat(count, " ", noun, count == 1 ? "" : "s");
+}
+
+absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags,
+                                                        const ReconstructionParameters& parameters,
+                                                        bool normals) {
+  if (flags.local) {
+    auto stream = LocalStream::Open({.parameters = parameters, .threads = flags.threads});
+    if (!stream.ok()) return stream.status();
+    return *std::move(stream);
+  }
+  const auto deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::duration<double>(flags.deadline_seconds));
+  auto stream = Stream::Open(
+      flags.server, {.parameters = parameters,
+                     .outputs = {.mesh = parameters.fill != Fill::kNone, .normals = normals},
+                     .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
+                     .deadline = deadline});
+  if (!stream.ok()) return stream.status();
+  return *std::move(stream);
+}
+
+// The receiving half of a replay: answers -> check -> outputs, until the stream ends.
+class Receiver {
+ public:
+  Receiver(const ReplayFlags& flags, FrameStream& stream, FrameFeeder& feeder,
+           ReplayOutputs& outputs, Progress& progress)
+      : flags_(flags), stream_(stream), feeder_(feeder), outputs_(outputs), progress_(progress) {}
+
+  /// kGood when every frame was answered, else the code of what ended the replay, which is told.
+  ExitCode Run() {
+    while (!Interrupted()) {
+      const auto received = stream_.Receive(event_, kPollInterval);
+      for (const auto& refused : feeder_.TakeRefused()) Refuse(refused.source, refused.message);
+      if (!received.ok()) {
+        progress_.Note("partiemc: " + OneLine(received.status()));
+        return kServer;
+      }
+      if (*received == Received::kEnd) return kGood;
+      if (*received == Received::kNothingYet) continue;
+      const absl::Status status = Take();
+      if (!status.ok()) {
+        progress_.Note("partiemc: " + OneLine(status));
+        return kFailed;
+      }
+    }
+    return kInterrupted;
+  }
+
+  std::uint64_t failed_checks() const { return failed_checks_; }
+
+ private:
+  absl::Status Take() {
+    if (event_.kind == Event::Kind::kNotice) {
+      progress_.Note("partiemc: the server says: " + OneLine(event_.message));
+      return absl::OkStatus();
+    }
+    std::unique_ptr<RecordedFrame> frame = feeder_.TakeAnswered();
+    absl::Status status;
+    if (event_.kind == Event::Kind::kRefusal) {
+      Refuse(frame->source, event_.message);
+    } else {
+      if (flags_.check) Check(frame->source);
+      status = outputs_.Write({.index = frame->index,
+                               .time = event_.time,
+                               .result = event_.frame.result,
+                               .particles = frame->positions,
+                               .stages_ms = event_.frame.times.stages_ms,
+                               .total_ms = event_.frame.times.total_ms,
+                               .rings_digest = event_.frame.rings_digest,
+                               .mesh_digest = event_.frame.mesh_digest});
+    }
+    feeder_.Recycle(std::move(frame));
+    progress_.Update(++answered_);
+    return status;
+  }
+
+  void Check(const std::string& source) {
+    const absl::Status valid = Validate(event_.frame.result);
+    if (valid.ok()) return;
+    ++failed_checks_;
+    progress_.Note(Concat("partiemc: ", source, ": --check: ", OneLine(valid)));
+  }
+
+  void Refuse(const std::string& source, const std::string& message) {
+    outputs_.AddRefused();
+    progress_.Note(Concat("partiemc: ", OneLine(source), ": frame refused: ", OneLine(message)));
+  }
+
+  const ReplayFlags& flags_;
+  FrameStream& stream_;
+  FrameFeeder& feeder_;
+  ReplayOutputs& outputs_;
+  Progress& progress_;
+  Event event_;
+  std::uint64_t answered_ = 0, failed_checks_ = 0;
+};
+
+// Prints what is worth a word once all frames are through, and decides how the program ends.
+ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& parameters,
+                  const ReplayOutputs& outputs, std::uint64_t failed_checks) {
+  const Summary& summary = outputs.summary();
+  ExitCode code = kGood;
+  if (summary.refused_count() > 0 && !flags.keep_going) {
+    Complain(kInput, Concat(Plural(summary.refused_count(), "frame"),
+                            " refused, as told above; --keep-going takes that as good"));
+    code = kInput;
+  }
+  if (failed_checks > 0) {
+    // farthest-particle breaks guarantees by its nature: counted and told, never fatal.
+    const bool expected = parameters.placement == Placement::kFarthestParticle;
+    Complain(kFailed,
+             Concat("--check: ", Plural(failed_checks, "frame"), " of ", summary.frame_count(),
+                    " broke a guarantee", expected ? ", as farthest-particle may" : ""));
+    if (!expected) code = kFailed;
+  }
+  return code;
+}
+
+absl::Status CheckCombinations(const CLI::App& app) {
+  if (app.count("--threads") > 0 && app.count("--local") == 0) {
+    return absl::InvalidArgumentError("--threads: goes with --local; a server has its own");
+  }
+  if (app.count("--format") > 0 && app.count("--output-dir") == 0) {
+    return absl::InvalidArgumentError("--format: goes with --output-dir, the place of the files");
+  }
+  return absl::OkStatus();
+}
+
+void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
+  constexpr const char* kGroup = "Input";
+  app.add_option("INPUT", flags.input,
+                 "Recording (.pemc), file, directory or quoted pattern of particle frames")
+      ->type_name("")
+      ->required();
+  app.add_option("--select", flags.sequence.select, "Keep the particles with COLUMN=VALUE: type=1")
+      ->type_name("COLUMN=VALUE")
+      ->allow_extra_args(false)
+      ->group(kGroup);
+  app.add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
+      ->type_name("NAMES")
+      ->group(kGroup);
+  app.add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
+      ->type_name("FILE")
+      ->group(kGroup);
+  app.add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
+      ->type_name("A:B")
+      ->group(kGroup);
+  app.add_option("--rate", flags.rate, "Frames per second to send at, or max")
+      ->type_name("FPS")
+      ->capture_default_str()
+      ->group(kGroup);
+}
+
+void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
+  constexpr const char* kGroup = "Where";
+  CLI::Option* server = app.add_option("--server", flags.server, "Server: HOST:PORT or unix:PATH")
+                            ->type_name("ADDRESS")
+                            ->capture_default_str()
+                            ->group(kGroup);
+  app.add_flag("--local", flags.local, "Reconstruct in this process, without a server")
+      ->excludes(server)
+      ->group(kGroup);
+  app.add_option("--threads", flags.threads, "Threads with --local; all processors by default")
+      ->check(CLI::Range(1, 1024))
+      ->group(kGroup);
+  app.add_option("--deadline", flags.deadline_seconds, "Seconds that an answer may take")
+      ->check(CLI::Range(0.001, 86400.0))
+      ->capture_default_str()
+      ->group(kGroup);
+}
+
+void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
+  constexpr const char* kGroup = "Method (lengths in spacings)";
+  app.add_option("--placement", flags.placement,
+                 "marching-squares, qef, farthest-particle or virtual-plane")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--fill", flags.fill, "greedy, conforming, polygon, grid or none")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--spacing", flags.spacing,
+                 "Particle spacing in world units, first-frame or every-frame (estimated); by "
+                 "default what the recording knows, else first-frame")
+      ->type_name("S|RULE")
+      ->group(kGroup);
+  app.add_option("--kernel-radius", flags.kernel_radius, "Kernel radius")
+      ->type_name("R")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--cell-size", flags.cell_size, "Spacing of the lattice")
+      ->type_name("C")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--reference-radius", flags.reference_radius,
+                 "Reference radius of the level set; calibrated by default")
+      ->type_name("A")
+      ->group(kGroup);
+  app.add_option("--surface-offset", flags.surface_offset,
+                 "farthest-particle: move the outline outward")
+      ->type_name("D")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_flag("--no-normal-memory", flags.no_normal_memory,
+               "Orient normals without those of the frame before")
+      ->group(kGroup);
+  app.add_option("--clean", flags.clean,
+                 "Drop tiny holes and components without a particle: on, off or auto")
+      ->type_name("WHEN")
+      ->capture_default_str()
+      ->group(kGroup);
+}
+
+void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
+  constexpr const char* kGroup = "Output";
+  std::string formats;
+  for (const FrameFormat format : AllFrameFormats()) {
+    AppendAll(formats, formats.empty() ? "" : ",", Name(format));
+  }
+  app.add_option("--output-dir", flags.output_dir, "Write DIR/frame_000000.EXT for every frame")
+      ->type_name("DIR")
+      ->group(kGroup);
+  app.add_option("--format", flags.format, "Of these files, a list of " + formats)
+      ->type_name("LIST")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
+      ->type_name("FILE")
+      ->group(kGroup);
+  app.add_option("--report", flags.report, "One HTML page to look at, frame by frame")
+      ->type_name("FILE.html")
+      ->group(kGroup);
+  app.add_flag("--check", flags.check, "Check every guarantee of every result")->group(kGroup);
+  app.add_flag("--keep-going", flags.keep_going, "End well although frames were refused")
+      ->group(kGroup);
+  app.add_flag("--quiet", flags.quiet, "No progress and no table")->group(kGroup);
+}
+
+}  // namespace
+
+CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
+  CLI::App* verb = app.add_subcommand(
+      "replay", "Reconstruct a recorded sequence through a server, or in this process");
+  AddInputFlags(*verb, flags);
+  AddPlaceFlags(*verb, flags);
+  AddMethodFlags(*verb, flags);
+  AddOutputFlags(*verb, flags);
+  verb->footer(
+      "Examples:\n"
+      "  partiemc replay dam_break.pemc --local --report dam_break.html\n"
+      "  partiemc replay frames/ --server 127.0.0.1:50051 --spacing 0.0303 "
+      "--output-dir out --format geojson,svg\n"
+      "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
+      "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
+      "--rate 25\n"
+      "Exit codes: 0 good, 1 failed, 2 wrong usage, 3 input, 4 server, 130 interrupted.");
+  verb->parse_complete_callback([verb] {
+    const absl::Status status = CheckCombinations(*verb);
+    if (!status.ok()) throw CLI::ValidationError(OneLine(status), CLI::ExitCodes::ValidationError);
+  });
+  return verb;
+}
+
+int Replay(const ReplayFlags& flags) {
+  const auto rate = RateOf(flags.rate);
+  if (!rate.ok()) return Complain(kUsage, rate.status());
+  const auto without_input = ParametersOf(flags, std::nullopt);
+  if (!without_input.ok()) return Complain(kUsage, without_input.status());
+
+  const auto input = OpenInput(flags.input, flags.sequence);
+  if (!input.ok()) {
+    const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kInput, input.status());
+  }
+  const auto parameters = ParametersOf(flags, input->spacing);
+  if (!parameters.ok()) return Complain(kInput, parameters.status());
+  auto outputs = ReplayOutputs::Create(flags, *parameters);
+  if (!outputs.ok()) {
+    const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
+  }
+  const auto stream = OpenStream(flags, *parameters, outputs->WantsNormals());
+  if (!stream.ok()) return Complain(kServer, stream.status());
+
+  CatchInterrupts();
+  Progress::Options progress_options = Progress::ForStandardError();
+  progress_options.quiet = flags.quiet;
+  progress_options.total = input->frames->FrameCount();
+  Progress progress(std::move(progress_options));
+  const Clock::time_point start = Clock::now();
+  FrameFeeder feeder(*input->frames, **stream, *rate);
+  Receiver receiver(flags, **stream, feeder, *outputs, progress);
+  const ExitCode ended = receiver.Run();
+  if (ended != kGood) feeder.Stop();
+  const absl::Status input_status = feeder.Join();
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  progress.Finish();
+
+  for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
+  if (ended == kInterrupted) {
+    return Complain(kInterrupted, Concat("interrupted after ",
+                                         Plural(outputs->summary().frame_count(), "frame")));
+  }
+  if (ended != kGood) return ended;
+  if (!input_status.ok()) return Complain(kInput, input_status);
+  if (outputs->summary().frame_count() + outputs->summary().refused_count() == 0) {
+    return Complain(kInput, Concat(flags.input, ": has no frame to replay; look at --frames"));
+  }
+  const absl::Status finished = outputs->Finish(seconds);
+  if (!finished.ok()) return Complain(kFailed, finished);
+  if (!flags.quiet) std::fputs(outputs->summary().Table(seconds).c_str(), stdout);
+  return Conclude(flags, *parameters, *outputs, receiver.failed_checks());
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,45 @@
+// Everything that a replay leaves behind: frames, statistics, report, and the numbers of its table.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "cli/replay.h"
+#include "output/frame_record.h"
+#include "output/frame_writer.h"
+#include "output/report.h"
+#include "output/statistics_writer.h"
+#include "output/summary.h"
+#include "partiemc/client/frame_stream.h"
+
+namespace partiemc::client {
+
+class ReplayOutputs {
+ public:
+  /// Opens every output, so that a place that cannot be written is known before the work.
+  /// Errors: INVALID_ARGUMENT for a wrong format or extension, those of AtomicFile.
+  static absl::StatusOr<ReplayOutputs> Create(const ReplayFlags& flags,
+                                              const ReconstructionParameters& parameters);
+
+  /// Whether an output shows the normals of the vertices.
+  bool WantsNormals() const;
+
+  absl::Status Write(const FrameRecord& frame);
+  void AddRefused() { summary_.AddRefused(); }
+
+  /// Completes statistics and report, which do not exist before.
+  absl::Status Finish(double wall_seconds);
+
+  const Summary& summary() const { return summary_; }
+
+ private:
+  std::optional<FrameWriter> frames_;
+  bool frames_show_normals_ = false;
+  std::optional<StatisticsWriter> statistics_;
+  std::optional<ReportWriter> report_;
+  Summary summary_;
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,234 @@
+#include "evaluation/sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+namespace partiemc::evaluation {
+namespace {
+
+constexpr double kJitter = 0.15;
+constexpr double kInset = 0.5;
+
+// Darts: 0.83 would be the most that fits on average.
+constexpr double kDartDistance = 0.75;
+constexpr int kDartAttempts = 200;  // For each dart, before the distance shrinks.
+constexpr double kDartShrink = 0.97;
+
+// Centroids are those of a raster with 25 points for each particle.
+constexpr double kRasterStep = 0.2;
+constexpr int kRelaxationRounds = 30;
+
+struct Box {
+  Point low, high;
+};
+
+Box BoxOf(const Outline& region) {
+  Box box{region.points[0], region.points[0]};
+  for (const Point& p : region.points) {
+    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y)};
+    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y)};
+  }
+  return box;
+}
+
+// Raster points inside the region, row by row: between the crossings of each row with the outline.
+std::vector<Point> Raster(const Outline& region, double step, Point offset) {
+  const Box box = BoxOf(region);
+  const double first_row = std::floor(box.low.y / step) * step + offset.y;
+  const std::size_t rows = static_cast<std::size_t>((box.high.y - first_row) / step) + 1;
+  std::vector<std::vector<double>> crossings(rows);
+  for (std::size_t k = 0; k < region.LoopCount(); ++k) {
+    const auto loop = region.Loop(k);
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Point a = loop[i];
+      const Point b = loop[(i + 1) % loop.size()];
+      const auto [bottom, top] = std::minmax(a.y, b.y);
+      const double from = std::max(0.0, std::floor((bottom - first_row) / step));
+      for (double row = from; row < static_cast<double>(rows); ++row) {
+        const double y = first_row + row * step;
+        if (y >= top) break;
+        if (y < bottom) continue;
+        crossings[static_cast<std::size_t>(row)].push_back(a.x +
+                                                           (y - a.y) / (b.y - a.y) * (b.x - a.x));
+      }
+    }
+  }
+  std::vector<Point> points;
+  for (std::size_t row = 0; row < rows; ++row) {
+    std::vector<double>& x = crossings[row];
+    std::sort(x.begin(), x.end());
+    for (std::size_t k = 0; k + 1 < x.size(); k += 2) {
+      double column = std::ceil((x[k] - offset.x) / step);
+      for (; column * step + offset.x < x[k + 1]; ++column) {
+        points.push_back({column * step + offset.x, first_row + static_cast<double>(row) * step});
+      }
+    }
+  }
+  return points;
+}
+
+// Centres in square cells of width 1, for neighbours up to one cell away.
+class CenterGrid {
+ public:
+  explicit CenterGrid(const Box& box)
+      : low_(box.low),
+        columns_(static_cast<int>(box.high.x - box.low.x) + 1),
+        rows_(static_cast<int>(box.high.y - box.low.y) + 1),
+        cells_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
+
+  void Clear() {
+    for (auto& cell : cells_) cell.clear();
+  }
+
+  void Add(Point p, std::uint32_t k) {
+    cells_[static_cast<std::size_t>(Row(p)) * columns_ + Column(p)].push_back({p, k});
+  }
+
+  // The nearest centre among the cells up to `reach` away.
+  std::pair<double, std::uint32_t> Nearest(Point p, int reach) const {
+    double square = std::numeric_limits<double>::infinity();
+    std::uint32_t nearest = 0;
+    const int column = Column(p);
+    const int row = Row(p);
+    for (int r = std::max(0, row - reach); r <= std::min(rows_ - 1, row + reach); ++r) {
+      for (int c = std::max(0, column - reach); c <= std::min(columns_ - 1, column + reach); ++c) {
+        for (const auto& [center, k] : cells_[static_cast<std::size_t>(r) * columns_ + c]) {
+          const double candidate = Dot(center - p, center - p);
+          if (candidate < square) {
+            square = candidate;
+            nearest = k;
+          }
+        }
+      }
+    }
+    return {square, nearest};
+  }
+
+ private:
+  struct Member {
+    Point center;
+    std::uint32_t index;
+  };
+  int Column(Point p) const {
+    return std::clamp(static_cast<int>(p.x - low_.x), 0, columns_ - 1);
+  }
+  int Row(Point p) const { return std::clamp(static_cast<int>(p.y - low_.y), 0, rows_ - 1); }
+
+  Point low_;
+  int columns_, rows_;
+  std::vector<std::vector<Member>> cells_;
+};
+
+// Moves a centre to the inset. In tips that are too narrow a few rounds end near their axis.
+Point PushInside(const SegmentIndex& boundary, Point p) {
+  for (int round = 0; round < 3; ++round) {
+    const auto nearest = boundary.Find(p);
+    const bool inside = boundary.Contains(p);
+    if (inside && nearest.distance >= kInset) break;
+    const Point inward = -1.0 * boundary.OutwardNormal(nearest.segment);
+    // Beside a reentrant corner the way in is away from the corner, not along a side's normal.
+    const Point away = p - nearest.point;
+    p = inside && nearest.distance > 1e-6 ? nearest.point + (kInset / nearest.distance) * away
+                                          : nearest.point + kInset * inward;
+  }
+  return p;
+}
+
+}  // namespace
+
+std::string_view Name(Sampling sampling) {
+  switch (sampling) {
+    case Sampling::kLattice:
+      return "lattice";
+    case Sampling::kJittered:
+      return "jittered";
+    case Sampling::kRelaxed:
+      return "relaxed";
+    case Sampling::kRagged:
+      return "ragged";
+  }
+  return "";
+}
+
+std::vector<Point> ThrowDarts(const Outline& region, const SegmentIndex& boundary,
+                              const std::vector<Point>& others, std::size_t count, Random& random) {
+  const Box box = BoxOf(region);
+  CenterGrid grid(box);
+  for (const Point& p : others) grid.Add(p, 0);
+  double distance = kDartDistance;
+  std::vector<Point> darts;
+  for (int attempt = 0; darts.size() < count; ++attempt) {
+    if (attempt == kDartAttempts) {
+      distance *= kDartShrink;
+      attempt = 0;
+    }
+    const double x = random.Uniform(box.low.x, box.high.x);
+    const Point p = {x, random.Uniform(box.low.y, box.high.y)};
+    if (grid.Nearest(p, 1).first < distance * distance) continue;
+    if (boundary.SignedDistance(p) < kInset) {
+      --attempt;  // Says nothing about how full the region is.
+      continue;
+    }
+    grid.Add(p, 0);
+    darts.push_back(p);
+    attempt = 0;
+  }
+  return darts;
+}
+
+void Relax(const Outline& region, const SegmentIndex& boundary, int rounds,
+           std::vector<Point>& centers) {
+  const std::vector<Point> raster =
+      Raster(region, kRasterStep, {kRasterStep / 2, kRasterStep / 2});
+  CenterGrid grid(BoxOf(region));
+  std::vector<Point> sums(centers.size());
+  std::vector<double> counts(centers.size());
+  for (int round = 0; round < rounds; ++round) {
+    grid.Clear();
+    for (std::uint32_t k = 0; k < centers.size(); ++k) grid.Add(centers[k], k);
+    std::fill(sums.begin(), sums.end(), Point{});
+    std::fill(counts.begin(), counts.end(), 0.0);
+    for (const Point& p : raster) {
+      auto [square, nearest] = grid.Nearest(p, 1);
+      for (int reach = 2; square > (reach - 1) * (reach - 1) && reach < 6; ++reach) {
+        std::tie(square, nearest) = grid.Nearest(p, reach);
+      }
+      sums[nearest] = sums[nearest] + p;
+      ++counts[nearest];
+    }
+    for (std::size_t k = 0; k < centers.size(); ++k) {
+      if (counts[k] > 0) centers[k] = (1 / counts[k]) * sums[k];
+      centers[k] = PushInside(boundary, centers[k]);
+    }
+  }
+}
+
+std::vector<Point> Sample(const Outline& region, Sampling sampling, bool on_lattice,
+                          Random& random) {
+  if (sampling == Sampling::kLattice || sampling == Sampling::kJittered) {
+    Point offset = {0.5, 0.5};
+    if (!on_lattice) {
+      offset.x = random.Uniform();
+      offset.y = random.Uniform();
+    }
+    std::vector<Point> centers = Raster(region, 1, offset);
+    if (sampling == Sampling::kJittered) {
+      for (Point& p : centers) {
+        p.x += random.Uniform(-kJitter, kJitter);
+        p.y += random.Uniform(-kJitter, kJitter);
+      }
+    }
+    return centers;
+  }
+  const SegmentIndex boundary(region, kInset);
+  const auto count = static_cast<std::size_t>(std::lround(SignedArea(region)));
+  std::vector<Point> centers = ThrowDarts(region, boundary, {}, count, random);
+  if (sampling == Sampling::kRelaxed) Relax(region, boundary, kRelaxationRounds, centers);
+  return centers;
+}
+
+}  // namespace partiemc::evaluation

@@ -1,0 +1,44 @@
+// The core in this process behind the interface of a stream: same frames, same answers, same bits
+// as from a server, without one.
+#pragma once
+
+#include <memory>
+
+#include "partiemc/client/frame_stream.h"
+
+namespace partiemc::client {
+
+struct LocalStreamOptions {
+  ReconstructionParameters parameters = {};
+  FrameLimits limits = {};
+  /// Threads that reconstruct, at least 1. 0: one for each processor.
+  int threads = 0;
+  /// Frames that wait or are in work, at least 1. 2 lets the caller read the next one meanwhile.
+  std::size_t frames_in_flight = 2;
+};
+
+class LocalStream final : public FrameStream {
+ public:
+  /// Errors: INVALID_ARGUMENT, see Validate(ReconstructionParameters).
+  static absl::StatusOr<std::unique_ptr<LocalStream>> Open(const LocalStreamOptions& options);
+
+  /// Waits for the frame in work, drops the others. No call may be under way.
+  ~LocalStream() override;
+
+  const StreamInfo& info() const override;
+  /// Waits without a deadline: the work is done by this process itself.
+  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
+  absl::Status FinishSending() override;
+  absl::StatusOr<Received> Receive(
+      Event& event, std::optional<std::chrono::milliseconds> wait = std::nullopt) override;
+  std::size_t InFlight() const override;
+  void Cancel() override;
+
+ private:
+  class Worker;
+  explicit LocalStream(std::unique_ptr<Worker> worker);
+
+  std::unique_ptr<Worker> worker_;
+};
+
+}  // namespace partiemc::client

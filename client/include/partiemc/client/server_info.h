@@ -1,0 +1,37 @@
+// What a server is and what it allows.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "partiemc/client/frame_stream.h"
+#include "partiemc/parameters.h"
+
+namespace partiemc::client {
+
+struct ServerInfo {
+  std::string version;
+  std::uint32_t method_version = 0;  ///< Changes whenever the same input would give other digests.
+  StreamLimits limits;
+  std::uint32_t max_streams = 0;
+  std::uint32_t max_watchers = 0;
+  std::uint32_t idle_timeout_seconds = 0;  ///< 0: none.
+  std::uint32_t frames_in_flight = 0;
+  std::uint32_t compute_threads = 0;
+  std::vector<Placement> placements;  ///< Those that this client knows too.
+  std::vector<Fill> fills;
+  std::vector<std::string> capabilities;
+  std::uint32_t open_streams = 0;
+  bool draining = false;
+};
+
+/// Asks the server at `address` (HOST:PORT, [IPV6]:PORT or unix:PATH).
+/// Errors: INVALID_ARGUMENT (address), UNAVAILABLE (no server there), DEADLINE_EXCEEDED.
+absl::StatusOr<ServerInfo> GetServerInfo(
+    std::string_view address, std::chrono::milliseconds deadline = std::chrono::seconds(5));
+
+}  // namespace partiemc::client

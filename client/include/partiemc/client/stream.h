@@ -1,0 +1,79 @@
+// A producer's stream to a PartiEMC server.
+//
+//   auto stream = partiemc::client::Stream::Open("127.0.0.1:50051",
+//                                                {.parameters = {.spacing = 0.01}});
+//   if (!stream.ok()) ...
+//   std::thread receiver([&] {
+//     partiemc::client::Event event;
+//     for (auto got = (*stream)->Receive(event);
+//          got.ok() && *got == partiemc::client::Received::kEvent;
+//          got = (*stream)->Receive(event)) Draw(event);
+//   });
+//   for (...) (*stream)->Send({.positions = std::span<const float>(xy)}, time);
+//   (*stream)->FinishSending();
+//   receiver.join();
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "partiemc/client/frame_stream.h"
+
+namespace partiemc::client {
+
+/// What the server sends back for each frame; rings and statistics always come.
+struct Outputs {
+  bool mesh = true;
+  bool normals = false;  ///< Outward unit normals at the points of the rings.
+  /// Coordinates as float32 relative to an origin: half the bytes. A frame so wide that a point
+  /// would move by more than 1e-4 spacings is refused.
+  bool relative_float32 = false;
+};
+
+struct StreamOptions {
+  /// 1 to 128 characters of [A-Za-z0-9._-], unique on the server. Empty: the server makes one up.
+  std::string name = {};
+  ReconstructionParameters parameters = {};
+  Outputs outputs = {};
+  /// Shown where streams are listed. At most 16, keys and values of at most 128 bytes each.
+  std::map<std::string, std::string> labels = {};
+  /// For reaching the server; a server that starts meanwhile is found.
+  std::chrono::milliseconds connect_timeout{2000};
+  /// For the server to accept the stream, and then for each answer, counted from the frame or the
+  /// answer before it, whichever came later.
+  std::chrono::milliseconds deadline{30000};
+};
+
+/// Frames are never dropped: Send waits while the server's window is full. A frame larger than the
+/// server's limits is refused before anything is sent. Reading runs in the background, so that a
+/// sender and a receiver never wait for each other beyond the window.
+class Stream final : public FrameStream {
+ public:
+  /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
+  /// Errors: INVALID_ARGUMENT (address, parameters, name or labels), UNAVAILABLE (no server
+  /// there), RESOURCE_EXHAUSTED (no room for another stream), DEADLINE_EXCEEDED, each in one line.
+  static absl::StatusOr<std::unique_ptr<Stream>> Open(std::string_view address,
+                                                      const StreamOptions& options);
+
+  /// Cancels the stream unless its end has been received. No call may be under way.
+  ~Stream() override;
+
+  const StreamInfo& info() const override;
+  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
+  absl::Status FinishSending() override;
+  absl::StatusOr<Received> Receive(
+      Event& event, std::optional<std::chrono::milliseconds> wait = std::nullopt) override;
+  std::size_t InFlight() const override;
+  void Cancel() override;
+
+ private:
+  class Call;
+  explicit Stream(std::unique_ptr<Call> call);
+
+  std::unique_ptr<Call> call_;
+};
+
+}  // namespace partiemc::client

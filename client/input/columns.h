@@ -1,0 +1,64 @@
+// What the columns of a table mean, by their names and by the caller's word.
+//
+// Every format is a table to this file: an array of two or three components counts as columns
+// "name:0", "name:1", "name:2".
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace partiemc::client::input {
+
+/// One of SequenceOptions::select.
+struct Condition {
+  std::string column;
+  std::string text;
+  std::optional<double> number;  ///< `text` as a number, if it is one.
+
+  bool Holds(std::string_view cell) const;
+  bool Holds(double cell) const { return number.has_value() && cell == *number; }
+};
+
+/// What the caller says about columns.
+struct ColumnRequest {
+  std::vector<Condition> conditions;
+  std::vector<std::string> columns;  ///< SequenceOptions::columns, split; empty: by names.
+};
+
+/// kInvalidArgument if an expression is not "COLUMN=VALUE" or an entry of `columns` is empty.
+absl::StatusOr<ColumnRequest> ParseColumnRequest(const std::vector<std::string>& select,
+                                                 std::string_view columns);
+
+/// Which column is what. Axes are x, y, z in the input's own terms.
+struct ColumnPlan {
+  std::array<std::optional<std::size_t>, 3> positions;  ///< Two or three are set.
+  std::array<std::optional<std::size_t>, 3> velocities;
+  std::optional<std::size_t> id;
+  std::optional<std::size_t> volume;
+  std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
+  std::size_t column_count = 0;
+  bool scaled = false;  ///< Positions are LAMMPS's xs ys zs: fractions of the box.
+};
+
+/// A plan for a table that names its columns. Recognised, in any case of letters, with any of
+/// " _.:-" between the parts, and with a unit in brackets behind: x, Pos.x, Points:0, Position_X,
+/// xu, xs, vx, Vel:0, velocity_x, id, idp, particle_id, volume, vol, area and the like.
+/// Errors: kFailedPrecondition if there are no positions or a column that is asked for is missing.
+absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& names,
+                                            const ColumnRequest& request);
+
+/// A plan for a table of `count` columns without names: two are x y, three are x y z, others need
+/// request.columns.
+absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnRequest& request);
+
+/// Whether PlanNamedColumns would find positions by names alone.
+bool NamesHoldPositions(const std::vector<std::string>& names);
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,31 @@
+// Which frames of an input are wanted.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+
+namespace partiemc::client::input {
+
+/// Frames begin, begin + step, ... below end.
+struct FrameRange {
+  std::size_t begin = 0;
+  std::size_t end = std::numeric_limits<std::size_t>::max();
+  std::size_t step = 1;
+
+  bool Contains(std::size_t index) const {
+    return index >= begin && index < end && (index - begin) % step == 0;
+  }
+  /// How many of the frames 0 .. count - 1 are in the range.
+  std::size_t CountOf(std::size_t count) const {
+    const std::size_t last = end < count ? end : count;
+    return last > begin ? (last - begin - 1) / step + 1 : 0;
+  }
+};
+
+/// Parses SequenceOptions::frames. kInvalidArgument if it is no range.
+absl::StatusOr<FrameRange> ParseFrameRange(std::string_view text);
+
+}  // namespace partiemc::client::input

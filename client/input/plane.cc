@@ -1,0 +1,164 @@
+#include "client/input/plane.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "absl/strings/str_format.h"
+#include "client/input/text.h"
+#include "partiemc/status.h"
+
+namespace partiemc::client::input {
+namespace {
+
+// Rounding in text output with six digits is below it, a real third dimension far above.
+constexpr double kFlatRelativeTolerance = 1e-6;
+
+constexpr std::string_view kAxisNames[] = {"x", "y", "z"};
+
+struct Interval {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  double Extent() const { return high >= low ? high - low : 0.0; }
+};
+
+Interval FiniteInterval(const std::vector<double>& values) {
+  Interval interval;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    interval.low = std::min(interval.low, value);
+    interval.high = std::max(interval.high, value);
+  }
+  return interval;
+}
+
+bool HasThreeAxes(const ParticleRows& rows) {
+  return rows.has_position[0] && rows.has_position[1] && rows.has_position[2];
+}
+
+std::array<std::size_t, 2> AxesWithout(std::size_t dropped) {
+  return {dropped == 0 ? std::size_t{1} : 0, dropped == 2 ? std::size_t{1} : 2};
+}
+
+std::string PlaneName(std::size_t dropped) {
+  const auto [first, second] = AxesWithout(dropped);
+  return Concat(kAxisNames[first], "-", kAxisNames[second]);
+}
+
+}  // namespace
+
+absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& frame,
+                                      std::vector<std::string>& notices) {
+  std::size_t dropped = 2;
+  if (HasThreeAxes(rows)) {
+    if (absl::Status status = plane_ ? CheckStaysInPlane(rows) : Decide(rows, notices);
+        !status.ok()) {
+      return status;
+    }
+    if (plane_) dropped = plane_->dropped_axis;
+  } else {
+    while (rows.has_position[dropped]) --dropped;
+    if (dropped != 2 && !told_plane_of_two_) {
+      told_plane_of_two_ = true;
+      notices.push_back(Concat("the particles lie in the ", PlaneName(dropped), " plane"));
+    }
+  }
+  const std::array<std::size_t, 2> axes = AxesWithout(dropped);
+  const std::vector<double>& x = rows.positions[axes[0]];
+  const std::vector<double>& y = rows.positions[axes[1]];
+  frame.positions.resize(2 * rows.count);
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    frame.positions[2 * i] = x[i];
+    frame.positions[2 * i + 1] = y[i];
+  }
+  if (HasThreeAxes(rows)) {
+    // A spoiled particle stays spoiled, also where only the dropped coordinate is not finite.
+    const std::vector<double>& off_plane = rows.positions[dropped];
+    for (std::size_t i = 0; i < rows.count; ++i) {
+      if (!std::isfinite(off_plane[i])) frame.positions[2 * i] = off_plane[i];
+    }
+  }
+  CopyOptionalArrays(rows, axes, frame, notices);
+  frame.float32 = rows.float32;
+  frame.time = rows.time;
+  frame.source = rows.source;
+  return absl::OkStatus();
+}
+
+absl::Status PlaneProjection::Decide(const ParticleRows& rows, std::vector<std::string>& notices) {
+  std::array<Interval, 3> intervals;
+  double largest = 0;
+  bool any_finite = true;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    intervals[axis] = FiniteInterval(rows.positions[axis]);
+    largest = std::max(largest, intervals[axis].Extent());
+    any_finite = any_finite && intervals[axis].high >= intervals[axis].low;
+  }
+  if (!any_finite) return absl::OkStatus();
+  largest_extent_ = largest;
+  for (std::size_t axis = 3; axis-- > 0;) {
+    if (intervals[axis].Extent() > kFlatRelativeTolerance * largest) continue;
+    plane_ = Plane{axis, intervals[axis].low};
+    if (axis != 2) {
+      notices.push_back(Concat("the particles lie in the ", PlaneName(axis), " plane (",
+                               kAxisNames[axis], " = ", ShortestNumber(plane_->offset + 0.0), ")"));
+    }
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): PartiEMC reconstructs 2D data; slice it "
+      "first",
+      rows.source, intervals[0].Extent(), intervals[1].Extent(), intervals[2].Extent()));
+}
+
+absl::Status PlaneProjection::CheckStaysInPlane(const ParticleRows& rows) {
+  for (const std::vector<double>& values : rows.positions) {
+    largest_extent_ = std::max(largest_extent_, FiniteInterval(values).Extent());
+  }
+  const Interval off_plane = FiniteInterval(rows.positions[plane_->dropped_axis]);
+  const double tolerance = kFlatRelativeTolerance * largest_extent_;
+  if (off_plane.high < off_plane.low || (off_plane.low >= plane_->offset - tolerance &&
+                                         off_plane.high <= plane_->offset + tolerance)) {
+    return absl::OkStatus();
+  }
+  const std::string_view axis = kAxisNames[plane_->dropped_axis];
+  return absl::FailedPreconditionError(
+      Concat(rows.source, ": leaves the plane of the frames before: ", axis, " was ",
+             ShortestNumber(plane_->offset), " and is now ", ShortestNumber(off_plane.low), " to ",
+             ShortestNumber(off_plane.high), "; PartiEMC reconstructs 2D data in one plane"));
+}
+
+void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows,
+                                         const std::array<std::size_t, 2>& axes,
+                                         RecordedFrame& frame, std::vector<std::string>& notices) {
+  frame.velocities.clear();
+  if (rows.has_velocity[axes[0]] && rows.has_velocity[axes[1]]) {
+    frame.velocities.resize(2 * rows.count);
+    for (std::size_t i = 0; i < rows.count; ++i) {
+      frame.velocities[2 * i] = rows.velocities[axes[0]][i];
+      frame.velocities[2 * i + 1] = rows.velocities[axes[1]][i];
+    }
+  }
+  frame.ids.clear();
+  if (rows.has_ids) {
+    sorted_ids_ = rows.ids;
+    std::sort(sorted_ids_.begin(), sorted_ids_.end());
+    const bool unique =
+        std::adjacent_find(sorted_ids_.begin(), sorted_ids_.end()) == sorted_ids_.end();
+    if (unique) frame.ids = rows.ids;
+  }
+  frame.volumes.clear();
+  if (!rows.has_volumes) return;
+  frame.volumes.assign(rows.volumes.begin(), rows.volumes.end());
+  const bool usable = std::all_of(frame.volumes.begin(), frame.volumes.end(),
+                                  [](float volume) { return volume > 0 && std::isfinite(volume); });
+  if (usable) return;
+  frame.volumes.clear();
+  if (!told_volumes_) {
+    notices.push_back(Concat(rows.source, ": volumes are ignored: not all are above 0 and finite"));
+  }
+  told_volumes_ = true;
+}
+
+}  // namespace partiemc::client::input

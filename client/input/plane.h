@@ -1,0 +1,43 @@
+// Three-component recordings of 2D simulations: which plane they lie in.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/input/particle_rows.h"
+#include "client/input/sequence.h"
+
+namespace partiemc::client::input {
+
+/// Turns the rows of a sequence's frames into frames of the plane that its first particles lie in.
+class PlaneProjection {
+ public:
+  /// Fills everything of `frame` but `index`. What a reader should know is appended to `notices`,
+  /// each once. Errors: kFailedPrecondition if the particles are 3D or leave the plane.
+  absl::Status Project(const ParticleRows& rows, RecordedFrame& frame,
+                       std::vector<std::string>& notices);
+
+ private:
+  struct Plane {
+    std::size_t dropped_axis;
+    double offset;  // Of the plane on the dropped axis.
+  };
+
+  absl::Status Decide(const ParticleRows& rows, std::vector<std::string>& notices);
+  absl::Status CheckStaysInPlane(const ParticleRows& rows);
+  void CopyOptionalArrays(const ParticleRows& rows, const std::array<std::size_t, 2>& axes,
+                          RecordedFrame& frame, std::vector<std::string>& notices);
+
+  std::optional<Plane> plane_;
+  double largest_extent_ = 0;  // Of the frames so far: what the tolerance is relative to.
+  bool told_volumes_ = false;
+  bool told_plane_of_two_ = false;
+  std::vector<std::uint64_t> sorted_ids_;
+};
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,248 @@
+#include "client/input/sequence.h"
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_join.h"
+#include "client/input/file_list.h"
+#include "client/input/formats.h"
+#include "client/input/frame_range.h"
+#include "client/input/frame_reader.h"
+#include "client/input/plane.h"
+#include "client/input/text.h"
+#include "client/input/times.h"
+
+namespace partiemc::client {
+namespace {
+
+using namespace input;
+
+// Files below this are scanned to count their frames: a fraction of a second.
+constexpr std::size_t kMaxScannedBytes = std::size_t{64} << 20;
+
+// What was found by Sequence::Open.
+struct Recording {
+  std::vector<std::string> files;
+  std::size_t bytes = 0;
+  const Format* format = nullptr;  // Of the first file.
+  ColumnRequest request;
+  FrameRange range;
+  std::optional<FrameTimes> times;
+  std::string times_path;
+  std::vector<std::string> notices;
+};
+
+class FileSequence final : public Sequence {
+ public:
+  explicit FileSequence(Recording recording) : recording_(std::move(recording)) {}
+
+  // Shows at once what is wrong with the first file. Needed before Next.
+  absl::Status OpenFirstFile() { return OpenNextFile(); }
+
+  absl::StatusOr<bool> Next(RecordedFrame& frame) override {
+    if (!failure_.ok()) return failure_;
+    auto found = ReadNext(frame);
+    failure_ = found.status();
+    return found;
+  }
+
+  std::optional<std::size_t> FrameCount() override {
+    if (!counted_) {
+      counted_ = true;
+      if (recording_.format->one_frame_per_file) {
+        count_ = recording_.files.size();
+      } else if (recording_.bytes <= kMaxScannedBytes) {
+        count_ = ScanFrames();
+      }
+      if (count_) count_ = recording_.range.CountOf(*count_);
+    }
+    return count_;
+  }
+
+  std::string Description() const override {
+    const auto name = [](const std::string& file) {
+      return std::filesystem::path(file).filename().string();
+    };
+    const std::vector<std::string>& files = recording_.files;
+    if (files.size() == 1) {
+      return Concat(recording_.format->name, " file ", name(files.front()));
+    }
+    return Concat(files.size(), " ", recording_.format->name, " files, ", name(files.front()),
+                  " to ", name(files.back()));
+  }
+
+  const std::vector<std::string>& notices() const override { return recording_.notices; }
+
+ private:
+  absl::StatusOr<bool> ReadNext(RecordedFrame& frame) {
+    while (index_ < recording_.range.end) {
+      const bool wanted = recording_.range.Contains(index_);
+      if (reader_ == nullptr) {
+        if (file_ == recording_.files.size()) return false;
+        if (!wanted && recording_.format->one_frame_per_file) {
+          ++file_;
+          ++index_;
+          continue;
+        }
+        if (absl::Status status = OpenNextFile(); !status.ok()) return status;
+      }
+      const auto found = reader_->Next(wanted ? &rows_ : nullptr);
+      if (!found.ok()) return found;
+      if (!*found) {
+        reader_.reset();
+        continue;
+      }
+      const std::size_t index = index_++;
+      if (!wanted) continue;
+      frame.index = index;
+      if (absl::Status status = projection_.Project(rows_, frame, recording_.notices);
+          !status.ok()) {
+        return status;
+      }
+      TakeTime(frame);
+      return true;
+    }
+    return false;
+  }
+
+  absl::Status OpenNextFile() {
+    const std::string& path = recording_.files[file_++];
+    const auto format = RecogniseFormat(path);
+    if (!format.ok()) return format.status();
+    auto reader = (*format)->open(path, recording_.request);
+    if (!reader.ok()) return reader.status();
+    reader_ = *std::move(reader);
+    return absl::OkStatus();
+  }
+
+  void TakeTime(RecordedFrame& frame) {
+    if (!recording_.times) return;
+    const auto found = recording_.times->find(frame.index);
+    if (found != recording_.times->end()) {
+      frame.time = found->second;
+    } else if (!std::exchange(told_missing_time_, true)) {
+      recording_.notices.push_back(
+          Concat(recording_.times_path, ": has no time for frame ", frame.index));
+    }
+  }
+
+  // Passes over all frames without parsing them. Nothing if a file is damaged: Next tells where.
+  std::optional<std::size_t> ScanFrames() const {
+    std::size_t count = 0;
+    for (const std::string& path : recording_.files) {
+      const auto format = RecogniseFormat(path);
+      if (!format.ok()) return std::nullopt;
+      const auto reader = (*format)->open(path, recording_.request);
+      if (!reader.ok()) return std::nullopt;
+      while (true) {
+        const auto found = (*reader)->Next(nullptr);
+        if (!found.ok()) return std::nullopt;
+        if (!*found) break;
+        ++count;
+      }
+    }
+    return count;
+  }
+
+  Recording recording_;
+  std::unique_ptr<FrameReader> reader_;
+  std::size_t file_ = 0;   // The next one to open.
+  std::size_t index_ = 0;  // Of the next frame.
+  ParticleRows rows_;
+  PlaneProjection projection_;
+  absl::Status failure_;
+  bool told_missing_time_ = false;
+  bool counted_ = false;
+  std::optional<std::size_t> count_;
+};
+
+// Whether the first file of a series can be read as far as its head.
+absl::Status CanBeOpened(const FileSeries& series, const ColumnRequest& request) {
+  const auto format = RecogniseFormat(series.files.front());
+  if (!format.ok()) return format.status();
+  return (*format)->open(series.files.front(), request).status();
+}
+
+// The one series of the input that holds frames. Series of a directory or pattern that cannot be
+// read are passed over with a notice; times.csv among them gives the times.
+absl::StatusOr<FileSeries> ChooseSeries(const std::string& input, InputFiles files,
+                                        Recording& recording) {
+  if (files.kind == InputKind::kFile) return std::move(files.series.front());
+  InputFiles readable{files.kind, files.directory, {}};
+  std::vector<std::string> reasons;
+  for (FileSeries& series : files.series) {
+    if (recording.times_path.empty() && IsTimesFile(series.files.front())) {
+      recording.times_path = series.files.front();
+      continue;
+    }
+    const absl::Status status = CanBeOpened(series, recording.request);
+    if (status.ok()) {
+      readable.series.push_back(std::move(series));
+      continue;
+    }
+    if (status.code() == absl::StatusCode::kInvalidArgument) return status;
+    reasons.push_back(std::string(status.message()));
+  }
+  if (readable.series.size() > 1) return SeveralSeries(input, readable);
+  if (readable.series.empty()) {
+    constexpr std::size_t kShown = 3;
+    const std::size_t more = reasons.size() > kShown ? reasons.size() - kShown : 0;
+    reasons.resize(reasons.size() - more);
+    if (reasons.empty()) reasons.push_back("only times");
+    return absl::FailedPreconditionError(
+        Concat(input, ": holds no frames that can be read: ", absl::StrJoin(reasons, " | "),
+               more > 0 ? Concat(" | and ", more, " more") : ""));
+  }
+  for (const std::string& reason : reasons) {
+    recording.notices.push_back(Concat("skipped: ", reason));
+  }
+  return std::move(readable.series.front());
+}
+
+absl::Status TakeTimes(const std::string& directory, Recording& recording) {
+  if (recording.times_path.empty()) {
+    const std::string beside = (std::filesystem::path(directory) / "times.csv").string();
+    const bool is_frame = recording.files.size() == 1 && recording.files.front() == beside;
+    std::error_code error;
+    if (!is_frame && std::filesystem::exists(beside, error) && IsTimesFile(beside)) {
+      recording.times_path = beside;
+    }
+    if (recording.times_path.empty()) return absl::OkStatus();
+  }
+  auto times = ReadTimes(recording.times_path);
+  if (!times.ok()) return times.status();
+  recording.times = *std::move(times);
+  recording.notices.push_back(Concat("times of the frames from ", recording.times_path));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& input,
+                                                         const SequenceOptions& options) {
+  Recording recording;
+  auto request = ParseColumnRequest(options.select, options.columns);
+  if (!request.ok()) return request.status();
+  recording.request = *std::move(request);
+  const auto range = ParseFrameRange(options.frames);
+  if (!range.ok()) return range.status();
+  recording.range = *range;
+  recording.times_path = options.times;
+  auto files = ListInput(input);
+  if (!files.ok()) return files.status();
+  const std::string directory = files->directory;
+  auto series = ChooseSeries(input, *std::move(files), recording);
+  if (!series.ok()) return series.status();
+  recording.files = std::move(series->files);
+  recording.bytes = series->bytes;
+  const auto format = RecogniseFormat(recording.files.front());
+  if (!format.ok()) return format.status();
+  recording.format = *format;
+  if (absl::Status status = TakeTimes(directory, recording); !status.ok()) return status;
+  auto sequence = std::make_unique<FileSequence>(std::move(recording));
+  if (absl::Status status = sequence->OpenFirstFile(); !status.ok()) return status;
+  return sequence;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,101 @@
+#include "library/channel.h"
+
+#include <charconv>
+#include <cstdint>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "partiemc/v1/reconstruction.grpc.pb.h"
+
+namespace partiemc::client {
+namespace {
+
+// A port that is refused is tried again this soon: long enough to cost nothing, short enough that
+// a server which starts at the same time is found at once.
+constexpr int kFirstBackoffMs = 100;
+constexpr int kLongestBackoffMs = 500;
+
+// For asking gRPC why there is no connection; it knows the answer already.
+constexpr std::chrono::seconds kReasonTimeout(1);
+
+bool IsPort(std::string_view text) {
+  std::uint16_t port = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  return error == std::errc() && end == text.data() + text.size() && port > 0;
+}
+
+bool IsAddress(std::string_view address) {
+  if (address.starts_with("unix:")) return address.size() > 5;
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) return false;
+  const std::string_view host = address.substr(0, colon);
+  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
+  const bool plain = host.find_first_of(":/[] \t") == std::string_view::npos;
+  return (bracketed || plain) && IsPort(address.substr(colon + 1));
+}
+
+// gRPC's words end in the system's: "...: Failed to connect to remote host: Connection refused".
+std::string Reason(const grpc::Status& status) {
+  std::string_view text = status.error_message();
+  const std::size_t colon = text.rfind(": ");
+  if (colon != std::string_view::npos) text.remove_prefix(colon + 2);
+  return text.empty() ? "no answer" : std::string(text);
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address) {
+  if (!IsAddress(address)) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {.reason = std::string(kReasonOutOfRange),
+                           .field = "address",
+                           .value = absl::StrCat("'", address, "'"),
+                           .rule = "must be HOST:PORT, [IPV6]:PORT or unix:PATH"});
+  }
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);
+  arguments.SetMaxSendMessageSize(-1);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
+  // The address is where the frames go; an http_proxy meant for browsers must not reroute them.
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
+                     std::chrono::milliseconds timeout) {
+  if (channel->WaitForConnected(std::chrono::system_clock::now() + timeout)) {
+    return absl::OkStatus();
+  }
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kReasonTimeout);
+  v1::GetServerInfoResponse response;
+  const auto stub = v1::ReconstructionService::NewStub(channel);
+  const grpc::Status status = stub->GetServerInfo(&context, {}, &response);
+  if (status.ok()) return absl::OkStatus();  // It came up in the meantime.
+  return absl::UnavailableError(absl::StrCat("no server at ", address, " (", Reason(status),
+                                             "): start one with `partiemc-server --address ",
+                                             address, "`, or use --local"));
+}
+
+absl::Status FromGrpc(const grpc::Status& status, const std::string& address) {
+  if (status.ok()) return absl::OkStatus();
+  const auto code = static_cast<absl::StatusCode>(status.error_code());
+  switch (status.error_code()) {
+    case grpc::StatusCode::UNAVAILABLE:
+      return absl::Status(
+          code, absl::StrCat("the connection to the server at ", address, " was lost (",
+                             Reason(status), "): look at the server's log, then start again"));
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return absl::Status(code, absl::StrCat("what listens at ", address,
+                                             " does not speak partiemc.v1: give the address of a "
+                                             "partiemc-server"));
+    default:
+      return absl::Status(
+          code, absl::StrCat("the server at ", address, " says: ", status.error_message()));
+  }
+}
+
+}  // namespace partiemc::client

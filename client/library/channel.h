@@ -1,0 +1,28 @@
+// How this library reaches a server, and what it says when it cannot.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace partiemc::client {
+
+/// A channel with this library's settings; connects when it is first used.
+/// Errors: INVALID_ARGUMENT unless `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
+absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address);
+
+/// Waits until `channel` is connected. A refused connection is tried again until the time is over.
+/// Errors: UNAVAILABLE, "no server at ADDRESS (WHY): ...".
+absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
+                     std::chrono::milliseconds timeout);
+
+/// The end of a call as one line that names the server. OK stays OK.
+absl::Status FromGrpc(const grpc::Status& status, const std::string& address);
+
+}  // namespace partiemc::client

@@ -1,0 +1,56 @@
+// One reconstructed frame as every writer of this room sees it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "partiemc/result.h"
+#include "partiemc/stage.h"
+
+namespace partiemc::client {
+
+/// A frame of a replay with what is known about it. Owns nothing; views must outlive the call.
+struct FrameRecord {
+  std::uint64_t index = 0;  ///< Of the frame in the input, from 0; names the files.
+  double time = 0;          ///< Simulation time, in the simulation's own unit.
+  const Result& result;
+  std::span<const double> particles = {};          ///< x0, y0, x1, y1, ... or empty.
+  std::array<double, kStageCount> stages_ms = {};  ///< Wall time by stage.
+  double total_ms = 0;                             ///< Wall time of the whole frame.
+  std::uint64_t rings_digest = 0;
+  std::uint64_t mesh_digest = 0;
+};
+
+/// An axis-parallel box in world units; empty until something is included.
+struct Box {
+  double min_x = std::numeric_limits<double>::infinity();
+  double min_y = std::numeric_limits<double>::infinity();
+  double max_x = -std::numeric_limits<double>::infinity();
+  double max_y = -std::numeric_limits<double>::infinity();
+
+  bool Empty() const { return !(min_x <= max_x && min_y <= max_y); }
+  double Width() const { return Empty() ? 0 : max_x - min_x; }
+  double Height() const { return Empty() ? 0 : max_y - min_y; }
+  double Side() const { return std::max(Width(), Height()); }
+
+  void Include(double x, double y) {
+    min_x = std::min(min_x, x);
+    min_y = std::min(min_y, y);
+    max_x = std::max(max_x, x);
+    max_y = std::max(max_y, y);
+  }
+  /// Includes interleaved coordinates.
+  void Include(std::span<const double> points) {
+    for (std::size_t k = 0; k + 1 < points.size(); k += 2) Include(points[k], points[k + 1]);
+  }
+  void Include(const Box& other) {
+    if (other.Empty()) return;
+    Include(other.min_x, other.min_y);
+    Include(other.max_x, other.max_y);
+  }
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,135 @@
+#include "output/frame_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_split.h"
+#include "output/atomic_file.h"
+#include "output/formats.h"
+#include "output/text.h"
+
+namespace partiemc::client {
+namespace {
+
+constexpr std::array kFormats = {
+    FrameFormat::kGeoJson, FrameFormat::kSvg, FrameFormat::kObj,
+#ifdef PARTIEMC_HAVE_VTK
+    FrameFormat::kVtp,
+#endif
+    FrameFormat::kCsv,
+};
+
+bool AllFinite(std::span<const double> values) {
+  return std::all_of(values.begin(), values.end(),
+                     [](double value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+std::span<const FrameFormat> AllFrameFormats() { return kFormats; }
+
+std::string_view Name(FrameFormat format) {
+  switch (format) {
+    case FrameFormat::kGeoJson:
+      return "geojson";
+    case FrameFormat::kSvg:
+      return "svg";
+    case FrameFormat::kObj:
+      return "obj";
+    case FrameFormat::kVtp:
+      return "vtp";
+    case FrameFormat::kCsv:
+      return "csv";
+  }
+  return "";
+}
+
+absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names) {
+  std::vector<FrameFormat> formats;
+  for (const std::string& word :
+       std::vector<std::string>(absl::StrSplit(std::string(names), ','))) {
+    const auto format = std::find_if(kFormats.begin(), kFormats.end(),
+                                     [&](FrameFormat known) { return Name(known) == word; });
+    if (format == kFormats.end()) {
+      std::string known;
+      for (const FrameFormat name : kFormats)
+        AppendAll(known, known.empty() ? "" : ",", Name(name));
+      const bool needs_vtk = word == Name(FrameFormat::kVtp);
+      return absl::InvalidArgumentError(Concat("format: '", absl::Utf8SafeCHexEscape(word), "'",
+                                               needs_vtk ? " needs a build with VTK" : "",
+                                               "; must be some of ", known));
+    }
+    if (std::find(formats.begin(), formats.end(), *format) == formats.end()) {
+      formats.push_back(*format);
+    }
+  }
+  return formats;
+}
+
+bool MeshSharesRingPoints(const Result& result) {
+  const std::vector<double>& rings = result.rings.points;
+  return rings.empty() ||
+         (result.mesh.points.size() >= rings.size() &&
+          std::memcmp(result.mesh.points.data(), rings.data(), rings.size() * sizeof(double)) == 0);
+}
+
+absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
+                                        const FrameWriterOptions& options) {
+  if (!AllFinite(frame.result.rings.points) || !AllFinite(frame.result.mesh.points)) {
+    return absl::DataLossError(Concat("frame ", frame.index,
+                                      ": a coordinate of the result is not finite; "
+                                      "reconstruct it again with --check"));
+  }
+  switch (format) {
+    case FrameFormat::kGeoJson:
+      return EncodeGeoJson(frame);
+    case FrameFormat::kSvg:
+      return EncodeSvg(frame, options);
+    case FrameFormat::kObj:
+      return EncodeObj(frame);
+    case FrameFormat::kCsv:
+      return EncodeCsv(frame);
+    case FrameFormat::kVtp:
+#ifdef PARTIEMC_HAVE_VTK
+      return EncodeVtp(frame);
+#else
+      break;
+#endif
+  }
+  return absl::InvalidArgumentError(
+      Concat("format: '", Name(format), "' is not part of this build; build it with VTK"));
+}
+
+absl::StatusOr<FrameWriter> FrameWriter::Create(FrameWriterOptions options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.directory, error);
+  if (error) {
+    return absl::Status(
+        absl::ErrnoToStatusCode(error.value()),
+        Concat(absl::Utf8SafeCHexEscape(options.directory.native()),
+               ": the directory cannot be made: ", error.message(), "; choose another one"));
+  }
+  return FrameWriter(std::move(options));
+}
+
+absl::Status FrameWriter::Write(const FrameRecord& frame) const {
+  for (const FrameFormat format : options_.formats) {
+    absl::StatusOr<std::string> bytes = EncodeFrame(format, frame, options_);
+    if (!bytes.ok()) return bytes.status();
+    absl::Status status = WriteFileAtomically(PathOf(frame.index, format), *bytes);
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+std::filesystem::path FrameWriter::PathOf(std::uint64_t index, FrameFormat format) const {
+  return options_.directory / absl::StrFormat("frame_%06d.%s", index, Name(format));
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,77 @@
+// Frames as files: DIR/frame_000042.geojson and its like.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "output/frame_record.h"
+
+namespace partiemc::client {
+
+enum class FrameFormat : std::uint8_t {
+  /// RFC 7946 FeatureCollection: one Polygon per outer ring with its holes, outer rings
+  /// counter-clockwise, holes clockwise whatever the result says, first point repeated at the end.
+  /// Properties: area (without the holes), perimeter (with the holes'), particles, ring, identity,
+  /// frame, time. A ring of `farthest-particle` that crosses itself is written as it is.
+  kGeoJson,
+  /// A picture: mesh edges, outline, particles; y up; longer side 1000 units, rounded to 0.001.
+  kSvg,
+  /// Wavefront: "v x y 0", groups "mesh" (faces) and "rings" (closed polylines), 1-based.
+  kObj,
+  /// VTK XML PolyData: rings as closed lines, triangles as polygons; cell data "class" (0 boundary
+  /// and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for triangles); field data
+  /// TimeValue. Only in builds with VTK.
+  kVtp,
+  /// ring,index,x,y,nx,ny: one row per vertex of the rings; nx,ny empty without normals.
+  kCsv,
+};
+
+/// The formats that this build writes.
+std::span<const FrameFormat> AllFrameFormats();
+
+/// "geojson", "svg", "obj", "vtp", "csv": the name on command lines and the file's extension.
+std::string_view Name(FrameFormat format);
+
+/// Formats from a list of names separated by commas, each once, in the order given.
+/// Errors: INVALID_ARGUMENT naming the word and what may stand there.
+absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names);
+
+struct FrameWriterOptions {
+  std::filesystem::path directory = {};  ///< Made, with its parents, when it is not there.
+  std::vector<FrameFormat> formats = {};
+  /// What a picture shows, in world units, so that all pictures of a sequence share it; what lies
+  /// outside is cut off. Absent: each frame is fitted to itself.
+  std::optional<Box> picture_box = {};
+  bool picture_particles = true;  ///< Draw the particles where the record has them.
+};
+
+/// The bytes of a frame in one of AllFrameFormats().
+/// Errors: DATA_LOSS when a coordinate is not finite; INTERNAL from VTK.
+absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
+                                        const FrameWriterOptions& options);
+
+/// Writes each frame in each format; every file appears as a whole or not at all.
+class FrameWriter {
+ public:
+  /// Errors: those of AtomicFile, for the directory.
+  static absl::StatusOr<FrameWriter> Create(FrameWriterOptions options);
+
+  /// Errors: those of EncodeFrame and AtomicFile. Formats before the one that failed are written.
+  absl::Status Write(const FrameRecord& frame) const;
+
+  /// DIR/frame_%06d.EXT, with more digits for an index that needs them.
+  std::filesystem::path PathOf(std::uint64_t index, FrameFormat format) const;
+
+ private:
+  explicit FrameWriter(FrameWriterOptions options) : options_(std::move(options)) {}
+
+  FrameWriterOptions options_;
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,60 @@
+// How far a replay has come, for the person who waits.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace partiemc::client {
+
+/// On a terminal one line that is drawn anew (at most ten times a second) and never wraps;
+/// elsewhere plain lines, at most one every two seconds; nothing at all when quiet. The last
+/// state is always shown. Not for several threads at once.
+class Progress {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  struct Options {
+    bool quiet = false;
+    bool terminal = false;               ///< Redraw one line; otherwise plain lines.
+    std::optional<std::uint64_t> total;  ///< Frames to come; absent: not known.
+    std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< Of the terminal.
+    std::function<Clock::time_point()> now = Clock::now;
+    std::function<void(std::string_view)> write;  ///< Gets text as it is to be shown.
+  };
+
+  /// Options for the standard error stream: its kind and width are asked from the system.
+  static Options ForStandardError();
+
+  explicit Progress(Options options);
+  ~Progress() { Finish(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// `done` frames are through, counted from the start.
+  void Update(std::uint64_t done);
+
+  /// Shows a line of its own without tearing the bar (a warning, a refused frame), also when
+  /// quiet, because it is no progress.
+  void Note(std::string_view line);
+
+  /// Shows the last state and ends the line. Further calls do nothing.
+  void Finish();
+
+ private:
+  void Show();
+  std::string Bar(double seconds) const;
+  std::string Line(double seconds) const;
+
+  Options options_;
+  Clock::time_point start_;
+  std::optional<Clock::time_point> shown_at_;
+  std::uint64_t done_ = 0;
+  std::optional<std::uint64_t> shown_done_;
+  bool finished_ = false;
+};
+
+}  // namespace partiemc::client

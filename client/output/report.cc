@@ -1,0 +1,265 @@
+#include "output/report.h"
+
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <string_view>
+
+#include "absl/strings/escaping.h"
+#include "output/report_geometry.h"
+#include "output/text.h"
+#include "partiemc/status.h"
+
+namespace partiemc::client {
+
+// The files of report/, embedded by embed.cmake.
+namespace page {
+extern const std::string_view kReportHtml;
+extern const std::string_view kReportCss;
+extern const std::string_view kGeometryJs;
+extern const std::string_view kChartsJs;
+extern const std::string_view kReportJs;
+}  // namespace page
+
+namespace {
+
+constexpr std::string_view kFramesMark = "{{frames}}";
+
+// Digits of a number that is read by eye, not calculated with.
+constexpr int kShownDigits = 7;
+
+// Outer rings below this share of the largest one do not decide what the picture shows: spray
+// that has left the scene would shrink everything else to a dot.
+constexpr double kMinorShare = 0.01;
+
+std::string EscapeHtml(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+/// Replaces every {{name}} of `text` by value(name). What a value holds is not looked at again.
+std::string Expand(std::string_view text,
+                   const std::function<std::string(std::string_view)>& value) {
+  std::string out;
+  while (true) {
+    const std::size_t begin = text.find("{{");
+    const std::size_t end = text.find("}}", begin);
+    if (begin == std::string_view::npos || end == std::string_view::npos) break;
+    AppendAll(out, text.substr(0, begin), value(text.substr(begin + 2, end - begin - 2)));
+    text.remove_prefix(end + 2);
+  }
+  return Concat(out, text);
+}
+
+void AppendShown(std::string& out, double value) {
+  if (!std::isfinite(value)) {
+    out += "null";
+    return;
+  }
+  char buffer[32];
+  out.append(buffer, std::to_chars(buffer, buffer + sizeof(buffer), value,
+                                   std::chars_format::general, kShownDigits)
+                         .ptr);
+}
+
+void AppendBox(std::string& out, const Box& box) {
+  if (box.Empty()) {
+    out += "null";
+    return;
+  }
+  out += '[';
+  AppendNumber(out, box.min_x);
+  out += ',';
+  AppendNumber(out, box.min_y);
+  out += ',';
+  AppendNumber(out, box.max_x);
+  out += ',';
+  AppendNumber(out, box.max_y);
+  out += ']';
+}
+
+/// The box of the rings that matter; of the particles where there is no ring.
+Box MainBox(const FrameRecord& frame) {
+  const Rings& rings = frame.result.rings;
+  double largest = 0;
+  for (const RingMeasures& measures : rings.measures) {
+    largest = std::max(largest, std::abs(measures.area));
+  }
+  Box box;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    if (std::abs(rings.measures[ring].area) >= kMinorShare * largest) {
+      box.Include(rings.RingPoints(ring));
+    }
+  }
+  if (box.Empty()) box.Include(frame.particles);
+  return box;
+}
+
+void AppendMeasures(std::string& out, const Rings& rings) {
+  out += '[';
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const RingMeasures& measures = rings.measures[ring];
+    out += ring == 0 ? "[" : ",[";
+    AppendShown(out, measures.area);
+    out += ',';
+    AppendShown(out, measures.perimeter);
+    // As text: the script's numbers end at 2^53.
+    AppendAll(out, ",", measures.particle_count, ",\"", measures.identity, "\"]");
+  }
+  out += ']';
+}
+
+std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options) {
+  const Result& result = frame.result;
+  const FrameStatistics& statistics = result.statistics;
+  std::string out = Concat(R"({"frame":)", frame.index, R"(,"particles":)", statistics.particles,
+                           R"(,"polylines":)", result.rings.RingCount(), R"(,"vertices":)",
+                           result.rings.PointCount(), R"(,"triangles_grid":)",
+                           statistics.triangles_grid, R"(,"triangles":)", statistics.triangles);
+  AppendAll(out, R"(,"self_intersections":)", statistics.self_intersections,
+            R"(,"folded_triangles":)", statistics.folded_triangles, R"(,"dropped_holes":)",
+            statistics.dropped_holes, R"(,"dropped_components":)", statistics.dropped_components);
+  const std::pair<std::string_view, double> numbers[] = {
+      {"time", frame.time},
+      {"area", statistics.area},
+      {"perimeter", statistics.perimeter},
+      {"spacing", statistics.spacing},
+      {"milliseconds", frame.total_ms},
+  };
+  for (const auto& [name, value] : numbers) {
+    AppendAll(out, ",\"", name, "\":");
+    AppendShown(out, value);
+  }
+  out += R"(,"stages":[)";
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    if (k > 0) out += ',';
+    AppendShown(out, frame.stages_ms[k]);
+  }
+  const std::size_t particles = frame.particles.size() / 2;
+  AppendAll(out, R"(],"particles_shown":)", std::min(particles, options.max_particles),
+            R"(,"particles_given":)", particles, R"(,"mesh_shown":)",
+            result.mesh.TriangleCount() <= options.max_triangles ? "true" : "false",
+            R"(,"rings_digest":")", DigestText(frame.rings_digest), R"(","mesh_digest":")",
+            DigestText(frame.mesh_digest), R"(","box":)");
+  AppendBox(out, MainBox(frame));
+  out += R"(,"measures":)";
+  AppendMeasures(out, result.rings);
+  out += '}';
+  return out;
+}
+
+std::string ParameterRows(const std::vector<std::pair<std::string, std::string>>& parameters) {
+  std::string out;
+  for (const auto& [name, value] : parameters) {
+    AppendAll(out, "<tr><th scope=\"row\">", EscapeHtml(name), "</th><td>", EscapeHtml(value),
+              "</td></tr>\n");
+  }
+  return out;
+}
+
+std::string SummaryRows(const Summary& summary) {
+  std::string out;
+  for (const SummaryRow& row : summary.Rows()) {
+    if (row.mean.empty()) {
+      AppendAll(out, "<tr class=\"heading\"><th scope=\"rowgroup\" colspan=\"4\">",
+                EscapeHtml(row.label), "</th></tr>\n");
+      continue;
+    }
+    const bool part = row.label.starts_with(' ');
+    AppendAll(out, "<tr", part ? " class=\"part\"" : "", "><th scope=\"row\">",
+              EscapeHtml(row.label), "</th><td>", EscapeHtml(row.mean), "</td><td>",
+              EscapeHtml(row.p50), "</td><td>", EscapeHtml(row.p99), "</td></tr>\n");
+  }
+  return out;
+}
+
+std::string StageNames() {
+  std::string out;
+  for (const std::string_view name : kStageNames) AppendAll(out, out.empty() ? "" : " ", name);
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> DescribeParameters(
+    const ReconstructionParameters& parameters) {
+  const auto spacings = [](double value) { return Concat(ShortestNumber(value), " spacings"); };
+  const auto yes_no = [](bool value) { return std::string(value ? "on" : "off"); };
+  std::vector<std::pair<std::string, std::string>> lines = {
+      {"placement", std::string(Name(parameters.placement))},
+      {"fill", std::string(Name(parameters.fill))},
+      {"spacing", parameters.spacing ? ShortestNumber(*parameters.spacing)
+                                     : Concat("estimated, ", Name(parameters.spacing_rule))},
+      {"kernel radius", spacings(parameters.kernel_radius)},
+      {"cell size", spacings(parameters.cell_size)},
+      {"reference radius", parameters.reference_radius ? spacings(*parameters.reference_radius)
+                                                       : std::string("calibrated")},
+  };
+  if (parameters.placement == Placement::kFarthestParticle) {
+    lines.emplace_back("surface offset", spacings(parameters.surface_offset));
+  }
+  lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
+  if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
+  return lines;
+}
+
+absl::StatusOr<ReportWriter> ReportWriter::Create(const std::filesystem::path& path,
+                                                  ReportOptions options) {
+  absl::StatusOr<AtomicFile> file = AtomicFile::Create(path);
+  if (!file.ok()) return file.status();
+  ReportWriter writer(*std::move(file), std::move(options));
+  const std::string_view head = page::kReportHtml.substr(0, page::kReportHtml.find(kFramesMark));
+  const ReportOptions& shown = writer.options_;
+  absl::Status status = writer.file_.Append(Expand(head, [&](std::string_view name) {
+    return name == "style" ? std::string(page::kReportCss)
+                           : EscapeHtml(name == "title" ? shown.title : shown.subtitle);
+  }));
+  if (!status.ok()) return status;
+  return writer;
+}
+
+absl::Status ReportWriter::Add(const FrameRecord& frame) {
+  const std::string geometry =
+      EncodeReportGeometry(frame, {options_.max_particles, options_.max_triangles});
+  return file_.Append(Concat("<script type=\"application/json\" class=\"frame-numbers\">",
+                             FrameNumbers(frame, options_),
+                             "</script><script type=\"text/plain\" class=\"frame-geometry\">",
+                             absl::Base64Escape(geometry), "</script>\n"));
+}
+
+absl::Status ReportWriter::Finish(const Summary& summary, double wall_seconds) {
+  const std::string_view tail =
+      page::kReportHtml.substr(page::kReportHtml.find(kFramesMark) + kFramesMark.size());
+  absl::Status status = file_.Append(Expand(tail, [&](std::string_view name) {
+    if (name == "headline") return EscapeHtml(summary.Headline(wall_seconds));
+    if (name == "summary") return SummaryRows(summary);
+    if (name == "parameters") return ParameterRows(options_.parameters);
+    if (name == "stages") return StageNames();
+    return Concat(page::kGeometryJs, page::kChartsJs, page::kReportJs);
+  }));
+  if (!status.ok()) return status;
+  return file_.Commit();
+}
+
+}  // namespace partiemc::client

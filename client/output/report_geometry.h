@@ -1,0 +1,30 @@
+// The geometry of a frame as the report's script reads it (report/geometry.js).
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "output/frame_record.h"
+
+namespace partiemc::client {
+
+struct ReportGeometryLimits {
+  std::size_t max_particles = 0;
+  std::size_t max_triangles = 0;
+};
+
+/// Bytes, before base64. Integers are LEB128 varints, signed ones zigzagged; a coordinate is a
+/// multiple of `step` from the origin, written as the difference to the one before.
+///
+///   float64 origin_x, origin_y, step       little-endian
+///   rings       count; per ring: points, outer ring + 1 (0: is one itself)
+///   points      x, y differences of all points of the rings
+///   normals     count (0 or that of the points); per point one byte, 256 to the full turn
+///   mesh points count of those after the rings' points; x, y differences. A mesh that does not
+///               share the rings' points has them all here, and `shared` is 0
+///   triangles   shared (0 or 1), count; per triangle (a - previous a) << 1 | interior as zigzag of
+///               the difference, then b - a, c - a
+///   particles   count; x, y differences, in an order that keeps them small
+std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryLimits& limits);
+
+}  // namespace partiemc::client

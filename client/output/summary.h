@@ -1,0 +1,51 @@
+// What a replay comes to: the table at its end.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "output/frame_record.h"
+
+namespace partiemc::client {
+
+/// One line of the table, its numbers as text. A heading has no numbers.
+struct SummaryRow {
+  std::string label;
+  std::string mean, p50, p99;
+};
+
+/// Gathers the numbers of a replay. Memory: about 120 bytes per frame.
+class Summary {
+ public:
+  void Add(const FrameRecord& frame);
+
+  /// Counts a frame that was answered by an error.
+  void AddRefused() { ++refused_; }
+
+  std::uint64_t frame_count() const { return particles_.size(); }
+  std::uint64_t refused_count() const { return refused_; }
+
+  /// Mean over the frames with a grid of 1 - triangles / triangles_grid, in percent; 0 without.
+  double MeanReductionPercent() const;
+
+  /// Mean, median and 99th percentile (nearest rank) over the frames: particles, polylines,
+  /// vertices, triangles unmerged and merged and the reduction, milliseconds by stage and in all.
+  /// Cost: n log n in the frames.
+  std::vector<SummaryRow> Rows() const;
+
+  /// One line: frames, refused ones, seconds, frames per second. Wall time of the whole replay.
+  std::string Headline(double wall_seconds) const;
+
+  /// The headline, then the rows as an aligned plain-text table; every line ends in '\n'.
+  std::string Table(double wall_seconds) const;
+
+ private:
+  std::vector<double> particles_, polylines_, vertices_, triangles_grid_, triangles_, reduction_;
+  std::array<std::vector<double>, kStageCount> stages_ms_;
+  std::vector<double> total_ms_;
+  std::uint64_t self_intersections_ = 0, folded_triangles_ = 0, refused_ = 0;
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,86 @@
+// The pieces that a recording file is made of: marks and compressed blocks.
+#pragma once
+
+#include <zstd.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace partiemc::client::recording {
+
+/// At most this much is unpacked from one block: a frame of 2^24 particles with everything.
+inline constexpr std::size_t kMaxBlockBytes = std::size_t{1} << 30;
+
+inline constexpr std::string_view kFileTag = "PEMCFILE";
+inline constexpr std::string_view kTailTag = "PEMCTAIL";
+inline constexpr std::uint64_t kVersion = 1;
+
+/// A mark: zstd's magic number of a skippable frame, its length, a tag of 8 bytes, a value.
+inline constexpr std::size_t kMarkBytes = 4 + 4 + 8 + 8;
+std::string MakeMark(std::string_view tag, std::uint64_t value);
+/// The value of a mark with this tag. Requires: bytes.size() == kMarkBytes.
+std::optional<std::uint64_t> ParseMark(std::string_view bytes, std::string_view tag);
+
+/// Packs blocks.
+class BlockPacker {
+ public:
+  explicit BlockPacker(int compression_level);
+  /// Valid until the next call. Errors: RESOURCE_EXHAUSTED.
+  absl::StatusOr<std::string_view> Pack(std::string_view block);
+
+ private:
+  struct Free {
+    void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+  };
+  std::unique_ptr<ZSTD_CCtx, Free> context_;
+  std::string packed_;
+};
+
+/// Reads marks and blocks from a file, one after the other.
+class BlockReader {
+ public:
+  enum class Piece : std::uint8_t {
+    kBlock,      ///< A whole block whose checksum is right.
+    kTail,       ///< The mark at the end of a whole recording.
+    kTruncated,  ///< The file ends, here or within a piece.
+  };
+
+  /// Reads the first mark. Errors: kNotFound, kPermissionDenied, kUnimplemented (another version),
+  /// kDataLoss (no recording).
+  static absl::StatusOr<BlockReader> Open(const std::string& path);
+
+  /// Errors: kDataLoss. `block` is valid until the next call.
+  absl::StatusOr<Piece> Next(std::string_view& block);
+
+  /// The frame count that the tail names; valid once Next gave kTail.
+  std::uint64_t frame_count() const { return frame_count_; }
+
+ private:
+  struct Free {
+    void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
+  };
+
+  explicit BlockReader(std::ifstream file);
+  bool Fill();  // False at the end of the file.
+  std::string_view Peek(std::size_t size);
+  absl::StatusOr<Piece> Unpack(std::string_view& block);
+  absl::StatusOr<Piece> ReadTail();
+
+  std::ifstream file_;
+  std::unique_ptr<ZSTD_DCtx, Free> context_;
+  std::string input_;         // Bytes of the file,
+  std::size_t position_ = 0;  // of which these are used up.
+  std::string block_;
+  std::uint64_t frame_count_ = 0;
+};
+
+}  // namespace partiemc::client::recording

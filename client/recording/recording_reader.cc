@@ -1,0 +1,227 @@
+#include <google/protobuf/io/coded_stream.h>
+
+#include <cmath>
+#include <fstream>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/input/frame_range.h"
+#include "partiemc/recording/v1/recording.pb.h"
+#include "partiemc/status.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "recording/block.h"
+#include "recording/recording.h"
+#include "wire/bytes.h"
+
+namespace partiemc::client {
+namespace {
+
+using recording::BlockReader;
+
+absl::Status CheckBytes(const char* field, std::size_t size, std::size_t expected) {
+  if (size == 0 || size == expected) return absl::OkStatus();
+  return absl::DataLossError(
+      absl::StrCat(field, " has ", size, " bytes where ", expected, " are due"));
+}
+
+absl::Status CopyPositions(const v1::ParticleFrame& message, RecordedFrame& frame) {
+  const std::string& bytes = message.positions();
+  frame.float32 = message.position_format() == v1::POSITION_FORMAT_FLOAT32_2;
+  if (!frame.float32 && message.position_format() != v1::POSITION_FORMAT_FLOAT64_2) {
+    return absl::DataLossError("positions have an unknown format");
+  }
+  const std::size_t particle_bytes = 2 * (frame.float32 ? sizeof(float) : sizeof(double));
+  if (bytes.size() % particle_bytes != 0) {
+    return absl::DataLossError(
+        absl::StrCat("positions have ", bytes.size(), " bytes, no multiple of ", particle_bytes));
+  }
+  if (frame.float32) {
+    const auto view = wire::ViewBytes<float>(bytes);
+    frame.positions.assign(view.begin(), view.end());
+  } else {
+    wire::CopyBytes(bytes, frame.positions);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
+  absl::Status status = CopyPositions(message, frame);
+  const std::size_t count = frame.ParticleCount();
+  if (status.ok()) status = CheckBytes("ids", message.ids().size(), 8 * count);
+  if (status.ok()) status = CheckBytes("volumes", message.volumes().size(), 4 * count);
+  if (status.ok()) status = CheckBytes("velocities", message.velocities().size(), 8 * count);
+  if (!status.ok()) return status;
+  frame.time = message.time();
+  wire::CopyBytes(message.ids(), frame.ids);
+  wire::CopyBytes(message.volumes(), frame.volumes);
+  wire::CopyBytes(message.velocities(), frame.velocities);
+  for (const float volume : frame.volumes) {
+    if (!(volume > 0 && std::isfinite(volume))) {
+      return absl::DataLossError("a volume is not positive and finite");
+    }
+  }
+  return absl::OkStatus();
+}
+
+// Takes the next length-delimited message from the front of `block`.
+template <typename Message>
+absl::Status TakeMessage(std::string_view& block, Message& message) {
+  google::protobuf::io::CodedInputStream stream(reinterpret_cast<const std::uint8_t*>(block.data()),
+                                                static_cast<int>(block.size()));
+  std::uint32_t size = 0;
+  const bool has_size = stream.ReadVarint32(&size);
+  const std::size_t start = static_cast<std::size_t>(stream.CurrentPosition());
+  if (!has_size || size > block.size() - start ||
+      !message.ParseFromArray(block.data() + start, static_cast<int>(size))) {
+    return absl::DataLossError("a message cannot be read");
+  }
+  block.remove_prefix(start + size);
+  return absl::OkStatus();
+}
+
+// The number of frames as the last bytes of the file tell it: a hint, checked while reading.
+std::optional<std::size_t> CountAtTail(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(-static_cast<std::streamoff>(recording::kMarkBytes), std::ios::end);
+  std::string bytes(recording::kMarkBytes, '\0');
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) return std::nullopt;
+  return recording::ParseMark(bytes, recording::kTailTag);
+}
+
+}  // namespace
+
+class RecordingReader::Impl {
+ public:
+  Impl(std::string path, BlockReader blocks, input::FrameRange range)
+      : path_(std::move(path)), blocks_(std::move(blocks)), range_(range) {}
+
+  absl::Status ReadHeader() {
+    const auto piece = blocks_.Next(block_);
+    if (!piece.ok()) return Located(piece.status());
+    partiemc::recording::v1::RecordingHeader message;
+    if (*piece != BlockReader::Piece::kBlock || !TakeMessage(block_, message).ok() ||
+        !block_.empty()) {
+      return Located(absl::DataLossError("there is no header"));
+    }
+    if (message.has_spacing()) {
+      if (!(message.spacing() > 0 && std::isfinite(message.spacing()))) {
+        return Located(absl::DataLossError("the spacing is not positive and finite"));
+      }
+      header_.spacing = message.spacing();
+    }
+    header_.title = message.title();
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> Next(RecordedFrame& frame) {
+    while (failure_.ok() && !over_) {
+      if (next_index_ >= range_.end) return false;
+      const auto more = Take();
+      if (!more.ok()) {
+        failure_ = Located(more.status());
+      } else if (*more) {
+        const std::size_t index = next_index_++;
+        if (!range_.Contains(index)) continue;
+        frame.index = index;
+        frame.source = absl::StrCat(path_, ": frame ", index);
+        failure_ = Decode(message_, frame);
+        if (failure_.ok()) return true;
+        failure_ = Located(failure_);
+      }
+    }
+    if (!failure_.ok()) return failure_;
+    return false;
+  }
+
+  std::optional<std::size_t> FrameCount() const {
+    const auto count = CountAtTail(path_);
+    return count ? std::optional(range_.CountOf(*count)) : std::nullopt;
+  }
+
+  const std::string& path() const { return path_; }
+  const RecordingHeader& header() const { return header_; }
+  const std::vector<std::string>& notices() const { return notices_; }
+
+ private:
+  // The next message into `message_`; false at the end, which is told where it comes too early.
+  absl::StatusOr<bool> Take() {
+    if (block_.empty()) {
+      const auto piece = blocks_.Next(block_);
+      if (!piece.ok()) return piece.status();
+      if (*piece != BlockReader::Piece::kBlock) {
+        over_ = true;
+        if (*piece == BlockReader::Piece::kTail) return CheckCount();
+        notices_.push_back(absl::StrCat(path_, ": truncated after ", next_index_,
+                                        " frames; what was recorded later is lost"));
+        return false;
+      }
+      if (block_.empty()) return absl::DataLossError("a block is empty");
+    }
+    const absl::Status status = TakeMessage(block_, message_);
+    if (!status.ok()) return status;
+    if (message_.sequence() != next_index_) {
+      return absl::DataLossError(absl::StrCat("frame ", message_.sequence(), " stands there"));
+    }
+    return true;
+  }
+
+  absl::StatusOr<bool> CheckCount() const {
+    if (blocks_.frame_count() == next_index_) return false;
+    return absl::DataLossError(absl::StrCat("its end promises ", blocks_.frame_count(), " frames"));
+  }
+
+  absl::Status Located(const absl::Status& status) const {
+    return absl::Status(status.code(), absl::StrCat(path_, ": damaged after ", next_index_,
+                                                    " frames: ", status.message(),
+                                                    "; the frames before are whole"));
+  }
+
+  const std::string path_;
+  BlockReader blocks_;
+  const input::FrameRange range_;
+  RecordingHeader header_;
+  std::string_view block_;  // What is left of the block that was read last.
+  v1::ParticleFrame message_;
+  std::size_t next_index_ = 0;
+  bool over_ = false;
+  absl::Status failure_;
+  std::vector<std::string> notices_;
+};
+
+bool IsRecording(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string expected = recording::MakeMark(recording::kFileTag, 0);
+  constexpr std::size_t kTagged = recording::kMarkBytes - sizeof(std::uint64_t);
+  std::string bytes(kTagged, '\0');
+  return file.read(bytes.data(), kTagged) && bytes == expected.substr(0, kTagged);
+}
+
+absl::StatusOr<std::unique_ptr<RecordingReader>> RecordingReader::Open(const std::string& path,
+                                                                       const std::string& frames) {
+  absl::StatusOr<input::FrameRange> range = input::FrameRange{};
+  if (!frames.empty()) range = input::ParseFrameRange(frames);
+  if (!range.ok()) return range.status();
+  auto blocks = BlockReader::Open(path);
+  if (!blocks.ok()) {
+    return absl::Status(blocks.status().code(),
+                        absl::StrCat(path, ": ", blocks.status().message()));
+  }
+  auto impl = std::make_unique<Impl>(path, *std::move(blocks), *range);
+  const absl::Status header = impl->ReadHeader();
+  if (!header.ok()) return header;
+  return std::unique_ptr<RecordingReader>(new RecordingReader(std::move(impl)));
+}
+
+RecordingReader::RecordingReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RecordingReader::~RecordingReader() = default;
+
+const RecordingHeader& RecordingReader::header() const { return impl_->header(); }
+absl::StatusOr<bool> RecordingReader::Next(RecordedFrame& frame) { return impl_->Next(frame); }
+std::optional<std::size_t> RecordingReader::FrameCount() { return impl_->FrameCount(); }
+std::string RecordingReader::Description() const {
+  const std::string& title = impl_->header().title;
+  return title.empty() ? "recording" : absl::StrCat("recording: ", title);
+}
+const std::vector<std::string>& RecordingReader::notices() const { return impl_->notices(); }
+
+}  // namespace partiemc::client
