@@ -1,0 +1,252 @@
+#include "architecture/rules.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
+#include <regex>
+#include <sstream>
+#include <utility>
+
+#include "partiemc/stage.h"
+
+namespace partiemc::architecture {
+namespace {
+
+// A header of gRPC or Protobuf, or one that protoc has made.
+bool IsMessaging(std::string_view include) {
+  return include.starts_with("grpc") || include.starts_with("google/protobuf/") ||
+         include.ends_with(".pb.h");
+}
+
+std::string StageFile(Stage stage, std::string_view extension) {
+  return "core/src/" + std::string(Name(stage)) + std::string(extension);
+}
+
+void RequireFile(const SourceTree& tree, const std::string& path, Violations& violations) {
+  if (!tree.contains(path)) violations.push_back(path + ": is missing");
+}
+
+std::vector<std::string> Matches(const std::string& text, const std::regex& pattern) {
+  std::vector<std::string> matches;
+  for (std::sregex_iterator match(text.begin(), text.end(), pattern), end; match != end; ++match) {
+    matches.push_back((*match)[1]);
+  }
+  return matches;
+}
+
+// The packages of docker/packages/<set>.txt and of the sets that it includes by '@'.
+std::set<std::string> PackageSet(const SourceTree& tree, const std::string& set) {
+  std::set<std::string> packages;
+  const auto file = tree.find("docker/packages/" + set + ".txt");
+  if (file == tree.end()) return packages;
+  std::istringstream lines(file->second);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line.substr(0, line.find('#')));
+    std::string word;
+    if (!(words >> word)) continue;
+    if (word.starts_with('@')) {
+      packages.merge(PackageSet(tree, word.substr(1)));
+    } else {
+      packages.insert(word);
+    }
+  }
+  return packages;
+}
+
+// What find_package, pkg_check_modules and find_library ask for, and the Debian packages that
+// have it. Nothing for what comes with the compiler or is the project itself.
+const std::map<std::string, std::vector<std::string>>& PackagesByName() {
+  static const std::map<std::string, std::vector<std::string>> packages = {
+      {"absl", {"libabsl-dev"}},
+      {"benchmark", {"libbenchmark-dev"}},
+      {"Boost", {"libboost1.74-dev"}},
+      {"CLI11", {"libcli11-dev"}},
+      {"FastFloat", {"libfast-float-dev"}},
+      {"geos_c", {"libgeos-dev"}},
+      {"GEOS", {"libgeos-dev"}},
+      {"gRPC", {"libgrpc++-dev", "protobuf-compiler-grpc"}},
+      {"GTest", {"libgtest-dev", "libgmock-dev"}},
+      {"HWY", {"libhwy-dev"}},
+      {"hwy", {"libhwy-dev"}},
+      {"libhwy", {"libhwy-dev"}},
+      {"libzstd", {"libzstd-dev"}},
+      {"nlohmann_json", {"nlohmann-json3-dev"}},
+      {"partiemc", {}},
+      {"PkgConfig", {"pkg-config"}},
+      {"prometheus-cpp", {"prometheus-cpp-dev"}},
+      {"Protobuf", {"libprotobuf-dev", "protobuf-compiler"}},
+      {"spdlog", {"libspdlog-dev"}},
+      {"TBB", {"libtbb-dev"}},
+      {"Threads", {}},
+      {"VTK", {"libvtk9-dev"}},
+      {"ZLIB", {"zlib1g-dev"}},
+      {"zstd", {"libzstd-dev"}},
+  };
+  return packages;
+}
+
+// The names that a CMake file looks for.
+std::vector<std::string> LookedFor(const std::string& cmake) {
+  static const std::regex kComment("#[^\n]*");
+  static const std::regex kFindPackage(R"(find_package\(\s*([A-Za-z0-9_+-]+))");
+  static const std::regex kLibrary(R"(find_library\(\s*\w+\s+(?:NAMES\s+)?([\w.+-]+))");
+  static const std::regex kModule(R"(pkg_(?:check_modules|search_module)\(([^)]*)\))");
+  static const std::set<std::string> kOptions = {"REQUIRED", "QUIET", "IMPORTED_TARGET", "GLOBAL"};
+  const std::string code = std::regex_replace(cmake, kComment, "");
+  std::vector<std::string> names = Matches(code, kFindPackage);
+  std::ranges::move(Matches(code, kLibrary), std::back_inserter(names));
+  for (const std::string& arguments : Matches(code, kModule)) {
+    std::istringstream words(arguments);
+    std::string word;
+    words >> word;  // The prefix of the variables.
+    while (words >> word) {
+      if (!kOptions.contains(word)) names.push_back(word.substr(0, word.find_first_of("<>=")));
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+Violations CoreIsPlain(const SourceTree& tree) {
+  static const std::regex kForbiddenHeader(
+      "(grpc|google/protobuf/|spdlog/|fmt/|CLI/|sys/|unistd|fcntl).*|.*\\.pb\\.h|"
+      "(fstream|iostream|cstdio|stdio\\.h|filesystem|chrono|ctime|time\\.h|cstdlib|thread|random)");
+  static const std::regex kForbiddenName(
+      R"(\b(getenv|fopen|f?printf|system_clock|steady_clock|random_device)\b)");
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    if (Room(path) != "core" || !IsCxx(path)) continue;
+    for (const std::string& include : Includes(text)) {
+      const std::string target = ResolveInclude(tree, path, include);
+      if (std::regex_match(include, kForbiddenHeader) ||
+          (!target.empty() && Room(target) != "core")) {
+        violations.push_back(path + ": includes " + include + "; the core is plain C++");
+      }
+    }
+    for (const std::string& name :
+         Matches(WithoutComments(text, Literals::kBlank), kForbiddenName)) {
+      violations.push_back(path + ": uses " + name + "; the core has no files, clock, environment");
+    }
+  }
+  return violations;
+}
+
+Violations StagesKeepTheirOrder(const SourceTree& tree) {
+  static const std::string kReconstructor = "core/src/reconstructor.cc";
+  static const std::string kLastStage = StageFile(static_cast<Stage>(kStageCount - 1), ".cc");
+  Violations violations;
+  RequireFile(tree, kReconstructor, violations);
+  std::vector<std::string> headers;
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    headers.push_back(StageFile(static_cast<Stage>(k), ".h"));
+    RequireFile(tree, headers.back(), violations);
+    RequireFile(tree, StageFile(static_cast<Stage>(k), ".cc"), violations);
+  }
+  if (!violations.empty()) return violations;
+
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    for (const char* extension : {".h", ".cc"}) {
+      const std::string file = StageFile(static_cast<Stage>(k), extension);
+      const Reached reached = Reach(tree, file);
+      for (std::size_t later = k + 1; later < kStageCount; ++later) {
+        if (reached.ours.contains(headers[later])) {
+          violations.push_back(file + ": reaches the later stage " + headers[later]);
+        }
+      }
+    }
+  }
+  for (const auto& [path, text] : tree) {
+    // The last stage may know all of the others: that is no knowledge of their order.
+    if (Room(path) != "core" || !path.ends_with(".cc") || path == kLastStage) continue;
+    const Reached reached = Reach(tree, path);
+    const bool all =
+        std::ranges::all_of(headers, [&](const auto& h) { return reached.ours.contains(h); });
+    if (all != (path == kReconstructor)) {
+      violations.push_back(path + ": " + (all ? "reaches" : "does not reach") +
+                           " all stages; reconstructor.cc alone knows their order");
+    }
+  }
+  return violations;
+}
+
+Violations SessionsAreFreeOfGrpc(const SourceTree& tree) {
+  Violations violations;
+  bool any = false;
+  for (const auto& [path, text] : tree) {
+    const std::string name = path.substr(path.rfind('/') + 1);
+    if (Room(path) != "server" || !IsCxx(path) || !name.starts_with("session")) continue;
+    any = true;
+    const Reached reached = Reach(tree, path);
+    for (const std::string& include : reached.foreign) {
+      if (IsMessaging(include)) violations.push_back(path + ": reaches " + include);
+    }
+  }
+  if (!any) violations.push_back("server: has no session source");
+  return violations;
+}
+
+Violations ServerAndClientAreStrangers(const SourceTree& tree) {
+  static const std::array<std::pair<std::string_view, std::string>, 2> kStrangers = {
+      {{"server", "client"}, {"client", "server"}}};
+  static const std::regex kLinked(R"(\bpartiemc(?:::|_)(server|client)\w*)");
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    for (const auto& [room, stranger] : kStrangers) {
+      if (Room(path) != room) continue;
+      if (IsCxx(path)) {
+        for (const std::string& file : Reach(tree, path).ours) {
+          if (Room(file) == stranger) violations.push_back(path + ": reaches " + file);
+        }
+      } else if (path.ends_with("CMakeLists.txt")) {
+        const auto linked = Matches(text, kLinked);
+        if (std::ranges::find(linked, stranger) != linked.end()) {
+          violations.push_back(path + ": links to the " + stranger);
+        }
+      }
+    }
+  }
+  return violations;
+}
+
+Violations NoMachinePaths(const SourceTree& tree) {
+  // Not preceded by what makes it the tail of a relative path, of a variable or of an address.
+  static const std::regex kMachinePath(
+      R"re((?:^|[^\w.~/})*-])(/(?:home|Users|work|mnt|root|media)/[\w.]+))re");
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    for (const std::string& found : Matches(text, kMachinePath)) {
+      violations.push_back(path + ": names " + found);
+    }
+  }
+  return violations;
+}
+
+Violations PackageSetsAreComplete(const SourceTree& tree) {
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    if (!path.ends_with("CMakeLists.txt") && !path.ends_with(".cmake")) continue;
+    for (const std::string& name : LookedFor(text)) {
+      const auto packages = PackagesByName().find(name);
+      if (packages == PackagesByName().end()) {
+        violations.push_back(path + ": looks for " + name + ", which no package is known for");
+        continue;
+      }
+      const std::string set = Room(path) == "core"    ? "core"
+                              : Room(path) == "tests" ? "tests"
+                              : name == "VTK"         ? "vtk"
+                                                      : "service";
+      const auto listed = PackageSet(tree, set);
+      for (const std::string& package : packages->second) {
+        if (!listed.contains(package)) {
+          violations.push_back("docker/packages/" + set + ".txt: lacks " + package + ", as " +
+                               path + " looks for " + name);
+        }
+      }
+    }
+  }
+  return violations;
+}
+
+}  // namespace partiemc::architecture

@@ -1,0 +1,35 @@
+// The rules of ARCHITECTURE.md that a compiler does not check. Each function looks at a whole
+// source tree and returns one line per violation, with the file that breaks the rule.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "architecture/source_tree.h"
+
+namespace partiemc::architecture {
+
+using Violations = std::vector<std::string>;
+
+/// The core knows no gRPC, Protobuf, logging, file, stream, clock or environment, and no other
+/// room.
+Violations CoreIsPlain(const SourceTree& tree);
+
+/// Each of the seven stages has its header and source; a stage reaches the headers of earlier
+/// stages only; no other source than reconstructor.cc reaches all of them.
+Violations StagesKeepTheirOrder(const SourceTree& tree);
+
+/// Sessions of the server reach neither gRPC nor Protobuf, so that they run under ThreadSanitizer.
+Violations SessionsAreFreeOfGrpc(const SourceTree& tree);
+
+/// Server and client never include each other, nor link to each other.
+Violations ServerAndClientAreStrangers(const SourceTree& tree);
+
+/// No file names a directory of somebody's own machine.
+Violations NoMachinePaths(const SourceTree& tree);
+
+/// What the CMake files look for is in the package sets of docker/packages: the core's in `core`,
+/// VTK in `vtk`, the tests' in `tests`, everything else in `service`.
+Violations PackageSetsAreComplete(const SourceTree& tree);
+
+}  // namespace partiemc::architecture

@@ -1,0 +1,149 @@
+#include "architecture/rules.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace partiemc::architecture {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const SourceTree& Project() {
+  static const SourceTree tree = ReadSourceTree(PARTIEMC_SOURCE_DIR);
+  return tree;
+}
+
+// The project with `text` added to the end of one of its files (or as a new file).
+SourceTree Planted(const std::string& path, const std::string& text) {
+  SourceTree tree = Project();
+  tree[path] += text;
+  return tree;
+}
+
+SourceTree Without(const std::string& path, const std::string& text) {
+  SourceTree tree = Project();
+  std::string& content = tree.at(path);
+  const auto at = content.find(text);
+  EXPECT_NE(at, std::string::npos) << path << " does not hold " << text;
+  content.erase(at, text.size());
+  return tree;
+}
+
+TEST(SourceTree, HoldsTheProjectAndNoBuild) {
+  EXPECT_TRUE(Project().contains("core/include/partiemc/partiemc.h"));
+  EXPECT_TRUE(Project().contains("docker/packages/core.txt"));
+  for (const auto& [path, text] : Project()) {
+    EXPECT_FALSE(path.starts_with("build/") || path.starts_with(".git/")) << path;
+  }
+}
+
+TEST(SourceTree, CommentsAreBlankedAndLiteralsOnlyOnRequest) {
+  const std::string text = "a /* \" */ \"// b\" 1'000 'c' // d\ne";
+  EXPECT_EQ(WithoutComments(text, Literals::kKeep), "a         \"// b\" 1'000 'c'     \ne");
+  EXPECT_EQ(WithoutComments(text, Literals::kBlank), "a         \"    \" 1'000 ' '     \ne");
+}
+
+TEST(SourceTree, AnIncludeInACommentIsNone) {
+  EXPECT_THAT(Includes("// x\n#include <a>\n/*\n#include <b>\n*/\n #  include \"c/d.h\"\n"),
+              testing::ElementsAre("a", "c/d.h"));
+}
+
+TEST(SourceTree, AnIncludeMeansTheNearestFile) {
+  const SourceTree tree = {{"core/src/a.h", ""}, {"server/a.h", ""}, {"server/x/b.cc", ""}};
+  EXPECT_EQ(ResolveInclude(tree, "server/x/b.cc", "a.h"), "server/a.h");
+  EXPECT_EQ(ResolveInclude(tree, "client/b.cc", "src/a.h"), "core/src/a.h");
+  EXPECT_EQ(ResolveInclude(tree, "client/b.cc", "vector"), "");
+}
+
+TEST(Architecture, TheCoreIsPlain) { EXPECT_THAT(CoreIsPlain(Project()), IsEmpty()); }
+
+TEST(Architecture, AForeignHeaderInTheCoreIsSeen) {
+  for (const std::string header :
+       {"<grpcpp/grpcpp.h>", "<spdlog/spdlog.h>", "<fstream>", "<iostream>", "<chrono>",
+        "\"partiemc/v1/reconstruction.pb.h\"", "\"wire/codec.h\""}) {
+    const SourceTree tree = Planted("core/src/status.cc", "\n#include " + header + "\n");
+    EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("core/src/status.cc"))) << header;
+  }
+}
+
+TEST(Architecture, TheEnvironmentReadInTheCoreIsSeen) {
+  const SourceTree tree = Planted("core/src/status.cc", "\nauto x = std::getenv(\"X\");\n");
+  EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("uses getenv")));
+}
+
+TEST(Architecture, StagesKeepTheirOrder) {
+  EXPECT_THAT(StagesKeepTheirOrder(Project()), IsEmpty());
+}
+
+TEST(Architecture, AStageThatLooksAheadIsSeen) {
+  const SourceTree direct = Planted("core/src/bins.cc", "\n#include \"rings.h\"\n");
+  EXPECT_THAT(StagesKeepTheirOrder(direct), Contains(HasSubstr("core/src/bins.cc: reaches")));
+}
+
+TEST(Architecture, AStageThatLooksAheadThroughAnotherHeaderIsSeen) {
+  SourceTree tree = Planted("core/src/field.h", "\n#include \"detour.h\"\n");
+  tree["core/src/detour.h"] = "#include \"mesh.h\"\n";
+  EXPECT_THAT(StagesKeepTheirOrder(tree), Contains(HasSubstr("core/src/field.h: reaches")));
+}
+
+TEST(Architecture, ASecondFileThatKnowsAllStagesIsSeen) {
+  const SourceTree tree =
+      Planted("core/src/pipeline.cc", Project().at("core/src/reconstructor.cc"));
+  EXPECT_THAT(StagesKeepTheirOrder(tree), Contains(HasSubstr("core/src/pipeline.cc: reaches all")));
+}
+
+TEST(Architecture, SessionsAreFreeOfGrpc) {
+  EXPECT_THAT(SessionsAreFreeOfGrpc(Project()), IsEmpty());
+}
+
+TEST(Architecture, ASessionThatReachesAMessageIsSeen) {
+  const SourceTree direct = Planted("server/session_extra.h", "#include <grpcpp/grpcpp.h>\n");
+  EXPECT_THAT(SessionsAreFreeOfGrpc(direct), Contains(HasSubstr("reaches grpcpp/grpcpp.h")));
+  SourceTree tree = Planted("server/session_extra.h", "#include \"detour.h\"\n");
+  tree["server/detour.h"] = "#include \"partiemc/v1/reconstruction.pb.h\"\n";
+  EXPECT_THAT(SessionsAreFreeOfGrpc(tree), Contains(HasSubstr("reconstruction.pb.h")));
+}
+
+TEST(Architecture, ServerAndClientAreStrangers) {
+  EXPECT_THAT(ServerAndClientAreStrangers(Project()), IsEmpty());
+}
+
+TEST(Architecture, AServerThatUsesTheClientIsSeen) {
+  SourceTree tree = Planted("client/private.h", "");
+  tree["server/extra.cc"] = "#include \"client/private.h\"\n";
+  EXPECT_THAT(ServerAndClientAreStrangers(tree),
+              Contains("server/extra.cc: reaches client/private.h"));
+  EXPECT_THAT(ServerAndClientAreStrangers(
+                  Planted("client/CMakeLists.txt", "target_link_libraries(x partiemc_server)")),
+              Contains("client/CMakeLists.txt: links to the server"));
+}
+
+TEST(Architecture, NoFileNamesAMachine) { EXPECT_THAT(NoMachinePaths(Project()), IsEmpty()); }
+
+TEST(Architecture, APathOfAMachineIsSeen) {
+  const SourceTree tree = Planted("README.md",
+                                  "\ncd /ho"
+                                  "me/alice/partiemc\n");
+  EXPECT_THAT(NoMachinePaths(tree), Contains(HasSubstr("README.md: names")));
+}
+
+TEST(Architecture, PackageSetsAreComplete) {
+  EXPECT_THAT(PackageSetsAreComplete(Project()), IsEmpty());
+}
+
+TEST(Architecture, APackageThatIsNotListedIsSeen) {
+  EXPECT_THAT(PackageSetsAreComplete(Without("docker/packages/core.txt", "libtbb-dev")),
+              Contains(HasSubstr("docker/packages/core.txt: lacks libtbb-dev")));
+  EXPECT_THAT(PackageSetsAreComplete(Planted("core/CMakeLists.txt", "\nfind_package(Novelty)\n")),
+              Contains(HasSubstr("looks for Novelty")));
+  EXPECT_THAT(PackageSetsAreComplete(
+                  Planted("core/CMakeLists.txt", "\npkg_check_modules(Z REQUIRED libzstd)\n")),
+              Contains(HasSubstr("docker/packages/core.txt: lacks libzstd-dev")));
+}
+
+}  // namespace
+}  // namespace partiemc::architecture

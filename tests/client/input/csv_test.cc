@@ -1,0 +1,111 @@
+#include <cmath>
+
+#include "client/input/fixtures.h"
+
+namespace partiemc::client {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+RecordedFrame Read(const std::string& content, const SequenceOptions& options = {}) {
+  const InputDirectory directory;
+  return ReadOne(directory.Write("frame.csv", content), options);
+}
+
+absl::Status Refusal(const std::string& content, const SequenceOptions& options = {}) {
+  const InputDirectory directory;
+  return ReadAll(directory.Write("frame.csv", content), options).status;
+}
+
+TEST(Csv, EveryDialectOfTheSameTableReadsTheSame) {
+  for (const char* content : {
+           "id,x,y,vx,vy\n7,1.5,-2,3,4\n9,2.5,1e1,5,6\n",
+           "id;x;y;vx;vy\n7;1.5;-2;3;4\n9;2.5;1e1;5;6\n",
+           "id\tx\ty\tvx\tvy\n7\t1.5\t-2\t3\t4\n9\t2.5\t1e1\t5\t6\n",
+           "id x  y vx vy\n  7 1.5 -2 3 4\n9   2.5 1e1 5 6\n",
+           "id, x, y, vx, vy\r\n7, 1.5, -2, 3, 4\r\n9, 2.5, 1e1, 5, 6\r\n",
+           "\xEF\xBB\xBFid,x,y,vx,vy\n7,1.5,-2,3,4\n9,2.5,1e1,5,6",
+           "# made by hand\n\nid,x,y,vx,vy\n7,1.5,-2,3,4\n# between\n9,2.5,1e1,5,6\n\n",
+           "# id x y vx vy\n7 1.5 -2 3 4\n9 2.5 1e1 5 6\n",
+           "% id,x,y,vx,vy\n7,1.5,-2,3,4\n9,2.5,1e1,5,6\n",
+           "id,x,y,vx,vy,\n7,1.5,-2,3,4,\n9,2.5,1e1,5,6,\n",
+           "\"Vel:0\",\"Vel:1\",\"Idp\",\"Points:0\",\"Points:1\"\n3,4,7,1.5,-2\n5,6,9,2.5,1e1\n",
+           "Pos.x [m];Pos.y [m];Idp;Vel.x [m/s];Vel.y [m/s]\n1.5;-2;7;3;4\n2.5;1e1;9;5;6\n",
+           "\"x, east\",id,x,y,vx,vy\n0,7,1.5,-2,3,4\n0,9,2.5,+10,5,6\n",
+       }) {
+    const RecordedFrame frame = Read(content);
+    EXPECT_THAT(frame.positions, ElementsAre(1.5, -2, 2.5, 10)) << content;
+    EXPECT_THAT(frame.velocities, ElementsAre(3, 4, 5, 6)) << content;
+    EXPECT_THAT(frame.ids, ElementsAre(7, 9)) << content;
+    EXPECT_FALSE(frame.float32);
+  }
+}
+
+TEST(Csv, WithoutHeaderTwoColumnsAreXAndY) {
+  EXPECT_THAT(Read("1,2\n3,4\n").positions, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(Read("1 2 5\n3 4 5\n").positions, ElementsAre(1, 2, 3, 4));
+}
+
+TEST(Csv, WithoutHeaderMoreColumnsNeedAWord) {
+  const std::string rows = "0 1 2 3 4 5\n1 6 7 8 9 5\n";
+  ExpectRefused(Refusal(rows), absl::StatusCode::kFailedPrecondition,
+                {"frame.csv", "6 columns", "--columns"});
+  EXPECT_THAT(Read(rows, {.columns = "2,3"}).positions, ElementsAre(1, 2, 6, 7));
+  const RecordedFrame named = Read(rows, {.columns = "id,x,y,vx,vy"});
+  EXPECT_THAT(named.positions, ElementsAre(1, 2, 6, 7));
+  EXPECT_THAT(named.velocities, ElementsAre(3, 4, 8, 9));
+  EXPECT_THAT(named.ids, ElementsAre(0, 1));
+  EXPECT_THAT(Read(rows, {.columns = "-,-,-,y,x"}).positions, ElementsAre(4, 3, 9, 8));
+}
+
+TEST(Csv, OnlySelectedParticlesAreRead) {
+  const std::string rows = "x,y,type,mk\n1,2,fluid,1\n3,4,wall,1\n5,6,fluid,2\n";
+  EXPECT_THAT(Read(rows, {.select = {"type=fluid"}}).positions, ElementsAre(1, 2, 5, 6));
+  EXPECT_THAT(Read(rows, {.select = {"type=fluid", "mk=2.0"}}).positions, ElementsAre(5, 6));
+  EXPECT_THAT(Read(rows, {.select = {"type=gas"}}).positions, IsEmpty());
+}
+
+TEST(Csv, AHeaderWithoutRowsIsAFrameWithoutParticles) {
+  const RecordedFrame frame = Read("x,y\n");
+  EXPECT_EQ(frame.ParticleCount(), 0u);
+}
+
+TEST(Csv, WhatIsNotFiniteIsPassedOnForTheCoreToJudge) {
+  const RecordedFrame frame = Read("x,y\nnan,1\n2,-inf\n");
+  EXPECT_TRUE(std::isnan(frame.positions[0]));
+  EXPECT_TRUE(std::isinf(frame.positions[3]));
+}
+
+TEST(Csv, RepeatedIdsAreNoIds) {
+  EXPECT_THAT(Read("x,y,gid\n1,2,4294967295\n3,4,4294967295\n").ids, IsEmpty());
+  EXPECT_THAT(Read("x,y,id\n1,2,0.5\n3,4,1\n").ids, IsEmpty());
+}
+
+TEST(Csv, VolumesAreTakenOnlyWhereAllArePositive) {
+  EXPECT_THAT(Read("x,y,vol\n1,2,0.25\n3,4,0.5\n").volumes, ElementsAre(0.25f, 0.5f));
+  const InputDirectory directory;
+  const ReadSequence read = ReadAll(directory.Write("a.csv", "x,y,vol\n1,2,0.25\n3,4,0\n"));
+  EXPECT_THAT(read.frames.at(0).volumes, IsEmpty());
+  EXPECT_THAT(read.notices, ElementsAre(testing::HasSubstr("volumes are ignored")));
+}
+
+TEST(Csv, ABadRowIsNamedByFileAndLine) {
+  ExpectRefused(Refusal("x,y\n1,2\n3,four\n"), absl::StatusCode::kDataLoss,
+                {"frame.csv:3", "'four' is not a number"});
+  ExpectRefused(Refusal("id,x,y\n1,2,3\n4,5\n"), absl::StatusCode::kDataLoss,
+                {"frame.csv:3", "2 of 3 values"});
+  ExpectRefused(Refusal("x;y\n1,5;2,5\n"), absl::StatusCode::kDataLoss, {"'1,5' is not a number"});
+}
+
+TEST(Csv, DegenerateFilesAreRefusedInOneLine) {
+  ExpectRefused(Refusal(""), absl::StatusCode::kDataLoss, {"frame.csv", "empty"});
+  ExpectRefused(Refusal("# only a comment\n"), absl::StatusCode::kDataLoss, {"empty"});
+  ExpectRefused(Refusal("t,energy\n0,1\n"), absl::StatusCode::kFailedPrecondition,
+                {"no position columns", "t,energy"});
+  ExpectRefused(Refusal("x,y\n" + std::string(2 << 20, '1') + "\n"), absl::StatusCode::kDataLoss,
+                {"frame.csv:2", "1 MiB"});
+}
+
+}  // namespace
+}  // namespace partiemc::client

@@ -1,0 +1,95 @@
+// Files made on the spot, and sequences read whole.
+#pragma once
+
+#include <unistd.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/input/sequence.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+namespace partiemc::client {
+
+/// A directory that goes away with its test.
+class InputDirectory {
+ public:
+  InputDirectory() {
+    std::string name = (std::filesystem::temp_directory_path() / "partiemc-input-XXXXXX").string();
+    path_ = mkdtemp(name.data());
+  }
+  InputDirectory(const InputDirectory&) = delete;
+  InputDirectory& operator=(const InputDirectory&) = delete;
+  ~InputDirectory() { std::filesystem::remove_all(path_); }
+
+  /// Writes a file and returns its path.
+  std::string Write(const std::string& name, std::string_view content) const {
+    const std::string path = Path(name);
+    std::ofstream(path, std::ios::binary) << content;
+    return path;
+  }
+  std::string Path(const std::string& name) const { return path_ + "/" + name; }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// All frames of an input up to its end or the first error.
+struct ReadSequence {
+  absl::Status status;
+  std::vector<RecordedFrame> frames;
+  std::vector<std::string> notices;
+  std::optional<std::size_t> frame_count;
+  std::string description;
+};
+
+inline ReadSequence ReadAll(const std::string& input, const SequenceOptions& options = {}) {
+  ReadSequence read;
+  auto sequence = Sequence::Open(input, options);
+  if (!sequence.ok()) {
+    read.status = sequence.status();
+    return read;
+  }
+  read.frame_count = (*sequence)->FrameCount();
+  read.description = (*sequence)->Description();
+  RecordedFrame frame;
+  while (true) {
+    const auto found = (*sequence)->Next(frame);
+    read.status = found.status();
+    if (!found.ok() || !*found) break;
+    read.frames.push_back(frame);
+  }
+  // An error stays: a caller that asks again must not take the rest for whole.
+  if (!read.status.ok()) EXPECT_EQ((*sequence)->Next(frame).status(), read.status);
+  read.notices = (*sequence)->notices();
+  return read;
+}
+
+/// The only frame of an input; an empty one, and a failed test, if there is another number.
+inline RecordedFrame ReadOne(const std::string& input, const SequenceOptions& options = {}) {
+  const ReadSequence read = ReadAll(input, options);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_EQ(read.frames.size(), 1u) << input;
+  return read.frames.empty() ? RecordedFrame() : read.frames.front();
+}
+
+/// A status of `code` in one line that has each of `words`.
+inline void ExpectRefused(const absl::Status& status, absl::StatusCode code,
+                          const std::vector<std::string>& words) {
+  EXPECT_EQ(status.code(), code) << status;
+  const std::string message(status.message());
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  for (const std::string& word : words) EXPECT_THAT(message, testing::HasSubstr(word));
+}
+
+inline std::string SamplePath(const std::string& name) {
+  return std::string(PARTIEMC_SOURCE_DIR "/tests/data/formats/") + name;
+}
+
+}  // namespace partiemc::client

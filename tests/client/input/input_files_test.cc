@@ -1,0 +1,168 @@
+#include "client/input/fixtures.h"
+#include "client/input/frame_range.h"
+
+namespace partiemc::client {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::vector<double> FirstCoordinates(const ReadSequence& read) {
+  std::vector<double> firsts;
+  for (const RecordedFrame& frame : read.frames) firsts.push_back(frame.positions.at(0));
+  return firsts;
+}
+
+InputDirectory& WriteFrames(InputDirectory& directory, const std::string& stem, int count) {
+  for (int k = 0; k < count; ++k) {
+    directory.Write(stem + std::to_string(k) + ".csv", "x,y\n" + std::to_string(k) + ",0\n");
+  }
+  return directory;
+}
+
+TEST(InputFiles, ADirectoryIsReadInTheOrderOfItsNumbers) {
+  InputDirectory directory;
+  const ReadSequence read = ReadAll(WriteFrames(directory, "frame_", 12).path());
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_EQ(read.frame_count, 12u);
+  EXPECT_EQ(read.description, "12 CSV files, frame_0.csv to frame_11.csv");
+  EXPECT_THAT(FirstCoordinates(read), ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
+  EXPECT_EQ(read.frames[10].index, 10u);
+}
+
+TEST(InputFiles, SeveralSeriesAreRefusedByNameWithAPatternToUse) {
+  InputDirectory directory;
+  WriteFrames(directory, "Water_", 3);
+  WriteFrames(directory, "Soil_", 2);
+  directory.Write("Wall.csv", "x,y\n1,2\n");
+  for (const std::string& input : {directory.path(), directory.path() + "/*.csv"}) {
+    ExpectRefused(ReadAll(input).status, absl::StatusCode::kFailedPrecondition,
+                  {"3 series", "Soil_*.csv (2 files)", "Wall.csv (1 file)", "Water_*.csv (3 files)",
+                   "'" + directory.path() + "/Water_*.csv'"});
+  }
+  EXPECT_EQ(ReadAll(directory.path() + "/Soil_*.csv").frames.size(), 2u);
+}
+
+TEST(InputFiles, RunsThatDifferInAnotherNumberAreSeveralSeriesUnlessAPatternSaysOtherwise) {
+  InputDirectory directory;
+  WriteFrames(directory, "run1_", 2);
+  WriteFrames(directory, "run2_", 2);
+  ExpectRefused(ReadAll(directory.path()).status, absl::StatusCode::kFailedPrecondition,
+                {"run1_*.csv (2 files)", "run2_*.csv (2 files)"});
+  EXPECT_EQ(ReadAll(directory.path() + "/run2_*").frames.size(), 2u);
+  EXPECT_EQ(ReadAll(directory.path() + "/run*").frames.size(), 4u);
+}
+
+TEST(InputFiles, FilesWithoutPositionsAreSkippedWithANotice) {
+  InputDirectory directory;
+  WriteFrames(directory, "frame_", 2);
+  directory.Write("energy.csv", "t,kinetic\n0,1\n");
+  directory.Write("in.dam", "units lj\ndimension 2\n");
+  directory.Write(".hidden.csv", "x,y\n1,2\n");
+  const ReadSequence read = ReadAll(directory.path());
+  EXPECT_EQ(read.frames.size(), 2u) << read.status;
+  EXPECT_EQ(read.notices.size(), 2u);
+  EXPECT_THAT(read.notices, Contains(HasSubstr("energy.csv")));
+  EXPECT_THAT(read.notices, Contains(HasSubstr("LAMMPS input script")));
+}
+
+TEST(InputFiles, TimesBesideTheFramesAreTheirTimes) {
+  InputDirectory directory;
+  WriteFrames(directory, "frame_", 3);
+  directory.Write("times.csv", "frame,t\n0,0.5\n1,0.75\n");
+  for (const std::string& input : {directory.path(), directory.path() + "/frame_*.csv"}) {
+    const ReadSequence read = ReadAll(input);
+    ASSERT_EQ(read.frames.size(), 3u) << read.status;
+    EXPECT_EQ(read.frames[0].time, 0.5);
+    EXPECT_EQ(read.frames[1].time, 0.75);
+    EXPECT_FALSE(read.frames[2].time.has_value());
+    EXPECT_THAT(read.notices, Contains(HasSubstr("times of the frames from")));
+    EXPECT_THAT(read.notices, Contains(HasSubstr("no time for frame 2")));
+  }
+}
+
+TEST(InputFiles, ATimesFileMayBeASingleColumn) {
+  InputDirectory directory;
+  WriteFrames(directory, "frame_", 2);
+  const std::string times = directory.Path("t.txt");
+  directory.Write("t.txt", "0.5\n0.75\n");
+  const ReadSequence read = ReadAll(directory.path() + "/frame_*.csv", {.times = times});
+  ASSERT_EQ(read.frames.size(), 2u) << read.status;
+  EXPECT_EQ(read.frames[1].time, 0.75);
+  directory.Write("t.txt", "0.5\nnan\n");
+  ExpectRefused(ReadAll(directory.path() + "/frame_*.csv", {.times = times}).status,
+                absl::StatusCode::kDataLoss, {"t.txt:2", "time"});
+  directory.Write("t.txt", "a,b\n1,2\n");
+  ExpectRefused(ReadAll(directory.path() + "/frame_*.csv", {.times = times}).status,
+                absl::StatusCode::kFailedPrecondition, {"t.txt", "frame,t"});
+}
+
+TEST(InputFiles, ARangeKeepsTheIndicesOfTheInput) {
+  InputDirectory directory;
+  WriteFrames(directory, "frame_", 10);
+  const ReadSequence read = ReadAll(directory.path(), {.frames = "2:9:3"});
+  EXPECT_EQ(read.frame_count, 3u);
+  EXPECT_THAT(FirstCoordinates(read), ElementsAre(2, 5, 8));
+  EXPECT_EQ(read.frames.at(1).index, 5u);
+  EXPECT_EQ(ReadAll(directory.path(), {.frames = "8:"}).frames.size(), 2u);
+  EXPECT_EQ(ReadAll(directory.path(), {.frames = ":3"}).frames.size(), 3u);
+  EXPECT_THAT(FirstCoordinates(ReadAll(directory.path(), {.frames = "4"})), ElementsAre(4));
+  EXPECT_EQ(ReadAll(directory.path(), {.frames = "20:"}).frames.size(), 0u);
+}
+
+TEST(InputFiles, ARangeWithinOneFilePassesOverTheOthers) {
+  const InputDirectory directory;
+  std::string dump;
+  for (const char* x : {"0", "1", "2", "3"}) {
+    dump += std::string("1\nAtoms. Timestep: 0\n1 ") + x + " 0 0\n";
+  }
+  const ReadSequence read = ReadAll(directory.Write("dump.xyz", dump), {.frames = "1::2"});
+  EXPECT_EQ(read.frame_count, 2u);
+  EXPECT_THAT(FirstCoordinates(read), ElementsAre(1, 3));
+}
+
+TEST(InputFiles, WhatIsNoRangeIsRefused) {
+  for (const char* text : {":0", "3:3", "5:2", "a:b", "-1:", "1:2:0", "1:2:3:4", "1.5"}) {
+    ExpectRefused(input::ParseFrameRange(text).status(), absl::StatusCode::kInvalidArgument,
+                  {"--frames", text, "A:B"});
+  }
+}
+
+TEST(InputFiles, TheCountOfARangeIsTheNumberOfIndicesInIt) {
+  for (const char* text : {"", "0:1", "2:", ":5", "1:9:2", "3:7:10", "0::3", "11:"}) {
+    const auto range = input::ParseFrameRange(text);
+    ASSERT_TRUE(range.ok()) << text;
+    for (std::size_t count = 0; count < 12; ++count) {
+      std::size_t expected = 0;
+      for (std::size_t k = 0; k < count; ++k) expected += range->Contains(k) ? 1 : 0;
+      EXPECT_EQ(range->CountOf(count), expected) << text << " of " << count;
+    }
+  }
+}
+
+TEST(InputFiles, WhatIsNotThereIsSaidWithAdvice) {
+  const InputDirectory directory;
+  ExpectRefused(ReadAll(directory.Path("none.csv")).status, absl::StatusCode::kNotFound,
+                {"none.csv", "check the path"});
+  ExpectRefused(ReadAll(directory.Path("*.vtp")).status, absl::StatusCode::kNotFound,
+                {"*.vtp", "check the pattern"});
+  std::filesystem::create_directory(directory.Path("run"));
+  ExpectRefused(ReadAll(directory.path()).status, absl::StatusCode::kNotFound,
+                {"holds no files", "run"});
+  directory.Write("notes.md", "# Notes\n");
+  ExpectRefused(ReadAll(directory.path()).status, absl::StatusCode::kFailedPrecondition,
+                {"no frames that can be read", "notes.md"});
+}
+
+TEST(InputFiles, AnErrorInALaterFileComesAfterTheFramesBefore) {
+  InputDirectory directory;
+  WriteFrames(directory, "frame_", 4);
+  directory.Write("frame_2.csv", "x,y\n1,oops\n");
+  const ReadSequence read = ReadAll(directory.path());
+  EXPECT_EQ(read.frames.size(), 2u);
+  ExpectRefused(read.status, absl::StatusCode::kDataLoss, {"frame_2.csv:2", "'oops'"});
+}
+
+}  // namespace
+}  // namespace partiemc::client

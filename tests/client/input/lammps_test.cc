@@ -1,0 +1,132 @@
+#include <string>
+
+#include "client/input/fixtures.h"
+
+namespace partiemc::client {
+namespace {
+
+using testing::DoubleNear;
+using testing::ElementsAre;
+using testing::Pointwise;
+
+constexpr char kBox[] = "ITEM: BOX BOUNDS pp pp pp\n0 10\n-5 15\n-0.5 0.5\n";
+
+std::string Frame(const std::string& step, const std::string& count, const std::string& atoms,
+                  const std::string& box = kBox) {
+  return "ITEM: TIMESTEP\n" + step + "\nITEM: NUMBER OF ATOMS\n" + count + "\n" + box +
+         "ITEM: ATOMS " + atoms;
+}
+
+ReadSequence Read(const std::string& content, const SequenceOptions& options = {}) {
+  const InputDirectory directory;
+  return ReadAll(directory.Write("dump.txt", content), options);
+}
+
+TEST(LammpsDump, FramesFollowEachOtherAndMayDifferInCountAndColumns) {
+  const ReadSequence read =
+      Read(Frame("0", "2", "id type x y\n2 1 3 4\n1 1 1 2\n") +
+           Frame("500", "1", "y x id\n6 5 9 \n") + Frame("900", "0", "id x y\n"));
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  ASSERT_EQ(read.frames.size(), 3u);
+  EXPECT_EQ(read.frame_count, 3u);
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(3, 4, 1, 2));
+  EXPECT_THAT(read.frames[0].ids, ElementsAre(2, 1));
+  EXPECT_THAT(read.frames[1].positions, ElementsAre(5, 6));
+  EXPECT_EQ(read.frames[2].ParticleCount(), 0u);
+  EXPECT_THAT(read.frames[1].source, testing::EndsWith("dump.txt, frame 1 (timestep 500)"));
+  EXPECT_FALSE(read.frames[0].time.has_value());
+}
+
+TEST(LammpsDump, UnitsAndTimeMayComeBeforeTheTimeStep) {
+  const ReadSequence read =
+      Read("ITEM: UNITS\nlj\nITEM: TIME\n0.25\n" + Frame("5", "1", "x y\n1 2\n") +
+           "ITEM: TIME\n0.5\n" + Frame("10", "1", "x y\n1 2\n"));
+  ASSERT_EQ(read.frames.size(), 2u) << read.status;
+  EXPECT_EQ(read.frames[0].time, 0.25);
+  EXPECT_EQ(read.frames[1].time, 0.5);
+}
+
+TEST(LammpsDump, ScaledPositionsAreFractionsOfTheBox) {
+  const ReadSequence read = Read(Frame("0", "2", "id xs ys zs\n1 0 0 0.5\n2 0.25 0.5 0.5\n"));
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(0, -5, 2.5, 5));
+}
+
+TEST(LammpsDump, ATiltedBoxShearsScaledPositions) {
+  // A box of 10 x 20 that leans 4 to the right: its bounding box is 14 wide.
+  const std::string tilted = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n0 14 4\n0 20 0\n-0.5 0.5 0\n";
+  const ReadSequence read = Read(Frame("0", "2", "xs ys\n0 1\n0.5 0.5\n", tilted));
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(4, 20, 7, 10));
+}
+
+TEST(LammpsDump, ABoxGivenByItsEdgesIsTheSameBox) {
+  const std::string edges =
+      "ITEM: BOX BOUNDS abc origin pp pp pp\n10 0 0 0\n4 20 0 0\n0 0 1 -0.5\n";
+  const ReadSequence read = Read(Frame("0", "2", "xs ys\n0 1\n0.5 0.5\n", edges));
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(4, 20, 7, 10));
+}
+
+TEST(LammpsDump, SelectionTakesTheFluidAndLeavesTheWall) {
+  const ReadSequence read =
+      Read(Frame("0", "3", "id type x y\n1 1 1 2\n2 2 3 4\n3 1 5 6\n"), {.select = {"type=1"}});
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(1, 2, 5, 6));
+  EXPECT_THAT(read.frames[0].ids, ElementsAre(1, 3));
+}
+
+TEST(LammpsDump, AFrameThatIsCutOffIsNamedAndThoseBeforeAreDelivered) {
+  const std::string whole =
+      Frame("0", "2", "x y\n1 2\n3 4\n") + Frame("500", "2", "x y\n5 6\n7 8\n");
+  const std::size_t first = Frame("0", "2", "x y\n1 2\n3 4\n").size();
+  for (std::size_t size = first + 1; size + 3 < whole.size(); ++size) {
+    const ReadSequence read = Read(whole.substr(0, size));
+    EXPECT_EQ(read.frames.size(), 1u) << size;
+    ExpectRefused(read.status, absl::StatusCode::kDataLoss, {"dump.txt:", "frame 1"});
+  }
+  ExpectRefused(Read(whole.substr(0, whole.size() - 4)).status, absl::StatusCode::kDataLoss,
+                {"(timestep 500)", "after 1 of 2 atoms", "truncated"});
+}
+
+TEST(LammpsDump, DeclaredCountsAreNotBelieved) {
+  for (const char* count : {"18446744073709551615", "99999999999999999999999", "-1", "many"}) {
+    ExpectRefused(Read(Frame("0", count, "x y\n1 2\n")).status, absl::StatusCode::kDataLoss,
+                  {"number of atoms", count});
+  }
+  // Within the limit but not there: no memory is taken for what does not come.
+  ExpectRefused(Read(Frame("0", "60000000", "x y\n1 2\n")).status, absl::StatusCode::kDataLoss,
+                {"after 1 of 60000000 atoms"});
+}
+
+TEST(LammpsDump, DamageIsRefusedInOneLine) {
+  ExpectRefused(Read(Frame("0", "1", "x y\n1 2\n3 4\n")).status, absl::StatusCode::kDataLoss,
+                {"expected a line that begins with ITEM:"});
+  ExpectRefused(Read("ITEM: ATOMS x y\n1 2\n").status, absl::StatusCode::kDataLoss,
+                {"before the number of atoms"});
+  ExpectRefused(
+      Read("ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n1\nITEM: ATOMS xs ys\n0 0\n").status,
+      absl::StatusCode::kDataLoss, {"without BOX BOUNDS"});
+  ExpectRefused(Read("ITEM: TIMESTEP\n0\nITEM: BOX BOUNDS pp\n0\n0 1\n0 1\n").status,
+                absl::StatusCode::kDataLoss, {"BOX BOUNDS"});
+  ExpectRefused(Read("ITEM: NUMBER OF ENTRIES\n0\n").status, absl::StatusCode::kDataLoss,
+                {"unknown ITEM"});
+  ExpectRefused(Read(Frame("0", "1", "id mass\n1 2\n")).status,
+                absl::StatusCode::kFailedPrecondition, {"no position columns", "id,mass"});
+}
+
+TEST(LammpsDump, TheSamplesAgreeWithEachOther) {
+  const ReadSequence scaled = ReadAll(SamplePath("dump.atom"));
+  const ReadSequence timed = ReadAll(SamplePath("dump.custom.units_time.gz"));
+  const ReadSequence unwrapped = ReadAll(SamplePath("dump.custom.unwrapped_scaled"));
+  ASSERT_EQ(scaled.frames.size(), 4u) << scaled.status;
+  ASSERT_EQ(timed.frames.size(), 4u) << timed.status;
+  ASSERT_EQ(unwrapped.frames.size(), 4u) << unwrapped.status;
+  EXPECT_THAT(scaled.frames[0].positions, Pointwise(DoubleNear(1e-4), timed.frames[0].positions));
+  EXPECT_THAT(unwrapped.frames[0].positions,
+              Pointwise(DoubleNear(1e-4), timed.frames[0].positions));
+  EXPECT_EQ(timed.frames[3].time, 1.5);
+}
+
+}  // namespace
+}  // namespace partiemc::client

@@ -1,0 +1,49 @@
+#include <algorithm>
+#include <random>
+
+#include "client/input/fixtures.h"
+
+namespace partiemc::client {
+namespace {
+
+TEST(NaturalOrder, NumbersInNamesCompareByTheirValue) {
+  EXPECT_TRUE(NaturalLess("frame_2", "frame_10"));
+  EXPECT_FALSE(NaturalLess("frame_10", "frame_2"));
+  EXPECT_TRUE(NaturalLess("a9b2", "a9b10"));
+  EXPECT_TRUE(NaturalLess("dump.999.gz", "dump.1000.gz"));
+}
+
+TEST(NaturalOrder, NumbersBeyondAnyIntegerTypeCompareByTheirValue) {
+  const std::string long_number(400, '9');
+  EXPECT_TRUE(NaturalLess("f" + long_number, "f1" + std::string(400, '0')));
+}
+
+TEST(NaturalOrder, LeadingZerosOnlyBreakTies) {
+  EXPECT_TRUE(NaturalLess("f007", "f8"));
+  EXPECT_TRUE(NaturalLess("f007", "f7"));
+  EXPECT_FALSE(NaturalLess("f7", "f007"));
+  EXPECT_TRUE(NaturalLess("f007a", "f7b"));
+}
+
+TEST(NaturalOrder, IsAStrictOrderThatShufflingDoesNotChange) {
+  std::vector<std::string> names = {"",    "0",    "00",    "a",  "a0",  "a00", "a1",
+                                    "a01", "a1b2", "a1b10", "a2", "a10", "b",   "b1.5"};
+  for (const std::string& a : names) {
+    EXPECT_FALSE(NaturalLess(a, a)) << a;
+    for (const std::string& b : names) {
+      EXPECT_EQ(a != b, NaturalLess(a, b) != NaturalLess(b, a)) << a << " " << b;
+    }
+  }
+  const std::uint32_t seed = 7;
+  std::mt19937 random(seed);
+  std::sort(names.begin(), names.end(), NaturalLess);
+  for (int round = 0; round < 20; ++round) {
+    std::vector<std::string> shuffled = names;
+    std::shuffle(shuffled.begin(), shuffled.end(), random);
+    std::sort(shuffled.begin(), shuffled.end(), NaturalLess);
+    EXPECT_EQ(shuffled, names) << "seed " << seed << " round " << round;
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::client

@@ -1,0 +1,207 @@
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "client/input/fixtures.h"
+
+namespace partiemc::client {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+template <typename T>
+std::string Bytes(const std::vector<T>& values, bool big_endian = false) {
+  std::string bytes;
+  for (const T value : values) {
+    char raw[sizeof(T)];
+    std::memcpy(raw, &value, sizeof(T));
+    if (big_endian) std::reverse(raw, raw + sizeof(T));
+    bytes.append(raw, sizeof(T));
+  }
+  return bytes;
+}
+
+std::string LittleEndian(std::uint64_t value, int size) {
+  std::string bytes;
+  for (int k = 0; k < size; ++k) bytes.push_back(static_cast<char>(value >> (8 * k)));
+  return bytes;
+}
+
+std::string Npy(const std::string& descr, const std::string& shape, const std::string& elements,
+                bool fortran = false, char version = 1) {
+  const std::string header = "{'descr': " + descr +
+                             ", 'fortran_order': " + (fortran ? "True" : "False") +
+                             ", 'shape': " + shape + ", }\n";
+  return std::string("\x93NUMPY") + version + '\0' +
+         LittleEndian(header.size(), version == 1 ? 2 : 4) + header + elements;
+}
+
+struct Entry {
+  std::string name;
+  std::string content;
+  bool deflate = false;
+};
+
+std::string RawDeflate(const std::string& content) {
+  z_stream stream = {};
+  deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+  std::string packed(content.size() + 100, '\0');
+  std::string input = content;
+  stream.next_in = reinterpret_cast<Bytef*>(input.data());
+  stream.avail_in = static_cast<uInt>(input.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+std::string Zip(const std::vector<Entry>& entries) {
+  std::string zip;
+  std::string directory;
+  for (const Entry& entry : entries) {
+    const std::string data = entry.deflate ? RawDeflate(entry.content) : entry.content;
+    const auto crc = crc32(0, reinterpret_cast<const Bytef*>(entry.content.data()),
+                           static_cast<uInt>(entry.content.size()));
+    const std::string common = LittleEndian(20, 2) + LittleEndian(0, 2) +
+                               LittleEndian(entry.deflate ? 8 : 0, 2) + LittleEndian(0, 4) +
+                               LittleEndian(crc, 4) + LittleEndian(data.size(), 4) +
+                               LittleEndian(entry.content.size(), 4) +
+                               LittleEndian(entry.name.size(), 2) + LittleEndian(0, 2);
+    directory += "PK\x01\x02" + LittleEndian(20, 2) + common + LittleEndian(0, 10) +
+                 LittleEndian(zip.size(), 4) + entry.name;
+    zip += "PK\x03\x04" + common + entry.name + data;
+  }
+  return zip + directory + "PK\x05\x06" + LittleEndian(0, 4) + LittleEndian(entries.size(), 2) +
+         LittleEndian(entries.size(), 2) + LittleEndian(directory.size(), 4) +
+         LittleEndian(zip.size(), 4) + LittleEndian(0, 2);
+}
+
+const std::vector<double> kPositions = {1.5, -2, 3, 4.25};
+
+TEST(Npy, EveryLayoutOfTheSamePositionsReadsTheSame) {
+  const std::vector<float> narrow(kPositions.begin(), kPositions.end());
+  const std::vector<double> by_column = {1.5, 3, -2, 4.25};
+  const std::vector<double> flat = {1.5, -2, 7, 3, 4.25, 7};
+  const InputDirectory directory;
+  for (const std::string& content :
+       {Npy("'<f8'", "(2, 2)", Bytes(kPositions)), Npy("'>f8'", "(2, 2)", Bytes(kPositions, true)),
+        Npy("'<f4'", "(2, 2)", Bytes(narrow)), Npy("'>f4'", "(2, 2)", Bytes(narrow, true)),
+        Npy("'<f8'", "(2, 2)", Bytes(by_column), true), Npy("'<f8'", "(2, 3)", Bytes(flat)),
+        Npy("'<f8'", "(2, 2)", Bytes(kPositions), false, 2)}) {
+    const RecordedFrame frame = ReadOne(directory.Write("pos.npy", content));
+    EXPECT_THAT(frame.positions, testing::ElementsAreArray(kPositions));
+    EXPECT_EQ(frame.float32, content.find("f4") != std::string::npos);
+  }
+}
+
+TEST(Npy, AnArrayWithoutRowsIsAFrameWithoutParticles) {
+  const InputDirectory directory;
+  EXPECT_EQ(ReadOne(directory.Write("pos.npy", Npy("'<f8'", "(0, 2)", ""))).ParticleCount(), 0u);
+}
+
+TEST(Npy, MoreColumnsAreNamedInTheirOrder) {
+  const InputDirectory directory;
+  const std::string path =
+      directory.Write("pos.npy", Npy("'<f8'", "(1, 4)", Bytes<double>({5, 1, 2, 9})));
+  ExpectRefused(ReadAll(path).status, absl::StatusCode::kFailedPrecondition,
+                {"4 columns", "--columns"});
+  const RecordedFrame frame = ReadOne(path, {.columns = "id,x,y"});
+  EXPECT_THAT(frame.positions, ElementsAre(1, 2));
+  EXPECT_THAT(frame.ids, ElementsAre(5));
+}
+
+TEST(Npy, WhatIsNoTableOfNumbersIsRefused) {
+  const InputDirectory directory;
+  const auto refusal = [&](const std::string& content) {
+    return ReadAll(directory.Write("pos.npy", content)).status;
+  };
+  ExpectRefused(refusal(Npy("'|O'", "(2,)", "pickle")), absl::StatusCode::kUnimplemented,
+                {"pickled Python objects", "numpy.savez"});
+  ExpectRefused(refusal(Npy("[('x', '<f8')]", "(2,)", "")), absl::StatusCode::kUnimplemented,
+                {"structured"});
+  ExpectRefused(refusal(Npy("'<c16'", "(2, 2)", "")), absl::StatusCode::kUnimplemented, {"c16"});
+  ExpectRefused(refusal(Npy("'<f8'", "(5, 2, 2)", "")), absl::StatusCode::kFailedPrecondition,
+                {"(5, 2, 2)", "one frame per file"});
+  ExpectRefused(refusal(Npy("'<f8'", "(4,)", "")), absl::StatusCode::kFailedPrecondition, {"(4)"});
+}
+
+TEST(Npy, DamageAndDeclaredSizesAreFoundOut) {
+  const InputDirectory directory;
+  const std::string whole = Npy("'<f8'", "(2, 2)", Bytes(kPositions));
+  for (std::size_t size = 6; size < whole.size(); ++size) {
+    const absl::Status status = ReadAll(directory.Write("pos.npy", whole.substr(0, size))).status;
+    ExpectRefused(status, absl::StatusCode::kDataLoss, {"pos.npy"});
+  }
+  const auto refusal = [&](const std::string& shape) {
+    return ReadAll(directory.Write("pos.npy", Npy("'<f8'", shape, Bytes(kPositions)))).status;
+  };
+  ExpectRefused(refusal("(4294967296, 4294967296)"), absl::StatusCode::kDataLoss, {"4 GiB"});
+  ExpectRefused(refusal("(99999999999999999999999, 2)"), absl::StatusCode::kDataLoss, {"shape"});
+  ExpectRefused(refusal("(200000000, 2)"), absl::StatusCode::kDataLoss, {"32 of 3200000000 bytes"});
+  ExpectRefused(refusal("(-1, 2)"), absl::StatusCode::kDataLoss, {"shape"});
+  ExpectRefused(refusal("2"), absl::StatusCode::kDataLoss, {"shape"});
+}
+
+TEST(Npz, NamedArraysAreRecognisedStoredAndDeflated) {
+  const InputDirectory directory;
+  for (const bool deflate : {false, true}) {
+    const RecordedFrame frame = ReadOne(directory.Write(
+        "frame.npz",
+        Zip({{"pos.npy", Npy("'<f8'", "(2, 2)", Bytes(kPositions)), deflate},
+             {"vel.npy", Npy("'<f4'", "(2, 2)", Bytes<float>({1, 2, 3, 4})), deflate},
+             {"id.npy", Npy("'<i8'", "(2,)", Bytes<std::int64_t>({1LL << 60, 7})), deflate},
+             {"t.npy", Npy("'<f8'", "()", Bytes<double>({0.5})), deflate}})));
+    EXPECT_THAT(frame.positions, testing::ElementsAreArray(kPositions));
+    EXPECT_THAT(frame.velocities, ElementsAre(1, 2, 3, 4));
+    EXPECT_THAT(frame.ids, ElementsAre(1ULL << 60, 7));
+    EXPECT_EQ(frame.time, 0.5);
+  }
+}
+
+TEST(Npz, SeparateAxesAreRecognisedAndOthersChosen) {
+  const InputDirectory directory;
+  const std::string path = directory.Write(
+      "frame.npz", Zip({{"x.npy", Npy("'<f4'", "(2,)", Bytes<float>({1, 3})), false},
+                        {"y.npy", Npy("'<f4'", "(2,)", Bytes<float>({2, 4})), false},
+                        {"type.npy", Npy("'|u1'", "(2,)", std::string("\x01\x02")), false},
+                        {"area.npy", Npy("'<f8'", "(1,)", Bytes<double>({9})), false},
+                        {"where.npy", Npy("'<f8'", "(2, 2)", Bytes(kPositions)), false}}));
+  EXPECT_THAT(ReadOne(path).positions, ElementsAre(1, 2, 3, 4));
+  EXPECT_TRUE(ReadOne(path).float32);
+  EXPECT_THAT(ReadOne(path).volumes, IsEmpty()) << "an array of another length is no property";
+  EXPECT_THAT(ReadOne(path, {.select = {"type=2"}}).positions, ElementsAre(3, 4));
+  EXPECT_THAT(ReadOne(path, {.columns = "where"}).positions, testing::ElementsAreArray(kPositions));
+  ExpectRefused(ReadAll(path, {.select = {"type=fluid"}}).status,
+                absl::StatusCode::kFailedPrecondition, {"type=fluid", "numbers"});
+}
+
+TEST(Npz, PickledObjectsAreRefusedWithTheWayOut) {
+  const InputDirectory directory;
+  const std::string path = directory.Write(
+      "frame.npz", Zip({{"version.npy", Npy("'<i8'", "()", Bytes<std::int64_t>({2})), false},
+                        {"particles.npy", Npy("'|O'", "()", "pickle"), false}}));
+  ExpectRefused(ReadAll(path).status, absl::StatusCode::kUnimplemented,
+                {"particles", "pickled Python objects", "PySPH", "numpy.savez"});
+}
+
+TEST(Npz, EveryFlippedOrMissingByteIsAnErrorOrHarmlessAndNeverACrash) {
+  const InputDirectory directory;
+  const std::string whole = Zip({{"pos.npy", Npy("'<f8'", "(2, 2)", Bytes(kPositions)), true}});
+  for (std::size_t at = 4; at < whole.size(); ++at) {
+    std::string flipped = whole;
+    flipped[at] = static_cast<char>(flipped[at] ^ 0xFF);
+    const ReadSequence read = ReadAll(directory.Write("a.npz", flipped));
+    if (read.status.ok()) {
+      ASSERT_EQ(read.frames.size(), 1u) << at;
+      EXPECT_THAT(read.frames[0].positions, testing::ElementsAreArray(kPositions)) << at;
+    }
+    EXPECT_FALSE(ReadAll(directory.Write("b.npz", whole.substr(0, at))).status.ok()) << at;
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::client

@@ -1,0 +1,91 @@
+#include <zlib.h>
+#include <zstd.h>
+
+#include "client/input/fixtures.h"
+
+namespace partiemc::client {
+namespace {
+
+std::string Dump(int frames) {
+  std::string dump;
+  for (int frame = 0; frame < frames; ++frame) {
+    dump +=
+        "ITEM: TIMESTEP\n" + std::to_string(frame) +
+        "\nITEM: NUMBER OF ATOMS\n500\nITEM: BOX BOUNDS pp pp pp\n0 1\n0 1\n0 1\nITEM: ATOMS x y\n";
+    for (int atom = 0; atom < 500; ++atom) {
+      dump += std::to_string(atom * 0.37) + " " + std::to_string(atom * frame * 0.11) + "\n";
+    }
+  }
+  return dump;
+}
+
+std::string Gzip(const std::string& content) {
+  z_stream stream = {};
+  deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+  std::string packed(content.size() + 100, '\0');
+  std::string input = content;
+  stream.next_in = reinterpret_cast<Bytef*>(input.data());
+  stream.avail_in = static_cast<uInt>(input.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+std::string Zstd(const std::string& content) {
+  std::string packed(ZSTD_compressBound(content.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), content.data(), content.size(), 3));
+  return packed;
+}
+
+class Packed : public testing::TestWithParam<std::string (*)(const std::string&)> {};
+
+TEST_P(Packed, ReadsAsThePlainFileWhateverItsName) {
+  const InputDirectory directory;
+  const ReadSequence plain = ReadAll(directory.Write("plain", Dump(80)));
+  const ReadSequence packed = ReadAll(directory.Write("packed", GetParam()(Dump(80))));
+  ASSERT_TRUE(packed.status.ok()) << packed.status;
+  ASSERT_EQ(packed.frames.size(), plain.frames.size());
+  for (std::size_t k = 0; k < plain.frames.size(); ++k) {
+    ASSERT_EQ(packed.frames[k].positions, plain.frames[k].positions) << k;
+  }
+}
+
+TEST_P(Packed, PartsThatFollowEachOtherAreOneFile) {
+  const InputDirectory directory;
+  const ReadSequence read =
+      ReadAll(directory.Write("packed", GetParam()(Dump(3)) + GetParam()(Dump(2))));
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_EQ(read.frames.size(), 5u);
+}
+
+TEST_P(Packed, WhatIsCutOffIsSaidAfterTheFramesBefore) {
+  const InputDirectory directory;
+  // Larger than the blocks of the packings, so that a part can be unpacked.
+  const std::string whole = GetParam()(Dump(200));
+  const ReadSequence read = ReadAll(directory.Write("packed", whole.substr(0, whole.size() - 40)));
+  EXPECT_GT(read.frames.size(), 10u);
+  EXPECT_LT(read.frames.size(), 200u);
+  ExpectRefused(read.status, absl::StatusCode::kDataLoss, {"packed", "truncated"});
+}
+
+TEST_P(Packed, DamageIsAnError) {
+  const InputDirectory directory;
+  std::string whole = GetParam()(Dump(3));
+  for (std::size_t k = 20; k < 120; ++k) whole[k] = static_cast<char>(k * 37);
+  const ReadSequence read = ReadAll(directory.Write("packed", whole));
+  EXPECT_FALSE(read.status.ok());
+}
+
+INSTANTIATE_TEST_SUITE_P(Packings, Packed, testing::Values(&Gzip, &Zstd));
+
+TEST(Packed, TablesMayBePackedToo) {
+  const InputDirectory directory;
+  EXPECT_THAT(ReadOne(directory.Write("frame.csv.gz", Gzip("x,y\n1,2\n"))).positions,
+              testing::ElementsAre(1, 2));
+}
+
+}  // namespace
+}  // namespace partiemc::client

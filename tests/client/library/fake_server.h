@@ -1,0 +1,52 @@
+// A server whose stream does what a test tells it to do, right or wrong.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "partiemc/v1/reconstruction.grpc.pb.h"
+
+namespace partiemc::client {
+
+class FakeServer final : private v1::ReconstructionService::Service {
+ public:
+  using Rpc = grpc::ServerReaderWriter<v1::ReconstructResponse, v1::ReconstructRequest>;
+  using Script = std::function<grpc::Status(grpc::ServerContext&, Rpc&)>;
+
+  /// Listens on a free port of the loopback device; `script` is the whole of each stream.
+  explicit FakeServer(Script script);
+  ~FakeServer() override;
+
+  std::string address() const;
+
+ private:
+  grpc::Status Reconstruct(grpc::ServerContext* context, Rpc* rpc) override;
+  grpc::Status GetServerInfo(grpc::ServerContext* context, const v1::GetServerInfoRequest* request,
+                             v1::GetServerInfoResponse* response) override;
+
+  const Script script_;
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+/// Reads OpenStream and accepts it with a window of `frames_in_flight`.
+v1::OpenStream Accept(FakeServer::Rpc& rpc, std::uint32_t frames_in_flight,
+                      std::uint64_t max_frame_bytes = 1 << 20);
+
+/// The next frame; false when the client has finished.
+bool ReadFrame(FakeServer::Rpc& rpc, v1::ParticleFrame& frame);
+
+/// An answer to `frame` that holds one triangle beginning at its first particle.
+v1::ReconstructResponse TriangleAt(const v1::ParticleFrame& frame);
+
+/// Accepts, then answers every frame in its turn.
+grpc::Status AnswerAll(grpc::ServerContext& context, FakeServer::Rpc& rpc);
+
+/// Returns when the client has gone away.
+grpc::Status WaitForCancel(grpc::ServerContext& context);
+
+}  // namespace partiemc::client

@@ -1,0 +1,235 @@
+// A stream to a server that is not there, does not answer, or breaks the protocol: one line, in
+// time, never a hang.
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <thread>
+#include <vector>
+
+#include "client/library/fake_server.h"
+#include "partiemc/client/server_info.h"
+#include "partiemc/client/stream.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::chrono::milliseconds kShort(200);
+
+const std::vector<double> kPositions = {1, 2};
+const Frame kFrame{.positions = std::span<const double>(kPositions)};
+
+// A port of the loopback device where nobody listens: bound, so that nobody else gets it.
+class DeafPort {
+ public:
+  DeafPort() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address = {};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size);
+    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
+    port_ = ntohs(address.sin_port);
+  }
+  ~DeafPort() { ::close(socket_); }
+  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+
+ private:
+  int socket_;
+  int port_ = 0;
+};
+
+void ExpectOneLine(const absl::Status& status) {
+  EXPECT_THAT(std::string(status.message()), Not(HasSubstr("\n")));
+}
+
+TEST(StreamFailure, AnAddressThatIsNoneIsNamedWithTheFormsThatAre) {
+  for (const char* address :
+       {"", "localhost", "localhost:", ":50051", "localhost:http", "localhost:0", "localhost:70000",
+        "unix:", "::1:50051", "http://localhost:50051", "a b:1"}) {
+    const auto stream = Stream::Open(address, {.connect_timeout = kShort});
+    EXPECT_EQ(stream.status().code(), absl::StatusCode::kInvalidArgument) << address;
+    EXPECT_THAT(std::string(stream.status().message()), HasSubstr("must be HOST:PORT"));
+  }
+}
+
+TEST(StreamFailure, NoServerThereIsOneLineThatSaysWhatToDo) {
+  const DeafPort port;
+  const auto stream = Stream::Open(port.address(), {.connect_timeout = kShort});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnavailable);
+  ExpectOneLine(stream.status());
+  EXPECT_EQ(stream.status().message(),
+            "no server at " + port.address() +
+                " (Connection refused): start one with `partiemc-server --address " +
+                port.address() + "`, or use --local");
+  EXPECT_EQ(GetServerInfo(port.address(), kShort).status(), stream.status());
+}
+
+TEST(StreamFailure, AMissingUnixSocketIsNoServerEither) {
+  const auto stream = Stream::Open("unix:/nonexistent/socket", {.connect_timeout = kShort});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(stream.status().message()),
+              HasSubstr("no server at unix:/nonexistent/socket (No such file or directory)"));
+}
+
+TEST(StreamFailure, ParametersOutOfRangeAreRefusedWithoutAsking) {
+  const auto stream = Stream::Open("127.0.0.1:1", {.parameters = {.kernel_radius = 99}});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(StreamFailure, AServerThatRefusesTheStreamIsQuoted) {
+  FakeServer server([](grpc::ServerContext&, FakeServer::Rpc&) {
+    return grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED, "32 streams are open");
+  });
+  const auto stream = Stream::Open(server.address(), {});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(stream.status().message()), HasSubstr("32 streams are open"));
+}
+
+TEST(StreamFailure, AServerThatNeverAcceptsIsGivenUpAtTheDeadline) {
+  FakeServer server(
+      [](grpc::ServerContext& context, FakeServer::Rpc&) { return WaitForCancel(context); });
+  const auto stream = Stream::Open(server.address(), {.deadline = kShort});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kDeadlineExceeded);
+  ExpectOneLine(stream.status());
+}
+
+TEST(StreamFailure, AServerThatBeginsWithAFrameBreaksTheProtocol) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    v1::ReconstructResponse response;
+    response.mutable_frame()->set_sequence(1);
+    rpc.Write(response);
+    return WaitForCancel(context);
+  });
+  EXPECT_EQ(Stream::Open(server.address(), {}).status().code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(StreamFailure, AFrameThatIsNeverAnsweredEndsBothDirectionsAtTheDeadline) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    Accept(rpc, 1);
+    return WaitForCancel(context);
+  });
+  const auto stream = Stream::Open(server.address(), {.deadline = kShort});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  absl::Status sender_status;
+  std::thread sender([&] { sender_status = (*stream)->Send(kFrame, 1).status(); });
+  Event event;
+  const auto received = (*stream)->Receive(event);
+  sender.join();
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kDeadlineExceeded) << received.status();
+  EXPECT_EQ(sender_status.code(), absl::StatusCode::kDeadlineExceeded) << sender_status;
+  EXPECT_EQ((*stream)->Receive(event).status().code(), absl::StatusCode::kDeadlineExceeded);
+}
+
+TEST(StreamFailure, AServerThatStopsReadingDoesNotHoldTheSenderForever) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    Accept(rpc, 64, std::uint64_t{1} << 30);
+    return WaitForCancel(context);
+  });
+  const auto stream = Stream::Open(server.address(), {.deadline = kShort});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  const std::vector<double> many(2'000'000, 1.0);  // 16 MB: more than gRPC queues.
+  absl::Status status;
+  for (int k = 0; k < 64 && status.ok(); ++k) {
+    status = (*stream)->Send({.positions = std::span<const double>(many)}, k).status();
+  }
+  EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded) << status;
+}
+
+TEST(StreamFailure, ASenderWithoutAReceiverIsToldToReceive) {
+  FakeServer server(AnswerAll);
+  const auto stream = Stream::Open(server.address(), {.deadline = kShort});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  absl::Status status;
+  for (int k = 0; k < 3; ++k) status = (*stream)->Send(kFrame, k).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("call Receive before or beside Send"));
+}
+
+TEST(StreamFailure, AnAnswerOutOfOrderIsDataLoss) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    Accept(rpc, 2);
+    v1::ParticleFrame frame;
+    ReadFrame(rpc, frame);
+    frame.set_sequence(2);
+    rpc.Write(TriangleAt(frame));
+    return WaitForCancel(context);
+  });
+  const auto stream = Stream::Open(server.address(), {});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  const auto received = (*stream)->Receive(event);
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kDataLoss) << received.status();
+  EXPECT_THAT(std::string(received.status().message()),
+              HasSubstr("answered frame 2 where frame 1 was due"));
+}
+
+TEST(StreamFailure, AnAnswerWhoseCountsDoNotFitIsDataLoss) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    Accept(rpc, 2);
+    v1::ParticleFrame frame;
+    ReadFrame(rpc, frame);
+    v1::ReconstructResponse response = TriangleAt(frame);
+    response.mutable_frame()->mutable_rings()->mutable_points()->resize(17);
+    rpc.Write(response);
+    return WaitForCancel(context);
+  });
+  const auto stream = Stream::Open(server.address(), {});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  const auto received = (*stream)->Receive(event);
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kDataLoss) << received.status();
+  ExpectOneLine(received.status());
+}
+
+TEST(StreamFailure, AServerThatClosesEarlyLeavesNoFrameSilentlyUnanswered) {
+  FakeServer server([](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    Accept(rpc, 2);
+    v1::ParticleFrame frame;
+    ReadFrame(rpc, frame);
+    return grpc::Status::OK;
+  });
+  const auto stream = Stream::Open(server.address(), {});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  const auto received = (*stream)->Receive(event);
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(received.status().message()), HasSubstr("1 frames unanswered"));
+  EXPECT_EQ((*stream)->Send(kFrame, 1).status().code(), absl::StatusCode::kUnavailable);
+}
+
+TEST(StreamFailure, CancelWakesAWaitingReceiver) {
+  FakeServer server(AnswerAll);
+  const auto stream = Stream::Open(server.address(), {});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  absl::Status status;
+  std::thread receiver([&] {
+    Event event;
+    status = (*stream)->Receive(event).status();
+  });
+  (*stream)->Cancel();
+  receiver.join();
+  EXPECT_EQ(status.code(), absl::StatusCode::kCancelled);
+}
+
+TEST(StreamFailure, AStreamThatIsDroppedInTheMiddleIsCleanedUp) {
+  FakeServer server(AnswerAll);
+  for (int k = 0; k < 20; ++k) {
+    const auto stream = Stream::Open(server.address(), {});
+    ASSERT_TRUE(stream.ok()) << stream.status();
+    for (int sent = 0; sent < k % 3; ++sent) ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::client

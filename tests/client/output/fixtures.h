@@ -1,0 +1,108 @@
+// Results made by hand, and a directory that goes away with its test.
+#pragma once
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "output/frame_record.h"
+
+namespace partiemc::client {
+
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory() {
+    std::string name = (std::filesystem::temp_directory_path() / "partiemc-test-XXXXXX").native();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Names of all entries, hidden ones too.
+  std::vector<std::string> Entries() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+      names.push_back(entry.path().filename().native());
+    }
+    return names;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline std::string ReadFile(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Twice the signed area of interleaved points.
+inline double TwiceArea(std::span<const double> ring) {
+  double sum = 0;
+  for (std::size_t k = 0, j = ring.size() - 2; k < ring.size(); j = k, k += 2) {
+    sum += ring[j] * ring[k + 1] - ring[k] * ring[j + 1];
+  }
+  return sum;
+}
+
+/// Appends a ring with measures and, as normals, unit vectors away from its centroid.
+inline void AddRing(Rings& rings, const std::vector<double>& points, std::uint32_t outer,
+                    std::uint64_t particles = 0, std::uint64_t identity = 0) {
+  if (rings.offsets.empty()) rings.offsets.push_back(0);
+  RingMeasures measures;
+  measures.area = TwiceArea(points) / 2;
+  for (std::size_t k = 0; k < points.size(); k += 2) {
+    const std::size_t next = (k + 2) % points.size();
+    measures.perimeter += std::hypot(points[next] - points[k], points[next + 1] - points[k + 1]);
+    measures.centroid_x += points[k] / static_cast<double>(points.size() / 2);
+    measures.centroid_y += points[k + 1] / static_cast<double>(points.size() / 2);
+  }
+  measures.particle_count = particles;
+  measures.identity = identity;
+  for (std::size_t k = 0; k < points.size(); k += 2) {
+    const double x = points[k] - measures.centroid_x, y = points[k + 1] - measures.centroid_y;
+    rings.normals.push_back(static_cast<float>(x / std::hypot(x, y)));
+    rings.normals.push_back(static_cast<float>(y / std::hypot(x, y)));
+  }
+  rings.points.insert(rings.points.end(), points.begin(), points.end());
+  rings.offsets.push_back(static_cast<std::uint32_t>(rings.points.size() / 2));
+  rings.outer_of.push_back(outer);
+  rings.measures.push_back(measures);
+}
+
+///   a 4 x 4 square with a 1 x 1 hole, meshed by 8 triangles, beside a triangle of its own:
+///   three rings, area 15 + 0.5
+inline Result SquareWithHoleAndIsland() {
+  Result result;
+  AddRing(result.rings, {0, 0, 4, 0, 4, 4, 0, 4}, kNoRing, 150, 7);
+  AddRing(result.rings, {10, 0, 11, 0, 10, 1}, kNoRing, 5, 9);
+  AddRing(result.rings, {1, 1, 1, 2, 2, 2, 2, 1}, 0);
+  result.mesh.points = result.rings.points;
+  result.mesh.triangles = {0, 1, 10, 0, 10, 7, 1, 2, 9, 1, 9, 10, 2, 3,
+                           8, 2, 8,  9, 3,  0, 7, 3, 7, 8, 4, 5,  6};
+  result.mesh.classes.assign(9, TriangleClass::kBoundary);
+  result.mesh.classes[2] = TriangleClass::kInterior;
+  FrameStatistics& statistics = result.statistics;
+  statistics.particles = 155;
+  statistics.triangles = 9;
+  statistics.triangles_grid = 36;
+  statistics.spacing = 0.1;
+  statistics.cell_size = 0.1;
+  for (const RingMeasures& measures : result.rings.measures) {
+    statistics.area += measures.area;
+    statistics.perimeter += measures.perimeter;
+  }
+  return result;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,349 @@
+#include "output/frame_writer.h"
+
+#include <bit>
+#include <charconv>
+#include <cstring>
+#include <iostream>
+#include <limits>
+#include <random>
+#include <sstream>
+
+#include "client/output/fixtures.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "nlohmann/json.hpp"
+#include "output/text.h"
+
+namespace partiemc::client {
+namespace {
+
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::UnorderedElementsAre;
+
+std::string Encode(FrameFormat format, const FrameRecord& frame,
+                   const FrameWriterOptions& options = {}) {
+  auto bytes = EncodeFrame(format, frame, options);
+  EXPECT_TRUE(bytes.ok()) << bytes.status();
+  return bytes.value_or("");
+}
+
+std::vector<double> Flat(const json& ring) {
+  std::vector<double> points;
+  for (const json& point : ring) {
+    points.push_back(point.at(0).get<double>());
+    points.push_back(point.at(1).get<double>());
+  }
+  return points;
+}
+
+std::size_t CountOf(const std::string& text, const std::string& word) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+/// Lines of a Wavefront file, split into words.
+std::vector<std::vector<std::string>> ObjLines(const std::string& text) {
+  std::vector<std::vector<std::string>> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    std::istringstream words(line);
+    lines.emplace_back(std::istream_iterator<std::string>(words),
+                       std::istream_iterator<std::string>());
+  }
+  return lines;
+}
+
+TEST(Numbers, TheShortestFormReadsBackTheSameBits) {
+  const unsigned seed = 20240611;
+  std::cout << "seed " << seed << "\n";
+  std::mt19937_64 random(seed);
+  for (int k = 0; k < 100'000; ++k) {
+    const double value = std::bit_cast<double>(random());
+    if (!std::isfinite(value)) continue;
+    std::string text;
+    AppendNumber(text, value);
+    double back = 0;
+    std::from_chars(text.data(), text.data() + text.size(), back);
+    ASSERT_EQ(std::bit_cast<std::uint64_t>(back), std::bit_cast<std::uint64_t>(value)) << text;
+  }
+  std::string text;
+  AppendNumber(text, 0.1);
+  EXPECT_EQ(text, "0.1");
+}
+
+TEST(GeoJson, ThereIsOnePolygonPerOuterRingWithItsHoles) {
+  const Result result = SquareWithHoleAndIsland();
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.index = 3, .result = result}));
+  EXPECT_EQ(file.at("type"), "FeatureCollection");
+  const json& features = file.at("features");
+  ASSERT_EQ(features.size(), 2u);
+  EXPECT_EQ(features[0].at("type"), "Feature");
+  EXPECT_EQ(features[0].at("geometry").at("type"), "Polygon");
+  ASSERT_EQ(features[0].at("geometry").at("coordinates").size(), 2u);
+  EXPECT_EQ(Flat(features[0]["geometry"]["coordinates"][1]),
+            (std::vector<double>{1, 1, 1, 2, 2, 2, 2, 1, 1, 1}));
+  EXPECT_EQ(features[1].at("geometry").at("coordinates").size(), 1u);
+}
+
+TEST(GeoJson, EveryRingEndsWithItsFirstPoint) {
+  const Result result = SquareWithHoleAndIsland();
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
+  int rings = 0;
+  for (const json& feature : file["features"]) {
+    for (const json& ring : feature["geometry"]["coordinates"]) {
+      EXPECT_EQ(ring.front(), ring.back());
+      EXPECT_GE(ring.size(), 4u);
+      ++rings;
+    }
+  }
+  EXPECT_EQ(rings, 3);
+}
+
+TEST(GeoJson, OuterRingsRunCounterClockwiseAndHolesClockwiseWhateverTheResultSays) {
+  Result reversed;
+  AddRing(reversed.rings, {0, 4, 4, 4, 4, 0, 0, 0}, kNoRing);
+  AddRing(reversed.rings, {2, 1, 2, 2, 1, 2, 1, 1}, 0);
+  for (const Result& result : {SquareWithHoleAndIsland(), reversed}) {
+    const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
+    for (const json& feature : file["features"]) {
+      const json& rings = feature["geometry"]["coordinates"];
+      for (std::size_t k = 0; k < rings.size(); ++k) {
+        const double area = TwiceArea(Flat(rings[k]));
+        EXPECT_TRUE(k == 0 ? area > 0 : area < 0) << "ring " << k << " of " << feature;
+      }
+    }
+  }
+}
+
+TEST(GeoJson, TheOrientationIsRightFarFromTheOriginToo) {
+  constexpr double kFar = 1e12;
+  Result result;
+  AddRing(result.rings, {kFar, kFar + 0.5, kFar + 0.5, kFar + 0.5, kFar + 0.5, kFar, kFar, kFar},
+          kNoRing);
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
+  const std::vector<double> ring = Flat(file["features"][0]["geometry"]["coordinates"][0]);
+  EXPECT_THAT(ring, ElementsAre(kFar, kFar + 0.5, kFar, kFar, kFar + 0.5, kFar, kFar + 0.5,
+                                kFar + 0.5, kFar, kFar + 0.5));
+}
+
+TEST(GeoJson, PropertiesTellAreaWithoutHolesPerimeterParticlesIdentityFrameAndTime) {
+  const Result result = SquareWithHoleAndIsland();
+  const json file =
+      json::parse(Encode(FrameFormat::kGeoJson, {.index = 12, .time = 0.1, .result = result}));
+  EXPECT_EQ(file.at("frame"), 12);
+  EXPECT_EQ(file.at("time"), 0.1);
+  EXPECT_EQ(file["features"][0].at("properties"), (json{{"area", 15.0},
+                                                        {"perimeter", 20.0},
+                                                        {"particles", 150},
+                                                        {"ring", 0},
+                                                        {"identity", 7},
+                                                        {"frame", 12},
+                                                        {"time", 0.1}}));
+}
+
+TEST(GeoJson, CoordinatesReadBackTheSame) {
+  const double third = 1.0 / 3, tiny = std::numeric_limits<double>::denorm_min();
+  Result result;
+  AddRing(result.rings, {third, tiny, 1e300, 0.1 + 0.2, -2.0 / 3, 5}, kNoRing);
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
+  EXPECT_THAT(Flat(file["features"][0]["geometry"]["coordinates"][0]),
+              ElementsAre(third, tiny, 1e300, 0.1 + 0.2, -2.0 / 3, 5, third, tiny));
+}
+
+TEST(GeoJson, AnEmptyFrameIsACollectionWithoutFeatures) {
+  const Result result;
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
+  EXPECT_THAT(file.at("features"), IsEmpty());
+}
+
+TEST(GeoJson, ARingThatCrossesItselfIsWrittenPointByPoint) {
+  Result bow_tie;
+  AddRing(bow_tie.rings, {0, 0, 2, 2, 2, 0, 0, 2}, kNoRing);
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = bow_tie}));
+  EXPECT_EQ(file["features"][0]["geometry"]["coordinates"][0].size(), 5u);
+}
+
+TEST(GeoJson, ATimeThatIsNotFiniteIsNull) {
+  const Result result;
+  const json file = json::parse(Encode(
+      FrameFormat::kGeoJson, {.time = std::numeric_limits<double>::quiet_NaN(), .result = result}));
+  EXPECT_TRUE(file.at("time").is_null());
+}
+
+TEST(FrameWriter, ACoordinateThatIsNotFiniteIsNeverWritten) {
+  Result result = SquareWithHoleAndIsland();
+  result.rings.points[3] = std::numeric_limits<double>::infinity();
+  for (const FrameFormat format : AllFrameFormats()) {
+    const auto bytes = EncodeFrame(format, {.index = 4, .result = result}, {});
+    EXPECT_EQ(bytes.status().code(), absl::StatusCode::kDataLoss) << Name(format);
+    EXPECT_THAT(std::string(bytes.status().message()), HasSubstr("frame 4"));
+  }
+}
+
+TEST(Svg, YPointsUpAndTheBoxIsThatOfTheSequence) {
+  Result result;
+  AddRing(result.rings, {0, 0, 1, 0, 0, 1}, kNoRing);
+  const std::string svg =
+      Encode(FrameFormat::kSvg, {.result = result}, {.picture_box = Box{0, 0, 2, 1}});
+  // The longer side of 2 with its margins of 0.04 on both sides takes 1000 units: 480.769 each.
+  EXPECT_THAT(svg, HasSubstr("viewBox=\"0 0 1000 519.231\""));
+  EXPECT_THAT(svg, HasSubstr("d=\"M19.231 500L500 500L19.231 19.231Z\""));
+}
+
+TEST(Svg, EveryMeshEdgeIsDrawnOnce) {
+  const Result result = SquareWithHoleAndIsland();
+  const std::string svg = Encode(FrameFormat::kSvg, {.result = result});
+  const std::size_t begin = svg.find("class=\"mesh\"");
+  const std::string path = svg.substr(begin, svg.find("/>", begin) - begin);
+  // Square with hole: 8 border edges and 8 across; the island: 3.
+  EXPECT_EQ(CountOf(path, "M"), 19u);
+}
+
+TEST(Svg, ParticlesAreDrawnWhereTheyAreWanted) {
+  const Result result = SquareWithHoleAndIsland();
+  const std::vector<double> particles = {1, 1, 2, 2, 3, std::nan("")};
+  const FrameRecord frame{.result = result, .particles = particles};
+  EXPECT_EQ(CountOf(Encode(FrameFormat::kSvg, frame), "h0"), 2u);
+  EXPECT_EQ(CountOf(Encode(FrameFormat::kSvg, frame, {.picture_particles = false}), "h0"), 0u);
+}
+
+TEST(Svg, AnEmptyFrameIsAPictureToo) {
+  const Result result;
+  const std::string svg = Encode(FrameFormat::kSvg, {.result = result});
+  EXPECT_THAT(svg, HasSubstr("</svg>"));
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(svg, Not(HasSubstr("inf")));
+}
+
+TEST(Obj, FacesAndClosedPolylinesShareTheVerticesOfTheMesh) {
+  const Result result = SquareWithHoleAndIsland();
+  const auto lines = ObjLines(Encode(FrameFormat::kObj, {.result = result}));
+  std::size_t vertices = 0, faces = 0;
+  std::vector<std::vector<std::string>> polylines;
+  for (const auto& words : lines) {
+    if (words[0] == "v") {
+      ASSERT_EQ(words.size(), 4u);
+      EXPECT_EQ(words[3], "0");
+      ++vertices;
+    }
+    if (words[0] == "f") ++faces;
+    if (words[0] == "l") polylines.push_back(words);
+  }
+  EXPECT_EQ(vertices, 11u);
+  EXPECT_EQ(faces, 9u);
+  EXPECT_THAT(polylines, ElementsAre(ElementsAre("l", "1", "2", "3", "4", "1"),
+                                     ElementsAre("l", "5", "6", "7", "5"),
+                                     ElementsAre("l", "8", "9", "10", "11", "8")));
+  EXPECT_THAT(lines, ::testing::Contains(ElementsAre("f", "1", "2", "11")));
+}
+
+TEST(Obj, WithoutAMeshThereAreOnlyPolylines) {
+  Result result = SquareWithHoleAndIsland();
+  result.mesh = {};
+  const std::string obj = Encode(FrameFormat::kObj, {.result = result});
+  EXPECT_EQ(CountOf(obj, "\nv "), 11u);
+  EXPECT_EQ(CountOf(obj, "\nf "), 0u);
+  EXPECT_EQ(CountOf(obj, "\nl "), 3u);
+}
+
+TEST(Obj, AMeshThatDoesNotBeginWithTheRingsHasVerticesOfItsOwn) {
+  Result result = SquareWithHoleAndIsland();
+  result.mesh.points[0] = -1;
+  const std::string obj = Encode(FrameFormat::kObj, {.result = result});
+  EXPECT_EQ(CountOf(obj, "\nv "), 22u);
+  EXPECT_THAT(obj, HasSubstr("\nl 12 13 14 15 12\n"));
+}
+
+TEST(Csv, ThereIsOneRowPerVertexWithItsNormal) {
+  Result result;
+  AddRing(result.rings, {1, 0, 0.1, 1, -1, 0, 0, -1}, kNoRing);
+  result.rings.normals = {1, 0, 0, 1, -1, 0, 0.1F, -1};
+  EXPECT_EQ(Encode(FrameFormat::kCsv, {.result = result}),
+            "ring,index,x,y,nx,ny\n0,0,1,0,1,0\n0,1,0.1,1,0,1\n0,2,-1,0,-1,0\n0,3,0,-1,0.1,-1\n");
+}
+
+TEST(Csv, WithoutNormalsTheirColumnsAreEmpty) {
+  Result result;
+  AddRing(result.rings, {1, 0, 0, 1, -1, 0}, kNoRing);
+  result.rings.normals.clear();
+  EXPECT_THAT(Encode(FrameFormat::kCsv, {.result = result}), HasSubstr("\n0,2,-1,0,,\n"));
+}
+
+TEST(Vtp, LinesComeBeforePolygonsAndEachCellHasItsClassWhereTheBuildHasVtk) {
+  const Result result = SquareWithHoleAndIsland();
+  const auto formats = AllFrameFormats();
+  if (std::find(formats.begin(), formats.end(), FrameFormat::kVtp) == formats.end()) {
+    const auto refused = ParseFrameFormats("vtp");
+    ASSERT_FALSE(refused.ok());
+    EXPECT_THAT(std::string(refused.status().message()), HasSubstr("needs a build with VTK"));
+    return;
+  }
+  const std::string vtp = Encode(FrameFormat::kVtp, {.time = 0.5, .result = result});
+  EXPECT_THAT(vtp, HasSubstr("NumberOfPoints=\"11\""));
+  EXPECT_THAT(vtp, HasSubstr("NumberOfLines=\"3\""));
+  EXPECT_THAT(vtp, HasSubstr("NumberOfPolys=\"9\""));
+  EXPECT_THAT(vtp, HasSubstr("Name=\"class\""));
+  EXPECT_THAT(vtp, HasSubstr("TimeValue"));
+  EXPECT_THAT(vtp, HasSubstr("</VTKFile>"));
+}
+
+TEST(FrameWriter, FilesAreNumberedByTheIndexInTheInput) {
+  TemporaryDirectory directory;
+  const auto writer = FrameWriter::Create({.directory = directory / "made/on/the/way",
+                                           .formats = {FrameFormat::kGeoJson, FrameFormat::kObj}});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  const Result result = SquareWithHoleAndIsland();
+  ASSERT_TRUE(writer->Write({.index = 42, .result = result}).ok());
+  ASSERT_TRUE(writer->Write({.index = 12345678, .result = result}).ok());
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(directory / "made/on/the/way")) {
+    names.push_back(entry.path().filename().native());
+  }
+  EXPECT_THAT(names, UnorderedElementsAre("frame_000042.geojson", "frame_000042.obj",
+                                          "frame_12345678.geojson", "frame_12345678.obj"));
+}
+
+TEST(FrameWriter, ADirectoryThatGoesAwayIsToldAndLeavesNothing) {
+  TemporaryDirectory directory;
+  const auto writer =
+      FrameWriter::Create({.directory = directory / "out", .formats = {FrameFormat::kSvg}});
+  ASSERT_TRUE(writer.ok());
+  std::filesystem::remove(directory / "out");
+  const Result result = SquareWithHoleAndIsland();
+  const absl::Status status = writer->Write({.index = 7, .result = result});
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("frame_000007.svg"));
+  EXPECT_THAT(directory.Entries(), IsEmpty());
+}
+
+TEST(FrameWriter, AFileInPlaceOfTheDirectoryIsRefused) {
+  TemporaryDirectory directory;
+  std::ofstream(directory / "out") << "a file";
+  const auto writer = FrameWriter::Create({.directory = directory / "out"});
+  EXPECT_FALSE(writer.ok());
+  EXPECT_EQ(ReadFile(directory / "out"), "a file");
+}
+
+TEST(FrameFormats, AListKeepsItsOrderAndNamesEachOnce) {
+  const auto formats = ParseFrameFormats("svg,geojson,svg");
+  ASSERT_TRUE(formats.ok());
+  EXPECT_THAT(*formats, ElementsAre(FrameFormat::kSvg, FrameFormat::kGeoJson));
+}
+
+TEST(FrameFormats, AnUnknownWordIsNamedWithWhatMayStandThere) {
+  for (const char* list : {"svg,stl", "stl", "svg,", ""}) {
+    const auto formats = ParseFrameFormats(list);
+    ASSERT_EQ(formats.status().code(), absl::StatusCode::kInvalidArgument) << list;
+    EXPECT_THAT(std::string(formats.status().message()), HasSubstr("must be some of geojson,svg"));
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::client

@@ -1,0 +1,116 @@
+#include "output/statistics_writer.h"
+
+#include <limits>
+
+#include "client/output/fixtures.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "nlohmann/json.hpp"
+
+namespace partiemc::client {
+namespace {
+
+using nlohmann::ordered_json;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr const char* kHeader =
+    "frame,particles,polylines,vertices,triangles_grid,triangles,area,milliseconds,"
+    "bins_ms,field_ms,crossings_ms,rings_ms,normals_ms,vertices_ms,mesh_ms,"
+    "perimeter,self_intersections,folded_triangles,dropped_holes,dropped_components,"
+    "rings_digest,mesh_digest,time";
+
+FrameRecord Record(const Result& result) {
+  return {.index = 3,
+          .time = 0.1,
+          .result = result,
+          .stages_ms = {1, 2, 3, 4, 5, 6, 7},
+          .total_ms = 28.5,
+          .rings_digest = 0x0123456789abcdef,
+          .mesh_digest = 0xf};
+}
+
+std::string Written(const std::filesystem::path& path, const std::vector<FrameRecord>& frames) {
+  auto writer = StatisticsWriter::Create(path);
+  EXPECT_TRUE(writer.ok()) << writer.status();
+  for (const FrameRecord& frame : frames) EXPECT_TRUE(writer->Add(frame).ok());
+  EXPECT_TRUE(writer->Finish().ok());
+  return ReadFile(path);
+}
+
+TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
+  TemporaryDirectory directory;
+  Result result = SquareWithHoleAndIsland();
+  result.statistics.perimeter = 23.5;
+  result.statistics.self_intersections = 1;
+  result.statistics.folded_triangles = 2;
+  result.statistics.dropped_holes = 3;
+  result.statistics.dropped_components = 4;
+  EXPECT_EQ(Written(directory / "stats.csv", {Record(result)}),
+            std::string(kHeader) +
+                "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,23.5,1,2,3,4,"
+                "0123456789abcdef,000000000000000f,0.1\n");
+}
+
+TEST(Statistics, JsonIsAnArrayOfObjects) {
+  TemporaryDirectory directory;
+  const Result result = SquareWithHoleAndIsland();
+  const auto rows =
+      ordered_json::parse(Written(directory / "stats.JSON", {Record(result), Record(result)}));
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[1].at("frame"), 3);
+  EXPECT_EQ(rows[1].at("triangles_grid"), 36);
+  EXPECT_EQ(rows[1].at("milliseconds"), 28.5);
+  EXPECT_EQ(rows[1].at("rings_digest"), "0123456789abcdef");
+}
+
+TEST(Statistics, NamesAreUniqueSoThatAnObjectHoldsEveryColumn) {
+  TemporaryDirectory directory;
+  const Result result = SquareWithHoleAndIsland();
+  const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
+  EXPECT_EQ(rows[0].size(), StatisticsColumns().size());
+}
+
+TEST(Statistics, NoFramesAtAllAreAHeaderOrAnEmptyArray) {
+  TemporaryDirectory directory;
+  EXPECT_EQ(Written(directory / "stats.csv", {}), std::string(kHeader) + "\n");
+  EXPECT_THAT(ordered_json::parse(Written(directory / "stats.json", {})), IsEmpty());
+}
+
+TEST(Statistics, AnAreaReadsBackTheSame) {
+  TemporaryDirectory directory;
+  Result result;
+  result.statistics.area = 0.1 + 0.2;
+  const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
+  EXPECT_EQ(rows[0].at("area").get<double>(), 0.1 + 0.2);
+}
+
+TEST(Statistics, ANumberThatIsNotFiniteIsNullInJson) {
+  TemporaryDirectory directory;
+  Result result;
+  result.statistics.area = std::numeric_limits<double>::quiet_NaN();
+  const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
+  EXPECT_TRUE(rows[0].at("area").is_null());
+}
+
+TEST(Statistics, AnotherExtensionIsRefusedAndNothingIsLeft) {
+  TemporaryDirectory directory;
+  const auto writer = StatisticsWriter::Create(directory / "stats.txt");
+  EXPECT_EQ(writer.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(writer.status().message()), HasSubstr("must end in .csv or .json"));
+  EXPECT_THAT(directory.Entries(), IsEmpty());
+}
+
+TEST(Statistics, WithoutFinishThereIsNoFile) {
+  TemporaryDirectory directory;
+  const Result result = SquareWithHoleAndIsland();
+  {
+    auto writer = StatisticsWriter::Create(directory / "stats.csv");
+    ASSERT_TRUE(writer.ok());
+    ASSERT_TRUE(writer->Add(Record(result)).ok());
+  }
+  EXPECT_THAT(directory.Entries(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace partiemc::client

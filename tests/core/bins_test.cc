@@ -1,0 +1,291 @@
+#include "bins.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "partiemc/status.h"
+#include "support/particles.h"
+
+namespace partiemc {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Scale ScaleOf(double spacing, double kernel_radius, double cell_size) {
+  const ReconstructionParameters parameters =
+      Resolve({.spacing = spacing, .kernel_radius = kernel_radius, .cell_size = cell_size});
+  return MakeScale(parameters, spacing, cell_size * spacing, spacing * spacing);
+}
+
+ParticleBins Bin(const support::Particles& particles, const Scale& scale) {
+  ParticleBins bins;
+  const absl::Status status = BinParticles(particles.AsFrame(), Plane::kXy, scale, {}, bins);
+  EXPECT_TRUE(status.ok()) << status;
+  return bins;
+}
+
+// Every fact about bins at once, for random frames and scales.
+class RandomBins : public testing::TestWithParam<int> {
+ protected:
+  RandomBins() : random_(static_cast<std::uint64_t>(GetParam())) {
+    scale_ = ScaleOf(1, random_.Uniform(1.5, 8), random_.Uniform(0.25, 4));
+    particles_ = support::RandomScene(random_.Bits());
+    bins_ = Bin(particles_, scale_);
+  }
+
+  // Calls visit(tile, entry, x, y) with positions in cells from the world's origin.
+  template <typename Visit>
+  void ForEachEntry(Visit visit) const {
+    for (std::size_t tile = 0; tile < bins_.tiles.size(); ++tile) {
+      for (std::uint32_t e = bins_.offsets[tile]; e < bins_.offsets[tile + 1]; ++e) {
+        visit(tile, e, static_cast<double>(bins_.x[e]) + 32.0 * bins_.tiles[tile].x,
+              static_cast<double>(bins_.y[e]) + 32.0 * bins_.tiles[tile].y);
+      }
+    }
+  }
+
+  support::Random random_;
+  Scale scale_;
+  support::Particles particles_;
+  ParticleBins bins_;
+};
+
+TEST_P(RandomBins, EachParticleIsAtHomeInExactlyOneTile) {
+  std::vector<int> homes(particles_.size());
+  ForEachEntry([&](std::size_t, std::uint32_t e, double, double) {
+    homes[bins_.source[e]] += IsAtHome(bins_.x[e], bins_.y[e]);
+  });
+  for (std::size_t k = 0; k < homes.size(); ++k) EXPECT_EQ(homes[k], 1) << "particle " << k;
+}
+
+TEST_P(RandomBins, EachParticleStandsInEveryTileWhoseNodesItsKernelReaches) {
+  std::vector<std::vector<bool>> listed(bins_.tiles.size(), std::vector<bool>(particles_.size()));
+  ForEachEntry([&](std::size_t tile, std::uint32_t e, double, double) {
+    EXPECT_FALSE(listed[tile][bins_.source[e]]) << "listed twice";
+    listed[tile][bins_.source[e]] = true;
+  });
+  for (std::size_t k = 0; k < particles_.size(); ++k) {
+    const double x = particles_.x(k) / scale_.cell_size;
+    const double y = particles_.y(k) / scale_.cell_size;
+    const auto tile_of = [](double v) { return static_cast<std::int32_t>(std::floor(v / 32)); };
+    // Nodes and cells of a tile fill [32 t, 32 t + 32]; half a rounding unit is left to chance.
+    const double reach = scale_.kernel_radius - 1e-5;
+    for (std::int32_t ty = tile_of(y - reach); ty <= tile_of(y + reach); ++ty) {
+      for (std::int32_t tx = tile_of(x - reach); tx <= tile_of(x + reach); ++tx) {
+        const std::uint32_t tile = bins_.tiles.Find({ty, tx});
+        ASSERT_NE(tile, kNoTile);
+        EXPECT_TRUE(listed[tile][k]) << "particle " << k;
+      }
+    }
+  }
+}
+
+TEST_P(RandomBins, AParticleHasTheSamePositionInEachOfItsTiles) {
+  std::vector<double> x(particles_.size(), kNan), y(particles_.size(), kNan);
+  ForEachEntry([&](std::size_t, std::uint32_t e, double px, double py) {
+    const std::uint32_t k = bins_.source[e];
+    if (std::isnan(x[k])) {
+      x[k] = px;
+      y[k] = py;
+      // Rounded to a multiple of 2^-17 cells, hence off by half of it at most.
+      EXPECT_NEAR(px, particles_.x(k) / scale_.cell_size, 0x1p-18 + 1e-9);
+      EXPECT_NEAR(py, particles_.y(k) / scale_.cell_size, 0x1p-18 + 1e-9);
+      EXPECT_EQ(px * 0x1p17, std::floor(px * 0x1p17));
+    }
+    EXPECT_EQ(x[k], px);
+    EXPECT_EQ(y[k], py);
+  });
+}
+
+TEST_P(RandomBins, EntriesOfATileStandInTheOrderOfTheFrame) {
+  ASSERT_EQ(bins_.offsets.size(), bins_.tiles.size() + 1);
+  EXPECT_EQ(bins_.offsets.back(), bins_.source.size());
+  for (std::size_t tile = 0; tile < bins_.tiles.size(); ++tile) {
+    for (std::uint32_t e = bins_.offsets[tile] + 1; e < bins_.offsets[tile + 1]; ++e) {
+      EXPECT_LT(bins_.source[e - 1], bins_.source[e]);
+    }
+  }
+}
+
+TEST_P(RandomBins, WeightsAreVolumesInUnitsOfTheKernel) {
+  if (particles_.volumes.empty()) {
+    EXPECT_TRUE(bins_.weight.empty());
+    return;
+  }
+  ForEachEntry([&](std::size_t, std::uint32_t e, double, double) {
+    const double radius = scale_.kernel_radius * scale_.cell_size;
+    const double expected =
+        particles_.volumes[bins_.source[e]] * 4 / (std::acos(-1) * radius * radius);
+    EXPECT_NEAR(bins_.weight[e], expected, 1e-6 * expected);
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomBins, testing::Range(1, 21));
+
+TEST(Bins, AFrameWithoutParticlesHasNoTiles) {
+  const ParticleBins bins = Bin({}, ScaleOf(1, 3, 1));
+  EXPECT_EQ(bins.tiles.size(), 0u);
+  EXPECT_TRUE(bins.source.empty());
+  EXPECT_EQ(bins.offsets, std::vector<std::uint32_t>{0});
+}
+
+TEST(Bins, ALoneParticleAMillionCellsAwayCostsAFewTilesAndNoBoundingBox) {
+  support::Particles particles = support::Disc(5);
+  const std::size_t before = Bin(particles, ScaleOf(1, 3, 1)).tiles.size();
+  particles.Add(1e6, -1e6);
+  EXPECT_LE(Bin(particles, ScaleOf(1, 3, 1)).tiles.size(), before + 4);
+}
+
+TEST(Bins, WhatAnEarlierFrameLeftBehindIsForgotten) {
+  const Scale scale = ScaleOf(1, 3, 1);
+  support::Particles weighted = support::Disc(8);
+  weighted.volumes.assign(weighted.size(), 1.0f);
+  ParticleBins bins = Bin(weighted, scale);
+  const support::Particles next = support::Lattice(3, 3, 100, 100);
+  ASSERT_TRUE(BinParticles(next.AsFrame(), Plane::kXy, scale, {}, bins).ok());
+  const ParticleBins fresh = Bin(next, scale);
+  EXPECT_EQ(bins.x, fresh.x);
+  EXPECT_EQ(bins.offsets, fresh.offsets);
+  EXPECT_TRUE(bins.weight.empty());
+}
+
+TEST(Bins, MoreTilesThanAllowedAreRefusedWithAReason) {
+  support::Particles particles;
+  for (int k = 0; k < 100; ++k) particles.Add(1000.0 * k, 0);
+  ParticleBins bins;
+  const absl::Status status =
+      BinParticles(particles.AsFrame(), Plane::kXy, ScaleOf(1, 3, 1), {.max_tiles = 50}, bins);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  ASSERT_TRUE(FindViolation(status).has_value());
+  EXPECT_EQ(FindViolation(status)->reason, kReasonTooManyTiles);
+  EXPECT_EQ(FindViolation(status)->field, "positions");
+}
+
+TEST(Bins, AParticleBeyondTwoToTheThirtyCellsIsRefusedByName) {
+  for (const auto& [x, y, field] :
+       {std::tuple(1.1e9, 0.0, "positions[1].x"), std::tuple(0.0, -1.1e9, "positions[1].y")}) {
+    support::Particles particles;
+    particles.Add(0, 0);
+    particles.Add(x, y);
+    ParticleBins bins;
+    const absl::Status status =
+        BinParticles(particles.AsFrame(), Plane::kXy, ScaleOf(1, 3, 1), {}, bins);
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    ASSERT_TRUE(FindViolation(status).has_value());
+    EXPECT_EQ(FindViolation(status)->reason, kReasonOutOfRange);
+    EXPECT_EQ(FindViolation(status)->field, field);
+  }
+}
+
+// What CheckFrame says of one bad frame.
+struct BadFrame {
+  std::string name;
+  std::vector<double> positions;
+  int components = 2;
+  std::vector<float> volumes;
+  std::string_view reason;
+  std::string field;
+  absl::StatusCode code = absl::StatusCode::kInvalidArgument;
+};
+
+std::vector<double> With(std::size_t index, double value, std::size_t count = 40) {
+  std::vector<double> positions(count);
+  for (std::size_t k = 0; k < count; ++k) positions[k] = static_cast<double>(k / 2);
+  positions[index] = value;
+  return positions;
+}
+
+std::vector<BadFrame> BadFrames() {
+  return {
+      {"NanInX", With(34, kNan), 2, {}, kReasonNotFinite, "positions[17].x"},
+      {"InfinityInY", With(35, kInfinity), 2, {}, kReasonNotFinite, "positions[17].y"},
+      {"MinusInfinity", With(0, -kInfinity), 2, {}, kReasonNotFinite, "positions[0].x"},
+      {"Enormous", With(1, 1e70), 2, {}, kReasonOutOfRange, "positions[0].y"},
+      {"NanInZ", With(5, kNan, 9), 3, {}, kReasonNotFinite, "positions[1].z"},
+      {"OddCount", With(0, 0, 39), 2, {}, kReasonCount, "positions"},
+      {"NotAMultipleOfThree", With(0, 0, 40), 3, {}, kReasonCount, "positions"},
+      {"NotPlanar", {0, 0, 0, 1, 0, 0, 0, 1, 0.5}, 3, {}, kReasonNotPlanar, "positions[2].z"},
+      {"FourComponents", With(0, 0), 4, {}, kReasonOutOfRange, "components"},
+      {"OneComponent", With(0, 0), 1, {}, kReasonOutOfRange, "components"},
+      {"NoComponents", With(0, 0), 0, {}, kReasonOutOfRange, "components"},
+      {"NegativeComponents", With(0, 0), -2, {}, kReasonOutOfRange, "components"},
+      {"TooFewVolumes", With(0, 0, 4), 2, {1.0f}, kReasonCount, "volumes"},
+      {"VolumeZero", With(0, 0, 4), 2, {1.0f, 0.0f}, kReasonOutOfRange, "volumes[1]"},
+      {"VolumeNegative", With(0, 0, 4), 2, {-1.0f, 1.0f}, kReasonOutOfRange, "volumes[0]"},
+      {"VolumeNan",
+       With(0, 0, 4),
+       2,
+       {1.0f, static_cast<float>(kNan)},
+       kReasonNotFinite,
+       "volumes[1]"},
+      {"VolumeInfinite",
+       With(0, 0, 4),
+       2,
+       {1.0f, static_cast<float>(kInfinity)},
+       kReasonNotFinite,
+       "volumes[1]"},
+      {"TooManyParticles",
+       With(0, 0, 202),
+       2,
+       {},
+       kReasonTooManyParticles,
+       "positions",
+       absl::StatusCode::kResourceExhausted},
+  };
+}
+
+class BadFrameTest : public testing::TestWithParam<BadFrame> {};
+
+TEST_P(BadFrameTest, IsRefusedWithReasonAndField) {
+  const BadFrame& bad = GetParam();
+  const Frame frame{.positions = std::span<const double>(bad.positions),
+                    .components = bad.components,
+                    .volumes = bad.volumes};
+  const absl::Status status = CheckFrame(frame, Plane::kXy, {.max_particles = 100});
+  EXPECT_EQ(status.code(), bad.code) << status;
+  ASSERT_TRUE(FindViolation(status).has_value());
+  EXPECT_EQ(FindViolation(status)->reason, bad.reason);
+  EXPECT_EQ(FindViolation(status)->field, bad.field);
+  EXPECT_FALSE(FindViolation(status)->value.empty());
+  EXPECT_NE(FindViolation(status)->rule.find("must"), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bins, BadFrameTest, testing::ValuesIn(BadFrames()),
+                         [](const auto& tested) { return tested.param.name; });
+
+TEST(Bins, AGoodFrameOfAnyKindIsAccepted) {
+  const std::vector<float> flat = {0, 0, 5, 1, 0, 5, 0, 1, 5};
+  const std::vector<float> volumes = {1, 2, 3};
+  EXPECT_TRUE(CheckFrame({}, Plane::kXy, {}).ok());
+  EXPECT_TRUE(
+      CheckFrame({.positions = std::span<const float>(flat), .components = 3, .volumes = volumes},
+                 Plane::kXy, {.max_particles = 3})
+          .ok());
+}
+
+TEST(Bins, ThreeComponentsAreReadInTheirPlane) {
+  const std::vector<double> xyz = {1, 2, 3};
+  const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
+  const auto read = [&](Plane plane) {
+    const WorldPosition position = PositionOf(frame, plane, 0);
+    return std::pair(position.x, position.y);
+  };
+  EXPECT_EQ(read(Plane::kXy), std::pair(1.0, 2.0));
+  EXPECT_EQ(read(Plane::kXz), std::pair(1.0, 3.0));
+  EXPECT_EQ(read(Plane::kYz), std::pair(2.0, 3.0));
+}
+
+TEST(Bins, ParticlesOutsideTheNamedPlaneAreToldByTheAxisThatVaries) {
+  const std::vector<double> xyz = {0, 0, 0, 1, 0, 1, 2, 0, 2};
+  const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
+  EXPECT_TRUE(CheckFrame(frame, Plane::kXz, {}).ok());
+  EXPECT_EQ(FindViolation(CheckFrame(frame, Plane::kXy, {}))->field, "positions[2].z");
+  EXPECT_EQ(FindViolation(CheckFrame(frame, Plane::kYz, {}))->field, "positions[2].x");
+}
+
+}  // namespace
+}  // namespace partiemc

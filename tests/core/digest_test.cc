@@ -1,0 +1,89 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "partiemc/result.h"
+
+namespace partiemc {
+namespace {
+
+Rings Triangle() {
+  Rings rings;
+  rings.points = {0, 0, 1, 0, 0, 1};
+  rings.offsets = {0, 3};
+  rings.outer_of = {kNoRing};
+  return rings;
+}
+
+Mesh OneTriangle() {
+  Mesh mesh;
+  mesh.points = {0, 0, 1, 0, 0, 1};
+  mesh.triangles = {0, 1, 2};
+  mesh.classes = {TriangleClass::kBoundary};
+  return mesh;
+}
+
+// The definition of the protocol, word by word: what any client would write.
+std::uint64_t Fold(const std::vector<std::uint64_t>& words) {
+  std::uint64_t hash = 14695981039346656037u;
+  for (const std::uint64_t word : words) {
+    hash ^= word;
+    hash *= 1099511628211u;
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+TEST(Digest, IsTheOneOfTheProtocol) {
+  constexpr std::uint64_t kOne = 0x3ff0000000000000u;  // 1.0
+  EXPECT_EQ(DigestRings(Triangle()),
+            Fold({6, 0, 0, kOne, 0, 0, kOne, 2, 0, 3, 1, 0xffffffffu}));
+  EXPECT_EQ(DigestMesh(OneTriangle()),
+            Fold({6, 0, 0, kOne, 0, 0, kOne, 3, 0, 1, 2, 1, 0}));
+  EXPECT_EQ(DigestRings(Rings{}), Fold({0, 1, 0, 0}));
+  EXPECT_EQ(DigestMesh(Mesh{}), Fold({0, 0, 0}));
+}
+
+TEST(Digest, TellsEveryChangeOfGeometryApart) {
+  std::set<std::uint64_t> digests = {DigestRings(Triangle())};
+  const auto expect_new = [&](const Rings& rings) {
+    EXPECT_TRUE(digests.insert(DigestRings(rings)).second);
+  };
+  for (std::size_t k = 0; k < 6; ++k) {
+    Rings rings = Triangle();
+    rings.points[k] += 0x1p-50;
+    expect_new(rings);
+  }
+  Rings negative_zero = Triangle();
+  negative_zero.points[0] = -0.0;
+  expect_new(negative_zero);
+  Rings hole = Triangle();
+  hole.outer_of[0] = 0;
+  expect_new(hole);
+  Rings split = Triangle();
+  split.offsets = {0, 2, 3};
+  expect_new(split);
+  Rings turned = Triangle();
+  turned.points = {1, 0, 0, 1, 0, 0};
+  expect_new(turned);
+}
+
+TEST(Digest, OfAMeshTellsTrianglesAndClassesApart) {
+  Mesh turned = OneTriangle();
+  turned.triangles = {1, 2, 0};
+  Mesh interior = OneTriangle();
+  interior.classes[0] = TriangleClass::kInterior;
+  EXPECT_NE(DigestMesh(turned), DigestMesh(OneTriangle()));
+  EXPECT_NE(DigestMesh(interior), DigestMesh(OneTriangle()));
+}
+
+TEST(Digest, LooksAtTheGeometryOnly) {
+  Rings measured = Triangle();
+  measured.measures.resize(1);
+  measured.measures[0].identity = 7;
+  measured.normals = {1, 0, 1, 0, 1, 0};
+  EXPECT_EQ(DigestRings(measured), DigestRings(Triangle()));
+}
+
+}  // namespace
+}  // namespace partiemc

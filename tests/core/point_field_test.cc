@@ -1,0 +1,144 @@
+#include "point_field.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/oracle.h"
+#include "support/particles.h"
+#include "support/stages.h"
+
+namespace partiemc {
+namespace {
+
+using support::Stages;
+
+class PointFieldTest : public testing::TestWithParam<int> {};
+
+TEST_P(PointFieldTest, ValueAndGradientAgreeWithTheEquationsOfThePaper) {
+  support::Random random(static_cast<std::uint64_t>(GetParam()));
+  const double cell = random.Uniform(0.4, 3);
+  support::Particles particles = support::Blob(random, random.Uniform(3, 6));
+  particles.Add(support::Noise(random, 10, 12));
+  if (GetParam() % 2 == 0) {
+    for (std::size_t k = 0; k < particles.size(); ++k) {
+      particles.volumes.push_back(static_cast<float>(random.Uniform(0.5, 1.5)));
+    }
+  }
+  Stages stages;
+  stages.Run(support::Snapped(particles, cell),
+             {.spacing = 1.0, .kernel_radius = random.Uniform(1.5, 8), .cell_size = cell});
+  const support::FieldOracle oracle(stages.particles, stages.parameters, 1.0);
+  int on_phi = 0, on_guard = 0;
+  for (int k = 0; k < 3000 && on_phi + on_guard < 400; ++k) {
+    // Round any particle, every other time one of the lone ones, where the guard rules.
+    const std::size_t lone = random.Chance(0.5) ? particles.size() - 10 : 0;
+    const std::size_t near = lone + random.Below(particles.size() - lone);
+    const double reach = 1.2 * oracle.kernel_radius();
+    const support::Vector at{particles.x(near) + random.Uniform(-reach, reach),
+                             particles.y(near) + random.Uniform(-reach, reach)};
+    const TileCoordinate place{static_cast<std::int32_t>(std::floor(at.y / cell / 32)),
+                               static_cast<std::int32_t>(std::floor(at.x / cell / 32))};
+    const std::uint32_t tile = stages.bins.tiles.Find(place);
+    if (tile == kNoTile || !stages.field.IsIndexed(tile)) continue;
+    const double x = at.x / cell - 32.0 * place.x;
+    const double y = at.y / cell - 32.0 * place.y;
+    const FieldSample sample = stages.field.Sample(tile, x, y);
+    // Where the kernel sum is tiny the mean is a quotient of roundings, and nearer than a step of
+    // the differences to the crease between the branches they see both.
+    if (oracle.KernelSum(at) < 1e-3) continue;
+    if (std::abs(oracle.Phi(at) - oracle.Guard(at)) < 1e-3) continue;
+    EXPECT_TRUE(sample.has_support);
+    EXPECT_NEAR(sample.density, oracle.Density(at), 1e-5);
+    EXPECT_NEAR(sample.phi * cell, oracle.Phi(at), 1e-5);
+    EXPECT_NEAR(sample.value * cell, oracle.Value(at), 1e-5);
+    const support::Vector mean = *oracle.Mean(at);
+    EXPECT_NEAR(sample.mean_x * cell, mean.x - at.x, 1e-5);
+    EXPECT_NEAR(sample.mean_y * cell, mean.y - at.y, 1e-5);
+    const double mean_distance = std::hypot(mean.x - at.x, mean.y - at.y);
+    if (mean_distance > 0.01) {  // Nearer, |x - xbar| has its kink within the differences' reach.
+      const support::Vector phi_gradient = oracle.PhiGradient(at);
+      const support::Vector gradient = oracle.ValueGradient(at);
+      const double tolerance = 1e-4 * std::max(1.0, std::hypot(gradient.x, gradient.y)) *
+                               std::max(1.0, 0.1 / mean_distance);
+      EXPECT_NEAR(sample.phi_x, phi_gradient.x, tolerance);
+      EXPECT_NEAR(sample.phi_y, phi_gradient.y, tolerance);
+      EXPECT_NEAR(sample.gradient_x, gradient.x, tolerance);
+      EXPECT_NEAR(sample.gradient_y, gradient.y, tolerance);
+    }
+    ++(oracle.Phi(at) > oracle.Guard(at) ? on_phi : on_guard);
+  }
+  EXPECT_GT(on_phi, 20);
+  EXPECT_GT(on_guard, 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, PointFieldTest, testing::Range(1, 13));
+
+TEST(PointField, AgreesWithTheFieldStageAtNodes) {
+  support::Random random(5);
+  Stages stages;
+  stages.Run(support::Snapped(support::Blob(random, 8), 1.0), {.spacing = 1.0});
+  for (std::uint32_t tile = 0; tile < stages.bins.tiles.size(); ++tile) {
+    if (!stages.field.IsIndexed(tile)) continue;
+    for (int node = 0; node < kTileNodes; node += 3) {
+      const FieldSample sample = stages.field.Sample(tile, node % kTileSize, node / kTileSize);
+      if (sample.density < 1e-3) continue;
+      EXPECT_NEAR(sample.value, stages.level_set.tiles[tile][node], 1e-5);
+    }
+  }
+}
+
+TEST(PointField, APointWithoutSupportSaysSoAndHasNoGradient) {
+  support::Particles particles;
+  particles.Add(3, 3);
+  Stages stages;
+  stages.Run(particles, {.spacing = 1.0});
+  const FieldSample sample = stages.field.Sample(stages.bins.tiles.Find({0, 0}), 20, 20);
+  EXPECT_FALSE(sample.has_support);
+  EXPECT_EQ(sample.value, stages.scale.VoidValue());
+  EXPECT_EQ(sample.gradient_x, 0);
+  EXPECT_EQ(sample.gradient_y, 0);
+}
+
+TEST(PointField, AtTheWeightedMeanItselfTheGradientOfPhiIsZeroAndNotNan) {
+  support::Particles particles;
+  particles.Add(3, 3);
+  Stages stages;
+  stages.Run(particles, {.spacing = 1.0});
+  const FieldSample sample = stages.field.Sample(stages.bins.tiles.Find({0, 0}), 3, 3);
+  EXPECT_EQ(sample.phi, -stages.scale.reference_radius);
+  EXPECT_EQ(sample.phi_x, 0);
+  EXPECT_EQ(sample.phi_y, 0);
+}
+
+TEST(PointField, FindsEveryParticleWithinARadiusAndNamesItsPlaceInTheFrame) {
+  support::Random random(6);
+  Stages stages;
+  stages.Run(support::Snapped(support::Noise(random, 300, 20), 1.0), {.spacing = 1.0});
+  int found = 0;
+  for (int k = 0; k < 500; ++k) {
+    const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
+    if (!stages.field.IsIndexed(tile)) continue;
+    const double x = random.Uniform(0, 32);
+    const double y = random.Uniform(0, 32);
+    const double radius = random.Uniform(0.1, stages.scale.kernel_radius);
+    std::vector<std::uint32_t> expected, visited;
+    for (std::uint32_t p = 0; p < stages.particles.size(); ++p) {
+      const double dx = stages.particles.x(p) - 32.0 * stages.bins.tiles[tile].x - x;
+      const double dy = stages.particles.y(p) - 32.0 * stages.bins.tiles[tile].y - y;
+      if (dx * dx + dy * dy <= radius * radius) expected.push_back(p);
+    }
+    stages.field.ForEachNear(tile, x, y, radius, [&](double px, double py, std::uint32_t entry) {
+      if ((px - x) * (px - x) + (py - y) * (py - y) > radius * radius) return;
+      visited.push_back(stages.field.SourceOf(entry));
+    });
+    std::sort(visited.begin(), visited.end());
+    EXPECT_EQ(visited, expected);
+    found += static_cast<int>(expected.size());
+  }
+  EXPECT_GT(found, 100);
+}
+
+}  // namespace
+}  // namespace partiemc

@@ -1,0 +1,276 @@
+#include "rings.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "partiemc/validate.h"
+#include "support/particles.h"
+#include "support/stages.h"
+
+namespace partiemc {
+namespace {
+
+using support::Particles;
+using support::Stages;
+
+// Level sets by hand: signed distances, negative inside.
+double Circle(double x, double y, double cx, double cy, double radius) {
+  return std::hypot(x - cx, y - cy) - radius;
+}
+
+Particles At(std::initializer_list<std::pair<double, double>> positions) {
+  Particles particles;
+  for (const auto& [x, y] : positions) particles.Add(x, y);
+  return particles;
+}
+
+ReconstructionParameters Plain(bool clean) {
+  return {.placement = Placement::kMarchingSquares, .spacing = 1.0, .clean = clean};
+}
+
+constexpr TileCoordinate kLow{0, 0}, kHigh{1, 1};
+
+// Centres on and off the seams of tiles.
+const std::pair<double, double> kCentres[] = {{16.2, 15.7}, {32, 32}, {31.5, 20.3}, {40.1, 33.9}};
+
+TEST(Rings, AnAnnulusIsAnOuterRingAndAHoleInIt) {
+  for (const auto& [cx, cy] : kCentres) {
+    Stages stages;
+    stages.RunOn(
+        [cx = cx, cy = cy](int x, int y) {
+          return std::max(Circle(x, y, cx, cy, 12), -Circle(x, y, cx, cy, 5));
+        },
+        kLow, kHigh, {}, Plain(false));
+    const Rings& rings = stages.result.rings;
+    ASSERT_EQ(rings.RingCount(), 2u);
+    const std::size_t outer = rings.outer_of[0] == kNoRing ? 0 : 1;
+    const std::size_t hole = 1 - outer;
+    EXPECT_EQ(rings.outer_of[outer], kNoRing);
+    EXPECT_EQ(rings.outer_of[hole], outer);
+    EXPECT_NEAR(rings.measures[outer].area, std::numbers::pi * 144, 2);
+    EXPECT_NEAR(rings.measures[hole].area, -std::numbers::pi * 25, 1);
+    EXPECT_NEAR(rings.measures[hole].centroid_x, cx, 0.05);
+    EXPECT_NEAR(rings.measures[hole].centroid_y, cy, 0.05);
+    EXPECT_TRUE(Validate(stages.result).ok()) << Validate(stages.result);
+  }
+}
+
+TEST(Rings, AnIslandInAHoleIsAnOuterRingOfItsOwn) {
+  for (const auto& [cx, cy] : kCentres) {
+    Stages stages;
+    stages.RunOn(
+        [cx = cx, cy = cy](int x, int y) {
+          return std::min(std::max(Circle(x, y, cx, cy, 13), -Circle(x, y, cx, cy, 8)),
+                          std::max(Circle(x, y, cx, cy, 5), -Circle(x, y, cx, cy, 2)));
+        },
+        kLow, kHigh, {}, Plain(false));
+    const Rings& rings = stages.result.rings;
+    ASSERT_EQ(rings.RingCount(), 4u);
+    EXPECT_EQ(std::count(rings.outer_of.begin(), rings.outer_of.end(), kNoRing), 2);
+    for (std::size_t ring = 0; ring < 4; ++ring) {
+      if (rings.outer_of[ring] == kNoRing) continue;
+      // A hole belongs to the ring just outside of it, which is the smaller one that holds it.
+      const double hole = -rings.measures[ring].area;
+      const double outer = rings.measures[rings.outer_of[ring]].area;
+      EXPECT_NEAR(outer, std::numbers::pi * (hole > 100 ? 169 : 25), 3);
+    }
+    EXPECT_TRUE(Validate(stages.result).ok()) << Validate(stages.result);
+  }
+}
+
+// Two blocks of 4 x 4 nodes that touch at a saddle, `inside` deep.
+double DiagonalBlocks(int x, int y, double inside, double outside) {
+  const bool lower = x >= 29 && x < 33 && y >= 29 && y < 33;
+  const bool upper = x >= 33 && x < 37 && y >= 33 && y < 37;
+  return lower || upper ? inside : outside;
+}
+
+TEST(Rings, BlobsThatTouchAtASaddleAreOneRingOrTwoAsTheDeciderSays) {
+  const Particles particles = At({{30, 30}, {31, 30}, {34, 35}});
+  Stages parted;
+  parted.RunOn([](int x, int y) { return DiagonalBlocks(x, y, -1, 3); }, kLow, kHigh, particles,
+               Plain(false));
+  ASSERT_EQ(parted.topology.RingCount(), 2u);
+  EXPECT_EQ(parted.topology.particle_count, (std::vector<std::uint64_t>{2, 1}));
+  EXPECT_TRUE(Validate(parted.result).ok()) << Validate(parted.result);
+
+  Stages joined;
+  joined.RunOn([](int x, int y) { return DiagonalBlocks(x, y, -3, 1); }, kLow, kHigh, particles,
+               Plain(false));
+  ASSERT_EQ(joined.topology.RingCount(), 1u);
+  EXPECT_EQ(joined.topology.particle_count, (std::vector<std::uint64_t>{3}));
+  EXPECT_TRUE(Validate(joined.result).ok()) << Validate(joined.result);
+}
+
+TEST(Rings, HolesThatTouchAtASaddleAreOneRingOrTwoAsTheDeciderSays) {
+  const auto block = [](double inside, double outside) {
+    return [=](int x, int y) {
+      if (x < 20 || x > 45 || y < 20 || y > 45) return outside;
+      return -DiagonalBlocks(x, y, -outside, -inside);
+    };
+  };
+  Stages joined;  // The fluid passes between the two holes.
+  joined.RunOn(block(-3, 1), kLow, kHigh, {}, Plain(false));
+  ASSERT_EQ(joined.topology.RingCount(), 3u);
+  EXPECT_TRUE(Validate(joined.result).ok()) << Validate(joined.result);
+  Stages parted;  // The hole passes through.
+  parted.RunOn(block(-1, 3), kLow, kHigh, {}, Plain(false));
+  ASSERT_EQ(parted.topology.RingCount(), 2u);
+  EXPECT_TRUE(Validate(parted.result).ok()) << Validate(parted.result);
+}
+
+class RingsOfNoise : public testing::TestWithParam<int> {};
+
+TEST_P(RingsOfNoise, AreClosedSimpleOrientedNestedAndUseEachSegmentOnce) {
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  const double bias = 0.1 * (GetParam() % 5) - 0.2;
+  Stages stages;
+  stages.RunOn(
+      [=](int x, int y) {
+        if (x <= 0 || y <= 0 || x >= 63 || y >= 63) return 1.0;
+        support::Random random(seed * 1'000'003 + static_cast<std::uint64_t>(y * 64 + x));
+        return random.Uniform(-1, 1) + bias;
+      },
+      kLow, kHigh, {}, Plain(false));
+  const RingTopology& rings = stages.topology;
+  std::vector<int> used(stages.crossings.segments.size());
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const std::uint32_t first = rings.offsets[ring];
+    const std::uint32_t last = rings.offsets[ring + 1];
+    for (std::uint32_t k = first; k < last; ++k) {
+      ++used[rings.segments[k]];
+      EXPECT_EQ(NextSegment(stages.bins.tiles, stages.crossings, rings.segments[k]),
+                rings.segments[k + 1 < last ? k + 1 : first]);
+    }
+  }
+  EXPECT_EQ(std::count(used.begin(), used.end(), 1), static_cast<std::ptrdiff_t>(used.size()));
+  EXPECT_TRUE(Validate(stages.result).ok()) << Validate(stages.result);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RingsOfNoise, testing::Range(1, 16));
+
+// A disc of radius 12 with a round hole at (cx, cy).
+struct Holed {
+  double cx, cy, hole;
+  double operator()(int x, int y) const {
+    return std::max(Circle(x, y, 32, 32, 12), -Circle(x, y, cx, cy, hole));
+  }
+};
+
+double HoleArea(const Stages& stages) {
+  for (const RingMeasures& measures : stages.result.rings.measures) {
+    if (measures.area < 0) return -measures.area;
+  }
+  return 0;
+}
+
+TEST(Rings, HolesBelowSixParticlesAreDroppedAndLargerOnesKept) {
+  // Holes on a tile's corner, on a seam and within a tile; spacings of one and of two cells.
+  int dropped = 0, kept = 0;
+  for (const auto& [cx, cy] : {std::pair(32.0, 32.0), {31.6, 28.3}, {36.2, 35.4}}) {
+    for (const double spacing : {1.0, 2.0}) {
+      for (const double radius : {0.9, 1.2, 1.38, 1.6, 2.2}) {
+        const Particles particles = At({{24, 32}});
+        ReconstructionParameters parameters = Plain(false);
+        parameters.spacing = spacing;
+        parameters.cell_size = 1 / spacing;
+        Stages unclean;
+        unclean.RunOn(Holed{cx, cy, radius * spacing}, kLow, kHigh, particles, parameters);
+        const double area = HoleArea(unclean);
+        ASSERT_GT(area, 0);
+        parameters.clean = true;
+        Stages clean;
+        clean.RunOn(Holed{cx, cy, radius * spacing}, kLow, kHigh, particles, parameters);
+        const bool small = area < 6 * spacing * spacing;
+        EXPECT_EQ(clean.topology.dropped_holes, small ? 1u : 0u) << "area " << area;
+        EXPECT_EQ(clean.topology.RingCount(), small ? 1u : 2u);
+        EXPECT_TRUE(Validate(clean.result).ok()) << Validate(clean.result);
+        ++(small ? dropped : kept);
+      }
+    }
+  }
+  EXPECT_GT(dropped, 5);
+  EXPECT_GT(kept, 5);
+}
+
+TEST(Rings, TheCellsOfADroppedHoleBecomeInterior) {
+  Stages full, dropped;
+  full.RunOn([](int x, int y) { return Circle(x, y, 32, 32, 12); }, kLow, kHigh, At({{24, 32}}),
+             Plain(true));
+  dropped.RunOn(Holed{32, 32, 1.2}, kLow, kHigh, At({{24, 32}}), Plain(true));
+  for (std::size_t tile = 0; tile < full.crossings.tiles.size(); ++tile) {
+    EXPECT_EQ(full.crossings.tiles[tile].interior, dropped.crossings.tiles[tile].interior);
+  }
+  EXPECT_EQ(full.result.rings.points, dropped.result.rings.points);
+}
+
+TEST(Rings, AComponentWithoutAParticleIsDroppedWithItsHoles) {
+  const auto two = [](int x, int y) {
+    const double ring = std::max(Circle(x, y, 45, 45, 9), -Circle(x, y, 45, 45, 4));
+    return std::min(Circle(x, y, 20, 20, 7), ring);
+  };
+  Stages unclean;
+  unclean.RunOn(two, kLow, kHigh, At({{20, 22}}), Plain(false));
+  EXPECT_EQ(unclean.topology.RingCount(), 3u);
+  Stages clean;
+  clean.RunOn(two, kLow, kHigh, At({{20, 22}}), Plain(true));
+  EXPECT_EQ(clean.topology.RingCount(), 1u);
+  EXPECT_EQ(clean.topology.dropped_components, 1u);
+  EXPECT_EQ(clean.topology.dropped_holes, 0u);
+  EXPECT_EQ(clean.topology.particle_count, (std::vector<std::uint64_t>{1}));
+  EXPECT_TRUE(Validate(clean.result).ok()) << Validate(clean.result);
+}
+
+TEST(Rings, AnIslandInADroppedHoleGoesWithItAndItsParticlesCountForTheBody) {
+  // A single inside node in the middle of a small hole.
+  const auto island = [](int x, int y) {
+    return x == 32 && y == 32 ? -1.0 : Holed{32, 32, 1.3}(x, y);
+  };
+  const Particles particles = At({{24, 32}, {32, 32}});
+  Stages unclean;
+  unclean.RunOn(island, kLow, kHigh, particles, Plain(false));
+  ASSERT_EQ(unclean.topology.RingCount(), 3u);
+  Stages clean;
+  clean.RunOn(island, kLow, kHigh, particles, Plain(true));
+  EXPECT_EQ(clean.topology.RingCount(), 1u);
+  EXPECT_EQ(clean.topology.dropped_holes, 1u);
+  EXPECT_EQ(clean.topology.particle_count, (std::vector<std::uint64_t>{2}));
+  EXPECT_TRUE(Validate(clean.result).ok()) << Validate(clean.result);
+}
+
+TEST(Rings, AnIslandInALargeHoleStaysAndTheHoleToo) {
+  const auto island = [](int x, int y) {
+    return std::min(Holed{32, 32, 7}(x, y), Circle(x, y, 32, 32, 3));
+  };
+  Stages clean;
+  clean.RunOn(island, kLow, kHigh, At({{22, 32}, {32, 32}, {33, 32}}), Plain(true));
+  ASSERT_EQ(clean.topology.RingCount(), 3u);
+  std::vector<std::uint64_t> counts = clean.topology.particle_count;
+  std::sort(counts.begin(), counts.end());
+  EXPECT_EQ(counts, (std::vector<std::uint64_t>{0, 1, 2}));
+}
+
+TEST(Rings, EveryParticleOfSeparateBodiesIsCountedForItsOwn) {
+  Particles particles = support::Disc(6);
+  const std::size_t disc = particles.size();
+  particles.Add(support::Lattice(5, 4, 40, 10));
+  particles.Add(-40, 0);
+  Stages stages;
+  stages.Run(particles, {.spacing = 1.0});
+  std::vector<std::uint64_t> counts = stages.topology.particle_count;
+  std::sort(counts.begin(), counts.end());
+  EXPECT_EQ(counts, (std::vector<std::uint64_t>{1, 20, disc}));
+}
+
+TEST(Rings, NothingAtAllHasNoRings) {
+  Stages stages;
+  stages.Run({}, {.spacing = 1.0});
+  EXPECT_EQ(stages.topology.RingCount(), 0u);
+  EXPECT_EQ(stages.topology.offsets, std::vector<std::uint32_t>{0});
+}
+
+}  // namespace
+}  // namespace partiemc

@@ -1,0 +1,182 @@
+#include "partiemc/state.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstring>
+#include <limits>
+
+#include "partiemc/status.h"
+#include "support/reconstruct.h"
+
+namespace partiemc {
+namespace {
+
+State ExampleState() {
+  State state;
+  state.cell_size = 0.1;
+  state.spacing = 0.09;
+  state.normals = {{-5, -7, 0.6f, 0.8f}, {3, -7, 1, 0}, {-100, 2, 0, -1}, {1 << 30, 2, -0.8f, 0.6f}};
+  return state;
+}
+
+// Appends the checksum of the format (FNV-1a), so that a test gets past it.
+std::string Sealed(std::string body) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char byte : body) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;
+  for (int k = 0; k < 8; ++k) body.push_back(static_cast<char>(hash >> (8 * k) & 0xff));
+  return body;
+}
+
+std::string BodyOf(const State& state) {
+  std::string bytes = Serialize(state);
+  bytes.resize(bytes.size() - 8);
+  return bytes;
+}
+
+template <typename T>
+std::string Patched(std::string bytes, std::size_t at, T value) {
+  std::memcpy(bytes.data() + at, &value, sizeof(value));
+  return bytes;
+}
+
+constexpr std::size_t kVersionAt = 4, kCellSizeAt = 8, kSpacingAt = 16, kCountAt = 24,
+                      kNormalsAt = 32;
+
+void ExpectRefused(std::string_view bytes, std::string_view what) {
+  const auto state = ParseState(bytes);
+  ASSERT_FALSE(state.ok()) << what;
+  EXPECT_EQ(state.status().code(), absl::StatusCode::kInvalidArgument);
+  ASSERT_TRUE(FindViolation(state.status()).has_value());
+  EXPECT_EQ(FindViolation(state.status())->reason, kReasonCorruptState);
+}
+
+TEST(State, ComesBackAsItWas) {
+  EXPECT_EQ(*ParseState(Serialize(State{})), State{});
+  EXPECT_EQ(*ParseState(Serialize(ExampleState())), ExampleState());
+}
+
+TEST(State, TakesFortyBytesAndSixteenPerNormal) {
+  EXPECT_EQ(Serialize(State{}).size(), 40u);
+  EXPECT_EQ(Serialize(ExampleState()).size(), 40u + 4 * 16);
+}
+
+TEST(State, EveryTruncationIsRefused) {
+  const std::string bytes = Serialize(ExampleState());
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    ExpectRefused(std::string_view(bytes).substr(0, size), "cut short");
+  }
+  ExpectRefused(bytes + '\0', "one byte too many");
+}
+
+TEST(State, EveryFlippedBitIsRefused) {
+  const std::string bytes = Serialize(ExampleState());
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    for (int bit = 0; bit < 8; ++bit) {
+      std::string flipped = bytes;
+      flipped[at] = static_cast<char>(flipped[at] ^ (1 << bit));
+      ExpectRefused(flipped, "a flipped bit");
+    }
+  }
+}
+
+TEST(State, ABodySealedByTheTestIsAccepted) {
+  EXPECT_EQ(*ParseState(Sealed(BodyOf(ExampleState()))), ExampleState());
+}
+
+TEST(State, HostileCountsAreRefusedBeforeAnythingIsAllocated) {
+  const std::string body = BodyOf(ExampleState());
+  for (const std::uint64_t count :
+       {std::uint64_t{0}, std::uint64_t{3}, std::uint64_t{5}, std::uint64_t{1} << 32,
+        std::uint64_t{1} << 60, (std::uint64_t{1} << 60) + 4,
+        std::numeric_limits<std::uint64_t>::max()}) {
+    ExpectRefused(Sealed(Patched(body, kCountAt, count)), "a wrong count");
+  }
+  ExpectRefused(Sealed(body.substr(0, body.size() - 1)), "a normal cut short");
+}
+
+TEST(State, OtherVersionsAreRefusedByNumber) {
+  const auto state = ParseState(Sealed(Patched(BodyOf(ExampleState()), kVersionAt, 77u)));
+  ASSERT_FALSE(state.ok());
+  EXPECT_NE(state.status().message().find("77"), absl::string_view::npos);
+}
+
+TEST(State, LengthsThatAreNoneAreRefused) {
+  const std::string body = BodyOf(ExampleState());
+  for (const double value : {-1.0, 1e-80, 1e80, std::numeric_limits<double>::infinity(),
+                             std::numeric_limits<double>::quiet_NaN()}) {
+    ExpectRefused(Sealed(Patched(body, kCellSizeAt, value)), "cell size");
+    ExpectRefused(Sealed(Patched(body, kSpacingAt, value)), "spacing");
+  }
+  ExpectRefused(Sealed(Patched(body, kSpacingAt, 0.0)), "a cell size without a spacing");
+  ExpectRefused(Sealed(Patched(body, kCellSizeAt, 0.0)), "a spacing without a cell size");
+}
+
+TEST(State, NormalsThatAreNotUnitOrNotInOrderAreRefused) {
+  const std::string body = BodyOf(ExampleState());
+  for (const float value : {5.0f, 0.0f, std::numeric_limits<float>::quiet_NaN(),
+                            std::numeric_limits<float>::infinity()}) {
+    ExpectRefused(Sealed(Patched(body, kNormalsAt + 8, value)), "not of unit length");
+  }
+  // Normal 1 into the cell of normal 0, and behind normal 2.
+  ExpectRefused(Sealed(Patched(body, kNormalsAt + 16, std::int32_t{-5})), "twice the same cell");
+  ExpectRefused(Sealed(Patched(body, kNormalsAt + 20, std::int32_t{9})), "out of order");
+}
+
+class RestoredState : public testing::TestWithParam<Placement> {};
+
+TEST_P(RestoredState, BetweenAnyTwoFramesGivesTheDigestsOfAnUnbrokenStream) {
+  constexpr int kFrames = 8;
+  const auto reconstructor =
+      Reconstructor::Create({.placement = GetParam(), .spacing_rule = SpacingRule::kFirstFrame});
+  ASSERT_TRUE(reconstructor.ok());
+  std::vector<Result> results;
+  std::vector<std::string> states;
+  State unbroken;
+  Workspace workspace;
+  for (int k = 0; k < kFrames; ++k) {
+    states.push_back(Serialize(unbroken));
+    Result& result = results.emplace_back();
+    const support::Particles body = support::MovingBody(k);
+    ASSERT_TRUE(reconstructor
+                    ->Reconstruct(body.AsFrame(), unbroken, workspace, result)
+                    .ok());
+  }
+  for (int restart = 0; restart < kFrames; ++restart) {
+    auto state = ParseState(states[static_cast<std::size_t>(restart)]);
+    ASSERT_TRUE(state.ok()) << state.status();
+    Workspace fresh;
+    Result result;
+    for (int k = restart; k < kFrames; ++k) {
+      const support::Particles body = support::MovingBody(k);
+      ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), *state, fresh, result).ok());
+      const Result& expected = results[static_cast<std::size_t>(k)];
+      EXPECT_EQ(DigestRings(result.rings), DigestRings(expected.rings));
+      EXPECT_EQ(DigestMesh(result.mesh), DigestMesh(expected.mesh));
+    }
+    EXPECT_EQ(*state, unbroken);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Placements, RestoredState, testing::ValuesIn(AllPlacements()));
+
+TEST(State, AnyAcceptedStateIsSafeToGoOnFrom) {
+  // Lengths that do not fit each other nor the frame: no crash, and a result or a clear refusal.
+  for (const double cell_size : {1e-60, 1e-3, 1.0, 1e3, 1e60}) {
+    for (const double spacing : {1e-60, 1.0, 1e60}) {
+      State state = ExampleState();
+      state.cell_size = cell_size;
+      state.spacing = spacing;
+      const auto reconstructor = Reconstructor::Create({}, {.max_tiles = 2000});
+      Workspace workspace;
+      Result result;
+      const support::Particles body = support::MovingBody(0);
+      const absl::Status status =
+          reconstructor->Reconstruct(body.AsFrame(), state, workspace, result);
+      EXPECT_TRUE(status.ok() || FindViolation(status).has_value()) << status;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace partiemc

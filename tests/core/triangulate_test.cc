@@ -1,0 +1,377 @@
+#include "triangulate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "predicates.h"
+#include "region_shapes.h"
+
+namespace partiemc {
+namespace {
+
+using testing::Cells;
+using testing::Random;
+using testing::Rectangle;
+using testing::Region;
+using testing::Reversed;
+
+std::optional<std::vector<std::uint32_t>> Triangulate(const Region& region) {
+  std::vector<std::uint32_t> triangles;
+  Triangulator triangulator;
+  if (!triangulator.Triangulate(region.points, region.loop_points, region.loop_offsets,
+                                triangles)) {
+    EXPECT_TRUE(triangles.empty());
+    return std::nullopt;
+  }
+  return triangles;
+}
+
+/// Of a region without pinches.
+std::size_t ExpectedCount(const Region& region) {
+  std::size_t count = region.loop_points.size();
+  for (std::size_t loop = 0; loop < region.LoopCount(); ++loop) {
+    count += testing::DoubleArea(region.Loop(loop)) > 0 ? -2 : 2;
+  }
+  return count;
+}
+
+/// Counter-clockwise triangles whose sides cancel but for the loops: together they cover each point
+/// as often as the loops wind round it.
+void ExpectCover(const Region& region, const std::vector<std::uint32_t>& triangles) {
+  using PointKey = std::pair<double, double>;
+  std::map<std::pair<PointKey, PointKey>, int> balance;
+  const auto add = [&](const Point& a, const Point& b) {
+    const PointKey from(a.x, a.y), to(b.x, b.y);
+    if (from < to) {
+      ++balance[{from, to}];
+    } else {
+      --balance[{to, from}];
+    }
+  };
+  ASSERT_EQ(triangles.size() % 3, 0u);
+  double area = 0;
+  for (std::size_t i = 0; i < triangles.size(); i += 3) {
+    const Point a = region.PointAt(triangles[i]);
+    const Point b = region.PointAt(triangles[i + 1]);
+    const Point c = region.PointAt(triangles[i + 2]);
+    ASSERT_EQ(Orientation(a, b, c), 1) << "triangle " << i / 3;
+    area += testing::DoubleArea({a, b, c});
+    add(a, b), add(b, c), add(c, a);
+  }
+  for (std::size_t k = 0; k < region.LoopCount(); ++k) {
+    const std::vector<Point> loop = region.Loop(k);
+    for (std::size_t i = 0; i < loop.size(); ++i) add(loop[(i + 1) % loop.size()], loop[i]);
+  }
+  const auto uneven = std::find_if(balance.begin(), balance.end(),
+                                   [](const auto& side) { return side.second != 0; });
+  ASSERT_EQ(uneven, balance.end())
+      << "gap or overlap at " << uneven->first.first.first << ", " << uneven->first.first.second;
+  const double expected = testing::DoubleArea(region);
+  EXPECT_NEAR(area, expected, 1e-9 * expected);
+}
+
+void ExpectTriangulated(const Region& region) {
+  const auto triangles = Triangulate(region);
+  ASSERT_TRUE(triangles.has_value());
+  EXPECT_EQ(triangles->size(), 3 * ExpectedCount(region));
+  ExpectCover(region, *triangles);
+}
+
+Region RegionOf(const std::vector<std::vector<Point>>& loops) {
+  Region region;
+  for (const auto& loop : loops) region.AddLoop(loop);
+  return region;
+}
+
+TEST(Triangulator, ATriangleStaysWhatItIs) {
+  EXPECT_EQ(Triangulate(RegionOf({{{0, 0}, {2, 0}, {1, 1}}})),
+            (std::vector<std::uint32_t>{0, 1, 2}));
+}
+
+TEST(Triangulator, NoLoopsMakeNoTriangles) {
+  EXPECT_EQ(Triangulate(Region{}), std::vector<std::uint32_t>{});
+}
+
+TEST(Triangulator, TrianglesAreAppendedAndAFailureLeavesThemAsTheyWere) {
+  const Region square = RegionOf({Rectangle(0, 0, 1, 1)});
+  // The second loop is met by the sweep when the first has already been triangulated.
+  const Region spoiled = RegionOf({Rectangle(0, 0, 1, 1), {{0, 2}, {1, 3}, {1, 2}, {0, 3}}});
+  std::vector<std::uint32_t> triangles{7, 8, 9};
+  Triangulator triangulator;
+  EXPECT_FALSE(triangulator.Triangulate(spoiled.points, spoiled.loop_points, spoiled.loop_offsets,
+                                        triangles));
+  EXPECT_EQ(triangles, (std::vector<std::uint32_t>{7, 8, 9}));
+  EXPECT_TRUE(
+      triangulator.Triangulate(square.points, square.loop_points, square.loop_offsets, triangles));
+  EXPECT_EQ(triangles.size(), 9u);
+  EXPECT_EQ(triangles[0], 7u);
+}
+
+TEST(Triangulator, HolesIslandsAndComponentsNest) {
+  ExpectTriangulated(RegionOf({Rectangle(0, 0, 10, 10), Reversed(Rectangle(1, 1, 9, 9)),
+                               Rectangle(2, 2, 8, 8), Reversed(Rectangle(3, 3, 5, 5)),
+                               Reversed(Rectangle(6, 3, 7, 5)), Rectangle(20, 0, 21, 10)}));
+}
+
+TEST(Triangulator, PointsOnStraightSidesMakeNoDegenerateTriangle) {
+  std::vector<Point> loop;
+  for (int i = 0; i < 5; ++i) loop.push_back({static_cast<double>(i), 0});
+  for (int i = 0; i < 5; ++i) loop.push_back({5, static_cast<double>(i)});
+  for (int i = 5; i > 0; --i) loop.push_back({static_cast<double>(i), 5});
+  for (int i = 5; i > 0; --i) loop.push_back({0, static_cast<double>(i)});
+  ExpectTriangulated(RegionOf({loop}));
+  std::vector<Point> hole = loop;
+  for (Point& point : hole) point = {0.3 + 0.5 * point.x, 0.3 + 0.5 * point.y};
+  ExpectTriangulated(RegionOf({loop, Reversed(hole)}));
+}
+
+TEST(Triangulator, HolesThatPinchEachOtherAndTheRingAtNamedPointsAreFine) {
+  Region region;
+  // A square whose corner (0, 0) is shared by a hole, which shares another point with a second
+  // hole.
+  region.AddLoop(Rectangle(0, 0, 10, 10));
+  const std::uint32_t shared = region.AddPoint({4, 4});
+  region.AddLoop({0, region.AddPoint({2, 4}), shared, region.AddPoint({4, 2})});
+  // At the place of `shared`, but another point.
+  region.AddLoop(Reversed({{4, 4}, {6, 4}, {6, 6}, {4, 6}}));
+  const auto triangles = Triangulate(region);
+  ASSERT_TRUE(triangles.has_value());
+  ExpectCover(region, *triangles);
+  // All three loops hang together at pinches: one loop of 12 points goes round the inside.
+  EXPECT_EQ(triangles->size() / 3, 12u - 2);
+}
+
+TEST(Triangulator, ALoopMayPassThroughAPointTwiceHoweverItIsPaired) {
+  Region one, two;
+  for (Region* region : {&one, &two}) {
+    for (const Point& point : {Point{0, 0}, {1, 0}, {1, 1}, {0, 1}, {2, 1}, {2, 2}, {1, 2}}) {
+      region->AddPoint(point);
+    }
+  }
+  one.AddLoop({0u, 1u, 2u, 4u, 5u, 6u, 2u, 3u});
+  two.AddLoop({0u, 1u, 2u, 3u});
+  two.AddLoop({2u, 4u, 5u, 6u});
+  const auto triangles = Triangulate(one);
+  ASSERT_TRUE(triangles.has_value());
+  EXPECT_EQ(triangles->size() / 3, 4u);
+  ExpectCover(one, *triangles);
+  EXPECT_EQ(triangles, Triangulate(two));
+}
+
+TEST(Triangulator, StarsSpiralsAndCombsAreCovered) {
+  Random random(20);
+  for (const std::size_t count : {3u, 4u, 7u, 50u, 1000u}) {
+    SCOPED_TRACE("seed 20, count " + std::to_string(count));
+    ExpectTriangulated(RegionOf({testing::RandomStar(random, count)}));
+    ExpectTriangulated(RegionOf({testing::Comb(random, count)}));
+    ExpectTriangulated(RegionOf({testing::HangingComb(random, count)}));
+    if (count >= 50) ExpectTriangulated(RegionOf({testing::Spiral(count, 3)}));
+  }
+}
+
+TEST(Triangulator, ContoursOfRandomFieldsAreCoveredAtAnyScaleAndPlace) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const Region region = testing::RandomContours(random, 10 + seed);
+    ExpectTriangulated(region);
+    ExpectTriangulated(region.Transformed(1e-30, 0));
+    ExpectTriangulated(region.Transformed(1e30, 0));
+    ExpectTriangulated(region.Transformed(0.01, 1e4));
+  }
+}
+
+/// Half the quarter turns of cells inside around each point.
+std::size_t ExpectedCount(const Region& staircases, const Cells& cells) {
+  std::size_t quarters = 0;
+  for (std::size_t i = 0; i < staircases.points.size() / 2; ++i) {
+    const auto x = static_cast<std::ptrdiff_t>(staircases.points[2 * i]);
+    const auto y = static_cast<std::ptrdiff_t>(staircases.points[2 * i + 1]);
+    for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}, {-1, -1}}) {
+      quarters += cells.At(x + dx, y + dy) ? 1 : 0;
+    }
+  }
+  return quarters / 2;
+}
+
+TEST(Triangulator, UnionsOfRandomLatticeCellsWithPinchesAreCovered) {
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const Cells cells = testing::RandomCells(random, 3 + seed % 17, 3 + seed % 13,
+                                             0.3 + 0.001 * static_cast<double>(seed));
+    const Region region = testing::Staircases(cells, random, seed % 2 == 0);
+    const auto triangles = Triangulate(region);
+    ASSERT_TRUE(triangles.has_value());
+    EXPECT_EQ(triangles->size() / 3, ExpectedCount(region, cells));
+    ExpectCover(region, *triangles);
+    const Region far = region.Transformed(0.5, 1e6);
+    EXPECT_EQ(Triangulate(far), triangles);
+  }
+}
+
+TEST(Triangulator, BandsBetweenContoursAndStaircasesAreCovered) {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const Region band = testing::RandomBand(random, 12 + seed);
+    const auto triangles = Triangulate(band);
+    ASSERT_TRUE(triangles.has_value());
+    ExpectCover(band, *triangles);
+  }
+}
+
+TEST(Triangulator, AHundredThousandPointsAreCovered) {
+  Random random(5);
+  ExpectTriangulated(RegionOf({testing::RandomStar(random, 100'000)}));
+  ExpectTriangulated(RegionOf({testing::Comb(random, 33'000)}));
+  ExpectTriangulated(testing::RandomContours(random, 300).Transformed(1, 1e6));
+}
+
+TEST(Triangulator, TheResultDoesNotDependOnWhatWasTriangulatedBefore) {
+  Random random(6);
+  Triangulator warm;
+  for (int round = 0; round < 20; ++round) {
+    const Region region = testing::RandomContours(random, 10 + random() % 30);
+    std::vector<std::uint32_t> triangles;
+    ASSERT_TRUE(
+        warm.Triangulate(region.points, region.loop_points, region.loop_offsets, triangles));
+    EXPECT_EQ(triangles, Triangulate(region)) << "seed 6, round " << round;
+  }
+}
+
+// --- Input that breaks the requirements ---------------------------------------------------------
+
+TEST(Triangulator, EachBrokenRequirementIsFound) {
+  EXPECT_FALSE(Triangulate(RegionOf({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}))) << "crosses itself";
+  EXPECT_FALSE(Triangulate(RegionOf({Reversed(Rectangle(0, 0, 1, 1))}))) << "hole in nothing";
+  EXPECT_FALSE(Triangulate(RegionOf({Rectangle(0, 0, 3, 3), Rectangle(1, 1, 2, 2)}))) << "twice";
+  EXPECT_FALSE(Triangulate(RegionOf({Rectangle(0, 0, 2, 2), Rectangle(1, 1, 3, 3)}))) << "cross";
+  EXPECT_FALSE(Triangulate(RegionOf({Rectangle(0, 0, 1, 1), Rectangle(1, 0, 2, 1)})))
+      << "overlapping edges";
+  EXPECT_FALSE(Triangulate(RegionOf({Rectangle(0, 0, 2, 2), {{2, 1}, {3, 0.5}, {3, 1.5}}})))
+      << "point on an edge";
+  EXPECT_FALSE(Triangulate(RegionOf({{{0, 0}, {1, 0}, {2, 0}}}))) << "flat";
+  EXPECT_FALSE(Triangulate(RegionOf({{{0, 0}, {1, 0}, {1, 0}, {1, 1}}}))) << "edge without length";
+  EXPECT_FALSE(Triangulate(RegionOf({{{0, 0}, {1, 0}}}))) << "two points";
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
+                           std::numeric_limits<double>::infinity(), 1e200, 1e-200}) {
+    EXPECT_FALSE(Triangulate(RegionOf({{{0, 0}, {1, 0}, {0, bad}}}))) << bad;
+  }
+}
+
+TEST(Triangulator, WrongIndicesAndOffsetsAreFound) {
+  const std::vector<double> points{0, 0, 1, 0, 0, 1};
+  const auto accepts = [&](const std::vector<std::uint32_t>& loop_points,
+                           const std::vector<std::uint32_t>& loop_offsets) {
+    std::vector<std::uint32_t> triangles;
+    return Triangulator().Triangulate(points, loop_points, loop_offsets, triangles);
+  };
+  EXPECT_TRUE(accepts({0, 1, 2}, {0, 3}));
+  EXPECT_FALSE(accepts({0, 1, 3}, {0, 3}));
+  EXPECT_FALSE(accepts({0, 1, 0xffffffff}, {0, 3}));
+  EXPECT_FALSE(accepts({0, 1, 2}, {}));
+  EXPECT_FALSE(accepts({0, 1, 2}, {0}));
+  EXPECT_FALSE(accepts({0, 1, 2}, {1, 3}));
+  EXPECT_FALSE(accepts({0, 1, 2}, {0, 4}));
+  EXPECT_FALSE(accepts({0, 1, 2}, {0, 0, 3}));
+  EXPECT_FALSE(accepts({0, 1, 2}, {0, 0xffffffff, 3}));
+  EXPECT_FALSE(accepts({0, 1, 2, 0, 1, 2}, {0, 6, 3, 6}));
+}
+
+/// Winding number of all loops round a point off their edges.
+int Winding(const Region& region, const Point& point) {
+  int winding = 0;
+  for (std::size_t k = 0; k < region.LoopCount(); ++k) {
+    const std::vector<Point> loop = region.Loop(k);
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Point& a = loop[i];
+      const Point& b = loop[(i + 1) % loop.size()];
+      if ((a.y <= point.y) == (b.y <= point.y)) continue;
+      const int side = Orientation(a, b, point);
+      if (side == (a.y < b.y ? 1 : -1)) winding += side;
+    }
+  }
+  return winding;
+}
+
+/// The requirements of Triangulate, as they are written, for points of a lattice of spacing 1.
+bool IsRegion(const Region& region) {
+  std::vector<std::pair<Point, Point>> edges;
+  for (std::size_t k = 0; k < region.LoopCount(); ++k) {
+    const std::vector<Point> loop = region.Loop(k);
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      edges.push_back({loop[i], loop[(i + 1) % loop.size()]});
+      if (edges.back().first == edges.back().second) return false;
+    }
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const auto& [a, b] = edges[i];
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto& [c, d] = edges[j];
+      if (!SegmentsTouch(a, b, c, d)) continue;
+      const int common = (a == c) + (a == d) + (b == c) + (b == d);
+      if (common != 1) return false;
+      // Of two edges with one common end, neither may run through the other end of the other.
+      const bool collinear = Orientation(a, b, c) == 0 && Orientation(a, b, d) == 0;
+      const Point& corner = a == c || a == d ? a : b;
+      const Point& end = a == corner ? b : a;
+      const Point& other = c == corner ? d : c;
+      if (collinear && SweepsBefore(corner, end) == SweepsBefore(corner, other)) return false;
+    }
+  }
+  for (const auto& [a, b] : edges) {
+    const Point middle{(a.x + b.x) / 2, (a.y + b.y) / 2};
+    const Point left{1e-4 * (a.y - b.y), 1e-4 * (b.x - a.x)};
+    if (Winding(region, {middle.x + left.x, middle.y + left.y}) != 1) return false;
+    if (Winding(region, {middle.x - left.x, middle.y - left.y}) != 0) return false;
+  }
+  return true;
+}
+
+TEST(Triangulator, AcceptsRandomLoopsExactlyWhenTheyBoundARegion) {
+  Random random(7);
+  std::size_t accepted = 0;
+  for (int round = 0; round < 200'000; ++round) {
+    const Region region =
+        testing::RandomGarbage(random, 3 + round % 3, 1 + round % 3, 3 + round % 6);
+    const auto triangles = Triangulate(region);
+    ASSERT_EQ(triangles.has_value(), IsRegion(region)) << "seed 7, round " << round;
+    if (!triangles.has_value()) continue;
+    ++accepted;
+    ExpectCover(region, *triangles);
+    ASSERT_FALSE(HasFatalFailure()) << "seed 7, round " << round;
+  }
+  EXPECT_GT(accepted, 1'000u);
+}
+
+TEST(Triangulator, LargeGarbageIsRefused) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    Random random(seed);
+    EXPECT_FALSE(Triangulate(testing::RandomGarbage(random, 2 + seed, 20, 1000)))
+        << "seed " << seed;
+  }
+}
+
+TEST(Triangulator, ARegionWithOnePointMovedIsTriangulatedRightOrRefused) {
+  for (std::uint64_t seed = 0; seed < 500; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    Region region = testing::RandomContours(random, 8 + seed % 20);
+    if (region.points.empty()) continue;
+    region.points[random() % region.points.size()] += testing::Uniform(random, -3, 3);
+    if (const auto triangles = Triangulate(region)) ExpectCover(region, *triangles);
+  }
+}
+
+}  // namespace
+}  // namespace partiemc

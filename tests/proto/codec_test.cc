@@ -1,0 +1,252 @@
+// Parameters, outputs, frames and frame errors on the wire.
+#include "wire/codec.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "partiemc/status.h"
+
+namespace partiemc::wire {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+Violation ViolationOf(const absl::Status& status) {
+  const auto violation = FindViolation(status);
+  EXPECT_TRUE(violation.has_value()) << status.ToString();
+  return violation.value_or(Violation{});
+}
+
+v1::ParticleFrame TwoParticles() {
+  const std::vector<double> positions = {1, 2, 3, 4};
+  Frame frame;
+  frame.positions = std::span<const double>(positions);
+  v1::ParticleFrame message;
+  EncodeFrame(frame, message);
+  return message;
+}
+
+TEST(Parameters, AbsentFieldsTakeTheirDefaults) {
+  const auto parameters = DecodeParameters({});
+  ASSERT_TRUE(parameters.ok());
+  EXPECT_EQ(*parameters, ReconstructionParameters{});
+}
+
+TEST(Parameters, EveryPlacementFillRuleAndPlaneComesBackAsItWas) {
+  for (const Placement placement : AllPlacements()) {
+    for (const Fill fill : AllFills()) {
+      for (const SpacingRule rule : {SpacingRule::kFirstFrame, SpacingRule::kEveryFrame}) {
+        for (const Plane plane : {Plane::kXy, Plane::kXz, Plane::kYz}) {
+          ReconstructionParameters parameters;
+          parameters.placement = placement;
+          parameters.fill = fill;
+          parameters.spacing_rule = rule;
+          parameters.plane = plane;
+          v1::ReconstructionParameters message;
+          EncodeParameters(parameters, message);
+          const auto decoded = DecodeParameters(message);
+          ASSERT_TRUE(decoded.ok());
+          EXPECT_EQ(*decoded, parameters);
+        }
+      }
+    }
+  }
+}
+
+TEST(Parameters, EveryNumberComesBackAsItWas) {
+  ReconstructionParameters parameters;
+  parameters.spacing = 0.1;
+  parameters.kernel_radius = 2.5;
+  parameters.cell_size = 0.5;
+  parameters.reference_radius = 1.25;
+  parameters.surface_offset = -0.5;
+  parameters.normal_memory = false;
+  parameters.clean = false;
+  v1::ReconstructionParameters message;
+  EncodeParameters(parameters, message);
+  const auto decoded = DecodeParameters(message);
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_EQ(*decoded, parameters);
+}
+
+TEST(Parameters, AZeroThatIsGivenIsNotTakenForAbsent) {
+  v1::ReconstructionParameters message;
+  message.set_spacing(0);
+  const auto decoded = DecodeParameters(message);
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_FALSE(Validate(*decoded).ok());
+}
+
+TEST(Parameters, AnEnumOfALaterVersionIsRefusedByItsNameAndNumber) {
+  v1::ReconstructionParameters message;
+  message.set_fill(static_cast<v1::Fill>(77));
+  const auto decoded = DecodeParameters(message);
+  EXPECT_EQ(decoded.status().code(), absl::StatusCode::kInvalidArgument);
+  const Violation violation = ViolationOf(decoded.status());
+  EXPECT_EQ(violation.reason, kReasonUnsupported);
+  EXPECT_EQ(violation.field, "parameters.fill");
+  EXPECT_EQ(violation.value, "77");
+}
+
+TEST(OutputsMessage, AbsentMeansRingsAndMesh) {
+  const auto outputs = DecodeOutputs({}, /*present=*/false);
+  ASSERT_TRUE(outputs.ok());
+  EXPECT_EQ(*outputs, Outputs{});
+}
+
+TEST(OutputsMessage, EveryCombinationComesBackAsItWas) {
+  for (int bits = 0; bits < 16; ++bits) {
+    const Outputs outputs{.rings = (bits & 1) != 0,
+                          .mesh = (bits & 2) != 0,
+                          .normals = (bits & 4) != 0,
+                          .relative_float32 = (bits & 8) != 0};
+    v1::Outputs message;
+    EncodeOutputs(outputs, message);
+    const auto decoded = DecodeOutputs(message, /*present=*/true);
+    ASSERT_TRUE(decoded.ok());
+    EXPECT_EQ(*decoded, outputs);
+  }
+}
+
+TEST(OutputsMessage, WhatTheServerCannotDoIsRefusedAndNotIgnored) {
+  v1::Outputs attributes;
+  attributes.add_attributes("pressure");
+  v1::Outputs echo;
+  echo.set_echo_particles(true);
+  v1::Outputs format;
+  format.set_coordinate_format(static_cast<v1::CoordinateFormat>(9));
+  for (const v1::Outputs& message : {attributes, echo, format}) {
+    const auto decoded = DecodeOutputs(message, /*present=*/true);
+    ASSERT_EQ(decoded.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(ViolationOf(decoded.status()).reason, kReasonUnsupported);
+  }
+}
+
+template <typename T>
+void ExpectFrameComesBack(int components) {
+  SCOPED_TRACE(::testing::Message() << components << " components of " << sizeof(T) << " bytes");
+  // From nothing over one particle, which a string keeps inside itself, to several.
+  for (std::size_t particles = 0; particles < 4; ++particles) {
+    std::vector<T> positions(particles * static_cast<std::size_t>(components));
+    for (std::size_t i = 0; i < positions.size(); ++i)
+      positions[i] = static_cast<T>(0.1) * static_cast<T>(i);
+    const std::vector<float> volumes(particles, 0.25f);
+    Frame frame;
+    frame.positions = std::span<const T>(positions);
+    frame.components = components;
+    frame.volumes = volumes;
+    v1::ParticleFrame message;
+    EncodeFrame(frame, message);
+    const auto decoded = DecodeFrame(message);
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->components, components);
+    EXPECT_EQ(decoded->ParticleCount(), particles);
+    const auto view = std::get<std::span<const T>>(decoded->positions);
+    EXPECT_EQ(std::vector<T>(view.begin(), view.end()), positions);
+    EXPECT_EQ(std::vector<float>(decoded->volumes.begin(), decoded->volumes.end()), volumes);
+  }
+}
+
+TEST(FrameMessage, EveryFormatComesBackAsItWas) {
+  ExpectFrameComesBack<float>(2);
+  ExpectFrameComesBack<double>(2);
+  ExpectFrameComesBack<float>(3);
+  ExpectFrameComesBack<double>(3);
+}
+
+TEST(FrameMessage, DecodingIsAViewOfTheBytesAndNoCopy) {
+  const v1::ParticleFrame message = TwoParticles();
+  const auto frame = DecodeFrame(message);
+  ASSERT_TRUE(frame.ok());
+  const auto view = std::get<std::span<const double>>(frame->positions);
+  EXPECT_EQ(static_cast<const void*>(view.data()),
+            static_cast<const void*>(message.positions().data()));
+}
+
+TEST(FrameMessage, PositionsAreLittleEndianAndTightlyPacked) {
+  const std::vector<float> positions = {1.0f, -2.0f};
+  Frame frame;
+  frame.positions = std::span<const float>(positions);
+  v1::ParticleFrame message;
+  EncodeFrame(frame, message);
+  EXPECT_THAT(message.positions(),
+              ElementsAre(0, 0, static_cast<char>(0x80), 0x3f, 0, 0, 0, static_cast<char>(0xc0)));
+}
+
+TEST(FrameMessage, EncodingAgainReplacesWhatWasThere) {
+  v1::ParticleFrame message = TwoParticles();
+  message.set_volumes("left over");
+  Frame frame;
+  const std::vector<float> positions = {1, 2, 3};
+  frame.positions = std::span<const float>(positions);
+  frame.components = 3;
+  EncodeFrame(frame, message);
+  EXPECT_EQ(message.position_format(), v1::POSITION_FORMAT_FLOAT32_3);
+  EXPECT_EQ(message.positions().size(), 12u);
+  EXPECT_TRUE(message.volumes().empty());
+}
+
+TEST(FrameMessage, AFormatThatIsNotGivenIsNotGuessed) {
+  v1::ParticleFrame message = TwoParticles();
+  message.clear_position_format();
+  const Violation violation = ViolationOf(DecodeFrame(message).status());
+  EXPECT_EQ(violation.reason, kReasonUnsupported);
+  EXPECT_EQ(violation.field, "position_format");
+}
+
+TEST(FrameMessage, AByteCountThatDoesNotFitIsRefusedFieldByField) {
+  const auto refused_field = [](auto change) {
+    v1::ParticleFrame message = TwoParticles();
+    change(message);
+    const auto frame = DecodeFrame(message);
+    EXPECT_EQ(frame.status().code(), absl::StatusCode::kInvalidArgument);
+    const Violation violation = ViolationOf(frame.status());
+    EXPECT_EQ(violation.reason, kReasonByteCount);
+    EXPECT_THAT(violation.value, HasSubstr("bytes"));
+    return violation.field;
+  };
+  EXPECT_EQ(refused_field([](auto& m) { m.mutable_positions()->pop_back(); }), "positions");
+  EXPECT_EQ(refused_field([](auto& m) { m.set_ids(std::string(15, 'x')); }), "ids");
+  EXPECT_EQ(refused_field([](auto& m) { m.set_volumes(std::string(4, 'x')); }), "volumes");
+  EXPECT_EQ(refused_field([](auto& m) { m.set_velocities(std::string(8, 'x')); }), "velocities");
+  EXPECT_EQ(refused_field([](auto& m) { m.add_scalars()->set_values(std::string(12, 'x')); }),
+            "scalars[0].values");
+}
+
+TEST(FrameMessage, WhatTheMethodDoesNotUseYetIsAcceptedWhereItFits) {
+  v1::ParticleFrame message = TwoParticles();
+  message.set_ids(std::string(16, 'x'));
+  message.set_velocities(std::string(16, 'x'));
+  message.add_scalars()->set_values(std::string(8, 'x'));
+  EXPECT_TRUE(DecodeFrame(message).ok());
+}
+
+TEST(FrameErrorMessage, CarriesEveryPartOfTheViolation) {
+  const auto status = ViolationError(absl::StatusCode::kInvalidArgument,
+                                     {"NOT_FINITE", "positions[3].x", "nan", "must be finite"});
+  v1::FrameError message;
+  message.set_reason("left over");
+  EncodeFrameError(status, 7, 8, message);
+  EXPECT_EQ(message.sequence(), 7u);
+  EXPECT_EQ(message.next_sequence(), 8u);
+  EXPECT_EQ(message.reason(), "NOT_FINITE");
+  EXPECT_EQ(message.field(), "positions[3].x");
+  EXPECT_EQ(message.value(), "nan");
+  EXPECT_EQ(message.rule(), "must be finite");
+  EXPECT_EQ(message.message(), "positions[3].x: nan; must be finite");
+}
+
+TEST(FrameErrorMessage, FallsBackToTheCodeWhereThereIsNoViolation) {
+  v1::FrameError message;
+  EncodeFrameError(absl::InternalError("a guarantee is broken"), 1, 2, message);
+  EXPECT_EQ(message.reason(), "INTERNAL");
+  EXPECT_EQ(message.message(), "a guarantee is broken");
+}
+
+}  // namespace
+}  // namespace partiemc::wire

@@ -1,0 +1,142 @@
+#!/bin/bash
+# Installs what is missing, builds everything and runs every test. The last line that it prints is
+# "N passed, N failed", summed over all steps; the exit code is 0 only if nothing failed.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
+
+readonly all_steps=(layout release sanitized core-alone consumer)
+
+usage() {
+  cat <<'USAGE'
+usage: tests/run.sh [--no-install] [STEP...]
+Steps, all of them by default:
+  layout      every source file is laid out as .clang-format says
+  release     the whole project, optimised, and all of its tests
+  sanitized   core and sessions under AddressSanitizer and UndefinedBehaviorSanitizer
+  core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
+  consumer    everything installed, found and used by tests/consumer (after release)
+Builds are kept in build/, so that a second run compiles only what has changed.
+USAGE
+}
+
+install=true
+steps=()
+for argument in "$@"; do
+  case $argument in
+    -h | --help) usage; exit 0 ;;
+    --no-install) install=false ;;
+    *)
+      if [[ " ${all_steps[*]} " != *" $argument "* ]]; then
+        usage >&2
+        exit 2
+      fi
+      steps+=("$argument")
+      ;;
+  esac
+done
+((${#steps[@]})) || steps=("${all_steps[@]}")
+
+passed=0
+failed=0
+failures=()
+
+headline() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
+
+record_failure() {
+  failed=$((failed + $1))
+  failures+=("$2")
+  echo "FAILED: $2"
+}
+
+# check NAME COMMAND...: one test, passed if the command succeeds.
+check() {
+  local name=$1
+  shift
+  if "$@"; then
+    passed=$((passed + 1))
+  else
+    record_failure 1 "$name"
+    return 1
+  fi
+}
+
+# Runs the tests of a build directory and adds CTest's own figures to the sum.
+run_ctest() {
+  local name=$1 directory=$2 log
+  log=$(mktemp)
+  ctest --test-dir "$directory" --output-on-failure --no-tests=error -j "$test_jobs" |
+    tee "$log" | sed -u -E '/^ +Start +[0-9]+: /d; s/ \.{3,} */ .. /'
+  local summary='^[0-9]+% tests passed, ([0-9]+) tests failed out of ([0-9]+)$'
+  if [[ $(grep -E "$summary" "$log") =~ $summary ]]; then
+    passed=$((passed + BASH_REMATCH[2] - BASH_REMATCH[1]))
+    ((BASH_REMATCH[1] == 0)) || record_failure "${BASH_REMATCH[1]}" "$name: see the list by CTest"
+  else
+    record_failure 1 "$name: CTest gave no result"
+  fi
+  rm -f "$log"
+}
+
+# A file that includes gRPC takes more than 1 GB to compile: no more jobs than memory allows.
+build_jobs() {
+  local processors memory
+  processors=$(nproc)
+  memory=$(awk '/^MemAvailable:/ { print int($2 / 1500000) }' /proc/meminfo)
+  ((memory >= 1)) || memory=1
+  echo $((processors < memory ? processors : memory))
+}
+
+step_layout() {
+  local files
+  mapfile -t files < <(find core proto server client tests -name '*.h' -o -name '*.cc' | sort)
+  check "layout: run clang-format-14 -i on the files above" \
+    clang-format-14 --dry-run --Werror "${files[@]}"
+}
+
+step_release() {
+  check "release: configure" cmake --preset release -DPARTIEMC_VTK=ON &&
+    check "release: build" cmake --build build/release -j "$jobs" &&
+    run_ctest release build/release
+}
+
+# The rooms that run without gRPC in the process, built and tested one by one, so that nothing
+# else is compiled with sanitizers.
+step_sanitized() {
+  check "sanitized: configure" cmake --preset asan -DPARTIEMC_VTK=OFF || return
+  local room
+  for room in core server; do
+    check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
+      run_ctest "sanitized $room" "build/asan/tests/$room"
+  done
+}
+
+step_core-alone() {
+  check "core alone: configure" cmake -S . -B build/core-alone -G Ninja \
+    -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_SERVICE=OFF \
+    -DCMAKE_DISABLE_FIND_PACKAGE_gRPC=ON -DCMAKE_DISABLE_FIND_PACKAGE_Protobuf=ON \
+    -DCMAKE_DISABLE_FIND_PACKAGE_VTK=ON -DCMAKE_DISABLE_FIND_PACKAGE_spdlog=ON \
+    -DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON &&
+    check "core alone: build" cmake --build build/core-alone -j "$jobs" &&
+    run_ctest "core alone" build/core-alone
+  check "core alone: consumer" tests/consumer/run.sh build/core-alone core
+}
+
+step_consumer() { check "consumer" tests/consumer/run.sh build/release core client; }
+
+if $install; then
+  headline "packages"
+  if ! docker/install.sh tests; then
+    echo "0 passed, 1 failed"
+    exit 1
+  fi
+fi
+jobs=$(build_jobs)
+readonly jobs test_jobs=2
+for step in "${steps[@]}"; do
+  headline "$step"
+  "step_$step"
+done
+
+headline "result"
+((failed == 0)) || printf 'FAILED: %s\n' "${failures[@]}"
+echo "$passed passed, $failed failed"
+((failed == 0))

@@ -1,0 +1,173 @@
+#include "server/memory_door.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+
+MemoryDoor::MemoryDoor(ComputePool& pool, std::size_t window,
+                       const ReconstructionParameters& parameters, const FrameLimits& limits)
+    : parameters_(parameters),
+      limits_(limits),
+      requests_(window),
+      answers_(window),
+      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, window)),
+      reader_([this] { ReadLoop(); }),
+      writer_([this] { WriteLoop(); }) {
+  flow_->Start();
+}
+
+MemoryDoor::~MemoryDoor() {
+  Cancel();
+  reader_.join();
+  writer_.join();
+}
+
+void MemoryDoor::Open() { SendRequest({.kind = RequestKind::kOpen, .sequence = 0, .positions = {}}); }
+
+void MemoryDoor::Send(std::uint64_t sequence, std::vector<double> positions) {
+  SendRequest({RequestKind::kFrame, sequence, std::move(positions)});
+}
+
+void MemoryDoor::SendRequest(MemoryRequest request) {
+  const std::lock_guard lock(mutex_);
+  sent_.push_back(std::move(request));
+  changed_.notify_all();
+}
+
+void MemoryDoor::HalfClose() {
+  const std::lock_guard lock(mutex_);
+  half_closed_ = true;
+  changed_.notify_all();
+}
+
+void MemoryDoor::Cancel() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (cancelled_ || finished_) return;
+    cancelled_ = true;
+    changed_.notify_all();
+  }
+  flow_->Cancelled();
+}
+
+std::optional<MemoryAnswer> MemoryDoor::Receive() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return to_receive_ || finished_; });
+  auto answer = std::exchange(to_receive_, std::nullopt);
+  if (answer && answer->what == Outgoing::kAnswer) ++frames_received_;
+  changed_.notify_all();
+  return answer;
+}
+
+absl::Status MemoryDoor::status() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return finished_.has_value(); });
+  return *finished_;
+}
+
+std::size_t MemoryDoor::most_inside() const {
+  const std::lock_guard lock(mutex_);
+  return most_inside_;
+}
+
+void MemoryDoor::WaitUntilRead(std::size_t frames) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return frames_read_ >= frames; });
+}
+
+void MemoryDoor::StartRead(std::size_t slot) {
+  const std::lock_guard lock(mutex_);
+  if (read_slot_ || finished_) throw std::logic_error("two reads at once, or one after the end");
+  read_slot_ = slot;
+  changed_.notify_all();
+}
+
+void MemoryDoor::StartWrite(Outgoing what, std::size_t slot) {
+  const std::lock_guard lock(mutex_);
+  if (being_written_ || finished_) throw std::logic_error("two writes at once, or one after the end");
+  being_written_ = what == Outgoing::kAnswer
+                       ? answers_[slot]
+                       : MemoryAnswer{.what = what, .sequence = 0, .reason = {}, .digests = {}};
+  changed_.notify_all();
+}
+
+absl::Status MemoryDoor::Open(std::size_t) {
+  auto session = Session::Open(parameters_, limits_);
+  if (session.ok()) session_ = *std::move(session);
+  return session.status();
+}
+
+Answered MemoryDoor::Answer(std::size_t slot, Worker& worker) {
+  const MemoryRequest& request = requests_[slot];
+  MemoryAnswer& answer = answers_[slot];
+  Frame frame;
+  frame.positions = std::span<const double>(request.positions);
+  const auto status =
+      session_->Answer(request.sequence, frame, worker, [&](const Result& result, auto&) {
+        answer.digests = {DigestRings(result.rings), DigestMesh(result.mesh)};
+        return absl::OkStatus();
+      });
+  answer.sequence = request.sequence;
+  answer.reason = status.ok() ? "" : FindViolation(status)->reason;
+  if (!status.ok()) answer.digests = {};
+  return {.is_result = status.ok(), .last_sequence = session_->next_sequence() - 1};
+}
+
+void MemoryDoor::Finish(const absl::Status& status) {
+  const std::lock_guard lock(mutex_);
+  if (finished_ || being_written_) throw std::logic_error("finished twice, or while writing");
+  finished_ = status;
+  changed_.notify_all();
+}
+
+void MemoryDoor::ReadLoop() {
+  for (;;) {
+    std::optional<RequestKind> kind;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] {
+        return finished_ ||
+               (read_slot_ && (cancelled_ || half_closed_ || !sent_.empty()));
+      });
+      if (finished_) return;
+      if (!cancelled_ && !sent_.empty()) {
+        kind = sent_.front().kind;
+        requests_[*read_slot_] = std::move(sent_.front());
+        sent_.pop_front();
+        if (kind == RequestKind::kFrame) ++frames_read_;
+        most_inside_ = std::max(most_inside_, frames_read_ - frames_received_);
+        changed_.notify_all();
+      }
+      read_slot_.reset();
+    }
+    if (kind) {
+      flow_->ReadDone(*kind);
+    } else {
+      flow_->ReadEnded();
+    }
+  }
+}
+
+void MemoryDoor::WriteLoop() {
+  for (;;) {
+    bool written = false;
+    {
+      std::unique_lock lock(mutex_);
+      // A client that has not received the answer before keeps this one waiting.
+      changed_.wait(lock, [this] {
+        return finished_ || (being_written_ && (cancelled_ || !to_receive_));
+      });
+      if (finished_) return;
+      written = !cancelled_;
+      if (written) to_receive_ = std::move(being_written_);
+      being_written_.reset();
+      changed_.notify_all();
+    }
+    flow_->WriteDone(written);
+  }
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,35 @@
+// A sequence of frames for tests: a jittered disc with a hole that drifts and turns, of which some
+// particles fly off. The same bits for the same arguments.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <vector>
+
+namespace partiemc::server {
+
+inline constexpr double kBlobSpacing = 0.05;
+
+/// Interleaved x, y of frame `index` of the sequence that `seed` names; about 1,200 particles.
+inline std::vector<double> MovingBlob(unsigned seed, std::uint64_t index) {
+  // Not a standard distribution: its values are the library's own choice.
+  std::mt19937_64 random(seed * 1000003ull + index);
+  const auto jitter = [&] {
+    return (static_cast<double>(random() >> 11) * 0x1p-53 - 0.5) * 0.4 * kBlobSpacing;
+  };
+  const double drift = 0.03 * static_cast<double>(index);
+  std::vector<double> positions;
+  for (int row = -20; row <= 20; ++row) {
+    for (int column = -20; column <= 20; ++column) {
+      const double x = column * kBlobSpacing, y = row * kBlobSpacing;
+      const double from_hole = (x - 0.3) * (x - 0.3) + y * y;
+      if (x * x + y * y > 1 || from_hole < 0.06) continue;
+      const double fling = random() % 100 == 0 ? 1.5 : 1.0;
+      positions.push_back(fling * x + drift + jitter());
+      positions.push_back(fling * y - 0.5 * drift + jitter());
+    }
+  }
+  return positions;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,216 @@
+// A session: which frame may come next, and what a refused frame leaves behind.
+#include "server/session.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <new>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "partiemc/status.h"
+#include "server/moving_blob.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr unsigned kSeed = 20;
+constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
+
+using Digests = std::pair<std::uint64_t, std::uint64_t>;
+
+ReconstructionParameters BlobParameters() {
+  ReconstructionParameters parameters;
+  parameters.spacing = kBlobSpacing;
+  return parameters;
+}
+
+Frame FrameOf(const std::vector<double>& positions) {
+  Frame frame;
+  frame.positions = std::span<const double>(positions);
+  return frame;
+}
+
+// A session with what a test asks of it.
+class Stream {
+ public:
+  Stream() : session_(*Session::Open(BlobParameters(), kLimits)) {}
+
+  absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame) {
+    return session_.Answer(sequence, frame, worker_, [this](const Result& result, auto&) {
+      last_ = {DigestRings(result.rings), DigestMesh(result.mesh)};
+      last_ring_count_ = result.rings.RingCount();
+      return absl::OkStatus();
+    });
+  }
+  absl::Status Answer(std::uint64_t sequence, const std::vector<double>& positions) {
+    return Answer(sequence, FrameOf(positions));
+  }
+  // Reconstructs frame `index` of the sequence under the number that comes next.
+  Digests Good(std::uint64_t index) {
+    const auto status = Answer(session_.next_sequence(), MovingBlob(kSeed, index));
+    EXPECT_TRUE(status.ok()) << status;
+    return last_;
+  }
+
+  Session& session() { return session_; }
+  Worker& worker() { return worker_; }
+  std::size_t last_ring_count() const { return last_ring_count_; }
+
+ private:
+  Session session_;
+  Worker worker_;
+  Digests last_;
+  std::size_t last_ring_count_ = 0;
+};
+
+std::string ReasonOf(const absl::Status& status) {
+  const auto violation = FindViolation(status);
+  return violation ? violation->reason : status.ToString();
+}
+
+TEST(Session, StartsWithOneAndGivesAResultWithRings) {
+  Stream stream;
+  EXPECT_EQ(stream.session().next_sequence(), 1u);
+  stream.Good(0);
+  EXPECT_EQ(stream.session().next_sequence(), 2u);
+  EXPECT_GE(stream.last_ring_count(), 2u) << "the blob has an outer ring and a hole";
+}
+
+TEST(Session, RefusesParametersThatTheCoreRefuses) {
+  ReconstructionParameters parameters;
+  parameters.kernel_radius = 100;
+  const auto session = Session::Open(parameters, kLimits);
+  EXPECT_EQ(session.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FindViolation(session.status())->field, "parameters.kernel_radius");
+}
+
+TEST(Session, ABadFrameIsRefusedAndTheNextOneIsReconstructedAsIfItHadNeverCome) {
+  Stream undisturbed, spoiled;
+  std::vector<double> nan = MovingBlob(kSeed, 1);
+  nan[7] = std::numeric_limits<double>::quiet_NaN();
+  std::set<Digests> different;
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    const auto status = spoiled.Answer(spoiled.session().next_sequence(), nan);
+    EXPECT_EQ(ReasonOf(status), kReasonNotFinite);
+    const Digests digests = spoiled.Good(i);
+    EXPECT_EQ(digests, undisturbed.Good(i)) << "frame " << i;
+    different.insert(digests);
+  }
+  EXPECT_EQ(different.size(), 4u) << "frames that are all alike prove nothing";
+  EXPECT_EQ(spoiled.session().next_sequence(), 9u);
+}
+
+TEST(Session, AnEmptyFrameIsNoErrorAndChangesNothingThatComesAfterTheFirst) {
+  Stream stream;
+  EXPECT_TRUE(stream.Answer(1, std::vector<double>{}).ok());
+  EXPECT_EQ(stream.last_ring_count(), 0u);
+  Stream other;
+  EXPECT_EQ(stream.Good(0), other.Good(0));
+}
+
+TEST(Session, AGapOrADuplicateUsesUpNothing) {
+  Stream stream, undisturbed;
+  stream.Good(0);
+  undisturbed.Good(0);
+  EXPECT_EQ(ReasonOf(stream.Answer(3, MovingBlob(kSeed, 5))), kReasonSequenceGap);
+  EXPECT_EQ(ReasonOf(stream.Answer(1, MovingBlob(kSeed, 0))), kReasonSequenceDuplicate);
+  EXPECT_EQ(ReasonOf(stream.Answer(0, MovingBlob(kSeed, 0))), kReasonSequenceDuplicate);
+  EXPECT_EQ(
+      ReasonOf(stream.Answer(std::numeric_limits<std::uint64_t>::max(), MovingBlob(kSeed, 0))),
+      kReasonSequenceGap);
+  EXPECT_EQ(stream.session().next_sequence(), 2u);
+  EXPECT_EQ(stream.Good(1), undisturbed.Good(1));
+}
+
+TEST(Session, AGapTellsTheNumberThatIsExpected) {
+  Stream stream;
+  const auto status = stream.Answer(7, MovingBlob(kSeed, 0));
+  EXPECT_EQ(status.message(), "sequence: 7; must be 1; a frame before it is missing");
+}
+
+TEST(Session, AFrameThatCannotBeDecodedUsesUpItsNumberButNotOutOfTurn) {
+  Stream stream;
+  const absl::StatusOr<Frame> undecodable =
+      ViolationError(absl::StatusCode::kInvalidArgument, {"BYTE_COUNT", "positions", "7", "8"});
+  EXPECT_EQ(ReasonOf(stream.Answer(2, undecodable)), kReasonSequenceGap);
+  EXPECT_EQ(stream.session().next_sequence(), 1u);
+  EXPECT_EQ(ReasonOf(stream.Answer(1, undecodable)), "BYTE_COUNT");
+  EXPECT_EQ(stream.session().next_sequence(), 2u);
+}
+
+TEST(Session, TooManyParticlesAreRefusedByTheLimitOfTheServer) {
+  Stream stream;
+  EXPECT_EQ(ReasonOf(stream.Answer(1, std::vector<double>(2 * 2001, 0.5))),
+            kReasonTooManyParticles);
+}
+
+TEST(Session, AResultThatCannotBeDeliveredLeavesTheStateAlone) {
+  Stream refused, undisturbed;
+  refused.Good(0);
+  undisturbed.Good(0);
+  const std::vector<double> positions = MovingBlob(kSeed, 9);
+  const auto status =
+      refused.session().Answer(2, FrameOf(positions), refused.worker(), [](auto&, auto&) {
+        return ViolationError(absl::StatusCode::kOutOfRange, {"RESOLUTION", "f", "v", "r"});
+      });
+  EXPECT_EQ(ReasonOf(status), "RESOLUTION");
+  EXPECT_EQ(refused.session().next_sequence(), 3u);
+  EXPECT_EQ(refused.Good(1), undisturbed.Good(1));
+}
+
+TEST(Session, MemoryThatRunsOutIsAnErrorOfTheFrameAndTheStreamGoesOn) {
+  Stream stream, undisturbed;
+  stream.Good(0);
+  undisturbed.Good(0);
+  const std::vector<double> positions = MovingBlob(kSeed, 9);
+  const auto status = stream.session().Answer(
+      2, FrameOf(positions), stream.worker(),
+      [](auto&, auto&) -> absl::Status { throw std::bad_alloc(); });
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(ReasonOf(status), kReasonOutOfMemory);
+  EXPECT_EQ(stream.Good(1), undisturbed.Good(1));
+}
+
+TEST(Session, TheWorkerThatComputesMakesNoDifference) {
+  Stream one;
+  Session two = *Session::Open(BlobParameters(), kLimits);
+  Worker workers[2];
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    const Digests expected = one.Good(i);
+    const std::vector<double> positions = MovingBlob(kSeed, i);
+    Digests digests;
+    // Each worker has seen other frames than the other.
+    const auto status =
+        two.Answer(i + 1, FrameOf(positions), workers[i % 2], [&](const Result& result, auto&) {
+          digests = {DigestRings(result.rings), DigestMesh(result.mesh)};
+          return absl::OkStatus();
+        });
+    ASSERT_TRUE(status.ok()) << status;
+    EXPECT_EQ(digests, expected);
+  }
+}
+
+TEST(Session, TheClockOfAResultHasATimeForEveryStageAndForTheWhole) {
+  Stream stream;
+  const std::vector<double> positions = MovingBlob(kSeed, 0);
+  double stages = -1, total = -1;
+  ASSERT_TRUE(stream.session()
+                  .Answer(1, FrameOf(positions), stream.worker(),
+                          [&](const Result&, const StageClock& clock) {
+                            stages = 0;
+                            for (const double ms : clock.stages_ms()) {
+                              EXPECT_GT(ms, 0);
+                              stages += ms;
+                            }
+                            total = clock.TotalMs();
+                            return absl::OkStatus();
+                          })
+                  .ok());
+  EXPECT_GE(total, stages);
+}
+
+}  // namespace
+}  // namespace partiemc::server

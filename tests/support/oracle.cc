@@ -1,0 +1,153 @@
+#include "support/oracle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace partiemc::support {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Decisions that hang on less than this many cells are left to rounding.
+constexpr double kCloseCall = 1e-4;
+
+}  // namespace
+
+FieldOracle::FieldOracle(const Particles& particles, const ReconstructionParameters& parameters,
+                         double spacing)
+    : particles_(particles),
+      radius_(parameters.kernel_radius * spacing),
+      reference_radius_(*parameters.reference_radius * spacing) {
+  double lightest = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const double volume =
+        particles.volumes.empty() ? spacing * spacing : static_cast<double>(particles.volumes[k]);
+    weights_.push_back(volume * 4 / (kPi * radius_ * radius_));
+    lightest = std::min(lightest, weights_.back());
+  }
+  guard_ = std::min(0.9 / (parameters.kernel_radius * parameters.kernel_radius), 0.7 * lightest);
+}
+
+double FieldOracle::Kernel(std::size_t particle, Vector at) const {
+  const double s = std::hypot(particles_.x(particle) - at.x, particles_.y(particle) - at.y) / radius_;
+  return std::max(0.0, std::pow(1 - s * s, 3));
+}
+
+double FieldOracle::KernelSum(Vector at) const {
+  double sum = 0;
+  for (std::size_t k = 0; k < particles_.size(); ++k) sum += Kernel(k, at);
+  return sum;
+}
+
+double FieldOracle::Density(Vector at) const {
+  double sum = 0;
+  for (std::size_t k = 0; k < particles_.size(); ++k) sum += weights_[k] * Kernel(k, at);
+  return sum;
+}
+
+std::optional<Vector> FieldOracle::Mean(Vector at) const {
+  double weight = 0;
+  Vector sum;  // Relative to the point: positions may be a million spacings from the origin.
+  for (std::size_t k = 0; k < particles_.size(); ++k) {
+    const double kernel = Kernel(k, at);
+    weight += kernel;
+    sum.x += kernel * (particles_.x(k) - at.x);
+    sum.y += kernel * (particles_.y(k) - at.y);
+  }
+  if (weight == 0) return std::nullopt;
+  return Vector{at.x + sum.x / weight, at.y + sum.y / weight};
+}
+
+double FieldOracle::Phi(Vector at) const {
+  const std::optional<Vector> mean = Mean(at);
+  const double distance = mean ? std::hypot(at.x - mean->x, at.y - mean->y) : radius_;
+  return distance - reference_radius_;
+}
+
+double FieldOracle::Guard(Vector at) const { return (guard_ - Density(at)) * radius_ / 1.164; }
+
+double FieldOracle::Value(Vector at) const { return std::max(Phi(at), Guard(at)); }
+
+template <typename Function>
+Vector FieldOracle::CentralDifferences(Function function, Vector at) const {
+  const double step = 1e-5 * radius_;
+  return {(function(Vector{at.x + step, at.y}) - function(Vector{at.x - step, at.y})) / (2 * step),
+          (function(Vector{at.x, at.y + step}) - function(Vector{at.x, at.y - step})) / (2 * step)};
+}
+
+Vector FieldOracle::PhiGradient(Vector at) const {
+  return CentralDifferences([this](Vector p) { return Phi(p); }, at);
+}
+
+Vector FieldOracle::ValueGradient(Vector at) const {
+  return CentralDifferences([this](Vector p) { return Value(p); }, at);
+}
+
+FarthestChoice FarthestParticle(const Particles& particles, Vector point, Vector normal,
+                                double cell_size) {
+  FarthestChoice choice;
+  double best = -std::numeric_limits<double>::infinity();
+  double second = best;
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const double dx = particles.x(k) - point.x;
+    const double dy = particles.y(k) - point.y;
+    const double along = dx * normal.x + dy * normal.y;
+    const double distance = std::hypot(dx, dy);
+    const double margin = kCloseCall * cell_size;
+    if (distance > cell_size + margin || along < -margin) continue;
+    if (distance > cell_size - margin || along < margin) choice.is_close_call = true;
+    if (along > best) {
+      second = best;
+      best = along;
+      choice.particle = k;
+    } else {
+      second = std::max(second, along);
+    }
+  }
+  if (best - second < kCloseCall * cell_size) choice.is_close_call = true;
+  if (choice.is_close_call) choice.particle.reset();
+  return choice;
+}
+
+std::vector<std::pair<int, int>> CellSegments(const std::array<double, 4>& corners) {
+  // Round the cell, counter-clockwise: the isoline enters through an edge from inside to outside,
+  // for the inside is then on its left, and leaves through one from outside to inside.
+  std::vector<int> entries, exits;
+  for (int edge = 0; edge < 4; ++edge) {
+    const bool here = corners[edge] < 0;
+    const bool next = corners[(edge + 1) % 4] < 0;
+    if (here && !next) entries.push_back(edge);
+    if (!here && next) exits.push_back(edge);
+  }
+  if (entries.empty()) return {};
+  if (entries.size() == 1) return {{entries[0], exits[0]}};
+  // Where the bilinear interpolant is stationary: s = (F0 - F3) / (F0 + F2 - F1 - F3), and F there
+  // by going along the row at s.
+  const double denominator = corners[0] + corners[2] - corners[1] - corners[3];
+  const double s = (corners[0] - corners[3]) / denominator;
+  const double saddle = corners[0] + s * (corners[1] - corners[0]);
+  // Joined corners: each segment cuts off the outside corner after its entry. Parted ones: each
+  // cuts off the inside corner before its entry.
+  const int step = saddle < 0 ? 1 : 3;
+  std::vector<std::pair<int, int>> segments;
+  for (const int entry : entries) segments.emplace_back(entry, (entry + step) % 4);
+  return segments;
+}
+
+double MedianNearestNeighbour(const Particles& particles) {
+  std::vector<double> distances;
+  for (std::size_t a = 0; a < particles.size(); ++a) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t b = 0; b < particles.size(); ++b) {
+      const double distance =
+          std::hypot(particles.x(a) - particles.x(b), particles.y(a) - particles.y(b));
+      if (distance > 0) nearest = std::min(nearest, distance);
+    }
+    distances.push_back(nearest);
+  }
+  std::sort(distances.begin(), distances.end());
+  return distances[distances.size() / 2];
+}
+
+}  // namespace partiemc::support

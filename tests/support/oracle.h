@@ -1,0 +1,64 @@
+// The method as the paper writes it, by brute force and in double: what the stages are checked
+// against. Every function reads like its equation; none shares a line with the core.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "partiemc/parameters.h"
+#include "support/particles.h"
+
+namespace partiemc::support {
+
+struct Vector {
+  double x = 0, y = 0;
+};
+
+/// The level set of a frame, in world units: sums over all particles, wherever they are.
+class FieldOracle {
+ public:
+  /// Requires: resolved parameters; `particles` outlives the oracle.
+  FieldOracle(const Particles& particles, const ReconstructionParameters& parameters,
+              double spacing);
+
+  double KernelSum(Vector at) const;             ///< sum k
+  double Density(Vector at) const;               ///< f, Eq. 1
+  std::optional<Vector> Mean(Vector at) const;   ///< xbar, Eq. 3-4; nothing without support.
+  double Phi(Vector at) const;                   ///< Eq. 5; R - r without support.
+  double Guard(Vector at) const;                 ///< (g - f) R / 1.164
+  double Value(Vector at) const;                 ///< F = max(phi, guard)
+  Vector PhiGradient(Vector at) const;           ///< By central differences.
+  Vector ValueGradient(Vector at) const;         ///< By central differences.
+  double kernel_radius() const { return radius_; }
+
+ private:
+  double Kernel(std::size_t particle, Vector at) const;
+  template <typename Function>
+  Vector CentralDifferences(Function function, Vector at) const;
+
+  const Particles& particles_;
+  double radius_, reference_radius_, guard_;
+  std::vector<double> weights_;
+};
+
+/// Section 3.5: the particle farthest along the unit normal, among those on or above the plane and
+/// within one cell of its point. Nothing if there is none, or if rounding could decide otherwise:
+/// then `is_close_call` is set.
+struct FarthestChoice {
+  std::optional<std::size_t> particle;
+  bool is_close_call = false;
+};
+FarthestChoice FarthestParticle(const Particles& particles, Vector point, Vector normal,
+                                double cell_size);
+
+/// Segments of one cell as (entry edge, exit edge), the inside on the left, from the values at its
+/// corners, counter-clockwise from the lower left; edge k joins corners k and k + 1.
+std::vector<std::pair<int, int>> CellSegments(const std::array<double, 4>& corners);
+
+/// Median over particles of the distance to the nearest other position.
+double MedianNearestNeighbour(const Particles& particles);
+
+}  // namespace partiemc::support

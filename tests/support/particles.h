@@ -1,0 +1,69 @@
+// Frames to test with: shapes, degenerate sets, and seeded random scenes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "partiemc/frame.h"
+#include "support/random.h"
+
+namespace partiemc::support {
+
+/// A frame that owns its particles.
+struct Particles {
+  std::vector<double> xy;
+  std::vector<float> volumes;  ///< Empty, or one per particle.
+
+  std::size_t size() const { return xy.size() / 2; }
+  double x(std::size_t k) const { return xy[2 * k]; }
+  double y(std::size_t k) const { return xy[2 * k + 1]; }
+  void Add(double px, double py) {
+    xy.push_back(px);
+    xy.push_back(py);
+  }
+  void Add(const Particles& others) {
+    xy.insert(xy.end(), others.xy.begin(), others.xy.end());
+  }
+  /// A view; valid as long as this object is and does not change.
+  Frame AsFrame() const;
+};
+
+// Shapes filled with particles at the nodes of a lattice of spacing 1, unless said otherwise.
+
+/// Particles at (x0 + i, y0 + j).
+Particles Lattice(int columns, int rows, double x0 = 0, double y0 = 0);
+Particles Disc(double radius, double cx = 0, double cy = 0);
+/// Between two circles round the origin.
+Particles Annulus(double inner, double outer);
+/// Particles with y <= 0 below a straight boundary: `columns` of them in `rows` layers.
+Particles HalfPlane(int columns, int rows);
+
+/// A jittered body with a wavy outline of about `radius` and a few holes.
+Particles Blob(Random& random, double radius);
+/// One or two layers of particles along a wave.
+Particles Sheet(Random& random, int length);
+Particles Noise(Random& random, std::size_t count, double extent);
+/// Uneven steps along one line of random direction.
+Particles Collinear(Random& random, std::size_t count);
+Particles Clusters(Random& random, std::size_t clusters, double extent);
+
+/// One of everything above, several at once, duplicates and spray now and then, volumes now and
+/// then, near the origin or up to a million spacings from it.
+Particles RandomScene(std::uint64_t seed);
+
+/// Frame `frame` of a wavy body with a hole that turns, drifts, stretches and breaks up a little.
+Particles MovingBody(int frame);
+
+// Metamorphoses.
+
+Particles Shifted(Particles particles, double dx, double dy);
+/// Positions times `factor`, volumes times its square.
+Particles Scaled(Particles particles, double factor);
+Particles Permuted(const Particles& particles, Random& random);
+/// Some of the particles once more, at the same places.
+Particles WithDuplicates(Particles particles, Random& random, std::size_t count);
+/// Positions rounded to what the bins keep: multiples of 2^-17 cells.
+Particles Snapped(Particles particles, double cell_size);
+
+}  // namespace partiemc::support

@@ -1,0 +1,87 @@
+#include "support/stages.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace partiemc::support {
+
+void Stages::SetScale(const ReconstructionParameters& wanted) {
+  parameters = Resolve(wanted);
+  const double spacing = parameters.spacing.value();
+  double lightest = spacing * spacing;
+  if (!particles.volumes.empty()) {
+    lightest = *std::min_element(particles.volumes.begin(), particles.volumes.end());
+  }
+  scale = MakeScale(parameters, spacing, parameters.cell_size * spacing, lightest);
+}
+
+void Stages::Run(const Particles& frame, const ReconstructionParameters& wanted,
+                 std::span<const CellNormal> previous) {
+  particles = frame;
+  SetScale(wanted);
+  const absl::Status status = BinParticles(particles.AsFrame(), parameters.plane, scale, {}, bins);
+  ASSERT_TRUE(status.ok()) << status;
+  SampleField(bins, scale, level_set);
+  RunFromCrossings(previous);
+}
+
+void Stages::RunOn(const std::function<double(int, int)>& function, TileCoordinate low,
+                   TileCoordinate high, const Particles& frame,
+                   const ReconstructionParameters& wanted, std::span<const CellNormal> previous) {
+  particles = frame;
+  SetScale(wanted);
+  bins.Clear();
+  for (std::int32_t y = low.y; y <= high.y; ++y) {
+    for (std::int32_t x = low.x; x <= high.x; ++x) bins.tiles.Insert({y, x});
+  }
+  bins.tiles.Seal();
+  level_set.void_value = 1;
+  level_set.tiles.resize(bins.tiles.size());
+  bins.offsets = {0};
+  for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    const int column = bins.tiles[tile].x * kTileSize;
+    const int row = bins.tiles[tile].y * kTileSize;
+    for (int node = 0; node < kTileNodes; ++node) {
+      level_set.tiles[tile][node] =
+          static_cast<float>(function(column + node % kTileSize, row + node / kTileSize));
+    }
+    for (std::size_t k = 0; k < particles.size(); ++k) {
+      const double px = particles.x(k) / scale.cell_size - column;
+      const double py = particles.y(k) / scale.cell_size - row;
+      const double reach = scale.kernel_radius;
+      if (std::min(px, py) < -reach || std::max(px, py) > kTileSize + reach) continue;
+      bins.x.push_back(static_cast<float>(px));
+      bins.y.push_back(static_cast<float>(py));
+      bins.source.push_back(static_cast<std::uint32_t>(k));
+    }
+    bins.offsets.push_back(static_cast<std::uint32_t>(bins.x.size()));
+  }
+  RunFromCrossings(previous);
+}
+
+void Stages::RunFromCrossings(std::span<const CellNormal> previous) {
+  FindCrossings(bins.tiles, level_set, crossings);
+  TraceRings(bins, level_set, scale, *parameters.clean, crossings, ring_scratch, topology);
+  field.Build(bins, crossings, scale, true);
+  EstimateNormals(bins, level_set, crossings, topology, field, parameters, previous, planes,
+                  next_normals);
+  const Frame frame = particles.AsFrame();
+  PlaceVertices(
+      {frame, bins, level_set, crossings, topology, field, planes, parameters, scale}, placed,
+      result.rings);
+  const absl::Status status =
+      BuildMesh({bins.tiles, crossings, topology, planes, placed, result.rings, parameters, scale},
+                mesh_scratch, result.mesh, result.statistics);
+  ASSERT_TRUE(status.ok()) << status;
+}
+
+std::array<double, 4> Stages::CornerValues(const ActiveCell& cell) const {
+  const auto at = [&](int di, int dj) {
+    return static_cast<double>(
+        level_set.At(bins.tiles, cell.tile, cell.i + di, cell.j + dj));
+  };
+  return {at(0, 0), at(1, 0), at(1, 1), at(0, 1)};
+}
+
+}  // namespace partiemc::support

@@ -1,0 +1,63 @@
+// The stages one after the other, with everything in between at hand, and level sets made by hand.
+// For tests of the core only: it includes the core's private headers.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "bins.h"
+#include "crossings.h"
+#include "field.h"
+#include "mesh.h"
+#include "normals.h"
+#include "partiemc/parameters.h"
+#include "partiemc/result.h"
+#include "point_field.h"
+#include "rings.h"
+#include "scale.h"
+#include "support/particles.h"
+#include "vertices.h"
+
+namespace partiemc::support {
+
+/// What the stages make of one frame. Not movable once run: later results refer to earlier ones.
+struct Stages {
+  ReconstructionParameters parameters;  ///< Resolved.
+  Scale scale;
+  Particles particles;
+  ParticleBins bins;
+  LevelSet level_set;
+  Crossings crossings;
+  RingScratch ring_scratch;
+  RingTopology topology;
+  PointField field;
+  std::vector<CellPlane> planes;
+  std::vector<CellNormal> next_normals;
+  PlacedVertices placed;
+  MeshScratch mesh_scratch;
+  Result result;
+
+  Stages() = default;
+  Stages(const Stages&) = delete;
+  Stages& operator=(const Stages&) = delete;
+
+  /// Stages 1 to 7 of `particles`; parameters need a spacing.
+  void Run(const Particles& frame, const ReconstructionParameters& wanted,
+           std::span<const CellNormal> previous = {});
+
+  /// Stages 3 to 7 of a level set made by hand, with values of `function` at nodes (column, row),
+  /// on the tiles [low, high]. Particles count for components and for the point field, not for the
+  /// level set. Nodes in the outermost row and column of tiles must be outside.
+  void RunOn(const std::function<double(int, int)>& function, TileCoordinate low,
+             TileCoordinate high, const Particles& frame, const ReconstructionParameters& wanted,
+             std::span<const CellNormal> previous = {});
+
+  /// Corners and value at each corner of an active cell.
+  std::array<double, 4> CornerValues(const ActiveCell& cell) const;
+
+ private:
+  void SetScale(const ReconstructionParameters& wanted);
+  void RunFromCrossings(std::span<const CellNormal> previous);
+};
+
+}  // namespace partiemc::support
