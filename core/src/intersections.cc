@@ -44,10 +44,11 @@ class Grids {
  public:
   Grids(const Box& bounds, double mean_extent)
       : origin_{bounds.left, bounds.bottom},
-        // Cells of half the mean extent or more make few candidates; the second bound keeps indices
-        // below 2^27, the third keeps sizes above zero when all points coincide.
+        // Cells of twice the mean extent hold almost all segments of a contour in one grid and
+        // still make few candidates (half of it costs a quarter more); the second bound keeps
+        // indices below 2^27, the third keeps sizes above zero when all points coincide.
         finest_(std::max(
-            {mean_extent / 2, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {}
+            {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {}
 
   /// The first level whose cells hold a box of `extent`; 28 at most, by the bounds of the finest.
   int LevelFor(double extent) const {

@@ -189,6 +189,7 @@ class Page {
     const {x, y, width, height} = this.view;
     this.picture.setAttribute('viewBox', `${x} ${y} ${width} ${height}`);
     this.showScale();
+    this.hover(-1);
   }
 
   // Screen pixels per unit of the picture.
