@@ -46,7 +46,7 @@ class InputStream final : public ByteSource {
 
   const std::string& path() const { return path_; }
   bool compressed() const { return compressed_; }
-  std::size_t line_number() const { return line_number_; }   ///< Of the line read last, 1-based.
+  std::size_t line_number() const { return line_number_; }  ///< Of the line read last, 1-based.
 
   /// "PATH:LINE: message" with the line read last.
   absl::Status ErrorAtLine(absl::StatusCode code, std::string_view message) const;

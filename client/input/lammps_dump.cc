@@ -179,8 +179,17 @@ class LammpsDumpReader final : public FrameReader {
     return absl::OkStatus();
   }
 
+  absl::Status EndsAfter(std::uint64_t atoms) const {
+    return Error(
+        Concat("ends after ", atoms, " of ", *head_.atoms, " atoms; the file is truncated"));
+  }
+
   absl::StatusOr<bool> ReadAtoms(const std::string& columns, ParticleRows* rows) {
     if (!head_.atoms) return Error("ITEM: ATOMS comes before the number of atoms");
+    // Asked before the columns are judged, of which the end of the file may have cut off some.
+    const auto next = stream_->Peek(1);
+    if (!next.ok()) return next.status();
+    if (next->empty() && *head_.atoms > 0) return EndsAfter(0);
     if (rows != nullptr) {
       if (absl::Status status = PlanColumns(columns); !status.ok()) return status;
       rows->Begin(*plan_);
@@ -191,10 +200,7 @@ class LammpsDumpReader final : public FrameReader {
     for (std::uint64_t atom = 0; atom < *head_.atoms; ++atom) {
       const auto found = stream_->ReadLine(line);
       if (!found.ok()) return found;
-      if (!*found || line.starts_with("ITEM:")) {
-        return Error(
-            Concat("ends after ", atom, " of ", *head_.atoms, " atoms; the file is truncated"));
-      }
+      if (!*found || line.starts_with("ITEM:")) return EndsAfter(atom);
       if (rows == nullptr) continue;
       SplitAtBlanks(line, cells_);
       if (absl::Status status = AppendTextRow(cells_, *plan_, request_, *rows); !status.ok()) {

@@ -34,7 +34,7 @@ struct RecordedFrame {
 struct SequenceOptions {
   /// Particles to keep: "COLUMN=VALUE", for example "type=1". All expressions must hold. A value
   /// equals a cell if both read as the same number, else if they are the same text.
-  std::vector<std::string> select;
+  std::vector<std::string> select = {};
 
   /// Columns, separated by commas; empty: recognised by their names.
   /// - The file names its columns (CSV header, LAMMPS dump, NPZ): two or three columns that hold
@@ -43,15 +43,15 @@ struct SequenceOptions {
   ///   the positions, "2,3", or names for the first columns in their order, "id,x,y,vx,vy";
   ///   a column named "-" is ignored.
   /// VTK files know where their positions are; the option is refused for them.
-  std::string columns;
+  std::string columns = {};
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if it is one.
-  std::string times;
+  std::string times = {};
 
   /// "A:B" or "A:B:STEP": frames A, A + STEP, ... below B; each part may be left out. "A" is one
   /// frame. Empty: all.
-  std::string frames;
+  std::string frames = {};
 };
 
 /// Frames of one input, read one at a time in natural order of the file names. Not thread safe.

@@ -4,6 +4,7 @@
 #include <vtkDataObject.h>
 #include <vtkFieldData.h>
 #include <vtkGenericDataObjectReader.h>
+#include <vtkLogger.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkOutputWindow.h>
@@ -51,8 +52,8 @@ class MessageCatcher final : public vtkOutputWindow {
   void DisplayErrorText(const char* text) override {
     if (error_.empty()) error_ = text;
   }
-  void DisplayWarningText(const char* /*text*/) override {}
-  void DisplayGenericWarningText(const char* /*text*/) override {}
+  void DisplayWarningText(const char* text) override { TakeWarning(text); }
+  void DisplayGenericWarningText(const char* text) override { TakeWarning(text); }
   void DisplayDebugText(const char* /*text*/) override {}
 
   // "ERROR: In FILE, line N\nvtkThing (0x...): message\n\n" -> "message", in one line.
@@ -67,20 +68,34 @@ class MessageCatcher final : public vtkOutputWindow {
   bool has_error() const { return !error_.empty(); }
 
  private:
+  // The legacy reader calls it a warning when a file ends within its data ("Error reading ascii
+  // data"). Other warnings, of newer file versions and the like, do no harm.
+  void TakeWarning(std::string_view text) {
+    if (error_.empty() && Contains(text, "Error reading")) error_ = text;
+  }
+
   std::string error_;
 };
 
 vtkStandardNewMacro(MessageCatcher)
 
-    // VTK's messages go through one object of the process; while this lives, to `catcher`.
+    // VTK's messages go through one object of the process, and through a log that writes to stderr.
+    // While this lives, they go to `catcher` alone.
     class CatchMessages {
  public:
-  CatchMessages() : lock_(Mutex()), before_(vtkOutputWindow::GetInstance()) {
+  CatchMessages()
+      : lock_(Mutex()),
+        before_(vtkOutputWindow::GetInstance()),
+        verbosity_before_(vtkLogger::GetCurrentVerbosityCutoff()) {
+    vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
     vtkOutputWindow::SetInstance(catcher);
   }
   CatchMessages(const CatchMessages&) = delete;
   CatchMessages& operator=(const CatchMessages&) = delete;
-  ~CatchMessages() { vtkOutputWindow::SetInstance(before_); }
+  ~CatchMessages() {
+    vtkOutputWindow::SetInstance(before_);
+    vtkLogger::SetStderrVerbosity(verbosity_before_);
+  }
 
   vtkNew<MessageCatcher> catcher;
 
@@ -92,6 +107,7 @@ vtkStandardNewMacro(MessageCatcher)
 
   std::lock_guard<std::mutex> lock_;
   vtkSmartPointer<vtkOutputWindow> before_;
+  vtkLogger::Verbosity verbosity_before_;
 };
 
 std::optional<ElementType> TypeOf(int vtk_type) {

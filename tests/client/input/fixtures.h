@@ -66,7 +66,9 @@ inline ReadSequence ReadAll(const std::string& input, const SequenceOptions& opt
     read.frames.push_back(frame);
   }
   // An error stays: a caller that asks again must not take the rest for whole.
-  if (!read.status.ok()) EXPECT_EQ((*sequence)->Next(frame).status(), read.status);
+  if (!read.status.ok()) {
+    EXPECT_EQ((*sequence)->Next(frame).status(), read.status);
+  }
   read.notices = (*sequence)->notices();
   return read;
 }

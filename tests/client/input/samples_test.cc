@@ -27,7 +27,9 @@ TEST_P(Samples, HoldTheParticlesOfTheTable) {
   }
   EXPECT_EQ(frame.float32, sample.float32);
   EXPECT_EQ(frame.time.has_value(), sample.has_time);
-  if (sample.has_time) EXPECT_EQ(frame.time, 1.0);
+  if (sample.has_time) {
+    EXPECT_EQ(frame.time, 1.0);
+  }
   ASSERT_EQ(frame.velocities.size(), sample.has_velocities ? 2 * kParticles : 0);
   for (std::size_t k = 0; k < frame.velocities.size(); ++k) {
     ASSERT_NEAR(frame.velocities[k], truth.velocities[k], 1e-5) << k;
