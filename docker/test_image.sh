@@ -86,7 +86,7 @@ start_server() {
   unshare_pid=$!
   for ((attempt = 0; attempt < 300; ++attempt)); do
     kill -0 "$unshare_pid" 2>/dev/null || fail "the server ended before it was healthy"
-    server=$(pgrep -P "$unshare_pid") && in_container "${check[@]:1}" && return
+    server=$(pgrep -P "$unshare_pid") && in_container "${check[@]:1}" 2>/dev/null && return
     sleep 0.1
   done
   fail "the server is not healthy after 30 s"

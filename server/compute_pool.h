@@ -1,6 +1,7 @@
 // The threads that compute, shared by all streams.
 #pragma once
 
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <condition_variable>
@@ -31,7 +32,8 @@ class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
 
-  /// `threads` is what all jobs together may use, at least 1.
+  /// `threads` is what all jobs together may use, at least 1. While it lives, the whole process
+  /// gives oneTBB no more than that.
   explicit ComputePool(unsigned threads);
   /// Runs what was submitted, then joins.
   ~ComputePool();
@@ -46,6 +48,7 @@ class ComputePool {
  private:
   void Run();
 
+  oneapi::tbb::global_control parallelism_;
   oneapi::tbb::task_arena arena_;
   std::mutex mutex_;
   std::condition_variable job_came_;

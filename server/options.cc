@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <thread>
 #include <utility>
@@ -164,7 +165,11 @@ std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* a
       ->expected(0, 1)
       ->type_name("[ADDRESS]")
       ->configurable(false);
-  app.set_config("--config", "", "Read options from this file")->envname("PARTIEMC_CONFIG");
+  // CLI11 reads the environment only after the file, too late for the file's own name.
+  const char* const config = std::getenv("PARTIEMC_CONFIG");
+  app.set_config("--config", config != nullptr ? config : "",
+                 "Read options from this file (or from that of PARTIEMC_CONFIG)",
+                 /*config_required=*/config != nullptr);
   // A misspelt option in the file would otherwise pass in silence.
   app.allow_config_extras(CLI::config_extras_mode::error);
   app.set_version_flag("--version", "partiemc-server " PARTIEMC_VERSION);

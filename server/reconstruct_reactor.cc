@@ -3,6 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <optional>
+#include <string>
 
 #include "server/grpc_status.h"
 
@@ -13,7 +15,7 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
             const absl::Status& status) {
   const std::string code = absl::StatusCodeToString(status.code());
   if (!stream) {
-    spdlog::warn("stream refused peer={} status={} message=\"{}\"", peer, code,
+    spdlog::warn("stream refused peer={} status={} message={}", peer, code,
                  std::string(status.message()));
     return;
   }
@@ -44,6 +46,8 @@ void ReconstructReactor::OnReadDone(bool ok) {
   if (ok) {
     flow_->ReadDone(messages_.Kind(read_slot_));
   } else {
+    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
+    if (context_.IsCancelled()) flow_->Cancelled();
     flow_->ReadEnded();
   }
 }
@@ -64,15 +68,13 @@ void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
 }
 
 absl::Status ReconstructReactor::Open(std::size_t slot) {
-  auto status = messages_.Open(slot, *flow_);
-  if (status.ok()) {
-    const v1::StreamOpened& opened = messages_.response(Outgoing::kOpened, slot).opened();
-    spdlog::info("stream opened id={} name={} peer={} placement={} fill={}", opened.stream_id(),
-                 messages_.request(slot).open().stream_name(), context_.peer(),
-                 v1::Placement_Name(opened.parameters().placement()),
-                 v1::Fill_Name(opened.parameters().fill()));
-  }
-  return status;
+  const auto stream = messages_.Open(slot, *flow_);
+  if (!stream.ok()) return stream.status();
+  const StreamDescription& description = stream->description;
+  spdlog::info("stream opened id={} name={} peer={} placement={} fill={}", stream->id,
+               description.name, context_.peer(), Name(description.parameters.placement),
+               Name(description.parameters.fill));
+  return absl::OkStatus();
 }
 
 Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {

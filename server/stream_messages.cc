@@ -87,7 +87,7 @@ const v1::ReconstructResponse& StreamMessages::response(Outgoing what, std::size
   return answers_[slot];
 }
 
-absl::Status StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
+absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
   const v1::OpenStream& open = requests_[slot].open();
   if (auto status = CheckCapabilities(open); !status.ok()) return status;
   const auto parameters = wire::DecodeParameters(open.parameters());
@@ -96,20 +96,20 @@ absl::Status StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
   if (!outputs.ok()) return outputs.status();
   auto session = Session::Open(*parameters, limits_.frame);
   if (!session.ok()) return session.status();
-  auto id = registry_.Open(flow, {.name = open.stream_name(),
-                                  .labels = {open.labels().begin(), open.labels().end()},
-                                  .parameters = session->parameters()});
-  if (!id.ok()) return id.status();
+  auto stream = registry_.Open(flow, {.name = open.stream_name(),
+                                      .labels = {open.labels().begin(), open.labels().end()},
+                                      .parameters = session->parameters()});
+  if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
   outputs_ = *outputs;
 
   v1::StreamOpened& opened = *opened_.mutable_opened();
-  opened.set_stream_id(*std::move(id));
+  opened.set_stream_id(stream->id);
   wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
   opened.set_frames_in_flight(limits_.frames_in_flight);
   EncodeLimits(limits_, *opened.mutable_limits());
   opened.set_next_sequence(session_->next_sequence());
-  return absl::OkStatus();
+  return stream;
 }
 
 Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {

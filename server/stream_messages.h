@@ -39,8 +39,8 @@ class StreamMessages {
   RequestKind Kind(std::size_t slot) const;
   const v1::ReconstructResponse& response(Outgoing what, std::size_t slot) const;
 
-  /// As StreamDoor::Open and StreamDoor::Answer.
-  absl::Status Open(std::size_t slot, const StreamFlow& flow);
+  /// As StreamDoor::Open and StreamDoor::Answer; gives the stream as it was opened.
+  absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamFlow& flow);
   Answered Answer(std::size_t slot, Worker& worker);
 
  private:

@@ -69,8 +69,8 @@ absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::string> StreamRegistry::Open(const StreamFlow& flow,
-                                                 StreamDescription description) {
+absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
+                                                   StreamDescription description) {
   if (auto status = CheckName(description.name); !status.ok()) return status;
   if (auto status = CheckLabels(description.labels); !status.ok()) return status;
 
@@ -102,7 +102,7 @@ absl::StatusOr<std::string> StreamRegistry::Open(const StreamFlow& flow,
   if (entry.stream->description.name.empty()) {
     entry.stream->description.name = absl::StrCat("stream-", entry.stream->id);
   }
-  return entry.stream->id;
+  return *entry.stream;
 }
 
 std::optional<StreamSummary> StreamRegistry::Leave(const StreamFlow& flow) {

@@ -47,10 +47,10 @@ class StreamRegistry {
   /// A flow comes in, not open yet. Errors: UNAVAILABLE (DRAINING).
   absl::Status Enter(std::shared_ptr<StreamFlow> flow);
 
-  /// Opens the stream of a flow that has entered and gives its id.
+  /// Opens the stream of a flow that has entered.
   /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS), ALREADY_EXISTS (NAME_IN_USE),
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS), UNAVAILABLE (DRAINING).
-  absl::StatusOr<std::string> Open(const StreamFlow& flow, StreamDescription description);
+  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description);
 
   /// The flow has gone, and its name with it. What it was, if it had been opened.
   std::optional<StreamSummary> Leave(const StreamFlow& flow);

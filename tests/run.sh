@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout release sanitized core-alone consumer)
+readonly all_steps=(layout release recordings sanitized core-alone consumer)
 
 usage() {
   cat <<'USAGE'
@@ -12,6 +12,7 @@ usage: tests/run.sh [--no-install] [STEP...]
 Steps, all of them by default:
   layout      every source file is laid out as .clang-format says
   release     the whole project, optimised, and all of its tests
+  recordings  the bundled recordings replayed, and the files that come out checked (after release)
   sanitized   core and sessions under AddressSanitizer and UndefinedBehaviorSanitizer
   core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
@@ -98,8 +99,12 @@ step_release() {
     run_ctest release build/release
 }
 
-# The rooms that run without gRPC in the process, built and tested one by one, so that nothing
-# else is compiled with sanitizers.
+step_recordings() {
+  check "recordings" /usr/bin/python3 tests/end_to_end/check_recordings.py \
+    --partiemc build/release/bin/partiemc
+}
+
+# Core and sessions, one room after the other, so that nothing else is compiled with sanitizers.
 step_sanitized() {
   check "sanitized: configure" cmake --preset asan -DPARTIEMC_VTK=OFF || return
   local room

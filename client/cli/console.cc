@@ -40,6 +40,8 @@ int Complain(ExitCode code, const absl::Status& status) { return Complain(code, 
 
 std::string AsFlag(const absl::Status& status) {
   std::string line = OneLine(status);
+  constexpr std::string_view kAddress = "address:";
+  if (line.starts_with(kAddress)) return "--server:" + line.substr(kAddress.size());
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
   line.replace(0, kPrefix.size(), "--");

@@ -17,7 +17,7 @@ int Complain(ExitCode code, const absl::Status& status);
 std::string OneLine(std::string_view text);
 std::string OneLine(const absl::Status& status);
 
-/// A field of ReconstructionParameters in a message becomes the flag that a person gave:
+/// A field in a message becomes the flag that a person gave, "address" becomes "--server":
 /// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...".
 std::string AsFlag(const absl::Status& status);
 

@@ -91,6 +91,7 @@ int Convert(const ConvertFlags& flags) {
     const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kInput, input.status());
   }
+  CatchInterrupts();  // Before there is a temporary file to take away.
   const auto writer = RecordingWriter::Create(
       flags.output,
       {.spacing = flags.spacing.empty() ? input->spacing : PositiveNumber(flags.spacing),
@@ -98,14 +99,15 @@ int Convert(const ConvertFlags& flags) {
       {.float64 = flags.float64, .compression_level = flags.compression_level});
   if (!writer.ok()) return Complain(kFailed, writer.status());
 
-  CatchInterrupts();
   Progress::Options progress_options = Progress::ForStandardError();
   progress_options.quiet = flags.quiet;
   progress_options.total = input->frames->FrameCount();
   Progress progress(std::move(progress_options));
   const ExitCode ended = CopyFrames(*input->frames, **writer, progress);
   progress.Finish();
-  for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
+  if (!flags.quiet) {
+    for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
+  }
   if (ended != kGood) return ended;
   if ((*writer)->frame_count() == 0) {
     return Complain(kInput, Concat(flags.input, ": has no frame to convert; look at --frames"));

@@ -116,7 +116,7 @@ int Info(const InfoFlags& flags) {
                                       std::chrono::duration<double>(flags.deadline_seconds)));
   if (!info.ok()) {
     const bool wrong_flag = info.status().code() == absl::StatusCode::kInvalidArgument;
-    return Complain(wrong_flag ? kUsage : kServer, info.status());
+    return Complain(wrong_flag ? kUsage : kServer, AsFlag(info.status()));
   }
   const std::string text =
       flags.json ? InfoJson(*info, flags.server) : InfoText(*info, flags.server);

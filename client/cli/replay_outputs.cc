@@ -30,7 +30,7 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
         flags.report, {.title = BaseName(flags.input),
                        .subtitle = flags.local ? "reconstructed in process"
                                                : "reconstructed by the server at " + flags.server,
-                       .parameters = DescribeParameters(parameters)});
+                       .parameters = DescribeParameters(Resolve(parameters))});
     if (!report.ok()) return report.status();
     outputs.report_.emplace(*std::move(report));
   }

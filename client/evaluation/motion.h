@@ -29,7 +29,7 @@ SharedMotion SimilarityMotion(std::vector<Similarity> steps);
 /// each of which keeps areas exactly.
 struct FlowStep {
   struct Shear {
-    Point along;                         ///< Unit length; points move along it.
+    Point along;                                      ///< Unit length; points move along it.
     double amplitude = 0, wavenumber = 0, phase = 0;  ///< By a sine of the position across it.
   };
   Shear shears[2];

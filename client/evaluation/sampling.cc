@@ -1,6 +1,7 @@
 #include "evaluation/sampling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -11,12 +12,12 @@ namespace partiemc::evaluation {
 namespace {
 
 constexpr double kJitter = 0.15;
-constexpr double kInset = 0.5;
 
 // Darts: 0.83 would be the most that fits on average.
 constexpr double kDartDistance = 0.75;
 constexpr int kDartAttempts = 200;  // For each dart, before the distance shrinks.
 constexpr double kDartShrink = 0.97;
+constexpr double kRaggedMargin = 2;
 
 // Centroids are those of a raster with 25 points for each particle.
 constexpr double kRasterStep = 0.2;
@@ -46,7 +47,7 @@ std::vector<Point> Raster(const Outline& region, double step, Point offset) {
     for (std::size_t i = 0; i < loop.size(); ++i) {
       const Point a = loop[i];
       const Point b = loop[(i + 1) % loop.size()];
-      const auto [bottom, top] = std::minmax(a.y, b.y);
+      const auto [bottom, top] = std::minmax({a.y, b.y});
       const double from = std::max(0.0, std::floor((bottom - first_row) / step));
       for (double row = from; row < static_cast<double>(rows); ++row) {
         const double y = first_row + row * step;
@@ -113,9 +114,7 @@ class CenterGrid {
     Point center;
     std::uint32_t index;
   };
-  int Column(Point p) const {
-    return std::clamp(static_cast<int>(p.x - low_.x), 0, columns_ - 1);
-  }
+  int Column(Point p) const { return std::clamp(static_cast<int>(p.x - low_.x), 0, columns_ - 1); }
   int Row(Point p) const { return std::clamp(static_cast<int>(p.y - low_.y), 0, rows_ - 1); }
 
   Point low_;
@@ -138,6 +137,22 @@ Point PushInside(const SegmentIndex& boundary, Point p) {
   return p;
 }
 
+// A piece cut out of darts in a larger box: thrown into the region itself they would crowd along
+// its boundary, where nothing on the other side keeps them away.
+std::vector<Point> RaggedCenters(const Outline& region, const SegmentIndex& boundary,
+                                 Random& random) {
+  const Box box = BoxOf(region);
+  const Point low = box.low - Point{kRaggedMargin, kRaggedMargin};
+  const Point high = box.high + Point{kRaggedMargin, kRaggedMargin};
+  Outline around;
+  around.AddLoop(std::array{low, Point{high.x, low.y}, high, Point{low.x, high.y}});
+  const auto count = static_cast<std::size_t>(std::lround(SignedArea(around)));
+  std::vector<Point> centers =
+      ThrowDarts(around, SegmentIndex(around, kRaggedMargin), 0, {}, count, random);
+  std::erase_if(centers, [&](Point p) { return !boundary.Contains(p); });
+  return centers;
+}
+
 }  // namespace
 
 std::string_view Name(Sampling sampling) {
@@ -154,7 +169,7 @@ std::string_view Name(Sampling sampling) {
   return "";
 }
 
-std::vector<Point> ThrowDarts(const Outline& region, const SegmentIndex& boundary,
+std::vector<Point> ThrowDarts(const Outline& region, const SegmentIndex& boundary, double inset,
                               const std::vector<Point>& others, std::size_t count, Random& random) {
   const Box box = BoxOf(region);
   CenterGrid grid(box);
@@ -169,7 +184,7 @@ std::vector<Point> ThrowDarts(const Outline& region, const SegmentIndex& boundar
     const double x = random.Uniform(box.low.x, box.high.x);
     const Point p = {x, random.Uniform(box.low.y, box.high.y)};
     if (grid.Nearest(p, 1).first < distance * distance) continue;
-    if (boundary.SignedDistance(p) < kInset) {
+    if (boundary.SignedDistance(p) < inset) {
       --attempt;  // Says nothing about how full the region is.
       continue;
     }
@@ -182,8 +197,7 @@ std::vector<Point> ThrowDarts(const Outline& region, const SegmentIndex& boundar
 
 void Relax(const Outline& region, const SegmentIndex& boundary, int rounds,
            std::vector<Point>& centers) {
-  const std::vector<Point> raster =
-      Raster(region, kRasterStep, {kRasterStep / 2, kRasterStep / 2});
+  const std::vector<Point> raster = Raster(region, kRasterStep, {kRasterStep / 2, kRasterStep / 2});
   CenterGrid grid(BoxOf(region));
   std::vector<Point> sums(centers.size());
   std::vector<double> counts(centers.size());
@@ -225,9 +239,10 @@ std::vector<Point> Sample(const Outline& region, Sampling sampling, bool on_latt
     return centers;
   }
   const SegmentIndex boundary(region, kInset);
+  if (sampling == Sampling::kRagged) return RaggedCenters(region, boundary, random);
   const auto count = static_cast<std::size_t>(std::lround(SignedArea(region)));
-  std::vector<Point> centers = ThrowDarts(region, boundary, {}, count, random);
-  if (sampling == Sampling::kRelaxed) Relax(region, boundary, kRelaxationRounds, centers);
+  std::vector<Point> centers = ThrowDarts(region, boundary, kInset, {}, count, random);
+  Relax(region, boundary, kRelaxationRounds, centers);
   return centers;
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,9 +29,9 @@ struct SceneRecipe {
   Pace pace = Pace::kSteady;
   std::size_t particles = 1000;  ///< About as many; `growth` starts with as many.
   std::size_t frames = 8;
-  double noise = 0;         ///< Standard deviation along each axis, in spacings.
-  double kept_share = 1;    ///< Share of the particles that is left.
-  bool reversed = false;    ///< `topology`: bodies part instead of merging.
+  double noise = 0;       ///< Standard deviation along each axis, in spacings.
+  double kept_share = 1;  ///< Share of the particles that is left.
+  bool reversed = false;  ///< `topology`: bodies part instead of merging.
 };
 
 /// Makes a scene. Everything in it, the world's unit and origin included, follows from the recipe.
@@ -43,7 +42,7 @@ Sequence MakeScene(const SceneRecipe& recipe);
 ///   "tuning"      63 sequences of 8 frames, TuningShapes(); methods are chosen by these;
 ///   "validation"  64 sequences, ValidationShapes(), other seeds: never used for choosing;
 ///   "smoke"       one small sequence a group, from the tuning shapes.
-/// Nothing for any other name.
-std::optional<std::vector<SceneRecipe>> Set(std::string_view name);
+/// Empty for any other name.
+std::vector<SceneRecipe> Set(std::string_view name);
 
 }  // namespace partiemc::evaluation

@@ -47,8 +47,8 @@ SegmentIndex::SegmentIndex(const Outline& outline, double cell) {
   for (const bool fill : {false, true}) {
     for (std::size_t k = segments_.size(); k-- > 0;) {
       const auto& [a, b, next] = segments_[k];
-      const auto [left, right] = std::minmax(ColumnOf(a.x), ColumnOf(b.x));
-      const auto [bottom, top] = std::minmax(RowOf(a.y), RowOf(b.y));
+      const auto [left, right] = std::minmax({ColumnOf(a.x), ColumnOf(b.x)});
+      const auto [bottom, top] = std::minmax({RowOf(a.y), RowOf(b.y)});
       for (int row = bottom; row <= top; ++row) {
         for (int column = left; column <= right; ++column) {
           std::uint32_t& start = starts_[static_cast<std::size_t>(row) * columns_ + column];
@@ -115,8 +115,7 @@ SegmentIndex::Nearest SegmentIndex::Find(Point p) const {
   for (int ring = 0; ring <= last_ring; ++ring) {
     if (ring > 0) {
       const double reach = to_side + (ring - 1) * cell_;
-      const double bound =
-          std::max({reach * reach, outside_x * outside_x + outside_y * outside_y});
+      const double bound = std::max({reach * reach, outside_x * outside_x + outside_y * outside_y});
       if (square <= bound) break;
     }
     const int left = std::max(0, column - ring);
@@ -146,8 +145,8 @@ bool SegmentIndex::Contains(Point p) const {
       const auto& [a, b, next] = segments_[k];
       if ((a.y > p.y) == (b.y > p.y)) continue;
       // Rounding must not move the crossing into a cell that does not know the segment.
-      const double x = std::clamp(a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x),
-                                  std::min(a.x, b.x), std::max(a.x, b.x));
+      const double x = std::clamp(a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x), std::min(a.x, b.x),
+                                  std::max(a.x, b.x));
       if (x > p.x && ColumnOf(x) == column) inside = !inside;
     }
   }

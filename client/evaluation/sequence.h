@@ -29,18 +29,18 @@ std::string_view Name(Group group);
 
 struct SequenceFrame {
   double time = 0;
-  std::vector<double> positions;    ///< x, y per particle, world units.
-  std::vector<float> volumes;       ///< Area per particle: in scenes exact area / particles.
-  std::vector<std::uint64_t> ids;   ///< Stable identities; empty where there are none.
-  std::vector<double> velocities;   ///< x, y per particle; empty where there are none.
-  Outline truth;                    ///< The true boundary; empty in recordings.
-  double area = 0;                  ///< Of the true region; in recordings the sum of volumes, or 0.
+  std::vector<double> positions;   ///< x, y per particle, world units.
+  std::vector<float> volumes;      ///< Area per particle: in scenes exact area / particles.
+  std::vector<std::uint64_t> ids;  ///< Stable identities; empty where there are none.
+  std::vector<double> velocities;  ///< x, y per particle; empty where there are none.
+  Outline truth;                   ///< The true boundary; empty in recordings.
+  double area = 0;                 ///< Of the true region; in recordings the sum of volumes, or 0.
 
   std::size_t ParticleCount() const { return positions.size() / 2; }
 };
 
 struct Sequence {
-  std::string name;   ///< Unique within a set.
+  std::string name;  ///< Unique within a set.
   Group group = Group::kRigid;
   std::string shape;
   std::string detail;  ///< Sampling, noise, fraction, ... for people.

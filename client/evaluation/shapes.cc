@@ -124,8 +124,7 @@ Outline Horseshoe(double area) {
   constexpr double kHalf = 0.25;
   constexpr double kFrom = kPi / 4;
   constexpr double kTo = 7 * kPi / 4;
-  const double radius =
-      std::sqrt(area / (2 * kHalf * (kTo - kFrom) + kPi * kHalf * kHalf));
+  const double radius = std::sqrt(area / (2 * kHalf * (kTo - kFrom) + kPi * kHalf * kHalf));
   const auto end = [&](double angle) {
     const Direction d = DirectionOf(angle);
     return Point{radius * d.cosine, radius * d.sine};
@@ -166,8 +165,7 @@ Outline TwoDiscs(double area) {
 
 Outline TwoEllipses(double area) {
   const double size = std::sqrt(area / (kPi * (0.6 + 0.5 * 0.8)));
-  Outline outline =
-      Single(EllipseLoop({0, -0.6 * size - kEllipseGap / 2}, size, 0.6 * size, 0));
+  Outline outline = Single(EllipseLoop({0, -0.6 * size - kEllipseGap / 2}, size, 0.6 * size, 0));
   outline.AddLoop(EllipseLoop({0, 0.5 * size + kEllipseGap / 2}, 0.8 * size, 0.5 * size, 0));
   return outline;
 }
@@ -222,8 +220,18 @@ Outline SparseShape(std::string_view shape, double area) {
   }
   if (shape == "rectangle") return Box(std::sqrt(area / 2), area);
   if (shape == "cross") {
-    return Blocks({{{1, 0}, {2, 0}, {2, 1}, {3, 1}, {3, 2}, {2, 2}, {2, 3}, {1, 3}, {1, 2},
-                    {0, 2}, {0, 1}, {1, 1}}},
+    return Blocks({{{1, 0},
+                    {2, 0},
+                    {2, 1},
+                    {3, 1},
+                    {3, 2},
+                    {2, 2},
+                    {2, 3},
+                    {1, 3},
+                    {1, 2},
+                    {0, 2},
+                    {0, 1},
+                    {1, 1}}},
                   area);
   }
   if (shape == "triangle") return Triangle(area);
@@ -232,8 +240,18 @@ Outline SparseShape(std::string_view shape, double area) {
   if (shape == "frame") return Blocks({BoxLoop(0, 0, 5, 5), Reversed(BoxLoop(2, 1, 4, 3))}, area);
   if (shape == "lens") return Lens(area);
   if (shape == "comb") {
-    return Blocks({{{0, 0}, {5, 0}, {5, 4}, {4, 4}, {4, 1}, {3, 1}, {3, 4}, {2, 4}, {2, 1}, {1, 1},
-                    {1, 4}, {0, 4}}},
+    return Blocks({{{0, 0},
+                    {5, 0},
+                    {5, 4},
+                    {4, 4},
+                    {4, 1},
+                    {3, 1},
+                    {3, 4},
+                    {2, 4},
+                    {2, 1},
+                    {1, 1},
+                    {1, 4},
+                    {0, 4}}},
                   area);
   }
   if (shape == "two-ellipses") return TwoEllipses(area);

@@ -2,6 +2,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "library/channel.h"
@@ -10,6 +11,9 @@
 
 namespace partiemc::client {
 namespace {
+
+// As for a stream: enough for a server that starts at the same time.
+constexpr std::chrono::milliseconds kConnectTimeout(2000);
 
 ServerInfo Decode(const v1::GetServerInfoResponse& message) {
   ServerInfo info{.version = message.version(),
@@ -49,7 +53,7 @@ absl::StatusOr<ServerInfo> GetServerInfo(std::string_view address_text,
   const auto until = std::chrono::system_clock::now() + deadline;
   const auto channel = MakeChannel(address);
   if (!channel.ok()) return channel.status();
-  const absl::Status connected = Connect(*channel, address, deadline);
+  const absl::Status connected = Connect(*channel, address, std::min(deadline, kConnectTimeout));
   if (!connected.ok()) return connected;
 
   grpc::ClientContext context;

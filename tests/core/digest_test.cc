@@ -36,10 +36,8 @@ std::uint64_t Fold(const std::vector<std::uint64_t>& words) {
 
 TEST(Digest, IsTheOneOfTheProtocol) {
   constexpr std::uint64_t kOne = 0x3ff0000000000000u;  // 1.0
-  EXPECT_EQ(DigestRings(Triangle()),
-            Fold({6, 0, 0, kOne, 0, 0, kOne, 2, 0, 3, 1, 0xffffffffu}));
-  EXPECT_EQ(DigestMesh(OneTriangle()),
-            Fold({6, 0, 0, kOne, 0, 0, kOne, 3, 0, 1, 2, 1, 0}));
+  EXPECT_EQ(DigestRings(Triangle()), Fold({6, 0, 0, kOne, 0, 0, kOne, 2, 0, 3, 1, 0xffffffffu}));
+  EXPECT_EQ(DigestMesh(OneTriangle()), Fold({6, 0, 0, kOne, 0, 0, kOne, 3, 0, 1, 2, 1, 0}));
   EXPECT_EQ(DigestRings(Rings{}), Fold({0, 1, 0, 0}));
   EXPECT_EQ(DigestMesh(Mesh{}), Fold({0, 0, 0}));
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "calibration.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/status.h"
@@ -49,17 +50,24 @@ TEST(Parameters, EachThatBreaksItsRuleIsNamedWithTheRule) {
     const absl::Status status = Validate(bad.parameters);
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << bad.field;
     ASSERT_TRUE(FindViolation(status).has_value());
-    EXPECT_EQ(FindViolation(status)->field, "parameters." + bad.field);
+    EXPECT_EQ(FindViolation(status)->field, absl::StrCat("parameters.", bad.field));
     EXPECT_EQ(FindViolation(status)->reason, kReasonOutOfRange);
     EXPECT_FALSE(Reconstructor::Create(bad.parameters).ok());
   }
 }
 
 TEST(Parameters, AtTheEndsOfTheirRangesAreAccepted) {
-  for (const ReconstructionParameters& good :
-       {ReconstructionParameters{}, {.spacing = 1e-60}, {.spacing = 1e60}, {.kernel_radius = 1.5},
-        {.kernel_radius = 8}, {.cell_size = 0.25}, {.cell_size = 4}, {.reference_radius = 1e-3},
-        {.reference_radius = 2.999}, {.surface_offset = -1}, {.surface_offset = 1}}) {
+  for (const ReconstructionParameters& good : {ReconstructionParameters{},
+                                               {.spacing = 1e-60},
+                                               {.spacing = 1e60},
+                                               {.kernel_radius = 1.5},
+                                               {.kernel_radius = 8},
+                                               {.cell_size = 0.25},
+                                               {.cell_size = 4},
+                                               {.reference_radius = 1e-3},
+                                               {.reference_radius = 2.999},
+                                               {.surface_offset = -1},
+                                               {.surface_offset = 1}}) {
     EXPECT_TRUE(Validate(good).ok()) << Validate(good);
     EXPECT_TRUE(Reconstructor::Create(good).ok());
   }

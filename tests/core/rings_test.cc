@@ -227,7 +227,7 @@ TEST(Rings, AComponentWithoutAParticleIsDroppedWithItsHoles) {
 TEST(Rings, AnIslandInADroppedHoleGoesWithItAndItsParticlesCountForTheBody) {
   // A single inside node in the middle of a small hole.
   const auto island = [](int x, int y) {
-    return x == 32 && y == 32 ? -1.0 : Holed{32, 32, 1.3}(x, y);
+    return x == 32 && y == 32 ? -1.0 : Holed{32, 32, 1.36}(x, y);
   };
   const Particles particles = At({{24, 32}, {32, 32}});
   Stages unclean;

@@ -16,7 +16,8 @@ State ExampleState() {
   State state;
   state.cell_size = 0.1;
   state.spacing = 0.09;
-  state.normals = {{-5, -7, 0.6f, 0.8f}, {3, -7, 1, 0}, {-100, 2, 0, -1}, {1 << 30, 2, -0.8f, 0.6f}};
+  state.normals = {
+      {-5, -7, 0.6f, 0.8f}, {3, -7, 1, 0}, {-100, 2, 0, -1}, {1 << 30, 2, -0.8f, 0.6f}};
   return state;
 }
 
@@ -138,9 +139,7 @@ TEST_P(RestoredState, BetweenAnyTwoFramesGivesTheDigestsOfAnUnbrokenStream) {
     states.push_back(Serialize(unbroken));
     Result& result = results.emplace_back();
     const support::Particles body = support::MovingBody(k);
-    ASSERT_TRUE(reconstructor
-                    ->Reconstruct(body.AsFrame(), unbroken, workspace, result)
-                    .ok());
+    ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), unbroken, workspace, result).ok());
   }
   for (int restart = 0; restart < kFrames; ++restart) {
     auto state = ParseState(states[static_cast<std::size_t>(restart)]);

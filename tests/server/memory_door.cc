@@ -25,7 +25,9 @@ MemoryDoor::~MemoryDoor() {
   writer_.join();
 }
 
-void MemoryDoor::Open() { SendRequest({.kind = RequestKind::kOpen, .sequence = 0, .positions = {}}); }
+void MemoryDoor::Open() {
+  SendRequest({.kind = RequestKind::kOpen, .sequence = 0, .positions = {}});
+}
 
 void MemoryDoor::Send(std::uint64_t sequence, std::vector<double> positions) {
   SendRequest({RequestKind::kFrame, sequence, std::move(positions)});
@@ -87,7 +89,8 @@ void MemoryDoor::StartRead(std::size_t slot) {
 
 void MemoryDoor::StartWrite(Outgoing what, std::size_t slot) {
   const std::lock_guard lock(mutex_);
-  if (being_written_ || finished_) throw std::logic_error("two writes at once, or one after the end");
+  if (being_written_ || finished_)
+    throw std::logic_error("two writes at once, or one after the end");
   being_written_ = what == Outgoing::kAnswer
                        ? answers_[slot]
                        : MemoryAnswer{.what = what, .sequence = 0, .reason = {}, .digests = {}};
@@ -129,8 +132,7 @@ void MemoryDoor::ReadLoop() {
     {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [this] {
-        return finished_ ||
-               (read_slot_ && (cancelled_ || half_closed_ || !sent_.empty()));
+        return finished_ || (read_slot_ && (cancelled_ || half_closed_ || !sent_.empty()));
       });
       if (finished_) return;
       if (!cancelled_ && !sent_.empty()) {
@@ -157,9 +159,8 @@ void MemoryDoor::WriteLoop() {
     {
       std::unique_lock lock(mutex_);
       // A client that has not received the answer before keeps this one waiting.
-      changed_.wait(lock, [this] {
-        return finished_ || (being_written_ && (cancelled_ || !to_receive_));
-      });
+      changed_.wait(
+          lock, [this] { return finished_ || (being_written_ && (cancelled_ || !to_receive_)); });
       if (finished_) return;
       written = !cancelled_;
       if (written) to_receive_ = std::move(being_written_);

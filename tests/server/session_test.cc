@@ -2,6 +2,7 @@
 #include "server/session.h"
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
 
 #include <limits>
 #include <new>
@@ -17,6 +18,10 @@ namespace partiemc::server {
 namespace {
 
 constexpr unsigned kSeed = 20;
+
+// Sessions know no threads, so their tests need none; stream_flow_test has those of the pool.
+const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_allowed_parallelism,
+                                             1);
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 
 using Digests = std::pair<std::uint64_t, std::uint64_t>;
@@ -166,9 +171,9 @@ TEST(Session, MemoryThatRunsOutIsAnErrorOfTheFrameAndTheStreamGoesOn) {
   stream.Good(0);
   undisturbed.Good(0);
   const std::vector<double> positions = MovingBlob(kSeed, 9);
-  const auto status = stream.session().Answer(
-      2, FrameOf(positions), stream.worker(),
-      [](auto&, auto&) -> absl::Status { throw std::bad_alloc(); });
+  const auto status =
+      stream.session().Answer(2, FrameOf(positions), stream.worker(),
+                              [](auto&, auto&) -> absl::Status { throw std::bad_alloc(); });
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(ReasonOf(status), kReasonOutOfMemory);
   EXPECT_EQ(stream.Good(1), undisturbed.Good(1));

@@ -30,7 +30,8 @@ FieldOracle::FieldOracle(const Particles& particles, const ReconstructionParamet
 }
 
 double FieldOracle::Kernel(std::size_t particle, Vector at) const {
-  const double s = std::hypot(particles_.x(particle) - at.x, particles_.y(particle) - at.y) / radius_;
+  const double s =
+      std::hypot(particles_.x(particle) - at.x, particles_.y(particle) - at.y) / radius_;
   return std::max(0.0, std::pow(1 - s * s, 3));
 }
 

@@ -24,14 +24,14 @@ class FieldOracle {
   FieldOracle(const Particles& particles, const ReconstructionParameters& parameters,
               double spacing);
 
-  double KernelSum(Vector at) const;             ///< sum k
-  double Density(Vector at) const;               ///< f, Eq. 1
-  std::optional<Vector> Mean(Vector at) const;   ///< xbar, Eq. 3-4; nothing without support.
-  double Phi(Vector at) const;                   ///< Eq. 5; R - r without support.
-  double Guard(Vector at) const;                 ///< (g - f) R / 1.164
-  double Value(Vector at) const;                 ///< F = max(phi, guard)
-  Vector PhiGradient(Vector at) const;           ///< By central differences.
-  Vector ValueGradient(Vector at) const;         ///< By central differences.
+  double KernelSum(Vector at) const;            ///< sum k
+  double Density(Vector at) const;              ///< f, Eq. 1
+  std::optional<Vector> Mean(Vector at) const;  ///< xbar, Eq. 3-4; nothing without support.
+  double Phi(Vector at) const;                  ///< Eq. 5; R - r without support.
+  double Guard(Vector at) const;                ///< (g - f) R / 1.164
+  double Value(Vector at) const;                ///< F = max(phi, guard)
+  Vector PhiGradient(Vector at) const;          ///< By central differences.
+  Vector ValueGradient(Vector at) const;        ///< By central differences.
   double kernel_radius() const { return radius_; }
 
  private:

@@ -20,7 +20,8 @@ void ForEachNode(double radius, Visit visit) {
 Particles AnyShape(Random& random) {
   switch (random.Below(7)) {
     case 0:
-      return Lattice(1 + static_cast<int>(random.Below(20)), 1 + static_cast<int>(random.Below(20)));
+      return Lattice(1 + static_cast<int>(random.Below(20)),
+                     1 + static_cast<int>(random.Below(20)));
     case 1:
       return Blob(random, random.Uniform(4, 11));
     case 2:

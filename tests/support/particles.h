@@ -22,9 +22,7 @@ struct Particles {
     xy.push_back(px);
     xy.push_back(py);
   }
-  void Add(const Particles& others) {
-    xy.insert(xy.end(), others.xy.begin(), others.xy.end());
-  }
+  void Add(const Particles& others) { xy.insert(xy.end(), others.xy.begin(), others.xy.end()); }
   /// A view; valid as long as this object is and does not change.
   Frame AsFrame() const;
 };

@@ -67,9 +67,8 @@ void Stages::RunFromCrossings(std::span<const CellNormal> previous) {
   EstimateNormals(bins, level_set, crossings, topology, field, parameters, previous, planes,
                   next_normals);
   const Frame frame = particles.AsFrame();
-  PlaceVertices(
-      {frame, bins, level_set, crossings, topology, field, planes, parameters, scale}, placed,
-      result.rings);
+  PlaceVertices({frame, bins, level_set, crossings, topology, field, planes, parameters, scale},
+                placed, result.rings);
   const absl::Status status =
       BuildMesh({bins.tiles, crossings, topology, planes, placed, result.rings, parameters, scale},
                 mesh_scratch, result.mesh, result.statistics);
@@ -78,8 +77,7 @@ void Stages::RunFromCrossings(std::span<const CellNormal> previous) {
 
 std::array<double, 4> Stages::CornerValues(const ActiveCell& cell) const {
   const auto at = [&](int di, int dj) {
-    return static_cast<double>(
-        level_set.At(bins.tiles, cell.tile, cell.i + di, cell.j + dj));
+    return static_cast<double>(level_set.At(bins.tiles, cell.tile, cell.i + di, cell.j + dj));
   };
   return {at(0, 0), at(1, 0), at(1, 1), at(0, 1)};
 }

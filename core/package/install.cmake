@@ -21,7 +21,7 @@ if(PARTIEMC_SERVICE)
   install(EXPORT partiemcClient NAMESPACE partiemc:: DESTINATION ${package_dir})
 endif()
 
-configure_package_config_file(cmake/partiemcConfig.cmake.in partiemcConfig.cmake
+configure_package_config_file(core/package/partiemcConfig.cmake.in partiemcConfig.cmake
   INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(partiemcConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/partiemcConfig.cmake

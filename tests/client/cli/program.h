@@ -1,0 +1,76 @@
+// The programs as a shell would run them.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace partiemc::client {
+
+/// A directory that is gone with the object.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory();
+  ~TemporaryDirectory();
+  std::string Path(const std::string& name) const { return (path_ / name).string(); }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A program under way. Its output goes to files, so that it never waits for a reader.
+class Program {
+ public:
+  Program(const std::string& program, const std::vector<std::string>& arguments);
+  /// Kills it if it still runs.
+  ~Program();
+
+  void Signal(int signal) const;
+  bool Running();
+  /// Waits for its end, at most a minute. 128 + N for a signal N, -1 if it did not end in time.
+  int Wait();
+
+  std::string Out() const;
+  std::string Error() const;
+
+ private:
+  TemporaryDirectory directory_;
+  pid_t id_ = -1;
+  int exit_code_ = -1;
+  bool ended_ = false;
+};
+
+struct Ran {
+  int exit_code;
+  std::string out, error;
+};
+
+/// `partiemc` with these arguments, until it ends.
+Ran RunPartiemc(const std::vector<std::string>& arguments);
+
+/// The real server on a port that the system chose.
+class ServerProgram {
+ public:
+  ServerProgram();
+  ~ServerProgram();
+  const std::string& address() const { return address_; }
+  void Signal(int signal) const { program_.Signal(signal); }
+
+ private:
+  TemporaryDirectory directory_;
+  Program program_;
+  std::string address_;
+};
+
+/// The names of all files below a directory, hidden ones too, in their order.
+std::vector<std::string> FilesIn(const std::filesystem::path& directory);
+
+std::string Content(const std::string& path);
+
+/// The bundled recording.
+inline const std::string kDamBreak = PARTIEMC_SOURCE_DIR "/client/recordings/dam_break.pemc";
+
+}  // namespace partiemc::client

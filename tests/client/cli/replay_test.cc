@@ -1,0 +1,222 @@
+// `partiemc replay` and `partiemc info`, as a person runs them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <thread>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+// One column of a statistics file.
+std::vector<std::string> Column(const std::string& csv, const std::string& name) {
+  std::istringstream lines(csv);
+  std::vector<std::string> values;
+  std::optional<std::size_t> wanted;
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<std::string> cells;
+    std::istringstream cells_of_line(line);
+    for (std::string cell; std::getline(cells_of_line, cell, ',');) cells.push_back(cell);
+    if (wanted) {
+      values.push_back(cells.at(*wanted));
+    } else {
+      wanted = static_cast<std::size_t>(std::ranges::find(cells, name) - cells.begin());
+    }
+  }
+  return values;
+}
+
+// Three small frames; the second one holds what no frame may hold.
+void WriteFrames(const TemporaryDirectory& directory) {
+  for (int k = 0; k < 3; ++k) {
+    std::ofstream file(directory.Path("frame_" + std::to_string(k) + ".csv"));
+    file << "x,y\n";
+    for (int row = 0; row < 6; ++row) {
+      for (int column = 0; column < 6; ++column) file << column << "," << row << "\n";
+    }
+    if (k == 1) file << "nan,1\n";
+  }
+}
+
+TEST(Replay, InProcessWritesEveryOutputAndATable) {
+  const TemporaryDirectory directory;
+  const Ran ran =
+      RunPartiemc({"replay", kDamBreak, "--local", "--frames", "10:13", "--check", "--output-dir",
+                   directory.Path("frames"), "--format", "geojson,svg,obj,csv", "--stats",
+                   directory.Path("stats.csv"), "--report", directory.Path("report.html")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("3 frames"), HasSubstr("whole frame")));
+  std::vector<std::string> expected;
+  for (const char* frame : {"000010", "000011", "000012"}) {
+    for (const char* extension : {"csv", "geojson", "obj", "svg"}) {
+      expected.push_back(std::string("frames/frame_") + frame + "." + extension);
+    }
+  }
+  expected.insert(expected.end(), {"report.html", "stats.csv"});
+  EXPECT_EQ(FilesIn(directory.path()), expected);
+  EXPECT_THAT(Column(Content(directory.Path("stats.csv")), "frame"), ElementsAre("10", "11", "12"));
+}
+
+TEST(Replay, UsesTheSpacingThatTheRecordingKnowsUnlessToldOtherwise) {
+  const TemporaryDirectory directory;
+  const auto area = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {
+        "replay",   kDamBreak, "--local", "--quiet",
+        "--frames", "0",       "--stats", directory.Path("stats.csv")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(RunPartiemc(arguments).exit_code, 0);
+    return Column(Content(directory.Path("stats.csv")), "area").at(0);
+  };
+  const std::string recorded = area({});
+  EXPECT_EQ(recorded, area({"--spacing", "0.0303"}));
+  EXPECT_NE(recorded, area({"--spacing", "0.06"}));
+  EXPECT_NEAR(std::stod(recorded), 2278 * 0.0303 * 0.0303, 0.003 * 2.0914);
+}
+
+TEST(Replay, ThroughAServerGivesTheBitsOfInProcess) {
+  const ServerProgram server;
+  ASSERT_THAT(server.address(), Not(IsEmpty()));
+  const TemporaryDirectory directory;
+  for (const char* placement : {"marching-squares", "farthest-particle", "virtual-plane"}) {
+    const Ran remote =
+        RunPartiemc({"replay", kDamBreak, "--server", server.address(), "--quiet", "--placement",
+                     placement, "--stats", directory.Path("remote.csv")});
+    EXPECT_EQ(remote.exit_code, 0) << remote.error;
+    for (const char* threads : {"1", "3"}) {
+      const Ran local =
+          RunPartiemc({"replay", kDamBreak, "--local", "--threads", threads, "--quiet",
+                       "--placement", placement, "--stats", directory.Path("local.csv")});
+      EXPECT_EQ(local.exit_code, 0) << local.error;
+      for (const char* column : {"area", "rings_digest", "mesh_digest"}) {
+        const auto values = Column(Content(directory.Path("remote.csv")), column);
+        EXPECT_THAT(values, SizeIs(75));
+        EXPECT_EQ(values, Column(Content(directory.Path("local.csv")), column));
+      }
+    }
+  }
+}
+
+TEST(Replay, AFrameThatIsRefusedIsToldAndTheOthersGoOn) {
+  const TemporaryDirectory input, output;
+  WriteFrames(input);
+  const ServerProgram server;
+  for (const std::vector<std::string>& where :
+       {std::vector<std::string>{"--local"}, {"--server", server.address()}}) {
+    std::vector<std::string> arguments = {"replay",  input.path().string(),   "--spacing", "1",
+                                          "--stats", output.Path("stats.csv")};
+    arguments.insert(arguments.end(), where.begin(), where.end());
+    const Ran ran = RunPartiemc(arguments);
+    EXPECT_EQ(ran.exit_code, 3);
+    EXPECT_THAT(ran.error, AllOf(HasSubstr("frame_1.csv"), HasSubstr("refused"), HasSubstr("nan")));
+    EXPECT_THAT(Column(Content(output.Path("stats.csv")), "frame"), ElementsAre("0", "2"));
+    arguments.push_back("--keep-going");
+    EXPECT_EQ(RunPartiemc(arguments).exit_code, 0);
+  }
+}
+
+TEST(Replay, QuietSaysNothing) {
+  const Ran ran = RunPartiemc({"replay", kDamBreak, "--local", "--quiet", "--frames", "0:5"});
+  EXPECT_EQ(ran.exit_code, 0);
+  EXPECT_THAT(ran.out, IsEmpty());
+  EXPECT_THAT(ran.error, IsEmpty());
+}
+
+TEST(Replay, ARecordingThatWasCutOffIsReplayedAsFarAsItGoes) {
+  const TemporaryDirectory directory;
+  const std::string whole = Content(kDamBreak);
+  std::ofstream(directory.Path("cut.pemc"), std::ios::binary) << whole.substr(0, whole.size() / 2);
+  const Ran ran = RunPartiemc({"replay", directory.Path("cut.pemc"), "--local"});
+  EXPECT_EQ(ran.exit_code, 0);
+  EXPECT_THAT(ran.error, HasSubstr("truncated after"));
+}
+
+TEST(Replay, ADamagedRecordingIsExitCodeThreeAndLeavesNoStatisticsTakenForWhole) {
+  const TemporaryDirectory directory;
+  std::string bytes = Content(kDamBreak);
+  bytes[bytes.size() / 2] = static_cast<char>(~bytes[bytes.size() / 2]);
+  std::ofstream(directory.Path("damaged.pemc"), std::ios::binary) << bytes;
+  const Ran ran = RunPartiemc({"replay", directory.Path("damaged.pemc"), "--local", "--quiet",
+                               "--stats", directory.Path("stats.csv")});
+  EXPECT_EQ(ran.exit_code, 3);
+  EXPECT_THAT(ran.error, HasSubstr("damaged after"));
+  EXPECT_EQ(std::ranges::count(ran.error, '\n'), 1) << ran.error;
+  EXPECT_THAT(FilesIn(directory.path()), ElementsAre("damaged.pemc"));
+}
+
+TEST(Replay, ARangeWithoutFramesIsExitCodeThree) {
+  const Ran ran = RunPartiemc({"replay", kDamBreak, "--local", "--frames", "200:300"});
+  EXPECT_EQ(ran.exit_code, 3);
+  EXPECT_THAT(ran.error, HasSubstr("no frame"));
+}
+
+TEST(Replay, APlaceThatCannotBeWrittenIsKnownBeforeTheWork) {
+  const Ran ran = RunPartiemc(
+      {"replay", kDamBreak, "--local", "--report", "/nonexistent/directory/report.html"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.error, HasSubstr("/nonexistent/directory/report.html"));
+}
+
+TEST(Replay, CtrlCEndsItWithWholeFramesAndNothingHalfWritten) {
+  const TemporaryDirectory directory;
+  Program replay(
+      PARTIEMC_PROGRAM,
+      {"replay", kDamBreak, "--local", "--rate", "50", "--output-dir", directory.Path("frames"),
+       "--stats", directory.Path("stats.csv"), "--report", directory.Path("report.html")});
+  const std::string second = directory.Path("frames/frame_000001.geojson");
+  while (replay.Running() && !std::filesystem::exists(second)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  replay.Signal(SIGINT);
+  EXPECT_EQ(replay.Wait(), 130);
+  EXPECT_THAT(replay.Error(), HasSubstr("interrupted after"));
+  for (const std::string& file : FilesIn(directory.path())) {
+    EXPECT_THAT(file, ::testing::MatchesRegex("frames/frame_0000[0-9][0-9]\\.geojson"));
+    EXPECT_TRUE(Content(directory.Path(file)).ends_with("}\n")) << file;
+  }
+}
+
+TEST(Replay, AServerThatDiesIsExitCodeFourInOneLine) {
+  const ServerProgram server;
+  const TemporaryDirectory directory;
+  Program replay(PARTIEMC_PROGRAM, {"replay", kDamBreak, "--server", server.address(), "--rate",
+                                    "50", "--quiet", "--output-dir", directory.Path("frames"),
+                                    "--stats", directory.Path("stats.csv")});
+  const std::string second = directory.Path("frames/frame_000001.geojson");
+  while (replay.Running() && !std::filesystem::exists(second)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  server.Signal(SIGKILL);
+  EXPECT_EQ(replay.Wait(), 4);
+  const std::string error = replay.Error();
+  EXPECT_EQ(std::ranges::count(error, '\n'), 1) << error;
+  EXPECT_THAT(error, HasSubstr(server.address()));
+  EXPECT_FALSE(std::filesystem::exists(directory.Path("stats.csv")));
+}
+
+TEST(Info, TellsVersionAndLimitsForPeopleAndPrograms) {
+  const ServerProgram server;
+  const Ran text = RunPartiemc({"info", "--server", server.address()});
+  EXPECT_EQ(text.exit_code, 0) << text.error;
+  EXPECT_THAT(text.out, AllOf(HasSubstr("version"), HasSubstr("virtual-plane")));
+  const Ran json = RunPartiemc({"info", "--server", server.address(), "--json"});
+  EXPECT_EQ(json.exit_code, 0) << json.error;
+  EXPECT_THAT(json.out,
+              AllOf(HasSubstr("\"max_particles_per_frame\":"), HasSubstr("\"placements\":[")));
+  EXPECT_EQ(std::ranges::count(json.out, '\n'), 1);
+}
+
+}  // namespace
+}  // namespace partiemc::client

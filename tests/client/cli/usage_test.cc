@@ -1,0 +1,100 @@
+// A wrong word on the command line: one line, exit code 2, nothing done.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+void ExpectOneLine(const Ran& ran) {
+  EXPECT_THAT(ran.error, StartsWith("partiemc: "));
+  EXPECT_EQ(std::ranges::count(ran.error, '\n'), 1) << ran.error;
+  EXPECT_TRUE(ran.error.ends_with('\n'));
+  EXPECT_THAT(ran.out, IsEmpty());
+}
+
+TEST(Usage, HelpTeachesEveryVerbByExamples) {
+  const Ran help = RunPartiemc({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  for (const char* verb : {"replay", "info", "convert"}) {
+    EXPECT_THAT(help.out, HasSubstr(verb));
+    const Ran verb_help = RunPartiemc({verb, "--help"});
+    EXPECT_EQ(verb_help.exit_code, 0);
+    EXPECT_THAT(verb_help.out, HasSubstr("Examples:"));
+  }
+}
+
+TEST(Usage, VersionIsOneLine) {
+  const Ran ran = RunPartiemc({"--version"});
+  EXPECT_EQ(ran.exit_code, 0);
+  EXPECT_THAT(ran.out, StartsWith("partiemc "));
+}
+
+TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"repaly"},
+      {"replay"},
+      {"replay", kDamBreak, "--fil", "grid"},
+      {"replay", kDamBreak, "--local", "--placement", "squares"},
+      {"replay", kDamBreak, "--local", "--fill", "greed"},
+      {"replay", kDamBreak, "--local", "--spacing", "-1"},
+      {"replay", kDamBreak, "--local", "--spacing", "first"},
+      {"replay", kDamBreak, "--local", "--kernel-radius", "99"},
+      {"replay", kDamBreak, "--local", "--kernel-radius", "wide"},
+      {"replay", kDamBreak, "--local", "--clean", "maybe"},
+      {"replay", kDamBreak, "--local", "--rate", "0"},
+      {"replay", kDamBreak, "--local", "--threads", "0"},
+      {"replay", kDamBreak, "--threads", "2"},
+      {"replay", kDamBreak, "--local", "--server", "127.0.0.1:1"},
+      {"replay", kDamBreak, "--local", "--format", "svg"},
+      {"replay", kDamBreak, "--local", "--frames", "x"},
+      {"replay", kDamBreak, "--local", "--select", "type=1"},
+      {"replay", kDamBreak, "--local", "--stats", "stats.xls"},
+      {"replay", kDamBreak, "--server", "nowhere"},
+      {"info", "--server", "nowhere"},
+      {"convert", kDamBreak},
+      {"convert", kDamBreak, "out.csv"},
+      {"convert", kDamBreak, "out.pemc", "--spacing", "0"},
+      {"convert", kDamBreak, "out.pemc", "--compression-level", "40"},
+  };
+  for (const auto& arguments : wrong) {
+    SCOPED_TRACE(::testing::PrintToString(arguments));
+    const Ran ran = RunPartiemc(arguments);
+    EXPECT_EQ(ran.exit_code, 2);
+    ExpectOneLine(ran);
+  }
+}
+
+TEST(Usage, AWrongFlagPointsToTheHelpOfItsVerb) {
+  EXPECT_THAT(RunPartiemc({"replay", kDamBreak, "--fil", "grid"}).error,
+              HasSubstr("see `partiemc replay --help`"));
+}
+
+TEST(Usage, SelectTakesOneWordSoThatTheInputMayFollow) {
+  const Ran ran = RunPartiemc({"replay", "--select", "type=1", "/nonexistent", "--local"});
+  EXPECT_EQ(ran.exit_code, 3);
+  EXPECT_THAT(ran.error, HasSubstr("/nonexistent"));
+}
+
+TEST(Usage, NoServerThereIsExitCodeFour) {
+  for (const auto& arguments : std::vector<std::vector<std::string>>{
+           {"replay", kDamBreak, "--server", "unix:/nonexistent/socket"},
+           {"info", "--server", "unix:/nonexistent/socket"}}) {
+    const Ran ran = RunPartiemc(arguments);
+    EXPECT_EQ(ran.exit_code, 4);
+    ExpectOneLine(ran);
+    EXPECT_THAT(ran.error, HasSubstr("no server at unix:/nonexistent/socket"));
+    EXPECT_THAT(ran.error, HasSubstr("start one with `partiemc-server --address"));
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::client

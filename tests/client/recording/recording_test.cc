@@ -1,0 +1,290 @@
+#include "recording/recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr unsigned kSeed = 20240229;
+
+class Recording : public ::testing::Test {
+ protected:
+  Recording() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "recording.XXXXXX").string();
+    directory_ = ::mkdtemp(pattern.data());
+  }
+  ~Recording() override { std::filesystem::remove_all(directory_); }
+
+  std::string Path(const std::string& name = "test.pemc") const {
+    return (directory_ / name).string();
+  }
+
+  std::filesystem::path directory_;
+};
+
+// Frames of different sizes, an empty one among them; every second one has no volumes.
+std::vector<RecordedFrame> RandomFrames(std::size_t count) {
+  SCOPED_TRACE(kSeed);
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<float> coordinate(-4, 4);
+  std::vector<RecordedFrame> frames(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    RecordedFrame& frame = frames[k];
+    frame.index = k;
+    frame.time = 0.1 * static_cast<double>(k);
+    const std::size_t particles = k == 3 ? 0 : 2 + random() % 5;
+    for (std::size_t p = 0; p < particles; ++p) {
+      for (int axis = 0; axis < 2; ++axis) {
+        frame.positions.push_back(coordinate(random));
+        frame.velocities.push_back(coordinate(random));
+      }
+      frame.ids.push_back((std::uint64_t{random()} << 32) + p);
+      if (k % 2 == 0) frame.volumes.push_back(0.5f + std::abs(coordinate(random)));
+    }
+  }
+  return frames;
+}
+
+void Write(const std::string& path, const std::vector<RecordedFrame>& frames,
+           const RecordingHeader& header = {}, const RecordingOptions& options = {}) {
+  const auto writer = RecordingWriter::Create(path, header, options);
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  for (const RecordedFrame& frame : frames) {
+    const absl::Status added = (*writer)->Add(frame);
+    ASSERT_TRUE(added.ok()) << added;
+  }
+  const absl::Status finished = (*writer)->Finish();
+  ASSERT_TRUE(finished.ok()) << finished;
+}
+
+struct WhatWasRead {
+  std::vector<RecordedFrame> frames;
+  absl::Status status;
+  std::vector<std::string> notices;
+};
+
+WhatWasRead Read(const std::string& path, const std::string& range = "") {
+  WhatWasRead read;
+  const auto reader = RecordingReader::Open(path, range);
+  if (!reader.ok()) {
+    read.status = reader.status();
+    return read;
+  }
+  RecordedFrame frame;
+  auto more = (*reader)->Next(frame);
+  for (; more.ok() && *more; more = (*reader)->Next(frame)) read.frames.push_back(frame);
+  read.status = more.status();
+  read.notices = (*reader)->notices();
+  return read;
+}
+
+bool SameBits(const RecordedFrame& a, const RecordedFrame& b) {
+  if (a.positions.size() != b.positions.size()) return false;
+  for (std::size_t k = 0; k < a.positions.size(); ++k) {
+    const auto a_bits = std::bit_cast<std::uint64_t>(a.positions[k]);
+    if (a_bits != std::bit_cast<std::uint64_t>(b.positions[k])) return false;
+  }
+  return a.time == b.time && a.ids == b.ids && a.volumes == b.volumes &&
+         a.velocities == b.velocities;
+}
+
+void ExpectPrefix(const std::vector<RecordedFrame>& read,
+                  const std::vector<RecordedFrame>& written) {
+  ASSERT_LE(read.size(), written.size());
+  for (std::size_t k = 0; k < read.size(); ++k) {
+    EXPECT_EQ(read[k].index, k);
+    EXPECT_TRUE(SameBits(read[k], written[k])) << "frame " << k;
+  }
+}
+
+std::string Bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void WriteBytes(const std::string& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+TEST_F(Recording, GivesBackEveryBitOfFloat32Frames) {
+  const auto frames = RandomFrames(30);
+  Write(Path(), frames, {.spacing = 0.25, .title = "a test"});
+  const auto reader = RecordingReader::Open(Path(), "");
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  EXPECT_EQ((*reader)->header().spacing, 0.25);
+  EXPECT_EQ((*reader)->header().title, "a test");
+  EXPECT_EQ((*reader)->FrameCount(), 30);
+  const WhatWasRead read = Read(Path());
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.notices, IsEmpty());
+  ASSERT_THAT(read.frames, SizeIs(30));
+  ExpectPrefix(read.frames, frames);
+  EXPECT_TRUE(read.frames[0].float32);
+}
+
+TEST_F(Recording, GivesBackEveryBitOfFloat64FramesWhenAskedTo) {
+  auto frames = RandomFrames(3);
+  frames[0].positions = {1e6 + 1e-9, 0.1, -1.0 / 3, 5e-324};
+  frames[0].ids.clear();
+  frames[0].volumes.clear();
+  frames[0].velocities.clear();
+  Write(Path(), frames, {}, {.float64 = true});
+  const WhatWasRead read = Read(Path());
+  ASSERT_THAT(read.frames, SizeIs(3));
+  ExpectPrefix(read.frames, frames);
+  EXPECT_FALSE(read.frames[0].float32);
+}
+
+TEST_F(Recording, KeepsWhatIsNotFinite) {
+  auto frames = RandomFrames(1);
+  frames[0].positions[0] = std::numeric_limits<float>::quiet_NaN();
+  frames[0].positions[1] = -std::numeric_limits<double>::infinity();
+  Write(Path(), frames);
+  const WhatWasRead read = Read(Path());
+  ASSERT_THAT(read.frames, SizeIs(1));
+  EXPECT_TRUE(std::isnan(read.frames[0].positions[0]));
+  EXPECT_EQ(read.frames[0].positions[1], -std::numeric_limits<double>::infinity());
+}
+
+TEST_F(Recording, RefusesFloat32WhereItWouldMoveAParticleVisibly) {
+  const auto writer = RecordingWriter::Create(Path(), {.spacing = 0.01}, {});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  RecordedFrame frame;
+  frame.positions = {0.001, 0.002, 0.011, 0.002};
+  EXPECT_TRUE((*writer)->Add(frame).ok());
+  for (double& x : frame.positions) x += 1e6;
+  const absl::Status status = (*writer)->Add(frame);
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("--float64"));
+}
+
+TEST_F(Recording, WithoutFramesIsARecordingToo) {
+  Write(Path(), {});
+  const WhatWasRead read = Read(Path());
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.frames, IsEmpty());
+  EXPECT_THAT(read.notices, IsEmpty());
+}
+
+TEST_F(Recording, DeliversTheFramesOfARangeUnderTheirOwnIndex) {
+  const auto frames = RandomFrames(20);
+  Write(Path(), frames);
+  const WhatWasRead read = Read(Path(), "7:12:2");
+  ASSERT_THAT(read.frames, SizeIs(3));
+  EXPECT_EQ(read.frames[1].index, 9);
+  EXPECT_TRUE(SameBits(read.frames[1], frames[9]));
+}
+
+TEST_F(Recording, CutOffAtAnyByteLosesItsTailAndNothingElse) {
+  const auto frames = RandomFrames(20);
+  Write(Path(), frames);
+  const std::string whole = Bytes(Path());
+  std::size_t most = 0;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    SCOPED_TRACE(size);
+    WriteBytes(Path("cut.pemc"), whole.substr(0, size));
+    const WhatWasRead read = Read(Path("cut.pemc"));
+    ExpectPrefix(read.frames, frames);
+    EXPECT_GE(read.frames.size(), most) << "a longer file must not give less";
+    most = read.frames.size();
+    if (read.status.ok()) {
+      ASSERT_THAT(read.notices, SizeIs(1));
+      EXPECT_THAT(read.notices[0],
+                  HasSubstr("truncated after " + std::to_string(most) + " frames"));
+    } else {
+      EXPECT_THAT(read.frames, IsEmpty()) << "only a file without its header is refused";
+      EXPECT_EQ(read.status.code(), absl::StatusCode::kDataLoss);
+    }
+  }
+  EXPECT_EQ(most, frames.size()) << "without its last bytes all frames are there";
+}
+
+TEST_F(Recording, ADamagedByteIsNeverDeliveredAsAFrame) {
+  const auto frames = RandomFrames(20);
+  Write(Path(), frames);
+  const std::string whole = Bytes(Path());
+  std::size_t errors = 0;
+  for (std::size_t place = 0; place < whole.size(); ++place) {
+    SCOPED_TRACE(place);
+    std::string damaged = whole;
+    damaged[place] = static_cast<char>(damaged[place] ^ (1 << place % 8));
+    WriteBytes(Path("damaged.pemc"), damaged);
+    const WhatWasRead read = Read(Path("damaged.pemc"));
+    ExpectPrefix(read.frames, frames);
+    if (!read.status.ok()) ++errors;
+    // A length that has grown looks like a file that was cut off; a bit that means nothing may
+    // leave everything as it was.
+    EXPECT_TRUE(!read.status.ok() || !read.notices.empty() || read.frames.size() == frames.size());
+  }
+  EXPECT_GT(errors, whole.size() / 2);
+}
+
+TEST_F(Recording, BytesBehindTheEndAreDamage) {
+  Write(Path(), RandomFrames(2));
+  WriteBytes(Path(), Bytes(Path()) + "x");
+  EXPECT_EQ(Read(Path()).status.code(), absl::StatusCode::kDataLoss);
+}
+
+TEST_F(Recording, AnUnfinishedOneLeavesNoFile) {
+  {
+    const auto writer = RecordingWriter::Create(Path(), {}, {});
+    ASSERT_TRUE(writer.ok());
+    ASSERT_TRUE((*writer)->Add(RandomFrames(1)[0]).ok());
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(directory_));
+}
+
+TEST_F(Recording, IsKnownByItsFirstBytes) {
+  Write(Path("other.name"), RandomFrames(1));
+  EXPECT_TRUE(IsRecording(Path("other.name")));
+  WriteBytes(Path("text.pemc"), "x,y\n0,0\n");
+  EXPECT_FALSE(IsRecording(Path("text.pemc")));
+  EXPECT_FALSE(IsRecording(Path("missing.pemc")));
+  EXPECT_FALSE(IsRecording(directory_.string()));
+}
+
+TEST_F(Recording, OptionsOutOfRangeAreRefused) {
+  EXPECT_EQ(RecordingWriter::Create(Path(), {.spacing = -1}, {}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(RecordingWriter::Create(Path(), {}, {.compression_level = 20}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST(BundledRecording, IsTheDamBreakBelowTwoMegabytes) {
+  const std::string path = PARTIEMC_SOURCE_DIR "/client/recordings/dam_break.pemc";
+  EXPECT_LT(std::filesystem::file_size(path), 2'000'000);
+  const auto reader = RecordingReader::Open(path, "");
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  EXPECT_EQ((*reader)->header().spacing, 0.0303);
+  const WhatWasRead read = Read(path);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  ASSERT_THAT(read.frames, SizeIs(75));
+  for (const RecordedFrame& frame : read.frames) {
+    EXPECT_EQ(frame.ParticleCount(), 2278);
+    EXPECT_THAT(frame.ids, SizeIs(2278));
+    EXPECT_THAT(frame.velocities, SizeIs(2 * 2278));
+  }
+  // 34 x 67 particles from (0.03, 0.03) on.
+  EXPECT_EQ(read.frames[0].positions[0], 0.03f);
+  EXPECT_EQ(read.frames[0].positions[3], 0.060303f);
+  EXPECT_EQ(*read.frames[1].time, 0.023347);
+}
+
+}  // namespace
+}  // namespace partiemc::client

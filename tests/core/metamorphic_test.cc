@@ -1,0 +1,228 @@
+// What must not change when a frame is permuted, moved, scaled, written otherwise or worked on by
+// more threads.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "partiemc/partiemc.h"
+#include "partiemc/validate.h"
+#include "support/reconstruct.h"
+
+namespace partiemc {
+namespace {
+
+using support::Particles;
+using support::ReconstructOnce;
+
+// Rings, normals and mesh of two results are the same to the bit.
+void ExpectSameBits(const Result& a, const Result& b) {
+  EXPECT_EQ(DigestRings(a.rings), DigestRings(b.rings));
+  EXPECT_EQ(DigestMesh(a.mesh), DigestMesh(b.mesh));
+  EXPECT_EQ(a, b);
+}
+
+// The rings of `result` scaled, then moved.
+Rings Mapped(const Result& result, double factor, double dx, double dy) {
+  Rings rings = result.rings;
+  for (std::size_t k = 0; k < rings.points.size(); k += 2) {
+    rings.points[k] = rings.points[k] * factor + dx;
+    rings.points[k + 1] = rings.points[k + 1] * factor + dy;
+  }
+  return rings;
+}
+
+// Largest distance between corresponding points of rings that come in the same order.
+double LargestDistance(const Rings& a, const Rings& b) {
+  EXPECT_EQ(a.offsets, b.offsets);
+  EXPECT_EQ(a.outer_of, b.outer_of);
+  if (a.points.size() != b.points.size()) return 1e300;
+  double largest = 0;
+  for (std::size_t k = 0; k < a.points.size(); ++k) {
+    largest = std::max(largest, std::abs(a.points[k] - b.points[k]));
+  }
+  return largest;
+}
+
+class Metamorphic : public testing::TestWithParam<Placement> {};
+
+TEST_P(Metamorphic, OneTwoOrSevenThreadsAndFreshOrUsedWorkspacesGiveTheSameBits) {
+  const auto reconstructor = Reconstructor::Create({.placement = GetParam()});
+  std::vector<Result> expected;
+  State end;
+  for (const int threads : {1, 2, 7}) {
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    tbb::task_arena arena(threads);
+    State state;
+    Workspace used;
+    for (int k = 0; k < 6; ++k) {
+      // A body of many tiles, so that there is work for all.
+      Particles body = support::MovingBody(k);
+      body.Add(support::Shifted(support::Disc(40), 100, -70));
+      Result result, fresh_result;
+      State fresh_state = state;
+      Workspace fresh;
+      arena.execute([&] {
+        ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), state, used, result).ok());
+        ASSERT_TRUE(
+            reconstructor->Reconstruct(body.AsFrame(), fresh_state, fresh, fresh_result).ok());
+      });
+      ExpectSameBits(result, fresh_result);
+      EXPECT_EQ(state, fresh_state);
+      if (threads == 1) {
+        expected.push_back(result);
+      } else {
+        ExpectSameBits(result, expected[static_cast<std::size_t>(k)]);
+      }
+    }
+    if (threads == 1) end = state;
+    EXPECT_EQ(state, end);
+  }
+}
+
+TEST_P(Metamorphic, AWorkspaceMayServeOtherStreamsInBetween) {
+  const auto reconstructor = Reconstructor::Create({.placement = GetParam()});
+  const auto other = Reconstructor::Create({.placement = Placement::kFarthestParticle,
+                                            .fill = Fill::kConforming,
+                                            .spacing = 0.37,
+                                            .kernel_radius = 5});
+  State state, undisturbed;
+  Workspace shared, own;
+  Result result, expected;
+  for (int k = 0; k < 5; ++k) {
+    const Particles body = support::MovingBody(k);
+    ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), undisturbed, own, expected).ok());
+    State other_state;
+    Particles scene = support::Disc(3 + 4.0 * k);
+    scene.volumes.assign(scene.size(), 0.2f);
+    ASSERT_TRUE(other->Reconstruct(scene.AsFrame(), other_state, shared, result).ok());
+    ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), state, shared, result).ok());
+    ExpectSameBits(result, expected);
+  }
+}
+
+TEST_P(Metamorphic, AShiftByWholeCellsShiftsTheRings) {
+  support::Random random(1);
+  // Multiples of 2^-17: every position is exact wherever it is moved to.
+  const Particles particles = support::Snapped(support::Blob(random, 9), 1.0);
+  const ReconstructionParameters parameters{.placement = GetParam(), .spacing = 1.0};
+  const Result here = ReconstructOnce(parameters, particles);
+  // By whole tiles, so that rings and points come in the same order.
+  for (const auto& [dx, dy] : {std::pair(32.0, 0.0), {-64.0, 96.0}, {32e6, -64e6}}) {
+    const Result there = ReconstructOnce(parameters, support::Shifted(particles, dx, dy));
+    EXPECT_LT(LargestDistance(Mapped(here, 1, dx, dy), there.rings), 1e-7);
+    EXPECT_EQ(there.mesh.TriangleCount(), here.mesh.TriangleCount());
+    EXPECT_NEAR(there.statistics.area, here.statistics.area, 1e-5);
+  }
+  // By any number of cells the order may change, the set of rings may not.
+  for (const auto& [dx, dy] : {std::pair(1.0, 0.0), {17.0, -5.0}}) {
+    const Result there = ReconstructOnce(parameters, support::Shifted(particles, dx, dy));
+    EXPECT_EQ(there.rings.RingCount(), here.rings.RingCount());
+    EXPECT_EQ(there.rings.PointCount(), here.rings.PointCount());
+    EXPECT_NEAR(there.statistics.area, here.statistics.area, 1e-7);
+    EXPECT_NEAR(there.statistics.perimeter, here.statistics.perimeter, 1e-7);
+  }
+}
+
+TEST_P(Metamorphic, AScaleByAPowerOfTwoScalesEveryPointBitForBit) {
+  support::Random random(2);
+  const Particles particles = support::Blob(random, 9);
+  const Result here = ReconstructOnce({.placement = GetParam()}, particles);
+  for (const double factor : {0x1p-180, 0x1p-30, 0.5, 4.0, 0x1p30, 0x1p180}) {
+    const Result there =
+        ReconstructOnce({.placement = GetParam()}, support::Scaled(particles, factor));
+    EXPECT_EQ(Mapped(here, factor, 0, 0).points, there.rings.points) << factor;
+    EXPECT_EQ(here.rings.normals, there.rings.normals);
+    EXPECT_EQ(here.mesh.triangles, there.mesh.triangles);
+    if (GetParam() != Placement::kFarthestParticle) {
+      EXPECT_TRUE(Validate(there).ok()) << Validate(there);
+    }
+  }
+}
+
+TEST_P(Metamorphic, ParticlesInAnyOrderGiveTheSameRingsUpToRounding) {
+  if (GetParam() == Placement::kFarthestParticle) {
+    // Its choice between two particles may hang on a rounding: the number of rings does not.
+    support::Random random(3);
+    const Particles particles = support::Blob(random, 9);
+    const Result a = ReconstructOnce({.placement = GetParam()}, particles);
+    const Result b =
+        ReconstructOnce({.placement = GetParam()}, support::Permuted(particles, random));
+    EXPECT_EQ(a.rings.RingCount(), b.rings.RingCount());
+    return;
+  }
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    support::Random random(seed);
+    const Particles particles = support::Scaled(support::Blob(random, 10), 0.1);
+    const Result here = ReconstructOnce({.placement = GetParam()}, particles);
+    const Result there =
+        ReconstructOnce({.placement = GetParam()}, support::Permuted(particles, random));
+    EXPECT_LT(LargestDistance(here.rings, there.rings), 1e-4 * here.statistics.spacing);
+  }
+}
+
+TEST_P(Metamorphic, FloatAndDoublePositionsOfTheSameValuesGiveTheSameBits) {
+  support::Random random(4);
+  const Particles particles = support::Blob(random, 9);
+  std::vector<float> floats(particles.xy.begin(), particles.xy.end());
+  const std::vector<double> doubles(floats.begin(), floats.end());
+  const ReconstructionParameters parameters{.placement = GetParam()};
+  ExpectSameBits(ReconstructOnce(parameters, Frame{.positions = std::span<const float>(floats)}),
+                 ReconstructOnce(parameters, Frame{.positions = std::span<const double>(doubles)}));
+}
+
+TEST_P(Metamorphic, ThreeComponentsInAnyPlaneGiveTheBitsOfTwo) {
+  support::Random random(5);
+  const Particles particles = support::Blob(random, 8);
+  const Result expected = ReconstructOnce({.placement = GetParam()}, particles);
+  for (const Plane plane : {Plane::kXy, Plane::kXz, Plane::kYz}) {
+    std::vector<double> xyz;
+    for (std::size_t k = 0; k < particles.size(); ++k) {
+      const double x = particles.x(k);
+      const double y = particles.y(k);
+      const double z = 3.25;
+      if (plane == Plane::kXy) xyz.insert(xyz.end(), {x, y, z});
+      if (plane == Plane::kXz) xyz.insert(xyz.end(), {x, z, y});
+      if (plane == Plane::kYz) xyz.insert(xyz.end(), {z, x, y});
+    }
+    ExpectSameBits(expected, ReconstructOnce({.placement = GetParam(), .plane = plane},
+                                             Frame{.positions = std::span<const double>(xyz),
+                                                   .components = 3}));
+  }
+}
+
+TEST_P(Metamorphic, VolumesOfOneSquaredSpacingEachChangeNothingButRounding) {
+  support::Random random(6);
+  Particles particles = support::Blob(random, 9);
+  const ReconstructionParameters parameters{.placement = GetParam(), .spacing = 1.0};
+  const Result without = ReconstructOnce(parameters, particles);
+  particles.volumes.assign(particles.size(), 1.0f);
+  const Result with = ReconstructOnce(parameters, particles);
+  EXPECT_LT(LargestDistance(without.rings, with.rings), 1e-4);
+}
+
+TEST_P(Metamorphic, AMillionCellsFromTheOriginTheShapeIsTheSame) {
+  support::Random random(7);
+  const Particles particles = support::Snapped(support::Blob(random, 9), 0.5);
+  const ReconstructionParameters parameters{
+      .placement = GetParam(), .spacing = 1.0, .cell_size = 0.5};
+  const Result near = ReconstructOnce(parameters, particles);
+  const Result far = ReconstructOnce(parameters, support::Shifted(particles, 16e5, -16e5));
+  EXPECT_LT(LargestDistance(Mapped(near, 1, 16e5, -16e5), far.rings), 1e-8);
+  if (GetParam() != Placement::kFarthestParticle) {
+    EXPECT_TRUE(Validate(far).ok()) << Validate(far);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Placements, Metamorphic, testing::ValuesIn(AllPlacements()),
+                         [](const auto& tested) {
+                           std::string name(Name(tested.param));
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace partiemc

@@ -1,0 +1,112 @@
+// Methods over sequences, in process.
+#include "evaluation/run.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "evaluation/scenes.h"
+
+namespace partiemc::evaluation {
+namespace {
+
+Method MethodOf(Placement placement) {
+  Method method;
+  method.name = Name(placement);
+  method.parameters.placement = placement;
+  return method;
+}
+
+SceneRecipe LatticeSquare() {
+  SceneRecipe recipe;
+  recipe.name = "square";
+  recipe.shape = "square";
+  recipe.sampling = Sampling::kLattice;
+  recipe.particles = 625;
+  recipe.seed = 12;
+  return recipe;
+}
+
+TEST(Run, FindsMarchingSquaresNearTheTruth) {
+  const Evaluator evaluator(MakeScene(LatticeSquare()), true);
+  const auto row = evaluator.Run(MethodOf(Placement::kMarchingSquares), {});
+  ASSERT_TRUE(row.ok()) << row.status();
+  EXPECT_LT((*row)[Metric::kMeanDeviation], 0.15);
+  EXPECT_LT((*row)[Metric::kHausdorff], 1.2);
+  EXPECT_LT((*row)[Metric::kBias], 0.03);
+  EXPECT_EQ((*row)[Metric::kComponentError], 0);
+  EXPECT_EQ((*row)[Metric::kSelfIntersections], 0);
+  EXPECT_EQ((*row)[Metric::kFolds], 0);
+  // The centres lie half a spacing inside.
+  EXPECT_NEAR((*row)[Metric::kCenterMean], 0.5, 0.1);
+  EXPECT_EQ(row->frames.size(), 8u);
+  EXPECT_TRUE(std::isnan(row->frames[0].jitter.mean));
+  EXPECT_FALSE(std::isnan(row->frames[1].jitter.mean));
+}
+
+TEST(Run, GivesTheSameNumbersAgain) {
+  const Evaluator evaluator(MakeScene(LatticeSquare()));
+  const Method method = MethodOf(Placement::kVirtualPlane);
+  const auto once = evaluator.Run(method, {});
+  const auto again = evaluator.Run(method, {});
+  ASSERT_TRUE(once.ok() && again.ok());
+  for (const Metric metric : {Metric::kHausdorff, Metric::kMeanDeviation, Metric::kMeanJitter,
+                              Metric::kAreaError, Metric::kTriangles}) {
+    EXPECT_EQ((*once)[metric], (*again)[metric]) << Name(metric);
+  }
+}
+
+TEST(Run, MetricsDoNotDependOnTheUnitOfLength) {
+  Sequence small = MakeScene(LatticeSquare());
+  small.motion = nullptr;
+  Sequence large = small;
+  constexpr double kFactor = 64;  // A power of two, so that nothing is rounded differently.
+  large.spacing *= kFactor;
+  large.original_spacing *= kFactor;
+  for (SequenceFrame& frame : large.frames) {
+    for (double& x : frame.positions) x *= kFactor;
+    for (float& v : frame.volumes) v *= static_cast<float>(kFactor * kFactor);
+    for (Point& p : frame.truth.points) p = kFactor * p;
+    frame.area *= kFactor * kFactor;
+  }
+  const Method method = MethodOf(Placement::kMarchingSquares);
+  const auto a = Evaluator(small).Run(method, {Knowledge::kVolumes});
+  const auto b = Evaluator(large).Run(method, {Knowledge::kVolumes});
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_NEAR((*a)[Metric::kHausdorff], (*b)[Metric::kHausdorff], 1e-9);
+  EXPECT_NEAR((*a)[Metric::kMeanDeviation], (*b)[Metric::kMeanDeviation], 1e-9);
+  EXPECT_NEAR((*a)[Metric::kAreaError], (*b)[Metric::kAreaError], 1e-9);
+}
+
+TEST(Run, RecordingsHaveJitterByVelocitiesAndAreaByVolumes) {
+  Sequence recording = MakeScene(LatticeSquare());
+  recording.motion = nullptr;
+  recording.group = Group::kRecording;
+  for (std::size_t t = 0; t < recording.frames.size(); ++t) {
+    SequenceFrame& frame = recording.frames[t];
+    frame.truth = {};
+    frame.area = 0;
+    if (t + 1 == recording.frames.size()) break;
+    const auto& next = recording.frames[t + 1].positions;
+    for (std::size_t k = 0; k < next.size(); ++k) {
+      frame.velocities.push_back(next[k] - frame.positions[k]);
+    }
+  }
+  const auto row = Evaluator(recording).Run(MethodOf(Placement::kMarchingSquares), {});
+  ASSERT_TRUE(row.ok()) << row.status();
+  EXPECT_TRUE(std::isnan((*row)[Metric::kHausdorff]));
+  EXPECT_LT((*row)[Metric::kMeanJitter], 0.1);
+  EXPECT_LT(std::abs((*row)[Metric::kAreaError]), 0.03);
+}
+
+TEST(Run, SaysWhichSequenceAndFrameWasRefused) {
+  Sequence broken = MakeScene(LatticeSquare());
+  broken.frames[2].positions[5] = std::nan("");
+  const auto row = Evaluator(broken).Run(MethodOf(Placement::kMarchingSquares), {});
+  ASSERT_FALSE(row.ok());
+  EXPECT_NE(row.status().message().find("square, frame 2, marching-squares"), std::string::npos)
+      << row.status();
+}
+
+}  // namespace
+}  // namespace partiemc::evaluation

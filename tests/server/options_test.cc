@@ -1,0 +1,141 @@
+// The command line, the environment and the config file of the server; addresses.
+#include "server/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace partiemc::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::variant<CommandLine, Leave> Parse(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "partiemc-server");
+  return ParseCommandLine(static_cast<int>(arguments.size()), arguments.data());
+}
+
+CommandLine Parsed(std::vector<const char*> arguments) {
+  const auto parsed = Parse(std::move(arguments));
+  const auto* leave = std::get_if<Leave>(&parsed);
+  EXPECT_EQ(leave, nullptr) << leave->text;
+  return leave == nullptr ? std::get<CommandLine>(parsed) : CommandLine{};
+}
+
+// The one line with which the arguments are refused.
+std::string Refused(std::vector<const char*> arguments) {
+  const auto parsed = Parse(std::move(arguments));
+  const auto* leave = std::get_if<Leave>(&parsed);
+  if (leave == nullptr) return "accepted";
+  EXPECT_EQ(leave->code, 2);
+  EXPECT_EQ(leave->text.find('\n'), leave->text.size() - 1) << leave->text;
+  return leave->text;
+}
+
+// Set for the length of a test.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) { setenv(name, value, 1); }
+  ~Environment() { unsetenv(name_); }
+
+ private:
+  const char* name_;
+};
+
+TEST(CommandLineOptions, ByDefaultListenOnLoopbackWithAffordableLimits) {
+  const CommandLine line = Parsed({});
+  EXPECT_EQ(line.server.address.ToString(), "127.0.0.1:50051");
+  EXPECT_FALSE(line.server.insecure);
+  EXPECT_EQ(line.server.limits.frames_in_flight, 4u);
+  EXPECT_EQ(line.server.limits.max_frame_bytes,
+            ServerLimits::DefaultFrameBytes(line.server.limits.frame.max_particles));
+  EXPECT_GE(line.server.threads, 1u);
+  EXPECT_FALSE(line.health_check.has_value());
+}
+
+TEST(CommandLineOptions, FlagsCountMoreThanTheFileAndTheFileMoreThanTheEnvironment) {
+  const std::string path = ::testing::TempDir() + "/partiemc_options.toml";
+  std::ofstream(path) << "max-streams = 8\nframes-in-flight = 2\n";
+  const Environment streams("PARTIEMC_MAX_STREAMS", "5");
+  const Environment tiles("PARTIEMC_MAX_TILES", "77");
+  const CommandLine line = Parsed({"--config", path.c_str(), "--frames-in-flight", "3"});
+  EXPECT_EQ(line.server.limits.max_streams, 8u);
+  EXPECT_EQ(line.server.limits.frames_in_flight, 3u);
+  EXPECT_EQ(line.server.limits.frame.max_tiles, 77u);
+}
+
+TEST(CommandLineOptions, TheConfigFileCanBeNamedByTheEnvironment) {
+  const std::string path = ::testing::TempDir() + "/partiemc_options_env.toml";
+  std::ofstream(path) << "max-streams = 9\n";
+  const Environment config("PARTIEMC_CONFIG", path.c_str());
+  EXPECT_EQ(Parsed({}).server.limits.max_streams, 9u);
+}
+
+TEST(CommandLineOptions, FewerParticlesMakeSmallerFramesUnlessToldOtherwise) {
+  EXPECT_EQ(Parsed({"--max-particles", "1000"}).server.limits.max_frame_bytes,
+            ServerLimits::DefaultFrameBytes(1000));
+  EXPECT_EQ(Parsed({"--max-frame-bytes", "2MB"}).server.limits.max_frame_bytes, 2u << 20);
+}
+
+TEST(CommandLineOptions, TheHealthCheckAsksTheAddressOfTheServerUnlessGivenAnother) {
+  EXPECT_EQ(Parsed({"--health-check"}).health_check->ToString(), "127.0.0.1:50051");
+  EXPECT_EQ(Parsed({"--health-check", "--address", "localhost:7"}).health_check->ToString(),
+            "localhost:7");
+  EXPECT_EQ(Parsed({"--health-check", "unix:/tmp/a"}).health_check->ToString(), "unix:/tmp/a");
+}
+
+TEST(CommandLineOptions, WhatIsWrongIsToldInOneLine) {
+  EXPECT_THAT(Refused({"--bogus"}), HasSubstr("--bogus"));
+  EXPECT_THAT(Refused({"--max-streams", "0"}), HasSubstr("--max-streams"));
+  EXPECT_THAT(Refused({"--max-frame-bytes", "2000000000"}), HasSubstr("--max-frame-bytes"));
+  EXPECT_THAT(Refused({"--log-format", "xml"}), HasSubstr("--log-format"));
+  EXPECT_THAT(Refused({"--address", "nowhere"}), HasSubstr("nowhere"));
+  EXPECT_THAT(Refused({"--health-check", "nowhere"}), HasSubstr("nowhere"));
+  EXPECT_THAT(Refused({"--config", "/no/such/file"}), HasSubstr("/no/such/file"));
+}
+
+TEST(CommandLineOptions, AMisspeltOptionInTheFileIsRefused) {
+  const std::string path = ::testing::TempDir() + "/partiemc_options_misspelt.toml";
+  std::ofstream(path) << "max-stream = 8\n";
+  EXPECT_THAT(Refused({"--config", path.c_str()}), HasSubstr("max-stream"));
+}
+
+TEST(CommandLineOptions, HelpAndVersionArePrintedAndAreNoError) {
+  for (const char* flag : {"--help", "--version"}) {
+    const auto parsed = Parse({flag});
+    ASSERT_TRUE(std::holds_alternative<Leave>(parsed));
+    EXPECT_EQ(std::get<Leave>(parsed).code, 0);
+    EXPECT_THAT(std::get<Leave>(parsed).text, HasSubstr("partiemc-server"));
+  }
+}
+
+TEST(AddressText, ComesBackAsItWas) {
+  for (const char* text : {"127.0.0.1:0", "localhost:50051", "[::1]:1", "unix:/run/x.sock"}) {
+    const auto address = ParseAddress(text);
+    ASSERT_TRUE(address.ok()) << address.status();
+    EXPECT_EQ(address->ToString(), text);
+    EXPECT_TRUE(address->IsLocal()) << text;
+  }
+}
+
+TEST(AddressText, OtherMachinesReachWhatIsNotLoopback) {
+  for (const char* text :
+       {"0.0.0.0:1", "[::]:1", "192.168.0.1:1", "example.org:1", "128.0.0.1:1"}) {
+    EXPECT_FALSE(ParseAddress(text)->IsLocal()) << text;
+  }
+}
+
+TEST(AddressText, IsRefusedWhereItIsNone) {
+  for (const char* text : {"", ":", ":1", "host", "host:", "host:-1", "host:65536", "host:1x",
+                           "::1:5", "[]:1", "unix:"}) {
+    EXPECT_FALSE(ParseAddress(text).ok()) << text;
+  }
+  EXPECT_FALSE(ParseAddress("unix:" + std::string(200, 'a')).ok());
+}
+
+}  // namespace
+}  // namespace partiemc::server

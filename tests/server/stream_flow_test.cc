@@ -1,0 +1,311 @@
+// The flow of messages through a stream, over a transport in memory: order, window, ends, and
+// results that do not depend on who else computes. Also under ThreadSanitizer.
+#include "server/stream_flow.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <limits>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "partiemc/status.h"
+#include "server/memory_door.h"
+#include "server/moving_blob.h"
+
+namespace partiemc::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
+constexpr std::size_t kWindow = 4;
+
+ReconstructionParameters BlobParameters() {
+  ReconstructionParameters parameters;
+  parameters.spacing = kBlobSpacing;
+  return parameters;
+}
+
+// Holds up a pool's only thread until it is let go.
+class Gate {
+ public:
+  explicit Gate(ComputePool& pool) {
+    pool.Submit([future = opened_.get_future().share()](Worker&) { future.wait(); });
+  }
+  ~Gate() { Open(); }
+  void Open() {
+    if (!std::exchange(is_open_, true)) opened_.set_value();
+  }
+
+ private:
+  std::promise<void> opened_;
+  bool is_open_ = false;
+};
+
+std::vector<MemoryAnswer> ReceiveAll(MemoryDoor& door) {
+  std::vector<MemoryAnswer> answers;
+  while (auto answer = door.Receive()) answers.push_back(*answer);
+  return answers;
+}
+
+// The answers of a whole stream of the blob of `seed`, opened and half-closed.
+std::vector<MemoryAnswer> RunStream(ComputePool& pool, unsigned seed, std::uint64_t frames) {
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Open();
+  for (std::uint64_t i = 0; i < frames; ++i) door.Send(i + 1, MovingBlob(seed, i));
+  door.HalfClose();
+  return ReceiveAll(door);
+}
+
+TEST(StreamFlow, OpensAnswersEveryFrameInOrderAndEndsWell) {
+  ComputePool pool(2);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Open();
+  for (std::uint64_t i = 1; i <= 10; ++i) door.Send(i, MovingBlob(1, i));
+  door.HalfClose();
+  const auto answers = ReceiveAll(door);
+  ASSERT_EQ(answers.size(), 11u);
+  EXPECT_EQ(answers[0].what, Outgoing::kOpened);
+  for (std::uint64_t i = 1; i <= 10; ++i) {
+    EXPECT_EQ(answers[i].sequence, i);
+    EXPECT_EQ(answers[i].reason, "");
+  }
+  EXPECT_TRUE(door.status().ok()) << door.status();
+  EXPECT_EQ(door.flow().counts().frames, 10u);
+  EXPECT_EQ(door.flow().counts().last_sequence, 10u);
+}
+
+TEST(StreamFlow, ReadsNoFurtherAheadThanTheWindowWhenTheClientDoesNotReceive) {
+  ComputePool pool(2);
+  for (const std::size_t window : {std::size_t{1}, std::size_t{3}, kWindow}) {
+    MemoryDoor door(pool, window, BlobParameters(), kLimits);
+    door.Open();
+    for (std::uint64_t i = 1; i <= 20; ++i) door.Send(i, MovingBlob(1, i));
+    door.HalfClose();
+    // The transport itself holds `opened`; behind it the window fills, and no more.
+    door.WaitUntilRead(window);
+    EXPECT_EQ(ReceiveAll(door).size(), 21u);
+    // The transport holds one answer that is neither inside the server nor received.
+    EXPECT_LE(door.most_inside(), window + 1);
+    EXPECT_GE(door.most_inside(), window);
+  }
+}
+
+TEST(StreamFlow, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeverCome) {
+  ComputePool pool(2);
+  const auto undisturbed = RunStream(pool, 5, 20);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Open();
+  std::vector<std::string> expected;  // By answer; empty for a result.
+  std::uint64_t sequence = 0;
+  const auto send = [&](std::uint64_t number, std::vector<double> positions,
+                        std::string_view reason) {
+    door.Send(number, std::move(positions));
+    expected.emplace_back(reason);
+  };
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    if (i % 5 == 4) {
+      std::vector<double> nan = MovingBlob(5, i);
+      nan[i] = std::numeric_limits<double>::quiet_NaN();
+      send(++sequence, nan, kReasonNotFinite);
+      send(++sequence, std::vector<double>(5001 * 2, 1.0), kReasonTooManyParticles);
+      send(sequence, MovingBlob(5, 99), kReasonSequenceDuplicate);
+      send(sequence + 7, MovingBlob(5, 99), kReasonSequenceGap);
+    }
+    send(++sequence, MovingBlob(5, i), "");
+  }
+  door.HalfClose();
+  std::vector<std::string> reasons;
+  std::vector<MemoryAnswer> results;
+  for (const MemoryAnswer& answer : ReceiveAll(door)) {
+    if (answer.what != Outgoing::kAnswer) continue;
+    reasons.push_back(answer.reason);
+    if (answer.reason.empty()) results.push_back(answer);
+  }
+  EXPECT_EQ(reasons, expected);
+  ASSERT_EQ(results.size(), 20u);
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(results[i].digests, undisturbed[i + 1].digests) << "frame " << i;
+  }
+  EXPECT_EQ(door.flow().counts().frames, 20u);
+  EXPECT_EQ(door.flow().counts().frame_errors, 16u);
+}
+
+TEST(StreamFlow, ResultsAreTheSameForOneTwoAndSevenThreads) {
+  // One pool at a time: each limits the whole process to its threads.
+  const auto answers_with = [](unsigned threads) {
+    ComputePool pool(threads);
+    return RunStream(pool, 6, 8);
+  };
+  const auto expected = answers_with(1);
+  ASSERT_EQ(expected.size(), 9u);
+  EXPECT_EQ(answers_with(2), expected);
+  EXPECT_EQ(answers_with(7), expected);
+}
+
+TEST(StreamFlow, ResultsAreTheSameAloneAndWithFiveOtherStreamsRunning) {
+  ComputePool pool(3);
+  const auto expected = RunStream(pool, 7, 10);
+  std::vector<std::thread> others;
+  for (unsigned seed = 100; seed < 105; ++seed) {
+    others.emplace_back([&pool, seed] { EXPECT_EQ(RunStream(pool, seed, 10).size(), 11u); });
+  }
+  EXPECT_EQ(RunStream(pool, 7, 10), expected);
+  for (std::thread& other : others) other.join();
+}
+
+TEST(StreamFlow, AFrameBeforeOpenEndsTheStream) {
+  ComputePool pool(1);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Send(1, MovingBlob(1, 0));
+  EXPECT_TRUE(ReceiveAll(door).empty());
+  EXPECT_EQ(door.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(door.status().message(), "request: frame; the first must be `open`");
+}
+
+TEST(StreamFlow, AStreamThatNeverOpensEndsWithAWordAboutIt) {
+  ComputePool pool(1);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.HalfClose();
+  EXPECT_EQ(door.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FindViolation(door.status())->reason, kReasonProtocol);
+}
+
+TEST(StreamFlow, ParametersThatAreRefusedEndTheStreamWithTheirReason) {
+  ComputePool pool(1);
+  ReconstructionParameters parameters;
+  parameters.cell_size = -1;
+  MemoryDoor door(pool, kWindow, parameters, kLimits);
+  door.Open();
+  EXPECT_TRUE(ReceiveAll(door).empty());
+  EXPECT_EQ(FindViolation(door.status())->reason, kReasonOutOfRange);
+}
+
+TEST(StreamFlow, ASecondOpenAndAnEmptyRequestEndTheStreamOnceWhatCameBeforeIsAnswered) {
+  ComputePool pool(2);
+  for (const RequestKind kind : {RequestKind::kOpen, RequestKind::kEmpty}) {
+    MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+    door.Open();
+    door.Send(1, MovingBlob(1, 0));
+    door.Send(2, MovingBlob(1, 1));
+    door.SendRequest({.kind = kind, .sequence = 0, .positions = {}});
+    door.Send(3, MovingBlob(1, 2));
+    const auto answers = ReceiveAll(door);
+    ASSERT_EQ(answers.size(), 3u);
+    EXPECT_EQ(answers[2].sequence, 2u);
+    EXPECT_EQ(door.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(FindViolation(door.status())->reason, kReasonProtocol);
+  }
+}
+
+TEST(StreamFlow, ADrainTellsTheClientAnswersWhatWasReadAndEndsUnavailable) {
+  ComputePool pool(1);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Open();
+  ASSERT_EQ(door.Receive()->what, Outgoing::kOpened);
+  Gate gate(pool);
+  for (std::uint64_t i = 1; i <= 10; ++i) door.Send(i, MovingBlob(1, i));
+  door.WaitUntilRead(kWindow);
+  door.flow().Drain();
+  gate.Open();
+  const auto answers = ReceiveAll(door);
+  // A read that had been delivered, but not yet told to the flow, may have been dropped by it.
+  ASSERT_GE(answers.size(), kWindow);
+  ASSERT_LE(answers.size(), kWindow + 1);
+  EXPECT_EQ(answers[0].what, Outgoing::kDraining);
+  for (std::size_t i = 1; i < answers.size(); ++i) EXPECT_EQ(answers[i].sequence, i);
+  EXPECT_EQ(door.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(FindViolation(door.status())->reason, kReasonDraining);
+}
+
+TEST(StreamFlow, ADrainEndsAStreamThatHasNotOpened) {
+  ComputePool pool(1);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.flow().Drain();
+  EXPECT_TRUE(ReceiveAll(door).empty());
+  EXPECT_EQ(door.status().code(), absl::StatusCode::kUnavailable);
+}
+
+TEST(StreamFlow, ACancelledStreamComputesNothingThatWasOnlyQueued) {
+  ComputePool pool(1);
+  Gate gate(pool);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Open();
+  for (std::uint64_t i = 1; i <= 10; ++i) door.Send(i, MovingBlob(1, i));
+  door.WaitUntilRead(kWindow);
+  door.Cancel();
+  gate.Open();
+  EXPECT_EQ(door.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(door.flow().counts().frames, 0u);
+}
+
+// The door throws where the flow breaks its word: two reads or writes at once, or anything after
+// the end.
+TEST(StreamFlow, MayBeCancelledAndDrainedAtAnyMoment) {
+  constexpr unsigned kSeed = 31;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  std::mt19937 random(kSeed);
+  ComputePool pool(2);
+  for (int round = 0; round < 200; ++round) {
+    MemoryDoor door(pool, 1 + random() % 4, BlobParameters(), kLimits);
+    door.Open();
+    for (std::uint64_t i = 1; i <= 4; ++i) door.Send(i, MovingBlob(1, i));
+    if (random() % 2 == 0) door.HalfClose();
+    const bool drain = random() % 2 == 0, cancel = !drain || random() % 2 == 0;
+    const auto pause = std::chrono::microseconds(random() % 3000);
+    std::thread outside([&] {
+      std::this_thread::sleep_for(pause);
+      if (drain) door.flow().Drain();
+      if (cancel) door.Cancel();
+    });
+    std::uint64_t expected = 1;
+    while (const auto answer = door.Receive()) {
+      if (answer->what != Outgoing::kAnswer) continue;
+      EXPECT_EQ(answer->sequence, expected++);
+    }
+    outside.join();
+    const auto code = door.status().code();
+    EXPECT_TRUE(code == absl::StatusCode::kOk || code == absl::StatusCode::kCancelled ||
+                code == absl::StatusCode::kUnavailable)
+        << door.status();
+  }
+}
+
+TEST(ComputePool, RunsWhatWasSubmittedBeforeItGoes) {
+  std::atomic<int> ran = 0;
+  {
+    ComputePool pool(2);
+    for (int i = 0; i < 100; ++i) pool.Submit([&](Worker&) { ++ran; });
+  }
+  EXPECT_EQ(ran, 100);
+}
+
+TEST(ComputePool, GivesEveryStreamATurnBeforeAnyHasASecond) {
+  ComputePool pool(1);
+  Gate gate(pool);
+  std::vector<int> order;
+  std::promise<void> done;
+  // Each stream submits its next frame when the one before is done, as StreamFlow does.
+  std::function<void(int, int)> submit = [&](int stream, int frames) {
+    pool.Submit([&, stream, frames](Worker&) {
+      order.push_back(stream);
+      if (order.size() == 6) done.set_value();
+      if (frames > 1) submit(stream, frames - 1);
+    });
+  };
+  submit(0, 3);
+  submit(1, 2);
+  submit(2, 1);
+  gate.Open();
+  done.get_future().wait();
+  EXPECT_THAT(order, ElementsAre(0, 1, 2, 0, 1, 0));
+}
+
+}  // namespace
+}  // namespace partiemc::server

@@ -1,0 +1,143 @@
+// Who may open a stream, and how all are sent home.
+#include "server/stream_registry.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+namespace {
+
+// A door that is never opened: the registry needs flows only by their identity.
+class ClosedDoor final : public StreamDoor {
+ public:
+  void StartRead(std::size_t) override {}
+  void StartWrite(Outgoing, std::size_t) override {}
+  absl::Status Open(std::size_t) override { return absl::OkStatus(); }
+  Answered Answer(std::size_t, Worker&) override { return {}; }
+  void Finish(const absl::Status& status) override { finished = status; }
+
+  std::optional<absl::Status> finished;
+};
+
+class Registry : public ::testing::Test {
+ protected:
+  static constexpr std::uint32_t kMaxStreams = 3;
+
+  std::shared_ptr<StreamFlow> Enter() {
+    auto flow = std::make_shared<StreamFlow>(door_, pool_, 1);
+    EXPECT_TRUE(registry_.Enter(flow).ok());
+    return flow;
+  }
+  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, const std::string& name) {
+    return registry_.Open(flow, {.name = name, .labels = {}, .parameters = {}});
+  }
+  static std::string ReasonOf(const absl::Status& status) {
+    const auto violation = FindViolation(status);
+    return violation ? violation->reason : status.ToString();
+  }
+
+  ComputePool pool_{1};
+  ClosedDoor door_;
+  StreamRegistry registry_{kMaxStreams};
+};
+
+TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  for (std::uint32_t i = 0; i < kMaxStreams; ++i) {
+    flows.push_back(Enter());
+    EXPECT_TRUE(Open(*flows.back(), "").ok());
+  }
+  const auto late = Enter();
+  const auto refused = Open(*late, "late");
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refused.status().message(),
+            "streams: 3 open; must be at most 3; try again when one has ended, or start the server "
+            "with a larger --max-streams");
+  registry_.Leave(*flows[0]);
+  EXPECT_TRUE(Open(*late, "late").ok());
+}
+
+TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatHasLeft) {
+  const auto first = Enter(), second = Enter();
+  ASSERT_TRUE(Open(*first, "tank").ok());
+  const auto refused = Open(*second, "tank");
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_EQ(ReasonOf(refused.status()), kReasonNameInUse);
+  const auto left = registry_.Leave(*first);
+  ASSERT_TRUE(left.has_value());
+  EXPECT_EQ(left->description.name, "tank");
+  EXPECT_TRUE(Open(*second, "tank").ok());
+}
+
+TEST_F(Registry, NamesAreShortAndPlain) {
+  const auto flow = Enter();
+  for (const std::string& name :
+       {std::string("a b"), std::string("\n"), std::string("a/b"), std::string(129, 'a')}) {
+    const auto refused = Open(*flow, name);
+    EXPECT_EQ(refused.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(ReasonOf(refused.status()), kReasonName);
+    EXPECT_EQ(refused.status().message().find('\n'), std::string::npos);
+  }
+  EXPECT_TRUE(Open(*flow, std::string(128, 'a')).ok());
+}
+
+TEST_F(Registry, LabelsAreFewAndShort) {
+  const auto flow = Enter();
+  StreamDescription many{.name = "", .labels = {}, .parameters = {}};
+  for (int i = 0; i < 17; ++i) many.labels[std::to_string(i)] = "";
+  EXPECT_EQ(ReasonOf(registry_.Open(*flow, many).status()), kReasonLabels);
+  StreamDescription wide{.name = "", .labels = {{"k", std::string(129, 'v')}}, .parameters = {}};
+  EXPECT_EQ(ReasonOf(registry_.Open(*flow, wide).status()), kReasonLabels);
+  many.labels.erase("0");
+  EXPECT_TRUE(registry_.Open(*flow, many).ok());
+}
+
+TEST_F(Registry, StreamsWithoutANameGetDifferentOnes) {
+  const auto first = Enter(), second = Enter();
+  const auto one = Open(*first, ""), two = Open(*second, "");
+  ASSERT_TRUE(one.ok() && two.ok());
+  EXPECT_NE(one->id, two->id);
+  const auto streams = registry_.List(0, 10);
+  ASSERT_EQ(streams.size(), 2u);
+  EXPECT_NE(streams[0].description.name, streams[1].description.name);
+}
+
+TEST_F(Registry, ListsOpenStreamsInOrderAndPageByPage) {
+  const auto first = Enter(), second = Enter(), not_open = Enter();
+  ASSERT_TRUE(Open(*second, "a").ok());
+  ASSERT_TRUE(Open(*first, "b").ok());
+  EXPECT_EQ(registry_.OpenCount(), 2u);
+  const auto page = registry_.List(0, 1);
+  ASSERT_EQ(page.size(), 1u);
+  EXPECT_EQ(page[0].description.name, "a");
+  const auto rest = registry_.List(page[0].number, 5);
+  ASSERT_EQ(rest.size(), 1u);
+  EXPECT_EQ(rest[0].description.name, "b");
+}
+
+TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {
+  const auto flow = Enter();
+  registry_.Drain();
+  EXPECT_TRUE(registry_.draining());
+  ASSERT_TRUE(door_.finished.has_value());
+  EXPECT_EQ(door_.finished->code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, 1)).code(),
+            absl::StatusCode::kUnavailable);
+  EXPECT_EQ(ReasonOf(Open(*flow, "x").status()), kReasonDraining);
+
+  const auto now = std::chrono::steady_clock::now();
+  EXPECT_FALSE(registry_.WaitUntilEmpty(now));
+  std::thread leaver([&] { registry_.Leave(*flow); });
+  EXPECT_TRUE(registry_.WaitUntilEmpty(now + std::chrono::seconds(60)));
+  leaver.join();
+}
+
+}  // namespace
+}  // namespace partiemc::server

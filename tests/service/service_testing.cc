@@ -1,0 +1,150 @@
+#include "service/service_testing.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "partiemc/reconstructor.h"
+#include "server/moving_blob.h"
+#include "wire/codec.h"
+
+namespace partiemc::server {
+namespace {
+
+// Far beyond what any call takes, below CTest's own limit.
+constexpr std::chrono::seconds kDeadline{120};
+
+ReconstructionParameters BlobParameters() {
+  ReconstructionParameters parameters;
+  parameters.spacing = kBlobSpacing;
+  return parameters;
+}
+
+Frame FrameOf(const std::vector<double>& positions) {
+  Frame frame;
+  frame.positions = std::span<const double>(positions);
+  return frame;
+}
+
+}  // namespace
+
+std::string TransportName(Transport transport) {
+  return transport == Transport::kInProcess ? "InProcess" : "Tcp";
+}
+
+ServerOptions TestOptions() {
+  ServerOptions options;
+  options.address.port = 0;
+  options.threads = 2;
+  options.limits.frame.max_particles = 20'000;
+  options.limits.max_frame_bytes = 1'000'000;
+  options.limits.max_streams = 24;
+  return options;
+}
+
+std::unique_ptr<Server> StartServer(const ServerOptions& options) {
+  auto server = Server::Start(options);
+  EXPECT_TRUE(server.ok()) << server.status();
+  return server.ok() ? *std::move(server) : nullptr;
+}
+
+std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport) {
+  if (transport == Transport::kInProcess) return server.InProcessChannel();
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);
+  // A connection of its own for every channel, as different clients have.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  return grpc::CreateCustomChannel(server.address().ToString(), grpc::InsecureChannelCredentials(),
+                                   arguments);
+}
+
+void SetDeadline(grpc::ClientContext& context) {
+  context.set_deadline(std::chrono::system_clock::now() + kDeadline);
+}
+
+std::string ReasonOf(const grpc::ClientContext& context) {
+  const auto& metadata = context.GetServerTrailingMetadata();
+  const auto reason = metadata.find("partiemc-reason");
+  return reason == metadata.end() ? "" : std::string(reason->second.data(), reason->second.size());
+}
+
+v1::ReconstructRequest BlobRequest(std::uint64_t sequence, unsigned seed, std::uint64_t index) {
+  v1::ReconstructRequest request;
+  v1::ParticleFrame& frame = *request.mutable_frame();
+  wire::EncodeFrame(FrameOf(MovingBlob(seed, index)), frame);
+  frame.set_sequence(sequence);
+  frame.set_time(0.25 * static_cast<double>(index));
+  return request;
+}
+
+v1::ReconstructRequest OpenRequest(const std::string& name) {
+  v1::ReconstructRequest request;
+  v1::OpenStream& open = *request.mutable_open();
+  open.set_stream_name(name);
+  wire::EncodeParameters(BlobParameters(), *open.mutable_parameters());
+  return request;
+}
+
+StreamClient::StreamClient(const std::shared_ptr<grpc::Channel>& channel)
+    : stub_(v1::ReconstructionService::NewStub(channel)) {
+  SetDeadline(context_);
+  stream_ = stub_->Reconstruct(&context_);
+}
+
+StreamClient::~StreamClient() {
+  if (finished_) return;
+  Cancel();
+  Finish();
+}
+
+v1::ReconstructResponse StreamClient::Receive() {
+  v1::ReconstructResponse response;
+  if (!stream_->Read(&response)) response.Clear();
+  return response;
+}
+
+v1::ReconstructResponse StreamClient::SendAndReceive(const v1::ReconstructRequest& request) {
+  Send(request);
+  return Receive();
+}
+
+grpc::Status StreamClient::Finish() {
+  v1::ReconstructResponse response;
+  while (stream_->Read(&response)) {
+  }
+  finished_ = true;
+  return stream_->Finish();
+}
+
+std::vector<Digests> LocalDigests(unsigned seed, std::uint64_t frames) {
+  const auto reconstructor = Reconstructor::Create(BlobParameters());
+  State state;
+  Workspace workspace;
+  Result result;
+  std::vector<Digests> digests;
+  for (std::uint64_t i = 0; i < frames; ++i) {
+    const std::vector<double> positions = MovingBlob(seed, i);
+    const auto status = reconstructor->Reconstruct(FrameOf(positions), state, workspace, result);
+    EXPECT_TRUE(status.ok()) << status;
+    digests.push_back({DigestRings(result.rings), DigestMesh(result.mesh)});
+  }
+  return digests;
+}
+
+std::vector<Digests> StreamedDigests(const std::shared_ptr<grpc::Channel>& channel, unsigned seed,
+                                     std::uint64_t frames) {
+  StreamClient client(channel);
+  EXPECT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
+  std::vector<Digests> digests;
+  for (std::uint64_t i = 0; i < frames; ++i) {
+    const auto answer = client.SendAndReceive(BlobRequest(i + 1, seed, i));
+    EXPECT_EQ(answer.frame().sequence(), i + 1) << answer.ShortDebugString().substr(0, 200);
+    digests.push_back({answer.frame().rings_digest(), answer.frame().mesh_digest()});
+  }
+  client.HalfClose();
+  const auto status = client.Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  return digests;
+}
+
+}  // namespace partiemc::server
