@@ -56,7 +56,10 @@ void ReconstructReactor::OnWriteDone(bool ok) { flow_->WriteDone(ok); }
 
 void ReconstructReactor::OnCancel() { flow_->Cancelled(); }
 
-void ReconstructReactor::OnDone() { delete this; }
+void ReconstructReactor::OnDone() {
+  registry_.Leave(*flow_);
+  delete this;
+}
 
 void ReconstructReactor::StartRead(std::size_t slot) {
   read_slot_ = slot;
@@ -82,8 +85,8 @@ Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
 }
 
 void ReconstructReactor::Finish(const absl::Status& status) {
-  // Out of the registry first: a client that sees the end may open the same name again at once.
-  LogEnd(registry_.Leave(*flow_), context_.peer(), status);
+  // Closed first: a client that sees the end may open the same name again at once.
+  LogEnd(registry_.Close(*flow_), context_.peer(), status);
   ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
 }
 

@@ -83,7 +83,9 @@ void Server::Drain(std::chrono::milliseconds grace) {
   const auto deadline = std::chrono::steady_clock::now() + grace;
   server_->GetHealthCheckService()->SetServingStatus(false);
   registry_.Drain();
-  // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first.
+  // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
+  // to the last word: a connection that closes with requests unread takes back what was just
+  // written.
   registry_.WaitUntilEmpty(deadline);
   const auto left = std::max(deadline - std::chrono::steady_clock::now(),
                              std::chrono::steady_clock::duration::zero());

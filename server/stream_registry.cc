@@ -105,18 +105,22 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
   return *entry.stream;
 }
 
-std::optional<StreamSummary> StreamRegistry::Leave(const StreamFlow& flow) {
+std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
   std::optional<StreamSummary> summary;
   {
     const std::lock_guard lock(mutex_);
     const auto found = entries_.find(&flow);
-    if (found == entries_.end()) return std::nullopt;
-    summary = std::move(found->second.stream);
-    entries_.erase(found);
+    if (found != entries_.end()) summary.swap(found->second.stream);
   }
-  left_.notify_all();
   if (summary) summary->counts = flow.counts();
   return summary;
+}
+
+void StreamRegistry::Leave(const StreamFlow& flow) {
+  const std::lock_guard lock(mutex_);
+  entries_.erase(&flow);
+  // With the lock held: whoever waits for the last flow may take the registry away after that.
+  left_.notify_all();
 }
 
 std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count) const {

@@ -52,8 +52,10 @@ class StreamRegistry {
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS), UNAVAILABLE (DRAINING).
   absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description);
 
-  /// The flow has gone, and its name with it. What it was, if it had been opened.
-  std::optional<StreamSummary> Leave(const StreamFlow& flow);
+  /// The flow's stream ends: its name and its place are free. What it was, if it had been opened.
+  std::optional<StreamSummary> Close(const StreamFlow& flow);
+  /// The flow has gone: its last word has been sent.
+  void Leave(const StreamFlow& flow);
 
   /// The open streams in the order of their numbers: at most `count`, with numbers above `after`.
   std::vector<StreamSummary> List(std::uint64_t after, std::size_t count) const;
@@ -68,7 +70,7 @@ class StreamRegistry {
  private:
   struct Entry {
     std::shared_ptr<StreamFlow> flow;
-    std::optional<StreamSummary> stream;  // Once open; its counts are asked of the flow.
+    std::optional<StreamSummary> stream;  // While open; its counts are asked of the flow.
   };
 
   const std::uint32_t max_streams_;

@@ -62,7 +62,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"CLI11", {"libcli11-dev"}},
       {"gRPC", {"libgrpc++-dev", "protobuf-compiler-grpc"}},
       {"GTest", {"libgtest-dev", "libgmock-dev"}},
-      {"libzstd", {"libzstd-dev"}},
+      {"libzstd", {"libzstd-dev"}},  // The name that pkg-config knows it by.
       {"nlohmann_json", {"nlohmann-json3-dev"}},
       {"partiemc", {}},
       {"PkgConfig", {"pkg-config"}},

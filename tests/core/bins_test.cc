@@ -84,6 +84,21 @@ TEST_P(RandomBins, EachParticleStandsInEveryTileWhoseNodesItsKernelReaches) {
   }
 }
 
+TEST_P(RandomBins, TilesReachACellAndTheRadiusOfASmallHoleBeyondEveryKernel) {
+  // A disc of the area of six particles has a radius of sqrt(6 / pi) spacings.
+  const double margin = 1 + std::sqrt(6 / std::acos(-1)) * scale_.spacing;
+  const double reach = scale_.kernel_radius + margin - 1e-4;
+  for (std::size_t k = 0; k < particles_.size(); ++k) {
+    const double x = particles_.x(k) / scale_.cell_size;
+    const double y = particles_.y(k) / scale_.cell_size;
+    for (const auto& [dx, dy] : {std::pair(-1, -1), {-1, 1}, {1, -1}, {1, 1}}) {
+      EXPECT_NE(bins_.tiles.Find({static_cast<std::int32_t>(std::floor((y + dy * reach) / 32)),
+                                  static_cast<std::int32_t>(std::floor((x + dx * reach) / 32))}),
+                kNoTile);
+    }
+  }
+}
+
 TEST_P(RandomBins, AParticleHasTheSamePositionInEachOfItsTiles) {
   std::vector<double> x(particles_.size(), kNan), y(particles_.size(), kNan);
   ForEachEntry([&](std::size_t, std::uint32_t e, double px, double py) {

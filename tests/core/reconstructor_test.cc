@@ -259,6 +259,24 @@ TEST(Reconstructor, ASpacingThatIsGivenCountsAndNotTheParticles) {
   EXPECT_EQ(result.statistics.cell_size, 1.25);
 }
 
+TEST(Reconstructor, AnOutlineAsFarOutAsTheKernelReachesStillKeepsEveryPromise) {
+  // A featherweight particle takes the guard away, and a reference radius near the kernel's puts
+  // the inside wherever a kernel reaches, up to the ends of tiles.
+  for (int shift = 0; shift < 32; ++shift) {
+    Particles particles = support::Shifted(support::Disc(3), shift + 0.25, 0.5 * shift);
+    particles.Add(shift + 8, 0.5 * shift);
+    particles.volumes.assign(particles.size(), 1.0f);
+    particles.volumes.back() = 2e-6f;
+    for (const Placement placement :
+         {Placement::kMarchingSquares, Placement::kQef, Placement::kVirtualPlane}) {
+      const Result result = ReconstructOnce(
+          {.placement = placement, .spacing = 1.0, .reference_radius = 2.99}, particles);
+      EXPECT_TRUE(Validate(result).ok()) << shift << ": " << Validate(result);
+      EXPECT_GT(result.statistics.area, 80);
+    }
+  }
+}
+
 TEST(Reconstructor, VolumesBeyondReasonAreRefusedByName) {
   Particles particles = support::Disc(4);
   particles.volumes.assign(particles.size(), 1.0f);

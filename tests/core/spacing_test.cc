@@ -51,9 +51,13 @@ TEST(Spacing, OfALargeFrameIsWithinThreePercentOfTheMedianOfAll) {
 
 TEST(Spacing, IgnoresSprayAndLoneParticles) {
   support::Random random(12);
-  Particles particles = support::Lattice(15, 15);
-  particles.Add(support::Shifted(support::Noise(random, 80, 500), 600, 600));
-  EXPECT_EQ(Estimate(particles), 1.0);
+  const Particles body = support::Blob(random, 12);
+  Particles particles = body;
+  // Two fifths as many lone ones would shift the median of all.
+  const int lone = static_cast<int>(body.size() * 2 / 5);
+  particles.Add(support::Shifted(support::Scaled(support::Lattice(lone, 1), 50), 100, 100));
+  EXPECT_DOUBLE_EQ(*Estimate(particles), support::MedianNearestNeighbour(body));
+  EXPECT_GT(support::MedianNearestNeighbour(particles), support::MedianNearestNeighbour(body));
 }
 
 TEST(Spacing, IgnoresDuplicates) {

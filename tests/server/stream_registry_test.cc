@@ -60,17 +60,17 @@ TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
   EXPECT_EQ(refused.status().message(),
             "streams: 3 open; must be at most 3; try again when one has ended, or start the server "
             "with a larger --max-streams");
-  registry_.Leave(*flows[0]);
+  registry_.Close(*flows[0]);
   EXPECT_TRUE(Open(*late, "late").ok());
 }
 
-TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatHasLeft) {
+TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatIsClosed) {
   const auto first = Enter(), second = Enter();
   ASSERT_TRUE(Open(*first, "tank").ok());
   const auto refused = Open(*second, "tank");
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kAlreadyExists);
   EXPECT_EQ(ReasonOf(refused.status()), kReasonNameInUse);
-  const auto left = registry_.Leave(*first);
+  const auto left = registry_.Close(*first);
   ASSERT_TRUE(left.has_value());
   EXPECT_EQ(left->description.name, "tank");
   EXPECT_TRUE(Open(*second, "tank").ok());
@@ -133,7 +133,8 @@ TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {
   EXPECT_EQ(ReasonOf(Open(*flow, "x").status()), kReasonDraining);
 
   const auto now = std::chrono::steady_clock::now();
-  EXPECT_FALSE(registry_.WaitUntilEmpty(now));
+  registry_.Close(*flow);
+  EXPECT_FALSE(registry_.WaitUntilEmpty(now)) << "closed is not gone";
   std::thread leaver([&] { registry_.Leave(*flow); });
   EXPECT_TRUE(registry_.WaitUntilEmpty(now + std::chrono::seconds(60)));
   leaver.join();

@@ -214,7 +214,7 @@ TEST_F(Operation, DrainingDeliversFinishedFramesTellsEveryStreamAndRefusesNewOne
       EXPECT_TRUE(noticed);
       const auto status = client.Finish();
       EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE) << status.error_message();
-      EXPECT_EQ(client.reason(), "DRAINING");
+      EXPECT_EQ(client.reason(), "DRAINING") << status.error_message();
     });
   }
   while (streaming < kStreams) std::this_thread::sleep_for(std::chrono::milliseconds(1));
