@@ -87,7 +87,7 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
 }
 
 void Components::CountParticles(const ParticleBins& bins, const Crossings& crossings,
-                                std::span<std::uint64_t> counts) const {
+                                std::span<std::uint64_t> counts, std::span<double> weights) const {
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
     for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
       if (!IsAtHome(bins.x[e], bins.y[e])) continue;
@@ -108,7 +108,10 @@ void Components::CountParticles(const ParticleBins& bins, const Crossings& cross
           nearest = node;
         }
       }
-      if (nearest.tile != kNoTile) ++counts[At(crossings, nearest)];
+      if (nearest.tile == kNoTile) continue;
+      const std::uint32_t component = At(crossings, nearest);
+      ++counts[component];
+      if (!bins.weight.empty()) weights[component] += bins.weight[e];
     }
   }
 }

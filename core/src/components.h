@@ -27,10 +27,11 @@ class Components {
   template <typename Visit>
   void ForEachRun(const Crossings& crossings, Visit visit) const;
 
-  /// Adds the particles of each component to `counts`, which has size() elements. A particle
-  /// belongs to the inside corner of its cell that is nearest to it; none: to nobody.
+  /// Adds the particles of each component to `counts`, and their weights, where particles have
+  /// weights of their own, to `weights`; both have size() elements. A particle belongs to the
+  /// inside corner of its cell that is nearest to it; none: to nobody.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
-                      std::span<std::uint64_t> counts) const;
+                      std::span<std::uint64_t> counts, std::span<double> weights) const;
 
  private:
   std::uint32_t RunAt(const Crossings& crossings, const TilePlace& node) const;

@@ -1,6 +1,9 @@
 #include "interior.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
+#include <limits>
 
 namespace partiemc {
 namespace {
@@ -84,7 +87,55 @@ bool TakeRowAbove(const TileDirectory& directory, MergeScratch& scratch, int row
   return true;
 }
 
+// Cells are taken out this much beyond a box, in cells: a vertex on a lattice line touches the
+// cells on both of its sides, and dividing by the cell size rounds.
+constexpr double kTouchMargin = 1.0 / 1024;
+
+// A box in cells of the lattice.
+struct CellBox {
+  double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
+
+  void Add(const double* point, double cell_size) {
+    const double x = point[0] / cell_size;
+    const double y = point[1] / cell_size;
+    x0 = std::min(x0, x);
+    x1 = std::max(x1, x);
+    y0 = std::min(y0, y);
+    y1 = std::max(y1, y);
+  }
+};
+
+void ExcludeBox(const TileDirectory& directory, const CellBox& box, std::vector<TileBits>& tiles) {
+  const auto cell = [](double coordinate) {
+    return static_cast<std::int64_t>(std::floor(coordinate));
+  };
+  for (std::int64_t j = cell(box.y0 - kTouchMargin); j <= cell(box.y1 + kTouchMargin); ++j) {
+    for (std::int64_t i = cell(box.x0 - kTouchMargin); i <= cell(box.x1 + kTouchMargin); ++i) {
+      const std::uint32_t tile = directory.Find(
+          {static_cast<std::int32_t>(j >> kTileShift), static_cast<std::int32_t>(i >> kTileShift)});
+      if (tile == kNoTile) continue;
+      tiles[tile].interior[j & (kTileSize - 1)] &= ~(std::uint32_t{1} << (i & (kTileSize - 1)));
+    }
+  }
+}
+
 }  // namespace
+
+void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
+                         std::span<const std::uint32_t> offsets, std::span<const double> roots,
+                         double cell_size, std::vector<TileBits>& tiles) {
+  for (std::size_t ring = 0; ring + 1 < offsets.size(); ++ring) {
+    for (std::size_t k = offsets[ring]; k < offsets[ring + 1]; ++k) {
+      const std::size_t next = k + 1 == offsets[ring + 1] ? offsets[ring] : k + 1;
+      CellBox box;
+      for (const std::size_t end : {k, next}) {
+        box.Add(points.data() + 2 * end, cell_size);
+        box.Add(roots.data() + 2 * end, cell_size);
+      }
+      ExcludeBox(directory, box, tiles);
+    }
+  }
+}
 
 void TraceStaircases(const TileDirectory& directory, const std::vector<TileBits>& tiles,
                      Staircases& staircases) {

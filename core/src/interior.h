@@ -3,12 +3,21 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "crossings.h"
 #include "lattice.h"
 
 namespace partiemc {
+
+/// Takes the cells that the rings run through, or that they ran over on their way from `roots`,
+/// out of the interior: what is left lies inside of the rings and does not touch them. `points` and
+/// `roots` are interleaved, in world units, one of each per point of the rings.
+/// Cost: linear in the points.
+void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
+                         std::span<const std::uint32_t> offsets, std::span<const double> roots,
+                         double cell_size, std::vector<TileBits>& tiles);
 
 /// Closed loops along lattice edges with interior cells on the left: outlines counter-clockwise,
 /// voids clockwise. Only the corners are listed. Where two interior cells touch at a node only, the

@@ -166,6 +166,7 @@ std::size_t CountInLevel(const Grids& grids, TouchingPairsBuffers& buffers, std:
         if (segments[j].cell != cell || (!finds_all && j <= i)) continue;
         if (!TouchesMoreThanItMust(segments, i, j)) continue;
         ++count;
+        if (buffers.pairs.size() < segments.size()) buffers.pairs.emplace_back(i, j);
         buffers.example_first = std::min(i, j);
         buffers.example_second = std::max(i, j);
       }
@@ -181,6 +182,7 @@ std::size_t CountTouchingPairs(std::span<const double> points,
                                TouchingPairsBuffers& buffers) {
   const std::vector<Segment>& segments = buffers.segments;
   const Box bounds = CollectSegments(points, ring_offsets, buffers.segments);
+  buffers.pairs.clear();
   if (segments.empty()) return 0;
   double extents = 0;
   for (const Segment& segment : segments) extents += Extent(BoxAround(segment));

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "point.h"
@@ -23,7 +24,11 @@ struct TouchingPairsBuffers {
   std::vector<Segment> segments;
   std::vector<std::uint32_t> slots;
 
-  /// A pair that was counted, each segment named by the point that it begins at. Only to be read
+  /// Pairs that were counted, each segment named by the point that it begins at. At most as many as
+  /// there are segments; a frame with more of them has lost the later ones.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+
+  /// One of them, each segment named by the point that it begins at. Only to be read
   /// when the count was not zero.
   std::uint32_t example_first = 0, example_second = 0;
 };

@@ -263,6 +263,10 @@ void MeshBuilder::Reset() {
 
 absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
   Reset();
+  if (input_.parameters.placement == Placement::kVirtualPlane) {
+    ExcludeTouchedCells(input_.directory, input_.rings.points, input_.rings.offsets,
+                        input_.placed.roots, input_.scale.cell_size, input_.crossings.tiles);
+  }
   TraceStaircases(input_.directory, input_.crossings.tiles, scratch_.staircases);
   std::uint64_t band_triangles = ExpectedBandTriangles();
   const Fill fill = input_.parameters.fill;

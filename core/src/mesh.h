@@ -31,7 +31,7 @@ struct MeshScratch {
 
 struct MeshInput {
   const TileDirectory& directory;
-  const Crossings& crossings;
+  Crossings& crossings;  ///< Interior cells that the rings touch are taken out.
   const RingTopology& topology;
   const std::vector<CellPlane>& planes;
   const PlacedVertices& placed;

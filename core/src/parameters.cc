@@ -49,6 +49,10 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
   if (!Within(p.surface_offset, -1, 1)) {
     return OutOfRange("surface_offset", p.surface_offset, "must be in [-1, 1] spacings");
   }
+  if (!(p.min_component_area >= 0 && std::isfinite(p.min_component_area))) {
+    return OutOfRange("min_component_area", p.min_component_area,
+                      "must be 0 or more squared spacings, and finite");
+  }
   return absl::OkStatus();
 }
 

@@ -64,17 +64,27 @@ LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossi
   return {origin.x + u, origin.y + v};
 }
 
+LatticePoint NewtonStep(LatticePoint point, const FieldSample& sample, double max_step) {
+  const double square =
+      sample.gradient_x * sample.gradient_x + sample.gradient_y * sample.gradient_y;
+  if (square < kWeakGradientSquare) return point;
+  double step_x = -sample.value * sample.gradient_x / square;
+  double step_y = -sample.value * sample.gradient_y / square;
+  const double length = std::sqrt(step_x * step_x + step_y * step_y);
+  if (length > max_step) {
+    step_x *= max_step / length;
+    step_y *= max_step / length;
+  }
+  return {point.x + step_x, point.y + step_y};
+}
+
 LatticePoint VirtualPlaneVertex(const CellPlane& plane) {
   if (plane.is_weak) return plane.point;
-  const double square = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y;
-  double step_x = -plane.value * plane.gradient_x / square;
-  double step_y = -plane.value * plane.gradient_y / square;
-  const double length = std::sqrt(step_x * step_x + step_y * step_y);
-  if (length > kMaxNewtonStep) {
-    step_x *= kMaxNewtonStep / length;
-    step_y *= kMaxNewtonStep / length;
-  }
-  return {plane.point.x + step_x, plane.point.y + step_y};
+  FieldSample sample;
+  sample.value = plane.value;
+  sample.gradient_x = plane.gradient_x;
+  sample.gradient_y = plane.gradient_y;
+  return NewtonStep(plane.point, sample, kMaxNewtonStep);
 }
 
 LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane) {

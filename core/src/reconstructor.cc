@@ -96,6 +96,7 @@ void Summarise(const Workspace::Buffers& buffers, const Lengths& lengths, Result
   statistics.active_cells = buffers.crossings.cells.size();
   statistics.dropped_holes = buffers.topology.dropped_holes;
   statistics.dropped_components = buffers.topology.dropped_components;
+  statistics.dropped_spray = buffers.topology.dropped_spray;
   statistics.spacing = lengths.spacing;
   statistics.cell_size = lengths.cell_size;
   for (const RingMeasures& measures : result.rings.measures) {
@@ -106,8 +107,8 @@ void Summarise(const Workspace::Buffers& buffers, const Lengths& lengths, Result
 
 // Stages 2 to 7: everything after the particles have found their tiles.
 absl::Status Contour(const ReconstructionParameters& parameters, const Frame& frame,
-                     const Scale& scale, std::span<const CellNormal> previous,
-                     StageObserver* observer, Workspace::Buffers& b, Result& result) {
+                     const Scale& scale, const State& previous, StageObserver* observer,
+                     Workspace::Buffers& b, Result& result) {
   const TileDirectory& tiles = b.bins.tiles;
   {
     const StageScope scope(observer, Stage::kField);
@@ -119,22 +120,25 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
   }
   {
     const StageScope scope(observer, Stage::kRings);
-    TraceRings(b.bins, b.level_set, scale, *parameters.clean, b.crossings, b.ring_scratch,
-               b.topology);
+    TraceRings(b.bins, b.level_set, scale, parameters, b.crossings, b.ring_scratch, b.topology);
   }
   const bool farthest = parameters.placement == Placement::kFarthestParticle;
+  // These two ask for the field beyond the cells of the isoline.
+  const bool wanders = farthest || parameters.placement == Placement::kVirtualPlane;
   {
     const StageScope scope(observer, Stage::kNormals);
-    b.point_field.Build(b.bins, b.crossings, scale, farthest);
+    b.point_field.Build(b.bins, b.crossings, scale, wanders);
     EstimateNormals(b.bins, b.level_set, b.crossings, b.topology, b.point_field, parameters,
-                    previous, b.planes, b.next_normals);
+                    previous.normals, b.planes, b.next_normals);
   }
   {
     const StageScope scope(observer, Stage::kVertices);
     PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.point_field, b.planes,
                    parameters, scale},
-                  b.placed, result.rings);
-    // The other placements cannot cross: Validate checks that claim, the hot path trusts it.
+                  b.next_area_offset, b.placed, result.rings);
+    ContinueRings(tiles, b.crossings, b.topology, b.placed, previous.history, b.identity_scratch,
+                  b.next_history, result.rings);
+    // The other placements do not cross: Validate checks that claim, the hot path trusts it.
     if (farthest) {
       result.statistics.self_intersections =
           CountTouchingPairs(result.rings.points, result.rings.offsets, b.intersections);
@@ -185,8 +189,8 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
       return status;
     }
   }
-  if (absl::Status status =
-          Contour(parameters_, frame, scale, state.normals, observer, buffers, result);
+  buffers.next_area_offset = state.area_offset;
+  if (absl::Status status = Contour(parameters_, frame, scale, state, observer, buffers, result);
       !status.ok()) {
     result.Clear();
     return status;
@@ -195,7 +199,9 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
   Summarise(buffers, *lengths, result);
   state.cell_size = lengths->cell_size;
   state.spacing = lengths->spacing;
+  state.area_offset = buffers.next_area_offset;
   std::swap(state.normals, buffers.next_normals);
+  std::swap(state.history, buffers.next_history);
   return absl::OkStatus();
 }
 

@@ -8,6 +8,8 @@ void Rings::Clear() {
   outer_of.clear();
   measures.clear();
   normals.clear();
+  parents.clear();
+  parent_offsets.assign(1, 0);
 }
 
 void Mesh::Clear() {

@@ -124,7 +124,9 @@ void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings,
 void CountComponents(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch) {
   scratch.components.Label(bins.tiles, crossings);
   scratch.particle_count.assign(scratch.components.size(), 0);
-  scratch.components.CountParticles(bins, crossings, scratch.particle_count);
+  scratch.particle_weight.assign(scratch.components.size(), 0);
+  scratch.components.CountParticles(bins, crossings, scratch.particle_count,
+                                    scratch.particle_weight);
 }
 
 void Clean(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
@@ -151,35 +153,107 @@ void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& 
           RingScratch& scratch, RingTopology& rings) {
   const std::size_t ring_count = rings.offsets.size() - 1;
   std::vector<std::uint32_t> outer_ring(scratch.components.size(), kNoRing);
-  std::vector<std::uint32_t> component(ring_count);
-  std::vector<bool> is_hole(ring_count);
+  scratch.component_of_ring.resize(ring_count);
+  scratch.area.resize(ring_count);
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
     const EdgeNodes nodes = EntryNodes(bins.tiles, crossings, rings.segments[rings.offsets[ring]]);
-    component[ring] = scratch.components.At(crossings, nodes.inside);
-    is_hole[ring] = AreaOf(bins, level_set, crossings, rings, ring, scratch.points) < 0;
-    if (!is_hole[ring]) outer_ring[component[ring]] = static_cast<std::uint32_t>(ring);
+    const std::uint32_t component = scratch.components.At(crossings, nodes.inside);
+    scratch.component_of_ring[ring] = component;
+    scratch.area[ring] = AreaOf(bins, level_set, crossings, rings, ring, scratch.points);
+    if (scratch.area[ring] >= 0) outer_ring[component] = static_cast<std::uint32_t>(ring);
   }
   rings.outer_of.assign(ring_count, kNoRing);
   rings.particle_count.assign(ring_count, 0);
+  rings.particle_weight.assign(ring_count, 0);
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
-    if (is_hole[ring]) {
-      rings.outer_of[ring] = outer_ring[component[ring]];
+    const std::uint32_t component = scratch.component_of_ring[ring];
+    if (scratch.area[ring] < 0) {
+      rings.outer_of[ring] = outer_ring[component];
     } else {
-      rings.particle_count[ring] = scratch.particle_count[component[ring]];
+      rings.particle_count[ring] = scratch.particle_count[component];
+      rings.particle_weight[ring] = scratch.particle_weight[component];
     }
   }
 }
 
+// Finds the outer ring around each outer ring. A ring's lowest row shows what it lies in: going
+// left from there, the next ring is a hole of the one around it, or a neighbour in the same void,
+// which has been seen before.
+void FindContainers(const TileDirectory& directory, const Crossings& crossings,
+                    const RingTopology& rings, RingScratch& scratch) {
+  scratch.outer_rings.clear();
+  scratch.container.assign(rings.RingCount(), kNoRing);
+  scratch.visited.assign(rings.RingCount(), 0);
+  scratch.rows.SetRings(crossings, rings.segments, rings.offsets);
+  CrossedEdge last;
+  scratch.rows.ForEachEdge(directory, crossings, [&](const CrossedEdge& edge) {
+    const CrossedEdge left = last;
+    last = edge;
+    if (rings.outer_of[edge.ring] != kNoRing || scratch.visited[edge.ring]) return;
+    scratch.visited[edge.ring] = 1;
+    scratch.outer_rings.push_back(edge.ring);
+    if (left.ring == kNoRing || left.row != edge.row) return;
+    const std::uint32_t around = rings.outer_of[left.ring];
+    scratch.container[edge.ring] = around != kNoRing ? around : scratch.container[left.ring];
+  });
+}
+
+// Decides which components are spray or lie in it. Returns how many.
+std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spacing,
+                        const RingTopology& rings, RingScratch& scratch) {
+  // Outer rings come after those around them.
+  scratch.enclosed = rings.particle_count;
+  for (std::size_t k = scratch.outer_rings.size(); k-- > 0;) {
+    const std::uint32_t ring = scratch.outer_rings[k];
+    const std::uint32_t around = scratch.container[ring];
+    if (around != kNoRing) scratch.enclosed[around] += scratch.enclosed[ring];
+  }
+  const double min_area = parameters.min_component_area * spacing * spacing;
+  scratch.dropped.assign(scratch.components.size(), 0);
+  std::uint64_t count = 0;
+  for (const std::uint32_t ring : scratch.outer_rings) {
+    const std::uint32_t around = scratch.container[ring];
+    const bool drop = scratch.area[ring] < min_area ||
+                      scratch.enclosed[ring] < parameters.min_component_particles ||
+                      (around != kNoRing && scratch.dropped[scratch.component_of_ring[around]]);
+    if (!drop) continue;
+    scratch.dropped[scratch.component_of_ring[ring]] = 1;
+    ++count;
+  }
+  return count;
+}
+
+void DropSpray(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
+               const ReconstructionParameters& parameters, Crossings& crossings,
+               RingScratch& scratch, RingTopology& rings) {
+  FindContainers(bins.tiles, crossings, rings, scratch);
+  rings.dropped_spray = FindSpray(parameters, scale.spacing, rings, scratch);
+  if (rings.dropped_spray == 0) return;
+  scratch.components.ForEachRun(
+      crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
+        if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
+      });
+  KeepSurvivors(bins.tiles, crossings, rings);
+  MarkInteriorCells(bins.tiles, crossings);
+  CountComponents(bins, crossings, scratch);
+  Nest(bins, level_set, crossings, scratch, rings);
+}
+
 }  // namespace
 
-void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale, bool clean,
-                Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
+void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
+                const ReconstructionParameters& parameters, Crossings& crossings,
+                RingScratch& scratch, RingTopology& rings) {
   rings.dropped_holes = 0;
   rings.dropped_components = 0;
+  rings.dropped_spray = 0;
   Trace(bins.tiles, crossings, scratch.visited, rings);
   CountComponents(bins, crossings, scratch);
-  if (clean) Clean(bins, level_set, scale, crossings, scratch, rings);
+  if (*parameters.clean) Clean(bins, level_set, scale, crossings, scratch, rings);
   Nest(bins, level_set, crossings, scratch, rings);
+  if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {
+    DropSpray(bins, level_set, scale, parameters, crossings, scratch, rings);
+  }
 }
 
 }  // namespace partiemc

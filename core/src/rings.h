@@ -6,7 +6,9 @@
 
 #include "bins.h"
 #include "components.h"
+#include "crossed_rows.h"
 #include "crossings.h"
+#include "partiemc/parameters.h"
 #include "scale.h"
 
 namespace partiemc {
@@ -17,8 +19,10 @@ struct RingTopology {
   std::vector<std::uint32_t> offsets;         ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;  ///< Per ring: of its component; 0 for holes.
+  std::vector<double> particle_weight;  ///< The same for the field's weights, where they differ.
   std::uint64_t dropped_holes = 0;
   std::uint64_t dropped_components = 0;
+  std::uint64_t dropped_spray = 0;
 
   std::size_t RingCount() const { return outer_of.size(); }
 };
@@ -27,15 +31,28 @@ struct RingTopology {
 struct RingScratch {
   Components components;
   std::vector<std::uint64_t> particle_count;
+  std::vector<double> particle_weight;
   std::vector<std::uint8_t> visited;
   std::vector<LatticePoint> points;
+  std::vector<std::uint32_t> component_of_ring;
+  std::vector<double> area;  // By ring, in cells.
+  CrossedRows rows;
+  std::vector<std::uint32_t> outer_rings;  // From the outside inwards.
+  std::vector<std::uint32_t> container;    // By outer ring: the one around it, or kNoRing.
+  std::vector<std::uint64_t> enclosed;     // By outer ring: particles in it and in its islands.
+  std::vector<std::uint8_t> dropped;       // By component.
 };
 
 /// Joins the segments of `crossings` to rings and assigns each hole to its outer ring. With
-/// `clean`, components without a particle and holes below 6 h^2 (METHOD, step 3) are dropped, with
-/// everything that lies in such a hole; the nodes that they held then change sides in `crossings`.
-/// Rings come in the order of their first segments. Cost: linear in segments and particles.
-void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale, bool clean,
-                Crossings& crossings, RingScratch& scratch, RingTopology& rings);
+/// `parameters.clean`, components without a particle and holes below 6 h^2 (METHOD, step 3) are
+/// dropped, with everything that lies in such a hole. Then spray is dropped: outer rings that
+/// enclose less area than `min_component_area` h^2, or fewer particles than
+/// `min_component_particles`, with everything in them. Nodes that were dropped change sides in
+/// `crossings`. Areas are those of the level set's own isoline, before vertices are placed.
+/// Rings come in the order of their first segments. Cost: linear in segments, tiles and particles.
+/// Requires: resolved parameters.
+void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
+                const ReconstructionParameters& parameters, Crossings& crossings,
+                RingScratch& scratch, RingTopology& rings);
 
 }  // namespace partiemc

@@ -12,11 +12,16 @@
 namespace partiemc {
 namespace {
 
-// Layout, little-endian: magic, version, cell size, spacing (0: none), count, normals, checksum.
+// Layout, little-endian: magic, version, cell size, spacing (0: none), area offset (kNoOffset:
+// none), identities given, counts of normals, rings and runs, then these, checksum.
 constexpr std::uint32_t kMagic = 0x53504d45;  // "EMPS"
-constexpr std::uint32_t kVersion = 1;
-constexpr std::size_t kHeaderBytes = 4 + 4 + 8 + 8 + 8;
+constexpr std::uint32_t kVersion = 2;
+constexpr std::size_t kHeaderBytes = 4 + 4 + 8 + 8 + 8 + 8 + 3 * 8;
+constexpr std::uint64_t kNoOffset = 0x7ff8000000000000;           // Not a number.
+constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;  // No stream gets to the end.
 constexpr std::size_t kNormalBytes = 4 + 4 + 4 + 4;
+constexpr std::size_t kRingBytes = 8 + 4;
+constexpr std::size_t kRunBytes = 4 + 4 + 4 + 4;
 constexpr std::size_t kChecksumBytes = 8;
 
 template <typename T>
@@ -71,22 +76,109 @@ absl::Status CheckNormals(const std::vector<CellNormal>& normals) {
   return absl::OkStatus();
 }
 
+absl::Status TakeAreaOffset(std::string_view& rest, std::optional<double>& offset) {
+  const auto bits = Take<std::uint64_t>(rest);
+  if (bits == kNoOffset) return absl::OkStatus();
+  offset = std::bit_cast<double>(bits);
+  if (*offset >= -1 && *offset <= 1) return absl::OkStatus();
+  return Corrupt(absl::StrCat("area offset ", ShortestNumber(*offset)),
+                 "must be absent or in [-1, 1] spacings");
+}
+
+absl::Status CheckHistory(const RingHistory& history) {
+  if (history.identities_given > kMaxIdentities) {
+    return Corrupt(absl::StrCat(history.identities_given, " identities"),
+                   absl::StrCat("must be at most ", kMaxIdentities));
+  }
+  for (std::size_t k = 0; k < history.rings.size(); ++k) {
+    const std::uint64_t after = k == 0 ? 0 : history.rings[k - 1].identity;
+    const std::uint64_t identity = history.rings[k].identity;
+    if (identity <= after || identity > history.identities_given) {
+      return Corrupt(
+          absl::StrCat("identity ", identity),
+          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
+    }
+  }
+  for (std::size_t k = 0; k < history.runs.size(); ++k) {
+    const NodeRun& run = history.runs[k];
+    if (run.first > run.last || run.ring >= history.rings.size()) {
+      return Corrupt(absl::StrCat("run ", k), "must have nodes and a ring");
+    }
+    if (k > 0 && std::tie(history.runs[k - 1].row, history.runs[k - 1].last) >=
+                     std::tie(run.row, run.first)) {
+      return Corrupt(absl::StrCat("run ", k), "must come after the one before it");
+    }
+  }
+  return absl::OkStatus();
+}
+
+struct Counts {
+  std::uint64_t normals, rings, runs;
+};
+
+// Whether `bytes` is what so many elements take. Each count is bounded before it is multiplied.
+bool Fill(const Counts& counts, std::size_t bytes) {
+  return counts.normals <= bytes / kNormalBytes && counts.rings <= bytes / kRingBytes &&
+         counts.runs <= bytes / kRunBytes &&
+         counts.normals * kNormalBytes + counts.rings * kRingBytes + counts.runs * kRunBytes ==
+             bytes;
+}
+
+void PutHistory(const RingHistory& history, std::string& bytes) {
+  for (const KnownRing& ring : history.rings) {
+    Put(ring.identity, bytes);
+    Put(std::uint32_t{ring.is_hole}, bytes);
+  }
+  for (const NodeRun& run : history.runs) {
+    Put(run.row, bytes);
+    Put(run.first, bytes);
+    Put(run.last, bytes);
+    Put(run.ring, bytes);
+  }
+}
+
+absl::Status TakeHistory(const Counts& counts, std::string_view& rest, RingHistory& history) {
+  history.rings.resize(counts.rings);
+  for (KnownRing& ring : history.rings) {
+    ring.identity = Take<std::uint64_t>(rest);
+    const auto kind = Take<std::uint32_t>(rest);
+    if (kind > 1) return Corrupt(absl::StrCat("ring of kind ", kind), "must be of kind 0 or 1");
+    ring.is_hole = kind == 1;
+  }
+  history.runs.resize(counts.runs);
+  for (NodeRun& run : history.runs) {
+    run.row = Take<std::int32_t>(rest);
+    run.first = Take<std::int32_t>(rest);
+    run.last = Take<std::int32_t>(rest);
+    run.ring = Take<std::uint32_t>(rest);
+  }
+  return CheckHistory(history);
+}
+
 }  // namespace
 
 std::string Serialize(const State& state) {
   std::string bytes;
-  bytes.reserve(kHeaderBytes + kNormalBytes * state.normals.size() + kChecksumBytes);
+  const RingHistory& history = state.history;
+  bytes.reserve(kHeaderBytes + kNormalBytes * state.normals.size() +
+                kRingBytes * history.rings.size() + kRunBytes * history.runs.size() +
+                kChecksumBytes);
   Put(kMagic, bytes);
   Put(kVersion, bytes);
   Put(state.cell_size.value_or(0), bytes);
   Put(state.spacing.value_or(0), bytes);
+  Put(state.area_offset ? std::bit_cast<std::uint64_t>(*state.area_offset) : kNoOffset, bytes);
+  Put(history.identities_given, bytes);
   Put(static_cast<std::uint64_t>(state.normals.size()), bytes);
+  Put(static_cast<std::uint64_t>(history.rings.size()), bytes);
+  Put(static_cast<std::uint64_t>(history.runs.size()), bytes);
   for (const CellNormal& normal : state.normals) {
     Put(normal.column, bytes);
     Put(normal.row, bytes);
     Put(normal.x, bytes);
     Put(normal.y, bytes);
   }
+  PutHistory(history, bytes);
   Put(ChecksumOf(bytes), bytes);
   return bytes;
 }
@@ -117,12 +209,19 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
                                 ", spacing ", ShortestNumber(state.spacing.value_or(0))),
                    "must both be absent or both be lengths");
   }
-  const auto count = Take<std::uint64_t>(rest);
-  if (count != rest.size() / kNormalBytes || rest.size() % kNormalBytes != 0) {
-    return Corrupt(absl::StrCat(count, " normals in ", rest.size(), " bytes"),
-                   absl::StrCat("must be ", kNormalBytes, " bytes each"));
+  if (absl::Status status = TakeAreaOffset(rest, state.area_offset); !status.ok()) return status;
+  state.history.identities_given = Take<std::uint64_t>(rest);
+  Counts counts{};
+  counts.normals = Take<std::uint64_t>(rest);
+  counts.rings = Take<std::uint64_t>(rest);
+  counts.runs = Take<std::uint64_t>(rest);
+  if (!Fill(counts, rest.size())) {
+    return Corrupt(absl::StrCat(counts.normals, " normals, ", counts.rings, " rings and ",
+                                counts.runs, " runs in ", rest.size(), " bytes"),
+                   absl::StrCat("must be ", kNormalBytes, ", ", kRingBytes, " and ", kRunBytes,
+                                " bytes each"));
   }
-  state.normals.resize(count);
+  state.normals.resize(counts.normals);
   for (CellNormal& normal : state.normals) {
     normal.column = Take<std::int32_t>(rest);
     normal.row = Take<std::int32_t>(rest);
@@ -130,6 +229,7 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
     normal.y = Take<float>(rest);
   }
   if (absl::Status status = CheckNormals(state.normals); !status.ok()) return status;
+  if (absl::Status status = TakeHistory(counts, rest, state.history); !status.ok()) return status;
   return state;
 }
 

@@ -4,7 +4,10 @@
 
 #include <cmath>
 
+#include "area.h"
+#include "measure.h"
 #include "placement.h"
+#include "virtual_plane.h"
 
 namespace partiemc {
 namespace {
@@ -36,9 +39,7 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
       break;
     }
     case Placement::kVirtualPlane:
-      Store(ClampToCell(input.bins.tiles, input.crossings, segment, VirtualPlaneVertex(plane)),
-            cell_size, target);
-      break;
+      break;  // Placed ring by ring, below.
   }
 }
 
@@ -115,33 +116,48 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment, Pla
   return keep;
 }
 
-RingMeasures Measure(std::span<const double> points) {
-  RingMeasures measures;
-  const double x0 = points[0];
-  const double y0 = points[1];
-  const std::size_t count = points.size() / 2;
-  double twice_area = 0, moment_x = 0, moment_y = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t next = k + 1 < count ? k + 1 : 0;
-    const double ax = points[2 * k] - x0, ay = points[2 * k + 1] - y0;
-    const double bx = points[2 * next] - x0, by = points[2 * next + 1] - y0;
-    const double cross = ax * by - bx * ay;
-    twice_area += cross;
-    moment_x += (ax + bx) * cross;
-    moment_y += (ay + by) * cross;
-    measures.perimeter += std::sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay));
+// The rings of `virtual-plane`, moved, matched to their area and repaired.
+void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
+                       PlacedVertices& placed, Rings& rings) {
+  RingVertices& vertices = placed.vertices;
+  PlaceOnVirtualPlanes(input, vertices);
+  const RingTopology& topology = input.topology;
+  const double cell_size = input.scale.cell_size;
+  placed.roots.clear();
+  placed.point_of_segment.resize(topology.segments.size());
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
+         i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
+      if (!vertices.is_kept[i]) continue;
+      // Of the two vertices of segment i / 2, the cell's comes second and is always kept.
+      placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(rings.PointCount());
+      rings.points.push_back(vertices.point[i].x * cell_size);
+      rings.points.push_back(vertices.point[i].y * cell_size);
+      placed.roots.push_back(vertices.root[i].x * cell_size);
+      placed.roots.push_back(vertices.root[i].y * cell_size);
+      rings.normals.push_back(static_cast<float>(vertices.normal[i].x));
+      rings.normals.push_back(static_cast<float>(vertices.normal[i].y));
+    }
+    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
   }
-  measures.area = twice_area / 2;
-  const bool flat = twice_area == 0;
-  measures.centroid_x = x0 + (flat ? 0 : moment_x / (3 * twice_area));
-  measures.centroid_y = y0 + (flat ? 0 : moment_y / (3 * twice_area));
-  return measures;
+  rings.outer_of = topology.outer_of;
+  MatchArea(input, placed.offset_points, area_offset, rings);
+  RepairRings(placed.roots, placed.repair, rings);
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    rings.measures.push_back(MeasureRing(rings.RingPoints(ring)));
+    rings.measures.back().particle_count = topology.particle_count[ring];
+  }
 }
 
 }  // namespace
 
-void PlaceVertices(const VertexInput& input, PlacedVertices& placed, Rings& rings) {
+void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+                   PlacedVertices& placed, Rings& rings) {
   rings.Clear();
+  if (input.parameters.placement == Placement::kVirtualPlane) {
+    PlaceRefinedRings(input, area_offset, placed, rings);
+    return;
+  }
   const RingTopology& topology = input.topology;
   const int per_segment = input.parameters.placement == Placement::kQef ? 2 : 1;
   placed.points.resize(2 * per_segment * topology.segments.size());
@@ -157,7 +173,7 @@ void PlaceVertices(const VertexInput& input, PlacedVertices& placed, Rings& ring
     rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
     rings.outer_of.push_back(topology.outer_of[ring]);
     const std::size_t start = rings.offsets[rings.offsets.size() - 2];
-    rings.measures.push_back(Measure(std::span(rings.points).subspan(2 * start)));
+    rings.measures.push_back(MeasureRing(std::span(rings.points).subspan(2 * start)));
     rings.measures.back().particle_count = topology.particle_count[ring];
   }
   // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "normals.h"
@@ -9,6 +10,8 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "point_field.h"
+#include "repair.h"
+#include "ring_vertices.h"
 #include "rings.h"
 
 namespace partiemc {
@@ -22,6 +25,12 @@ struct PlacedVertices {
   /// Per segment of RingTopology: index in Rings::points of the vertex of its cell (of its entry
   /// crossing for `marching-squares`), or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
+  /// `virtual-plane` only: the vertices on their way, and where each point of the rings may retreat
+  /// to, interleaved, in world units.
+  RingVertices vertices;
+  std::vector<double> roots;
+  std::vector<double> offset_points;
+  RepairScratch repair;
 };
 
 /// What the placements need of the stages before.
@@ -41,12 +50,16 @@ struct VertexInput {
 ///   marching-squares   the crossings of lattice edges, by linear interpolation of F;
 ///   qef                those, and in each cell the minimiser of Eq. 14, kept in the cell;
 ///   farthest-particle  section 3.5: the particle farthest along the normal, one cell around;
-///   virtual-plane      one vertex per cell: from the middle of the segment along the gradient to
-///                      the level set, kept in the cell (in a saddle: in its segment's half).
-/// All but farthest-particle keep every vertex in its cell or on its edge, so that rings are
-/// simple by construction (core/METHOD.md, "Why rings are simple"). farthest-particle drops
-/// consecutive equal vertices, and rings of which fewer than three points remain.
+///   virtual-plane      one vertex per cell and crossed edge, moved to the plane that its
+///                      surroundings support (virtual_plane.h), matched to the particles' area
+///                      (area.h; `area_offset` is State::area_offset before and after) and
+///                      repaired (repair.h).
+/// marching-squares and qef keep every vertex in its cell or on its edge, so that rings are simple
+/// by construction (core/METHOD.md, "Why rings are simple"); virtual-plane may leave the cells and
+/// is simple by its repair. farthest-particle drops consecutive equal vertices, and rings of which
+/// fewer than three points remain.
 /// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
-void PlaceVertices(const VertexInput& input, PlacedVertices& placed, Rings& rings);
+void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+                   PlacedVertices& placed, Rings& rings);
 
 }  // namespace partiemc

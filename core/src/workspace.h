@@ -1,11 +1,13 @@
 // The buffers of all stages, kept warm from frame to frame.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "bins.h"
 #include "crossings.h"
 #include "field.h"
+#include "identities.h"
 #include "intersections.h"
 #include "mesh.h"
 #include "normals.h"
@@ -26,6 +28,9 @@ struct Workspace::Buffers {
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;
   PlacedVertices placed;
+  std::optional<double> next_area_offset;
+  IdentityScratch identity_scratch;
+  RingHistory next_history;
   MeshScratch mesh_scratch;
   TouchingPairsBuffers intersections;
 };

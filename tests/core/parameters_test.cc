@@ -42,6 +42,9 @@ std::vector<BadParameters> AllBadParameters() {
   for (const double value : {-1.01, 1.01, kNan, kInfinity}) {
     all.push_back({"surface_offset", {.surface_offset = value}});
   }
+  for (const double value : {-1e-9, -1.0, kNan, kInfinity}) {
+    all.push_back({"min_component_area", {.min_component_area = value}});
+  }
   return all;
 }
 
@@ -67,7 +70,9 @@ TEST(Parameters, AtTheEndsOfTheirRangesAreAccepted) {
                                                {.reference_radius = 1e-3},
                                                {.reference_radius = 2.999},
                                                {.surface_offset = -1},
-                                               {.surface_offset = 1}}) {
+                                               {.surface_offset = 1},
+                                               {.min_component_area = 1e300},
+                                               {.min_component_particles = ~std::uint64_t{0}}}) {
     EXPECT_TRUE(Validate(good).ok()) << Validate(good);
     EXPECT_TRUE(Reconstructor::Create(good).ok());
   }
@@ -100,8 +105,8 @@ TEST(Parameters, NamesAreFoundAgainAndOthersAreNot) {
 
 TEST(Calibration, AtThreeSpacingsIsTheFigureOfTheMethodNote) {
   EXPECT_NEAR(CalibratedReferenceRadius(Placement::kFarthestParticle, 3), 0.8083, 5e-5);
-  EXPECT_NEAR(CalibratedReferenceRadius(Placement::kVirtualPlane, 3), 1.01 * 0.8083, 1e-4);
-  EXPECT_NEAR(CalibratedReferenceRadius(Placement::kMarchingSquares, 3), 1.05 * 0.8083, 1e-4);
+  EXPECT_NEAR(CalibratedReferenceRadius(Placement::kVirtualPlane, 3), 1.05 * 0.8083, 1e-4);
+  EXPECT_NEAR(CalibratedReferenceRadius(Placement::kMarchingSquares, 3), 1.09 * 0.8083, 1e-4);
 }
 
 TEST(Calibration, PutsAFlatBoundaryHalfASpacingOutsideTheOutermostLayer) {

@@ -18,6 +18,10 @@ State ExampleState() {
   state.spacing = 0.09;
   state.normals = {
       {-5, -7, 0.6f, 0.8f}, {3, -7, 1, 0}, {-100, 2, 0, -1}, {1 << 30, 2, -0.8f, 0.6f}};
+  state.area_offset = -0.03;
+  state.history.identities_given = 9;
+  state.history.rings = {{2, false}, {5, true}, {9, false}};
+  state.history.runs = {{-7, -5, 3, 0}, {-7, 4, 4, 1}, {-7, 9, 12, 0}, {2, -100, 1 << 30, 2}};
   return state;
 }
 
@@ -41,8 +45,9 @@ std::string Patched(std::string bytes, std::size_t at, T value) {
   return bytes;
 }
 
-constexpr std::size_t kVersionAt = 4, kCellSizeAt = 8, kSpacingAt = 16, kCountAt = 24,
-                      kNormalsAt = 32;
+constexpr std::size_t kVersionAt = 4, kCellSizeAt = 8, kSpacingAt = 16, kOffsetAt = 24,
+                      kGivenAt = 32, kNormalCountAt = 40, kRingCountAt = 48, kRunCountAt = 56,
+                      kNormalsAt = 64, kRingsAt = kNormalsAt + 4 * 16, kRunsAt = kRingsAt + 3 * 12;
 
 void ExpectRefused(std::string_view bytes, std::string_view what) {
   const auto state = ParseState(bytes);
@@ -57,9 +62,9 @@ TEST(State, ComesBackAsItWas) {
   EXPECT_EQ(*ParseState(Serialize(ExampleState())), ExampleState());
 }
 
-TEST(State, TakesFortyBytesAndSixteenPerNormal) {
-  EXPECT_EQ(Serialize(State{}).size(), 40u);
-  EXPECT_EQ(Serialize(ExampleState()).size(), 40u + 4 * 16);
+TEST(State, TakesAsManyBytesAsItsHeaderSays) {
+  EXPECT_EQ(Serialize(State{}).size(), 72u);
+  EXPECT_EQ(Serialize(ExampleState()).size(), 72u + 4 * 16 + 3 * 12 + 4 * 16);
 }
 
 TEST(State, EveryTruncationIsRefused) {
@@ -91,8 +96,15 @@ TEST(State, HostileCountsAreRefusedBeforeAnythingIsAllocated) {
        {std::uint64_t{0}, std::uint64_t{3}, std::uint64_t{5}, std::uint64_t{1} << 32,
         std::uint64_t{1} << 60, (std::uint64_t{1} << 60) + 4,
         std::numeric_limits<std::uint64_t>::max()}) {
-    ExpectRefused(Sealed(Patched(body, kCountAt, count)), "a wrong count");
+    for (const std::size_t at : {kNormalCountAt, kRingCountAt, kRunCountAt}) {
+      if (at == kRingCountAt && count == 3) continue;  // The right one.
+      ExpectRefused(Sealed(Patched(body, at, count)), "a wrong count");
+    }
   }
+  // Counts of which the bytes in all are right, were it not for the overflow.
+  const std::string overflowing = Patched(body, kNormalCountAt, (std::uint64_t{1} << 60) + 4);
+  ExpectRefused(Sealed(Patched(overflowing, kRunCountAt, (std::uint64_t{15} << 60) + 4)),
+                "counts that overflow");
   ExpectRefused(Sealed(body.substr(0, body.size() - 1)), "a normal cut short");
 }
 
@@ -122,6 +134,33 @@ TEST(State, NormalsThatAreNotUnitOrNotInOrderAreRefused) {
   // Normal 1 into the cell of normal 0, and behind normal 2.
   ExpectRefused(Sealed(Patched(body, kNormalsAt + 16, std::int32_t{-5})), "twice the same cell");
   ExpectRefused(Sealed(Patched(body, kNormalsAt + 20, std::int32_t{9})), "out of order");
+}
+
+TEST(State, AnAreaOffsetBeyondASpacingIsRefused) {
+  const std::string body = BodyOf(ExampleState());
+  for (const double value : {-1.01, 1.01, std::numeric_limits<double>::infinity(),
+                             -std::numeric_limits<double>::quiet_NaN()}) {
+    ExpectRefused(Sealed(Patched(body, kOffsetAt, value)), "area offset");
+  }
+}
+
+TEST(State, RingsWithoutOrderKindOrAnIdentityThatWasGivenAreRefused) {
+  const std::string body = BodyOf(ExampleState());
+  ExpectRefused(Sealed(Patched(body, kRingsAt, std::uint64_t{0})), "no identity");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 12, std::uint64_t{2})), "twice the same");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 12, std::uint64_t{9})), "out of order");
+  ExpectRefused(Sealed(Patched(body, kGivenAt, std::uint64_t{8})), "one that was not given yet");
+  ExpectRefused(Sealed(Patched(body, kGivenAt, ~std::uint64_t{0})), "none left to give");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 8, 2u)), "of another kind");
+}
+
+TEST(State, RunsWithoutOrderNodesOrARingAreRefused) {
+  const std::string body = BodyOf(ExampleState());
+  ExpectRefused(Sealed(Patched(body, kRunsAt + 12, 3u)), "a ring that is not there");
+  ExpectRefused(Sealed(Patched(body, kRunsAt + 8, std::int32_t{-6})), "no nodes");
+  ExpectRefused(Sealed(Patched(body, kRunsAt + 8, std::int32_t{4})), "nodes of the next run");
+  ExpectRefused(Sealed(Patched(body, kRunsAt + 16, std::int32_t{-8})), "rows out of order");
+  ExpectRefused(Sealed(Patched(body, kRunsAt + 48, std::int32_t{-7})), "columns out of order");
 }
 
 class RestoredState : public testing::TestWithParam<Placement> {};

@@ -41,7 +41,10 @@ struct NoisyStages : Stages {
           return node.Uniform(-1, 1);
         },
         {0, 0}, {1, 1}, support::Shifted(support::Noise(random, 400, 30), 31, 31),
-        {.placement = placement, .spacing = 1.0, .clean = false});
+        {.placement = placement,
+         .spacing = 1.0,
+         .clean = false,
+         .steps = VirtualPlaneSteps::None()});
   }
 };
 
@@ -103,10 +106,12 @@ INSTANTIATE_TEST_SUITE_P(Seeds, VerticesInCells,
                                           testing::Values(Placement::kVirtualPlane,
                                                           Placement::kQef)));
 
-TEST(Vertices, OfTheVirtualPlaneLieNearerToTheLevelSetThanTheMiddlesOfTheirSegments) {
+TEST(Vertices,
+     OfTheVirtualPlaneWithoutItsStepsLieNearerToTheLevelSetThanTheMiddlesOfTheirSegments) {
   support::Random random(2);
   Stages stages;
-  stages.Run(support::Snapped(support::Blob(random, 12), 1.0), {.spacing = 1.0});
+  stages.Run(support::Snapped(support::Blob(random, 12), 1.0),
+             {.spacing = 1.0, .steps = VirtualPlaneSteps::None()});
   const support::FieldOracle oracle(stages.particles, stages.parameters, 1.0);
   double middles = 0, vertices = 0;
   for (std::size_t k = 0; k < stages.planes.size(); ++k) {

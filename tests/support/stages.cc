@@ -62,13 +62,14 @@ void Stages::RunOn(const std::function<double(int, int)>& function, TileCoordina
 
 void Stages::RunFromCrossings(std::span<const CellNormal> previous) {
   FindCrossings(bins.tiles, level_set, crossings);
-  TraceRings(bins, level_set, scale, *parameters.clean, crossings, ring_scratch, topology);
+  TraceRings(bins, level_set, scale, parameters, crossings, ring_scratch, topology);
   field.Build(bins, crossings, scale, true);
   EstimateNormals(bins, level_set, crossings, topology, field, parameters, previous, planes,
                   next_normals);
   const Frame frame = particles.AsFrame();
+  std::optional<double> area_offset;
   PlaceVertices({frame, bins, level_set, crossings, topology, field, planes, parameters, scale},
-                placed, result.rings);
+                area_offset, placed, result.rings);
   const absl::Status status =
       BuildMesh({bins.tiles, crossings, topology, planes, placed, result.rings, parameters, scale},
                 mesh_scratch, result.mesh, result.statistics);

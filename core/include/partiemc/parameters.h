@@ -33,6 +33,22 @@ enum class SpacingRule : std::uint8_t {
   kEveryFrame,  ///< Estimated in each frame; it changes the radii, never the lattice.
 };
 
+/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). All on is the method;
+/// each can be switched off, so that `evaluate` can show what it is worth. Not on the wire.
+struct VirtualPlaneSteps {
+  bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, beside the cell's.
+  bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
+  bool curvature = true;      ///< Undo the kernel's rounding of curved boundaries.
+  bool support = true;        ///< Shift planes to the particles that support them.
+  bool smoothing = true;      ///< Vertices smoothed along the ring, across no corner.
+  bool area = true;           ///< Match the particles' volumes where they are known.
+
+  /// One vertex per cell, one Newton step from the middle of its segment, and nothing else.
+  static constexpr VirtualPlaneSteps None() { return {false, false, false, false, false, false}; }
+
+  friend bool operator==(const VirtualPlaneSteps&, const VirtualPlaneSteps&) = default;
+};
+
 /// Which two of three coordinates span the plane of the particles.
 enum class Plane : std::uint8_t { kXy, kXz, kYz };
 
@@ -67,6 +83,14 @@ struct ReconstructionParameters {
   /// Drop holes smaller than six particles and components that hold no particle. Absent: as the
   /// placement wants it (on for `virtual-plane`, off for the others).
   std::optional<bool> clean = std::nullopt;
+
+  VirtualPlaneSteps steps;
+
+  /// Components that enclose less area than this many squared spacings, at least 0 (a lone
+  /// particle's has about 2), or fewer particles than this, are dropped with everything in them,
+  /// and counted (FrameStatistics::dropped_spray). 0: keep all.
+  double min_component_area = 0;
+  std::uint64_t min_component_particles = 0;
 
   /// The plane of positions with three components; positions with two are taken as they are.
   Plane plane = Plane::kXy;

@@ -16,7 +16,9 @@ struct RingMeasures {
   double perimeter = 0;  ///< World units.
   double centroid_x = 0, centroid_y = 0;  ///< Of the area that the ring encloses, world units.
   std::uint64_t particle_count = 0;       ///< Particles of the ring's component; 0 for holes.
-  std::uint64_t identity = 0;  ///< Which ring of earlier frames this one continues; 0: not tracked.
+  /// The same for a ring and the one that continues it in the next frame, different for any two
+  /// rings of a frame, and never given twice in a stream (core/METHOD.md, "Identities").
+  std::uint64_t identity = 0;  ///< 0: not tracked.
 
   friend bool operator==(const RingMeasures&, const RingMeasures&) = default;
 };
@@ -32,12 +34,22 @@ struct Rings {
   std::vector<std::uint32_t> outer_of;       ///< Per ring: its outer ring, or kNoRing.
   std::vector<RingMeasures> measures;        ///< Per ring.
   std::vector<float> normals;                ///< Per point: outward unit normal, interleaved.
+  /// Identities, in the frame before, of the rings that ring k continues, ascending, are
+  /// [parent_offsets[k], parent_offsets[k + 1]): none for a new ring, several after a merge; after
+  /// a split, several rings name the same one.
+  std::vector<std::uint64_t> parents;
+  std::vector<std::uint32_t> parent_offsets = {0};  ///< As `offsets`; {0} where nothing is tracked.
 
   std::size_t RingCount() const { return outer_of.size(); }
   std::size_t PointCount() const { return points.size() / 2; }
   std::span<const double> RingPoints(std::size_t ring) const {
     return std::span(points).subspan(2 * std::size_t{offsets[ring]},
                                      2 * std::size_t{offsets[ring + 1] - offsets[ring]});
+  }
+  std::span<const std::uint64_t> ParentsOf(std::size_t ring) const {
+    if (ring + 1 >= parent_offsets.size()) return {};
+    return std::span(parents).subspan(parent_offsets[ring],
+                                      parent_offsets[ring + 1] - parent_offsets[ring]);
   }
   void Clear();
   friend bool operator==(const Rings&, const Rings&) = default;
@@ -69,6 +81,7 @@ struct FrameStatistics {
   std::uint64_t active_cells = 0;        ///< Cells that the isoline runs through.
   std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
+  std::uint64_t dropped_spray = 0;       ///< Components below a size that the caller set.
   std::uint64_t triangles = 0;           ///< Triangles of the mesh.
   std::uint64_t triangles_grid = 0;      ///< What `grid` would have made of the same rings.
   std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.

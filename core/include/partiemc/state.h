@@ -20,6 +20,33 @@ struct CellNormal {
   friend bool operator==(const CellNormal&, const CellNormal&) = default;
 };
 
+/// A ring of the last frame.
+struct KnownRing {
+  std::uint64_t identity = 0;
+  bool is_hole = false;
+
+  friend bool operator==(const KnownRing&, const KnownRing&) = default;
+};
+
+/// Neighbouring nodes of one row of the lattice, `first` to `last`, that lay inside of an outer
+/// ring of the last frame, or in the void of a hole next to its ring.
+struct NodeRun {
+  std::int32_t row = 0, first = 0, last = 0;  ///< In cells from the origin.
+  std::uint32_t ring = 0;                     ///< Index in RingHistory::rings.
+
+  friend bool operator==(const NodeRun&, const NodeRun&) = default;
+};
+
+/// What is needed to tell which ring of the next frame continues which ring of this one. Its size
+/// follows the length of the outline: a run has two ends on it.
+struct RingHistory {
+  std::uint64_t identities_given = 0;  ///< They are 1 to this number; none is given twice.
+  std::vector<KnownRing> rings;        ///< By identity.
+  std::vector<NodeRun> runs;           ///< By row, then column; disjoint. Each ring has one.
+
+  friend bool operator==(const RingHistory&, const RingHistory&) = default;
+};
+
 /// Everything that a stream remembers between frames, and nothing else. A default-constructed
 /// State is that of a stream that has seen no frame. Reconstruction is a pure function of frame
 /// and state, so that a stream goes on from a restored State bit for bit as if it had never
@@ -30,14 +57,18 @@ struct State {
   std::optional<double> cell_size;
   /// Spacing in use, world units.
   std::optional<double> spacing;
+  /// How far the last frame's outline was moved to match its area, in spacings (core/METHOD.md,
+  /// "The default placement", step 6).
+  std::optional<double> area_offset;
   /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
   std::vector<CellNormal> normals;
+  RingHistory history;
 
   friend bool operator==(const State&, const State&) = default;
 };
 
-/// Bytes with a version and a checksum; the same on every machine. Size: 40 bytes and 16 per
-/// normal.
+/// Bytes with a version and a checksum; the same on every machine. Size: 72 bytes, 16 per normal,
+/// 12 per ring and 16 per run.
 std::string Serialize(const State& state);
 
 /// The state that Serialize wrote. Errors: INVALID_ARGUMENT (reason CORRUPT_STATE) for anything

@@ -1,0 +1,109 @@
+#include "area.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "measure.h"
+
+namespace partiemc {
+namespace {
+
+// Smaller components are spray: their volume says more about how they broke off than about where
+// the outline of the rest should be.
+constexpr std::uint64_t kMinPooledParticles = 30;
+
+// Volumes of recordings are 1-4 % off: more than this is not theirs to decide. In spacings.
+constexpr double kMaxOffset = 0.05;
+// Wishes beyond the first number fade, beyond the second they are ignored. In spacings.
+constexpr double kFadeFrom = 0.2;
+constexpr double kFadeTo = 0.4;
+
+// Share of the difference to the wish that a frame makes good. Following at once turns every change
+// of topology into a jump of the whole outline.
+constexpr double kFollow = 0.5;
+
+// Longest mitre, as a multiple of the offset.
+constexpr double kMaxMitre = 2;
+
+double Smoothstep(double low, double high, double x) {
+  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// Sum of the volumes of an outer ring's particles, in cells.
+double VolumeOf(const VertexInput& input, std::size_t ring) {
+  if (input.frame.volumes.empty()) {
+    const double each = input.scale.spacing * input.scale.spacing;
+    return static_cast<double>(input.topology.particle_count[ring]) * each;
+  }
+  return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
+}
+
+// The offset that this frame alone would ask for, in world units; nothing without large components.
+std::optional<double> WantedOffset(const VertexInput& input, const Rings& rings, double spacing) {
+  const double cell_area = input.scale.cell_size * input.scale.cell_size;
+  double volume = 0, area = 0, perimeter = 0;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const bool is_outer = rings.outer_of[ring] == kNoRing;
+    const std::size_t outer = is_outer ? ring : rings.outer_of[ring];
+    if (input.topology.particle_count[outer] < kMinPooledParticles) continue;
+    if (is_outer) volume += VolumeOf(input, ring) * cell_area;
+    const RingMeasures measures = MeasureRing(rings.RingPoints(ring));
+    area += measures.area;
+    perimeter += measures.perimeter;
+  }
+  if (perimeter <= 0) return std::nullopt;
+  const double wanted = (volume - area) / perimeter;
+  const double trust = 1 - Smoothstep(kFadeFrom * spacing, kFadeTo * spacing, std::abs(wanted));
+  return std::clamp(wanted, -kMaxOffset * spacing, kMaxOffset * spacing) * trust;
+}
+
+// Moves the points of one ring outward by `offset` along the mitres of their segments.
+void OffsetRing(std::span<const double> points, double offset, double* target) {
+  const std::size_t count = points.size() / 2;
+  const auto normal_after = [&](std::size_t k, double& x, double& y) {
+    const std::size_t next = k + 1 == count ? 0 : k + 1;
+    x = points[2 * next + 1] - points[2 * k + 1];
+    y = points[2 * k] - points[2 * next];
+    const double length = std::sqrt(x * x + y * y);
+    if (length > 0) {
+      x /= length;
+      y /= length;
+    }
+  };
+  double before_x, before_y;
+  normal_after(count - 1, before_x, before_y);
+  for (std::size_t k = 0; k < count; ++k) {
+    double x, y;
+    normal_after(k, x, y);
+    // (a + b) / (1 + a . b) has length 1 / cos of half the turn.
+    const double divisor = std::max(1 + before_x * x + before_y * y, 2 / (kMaxMitre * kMaxMitre));
+    target[2 * k] = points[2 * k] + offset * (before_x + x) / divisor;
+    target[2 * k + 1] = points[2 * k + 1] + offset * (before_y + y) / divisor;
+    before_x = x;
+    before_y = y;
+  }
+}
+
+}  // namespace
+
+void MatchArea(const VertexInput& input, std::vector<double>& scratch,
+               std::optional<double>& offset, Rings& rings) {
+  const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
+  if (!is_known || !input.parameters.steps.area) return;
+  const double spacing = input.scale.spacing * input.scale.cell_size;
+  const std::optional<double> wanted = WantedOffset(input, rings, spacing);
+  if (wanted) {
+    const double wish = *wanted / spacing;
+    offset = offset ? *offset + kFollow * (wish - *offset) : wish;
+  }
+  if (!offset) return;
+  scratch.resize(rings.points.size());
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    OffsetRing(rings.RingPoints(ring), *offset * spacing,
+               scratch.data() + 2 * std::size_t{rings.offsets[ring]});
+  }
+  std::swap(rings.points, scratch);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,98 @@
+#include "repair.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "measure.h"
+
+namespace partiemc {
+namespace {
+
+// Rings of given points; the first `outers` are outer rings, the others holes of the first.
+Rings RingsOf(const std::vector<std::vector<double>>& rings, std::size_t outers) {
+  Rings result;
+  for (std::size_t ring = 0; ring < rings.size(); ++ring) {
+    result.points.insert(result.points.end(), rings[ring].begin(), rings[ring].end());
+    result.offsets.push_back(static_cast<std::uint32_t>(result.PointCount()));
+    result.outer_of.push_back(ring < outers ? kNoRing : 0);
+  }
+  return result;
+}
+
+std::vector<double> Square(double x, double y, double half) {
+  return {x - half, y - half, x + half, y - half, x + half, y + half, x - half, y + half};
+}
+
+std::vector<double> Reversed(const std::vector<double>& ring) {
+  std::vector<double> result;
+  for (std::size_t k = ring.size(); k >= 2; k -= 2) {
+    result.insert(result.end(), {ring[k - 2], ring[k - 1]});
+  }
+  return result;
+}
+
+// Moves `rings` from `roots`, repairs them, and checks that nothing crosses.
+Rings Repaired(const Rings& roots, Rings rings) {
+  RepairScratch scratch;
+  RepairRings(roots.points, scratch, rings);
+  EXPECT_EQ(CountTouchingPairs(rings.points, rings.offsets, scratch.pairs), 0u);
+  return rings;
+}
+
+TEST(Repair, LeavesRingsAloneThatAreInTheirPlaces) {
+  const Rings roots = RingsOf({Square(0, 0, 10), Reversed(Square(0, 0, 3))}, 1);
+  const Rings moved = RingsOf({Square(0, 0, 10.5), Reversed(Square(0.5, 0, 2))}, 1);
+  EXPECT_EQ(Repaired(roots, moved).points, moved.points);
+}
+
+TEST(Repair, BringsCrossingSegmentsBackOnlyAsFarAsItTakes) {
+  const Rings roots = RingsOf({Square(0, 0, 1), Square(3, 0, 1)}, 2);
+  Rings moved = roots;
+  moved.points[2] = 2.1;  // The lower right corner of the first, now inside of the second.
+  const Rings repaired = Repaired(roots, moved);
+  EXPECT_LT(repaired.points[2], 2.0);
+  EXPECT_GT(repaired.points[2], 1.0) << "half way is enough here";
+  // The far corners of the second square were not near it.
+  EXPECT_EQ(repaired.points[8 + 2], 4);
+}
+
+TEST(Repair, FindsARingThatAnotherOneHasPassedOverWithoutCrossing) {
+  // A small ring beside a large one, which has grown over it.
+  const Rings roots = RingsOf({Square(0, 0, 5), Square(7, 0, 0.5)}, 2);
+  Rings moved = roots;
+  for (std::size_t k = 0; k < 8; ++k) moved.points[k] *= 2;
+  const Rings repaired = Repaired(roots, moved);
+  EXPECT_EQ(repaired.points, roots.points);
+}
+
+TEST(Repair, FindsAnIslandThatHasLeftTheHoleThatItLiesIn) {
+  Rings roots = RingsOf({Square(0, 0, 10), Square(0, 0, 1), Reversed(Square(0, 0, 5))}, 2);
+  Rings moved = roots;
+  for (std::size_t k = 8; k < 16; k += 2) moved.points[k] += 7.5;  // Into the fluid.
+  EXPECT_EQ(Repaired(roots, moved).points, roots.points);
+}
+
+TEST(Repair, FindsARingThatWasTurnedInsideOut) {
+  const Rings roots = RingsOf({Square(0, 0, 1)}, 1);
+  Rings moved = roots;
+  for (double& coordinate : moved.points) coordinate *= -1;  // Half a turn: still fine.
+  EXPECT_EQ(Repaired(roots, moved).points, moved.points);
+  for (std::size_t k = 0; k < moved.points.size(); k += 2) moved.points[k] = -roots.points[k];
+  for (std::size_t k = 1; k < moved.points.size(); k += 2) moved.points[k] = roots.points[k];
+  ASSERT_LT(MeasureRing(moved.RingPoints(0)).area, 0);
+  EXPECT_EQ(Repaired(roots, moved).points, roots.points);
+}
+
+TEST(Repair, SeparatesPointsThatFellTogether) {
+  const Rings roots = RingsOf({Square(0, 0, 1)}, 1);
+  Rings moved = roots;
+  moved.points[2] = moved.points[0];
+  moved.points[3] = moved.points[1];
+  const Rings repaired = Repaired(roots, moved);
+  EXPECT_FALSE(repaired.points[2] == repaired.points[0] &&
+               repaired.points[3] == repaired.points[1]);
+}
+
+}  // namespace
+}  // namespace partiemc

@@ -1,0 +1,147 @@
+// The default placement as a whole: what its steps promise on shapes whose truth is known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "partiemc/partiemc.h"
+#include "support/random.h"
+
+namespace partiemc {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Particles of spacing 1 in a disc: rings of them, each half a spacing inside of the next boundary,
+// `noise` spacings off at random.
+std::vector<double> Disc(double radius, double noise, std::uint64_t seed) {
+  support::Random random(seed);
+  std::vector<double> positions;
+  for (double r = radius - 0.5; r > 0.2; r -= 1) {
+    const int count = static_cast<int>(std::lround(2 * kPi * r));
+    for (int k = 0; k < count; ++k) {
+      const double angle = 2 * kPi * (k + 0.37 * r) / count;
+      positions.push_back(r * std::cos(angle) + noise * random.Uniform(-1, 1));
+      positions.push_back(r * std::sin(angle) + noise * random.Uniform(-1, 1));
+    }
+  }
+  return positions;
+}
+
+Result Reconstructed(const std::vector<double>& positions, ReconstructionParameters parameters,
+                     State& state) {
+  parameters.spacing = 1.0;
+  const auto reconstructor = Reconstructor::Create(parameters);
+  Workspace workspace;
+  Result result;
+  const absl::Status status = reconstructor->Reconstruct(
+      {.positions = std::span<const double>(positions)}, state, workspace, result);
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_TRUE(Validate(result).ok()) << Validate(result);
+  return result;
+}
+
+Result Reconstructed(const std::vector<double>& positions,
+                     const ReconstructionParameters& parameters = {}) {
+  State state;
+  return Reconstructed(positions, parameters, state);
+}
+
+// Root mean square of the distance of the first ring from its mean radius, sampled along its
+// segments, so that it does not matter where the vertices are.
+double Roughness(const Rings& rings) {
+  constexpr int kSamples = 10;
+  const std::span<const double> points = rings.RingPoints(0);
+  const std::size_t count = points.size() / 2;
+  double length = 0, sum = 0, square = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t next = (k + 1) % count;
+    const double dx = points[2 * next] - points[2 * k];
+    const double dy = points[2 * next + 1] - points[2 * k + 1];
+    const double weight = std::hypot(dx, dy) / kSamples;
+    for (int n = 0; n < kSamples; ++n) {
+      const double t = (n + 0.5) / kSamples;
+      const double r = std::hypot(points[2 * k] + t * dx, points[2 * k + 1] + t * dy);
+      length += weight;
+      sum += weight * r;
+      square += weight * r * r;
+    }
+  }
+  return std::sqrt(square / length - (sum / length) * (sum / length));
+}
+
+TEST(VirtualPlane, FindsTheRadiusOfADisc) {
+  for (const double radius : {6.0, 10.0, 15.0}) {
+    const Result result = Reconstructed(Disc(radius, 0, 1));
+    ASSERT_EQ(result.rings.RingCount(), 1u);
+    EXPECT_NEAR(std::sqrt(result.statistics.area / kPi), radius, 0.06) << radius;
+    EXPECT_LT(Roughness(result.rings), 0.03) << radius;
+  }
+}
+
+TEST(VirtualPlane, IsSmootherThanItsStartUnderNoise) {
+  ReconstructionParameters first_form;
+  first_form.steps = VirtualPlaneSteps::None();
+  double rough = 0, smooth = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const std::vector<double> positions = Disc(10, 0.2, seed);
+    rough += Roughness(Reconstructed(positions, first_form).rings);
+    smooth += Roughness(Reconstructed(positions).rings);
+  }
+  EXPECT_LT(smooth, 0.9 * rough);
+}
+
+TEST(VirtualPlane, MatchesTheVolumeOfTheParticlesWhereItIsKnown) {
+  const std::vector<double> positions = Disc(12, 0.1, 3);
+  const auto volume = static_cast<double>(positions.size() / 2);
+  ReconstructionParameters unmatched;
+  unmatched.reference_radius = 0.78;  // Too far in, by about 0.06 spacings.
+  unmatched.steps.area = false;
+  ReconstructionParameters matched = unmatched;
+  matched.steps.area = true;
+  const double before = std::abs(Reconstructed(positions, unmatched).statistics.area - volume);
+  const double after = std::abs(Reconstructed(positions, matched).statistics.area - volume);
+  EXPECT_GT(before, 0.005 * volume);
+  EXPECT_LT(after, 0.4 * before);
+}
+
+TEST(VirtualPlane, FollowsAWishForAreaSlowlyAndRemembersItInTheState) {
+  const std::vector<double> positions = Disc(12, 0.05, 4);
+  State state;
+  Reconstructed(positions, {}, state);
+  ASSERT_TRUE(state.area_offset.has_value());
+  const double wish = *state.area_offset;
+  state.area_offset = wish + 0.04;
+  Reconstructed(positions, {}, state);
+  EXPECT_NEAR(*state.area_offset, wish + 0.02, 1e-9);
+  // Half way to the wish again.
+  Reconstructed(positions, {}, state);
+  EXPECT_NEAR(*state.area_offset, wish + 0.01, 1e-9);
+}
+
+TEST(VirtualPlane, DoesNotMoveTheOutlineByMoreThanItsLimitForAnyVolume) {
+  const std::vector<double> positions = Disc(12, 0.05, 5);
+  std::vector<float> volumes(positions.size() / 2, 1.15f);
+  const auto reconstructor = Reconstructor::Create({.spacing = 1.0});
+  State state;
+  Workspace workspace;
+  Result result;
+  ASSERT_TRUE(
+      reconstructor
+          ->Reconstruct({.positions = std::span<const double>(positions), .volumes = volumes},
+                        state, workspace, result)
+          .ok());
+  EXPECT_LE(std::abs(*state.area_offset), 0.05);
+}
+
+TEST(VirtualPlane, KeepsFewMoreVerticesThanMarchingSquares) {
+  const std::vector<double> positions = Disc(15, 0.05, 6);
+  const auto squares =
+      Reconstructed(positions, {.placement = Placement::kMarchingSquares}).rings.PointCount();
+  const auto planes = Reconstructed(positions).rings.PointCount();
+  EXPECT_GE(planes, squares);
+  EXPECT_LE(planes, squares + squares / 4);
+}
+
+}  // namespace
+}  // namespace partiemc
