@@ -219,6 +219,12 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (message.has_surface_offset()) parameters.surface_offset = message.surface_offset();
   if (message.has_normal_memory()) parameters.normal_memory = message.normal_memory();
   if (message.has_clean()) parameters.clean = message.clean();
+  if (message.has_min_component_area()) {
+    parameters.min_component_area = message.min_component_area();
+  }
+  if (message.has_min_component_particles()) {
+    parameters.min_component_particles = message.min_component_particles();
+  }
   return parameters;
 }
 
@@ -236,6 +242,8 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   message.set_normal_memory(parameters.normal_memory);
   if (parameters.clean) message.set_clean(*parameters.clean);
   message.set_plane(ToWire(parameters.plane));
+  message.set_min_component_area(parameters.min_component_area);
+  message.set_min_component_particles(parameters.min_component_particles);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

@@ -84,6 +84,8 @@ void EncodeMeasures(const Rings& rings, v1::Rings& message) {
     to.set_particle_count(from.particle_count);
     std::memcpy(identities.data() + k * sizeof(std::uint64_t), &from.identity,
                 sizeof(std::uint64_t));
+    const auto parents = rings.ParentsOf(k);
+    to.mutable_parent_identities()->Assign(parents.begin(), parents.end());
   }
 }
 
@@ -117,6 +119,7 @@ void EncodeStatistics(const FrameStatistics& statistics, const FrameTimes& times
   message.set_active_cells(statistics.active_cells);
   message.set_dropped_holes(statistics.dropped_holes);
   message.set_dropped_components(statistics.dropped_components);
+  message.set_dropped_spray(statistics.dropped_spray);
   message.set_triangles(statistics.triangles);
   message.set_triangles_grid(statistics.triangles_grid);
   message.set_self_intersections(statistics.self_intersections);
@@ -232,6 +235,8 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
 
   const auto identities = ViewBytes<std::uint64_t>(from.identities());
   rings.measures.resize(rings.RingCount());
+  rings.parents.clear();
+  rings.parent_offsets.assign(1, 0);
   for (std::size_t k = 0; k < rings.measures.size(); ++k) {
     const v1::RingMeasures& measures = from.measures(static_cast<int>(k));
     rings.measures[k] = {.area = measures.area(),
@@ -240,6 +245,9 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
                          .centroid_y = measures.centroid_y(),
                          .particle_count = measures.particle_count(),
                          .identity = identities.empty() ? 0 : identities[k]};
+    const auto& parents = measures.parent_identities();
+    rings.parents.insert(rings.parents.end(), parents.begin(), parents.end());
+    rings.parent_offsets.push_back(static_cast<std::uint32_t>(rings.parents.size()));
   }
   return absl::OkStatus();
 }
@@ -278,6 +286,7 @@ void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& stati
                 .active_cells = message.active_cells(),
                 .dropped_holes = message.dropped_holes(),
                 .dropped_components = message.dropped_components(),
+                .dropped_spray = message.dropped_spray(),
                 .triangles = message.triangles(),
                 .triangles_grid = message.triangles_grid(),
                 .self_intersections = message.self_intersections(),

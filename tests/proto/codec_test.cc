@@ -67,6 +67,8 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.surface_offset = -0.5;
   parameters.normal_memory = false;
   parameters.clean = false;
+  parameters.min_component_area = 2.5;
+  parameters.min_component_particles = 3'000'000'000'000;
   v1::ReconstructionParameters message;
   EncodeParameters(parameters, message);
   const auto decoded = DecodeParameters(message);

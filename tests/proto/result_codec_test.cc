@@ -31,6 +31,8 @@ Result SquareWithHole() {
                             .particle_count = 12,
                             .identity = 5},
                            {.area = -4, .perimeter = 8, .centroid_x = 2, .centroid_y = 2}};
+  result.rings.parents = {2, 5};
+  result.rings.parent_offsets = {0, 2, 2};
   for (int i = 0; i < 8; ++i) result.rings.normals.insert(result.rings.normals.end(), {0.6f, 0.8f});
   result.mesh.points = result.rings.points;
   result.mesh.points.insert(result.mesh.points.end(), {0.5, 0.5});
@@ -41,6 +43,7 @@ Result SquareWithHole() {
                        .active_cells = 20,
                        .dropped_holes = 2,
                        .dropped_components = 3,
+                       .dropped_spray = 7,
                        .triangles = 2,
                        .triangles_grid = 9,
                        .self_intersections = 4,
@@ -116,6 +119,8 @@ TEST(ResultMessage, AReusedMessageHoldsNothingOfTheFrameBefore) {
   small.rings.offsets = {0, 4};
   small.rings.outer_of = {kNoRing};
   small.rings.measures.resize(1);
+  small.rings.parents = {5};
+  small.rings.parent_offsets = {0, 1};
   small.rings.normals.resize(8);
   ASSERT_TRUE(EncodeResult(small, SomeTimes(), kAll, reused).ok());
   EXPECT_EQ(reused.SerializeAsString(), Encoded(small, kAll).SerializeAsString());
