@@ -2,6 +2,7 @@
 #include "CLI/CLI.hpp"
 #include "cli/console.h"
 #include "cli/convert.h"
+#include "cli/evaluate.h"
 #include "cli/info.h"
 #include "cli/replay.h"
 
@@ -29,8 +30,10 @@ int main(int argc, char** argv) {
   partiemc::client::ReplayFlags replay;
   partiemc::client::InfoFlags info;
   partiemc::client::ConvertFlags convert;
+  partiemc::client::EvaluateFlags evaluate;
   const CLI::App* replay_verb = AddReplay(app, replay);
   const CLI::App* info_verb = AddInfo(app, info);
+  const CLI::App* evaluate_verb = AddEvaluate(app, evaluate);
   AddConvert(app, convert);
   try {
     app.parse(argc, argv);
@@ -41,5 +44,6 @@ int main(int argc, char** argv) {
   }
   if (replay_verb->parsed()) return Replay(replay);
   if (info_verb->parsed()) return Info(info);
+  if (evaluate_verb->parsed()) return Evaluate(evaluate);
   return Convert(convert);
 }

@@ -240,6 +240,17 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("WHEN")
       ->capture_default_str()
       ->group(kGroup);
+  app.add_option("--min-area", flags.min_area,
+                 "Drop spray: components of less area, in squared spacings")
+      ->type_name("A")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--min-particles", flags.min_particles,
+                 "Drop spray: components of fewer particles")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber)  // Else "-1" is read as the largest number there is.
+      ->capture_default_str()
+      ->group(kGroup);
 }
 
 void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {

@@ -1,6 +1,7 @@
 // `partiemc replay`: a recorded sequence through a server, or through the core in this process.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ struct ReplayFlags {
   double surface_offset = 0;
   bool no_normal_memory = false;
   std::string clean = "auto";
+  double min_area = 0;
+  std::uint64_t min_particles = 0;
 
   std::string rate = "max";
   bool check = false;

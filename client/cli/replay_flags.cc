@@ -38,7 +38,9 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                       .cell_size = flags.cell_size,
                                       .reference_radius = flags.reference_radius,
                                       .surface_offset = flags.surface_offset,
-                                      .normal_memory = !flags.no_normal_memory};
+                                      .normal_memory = !flags.no_normal_memory,
+                                      .min_component_area = flags.min_area,
+                                      .min_component_particles = flags.min_particles};
   const auto placement = FindPlacement(flags.placement);
   if (!placement) return WrongFlag("--placement", flags.placement, Names(AllPlacements()));
   parameters.placement = *placement;
@@ -60,6 +62,9 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
     parameters.clean = flags.clean == "on";
   } else if (flags.clean != "auto") {
     return WrongFlag("--clean", flags.clean, "on, off or auto");
+  }
+  if (!(flags.min_area >= 0 && std::isfinite(flags.min_area))) {
+    return WrongFlag("--min-area", Concat(flags.min_area), "0 or more squared spacings");
   }
   const absl::Status valid = Validate(parameters);
   if (!valid.ok()) return absl::InvalidArgumentError(AsFlag(valid));

@@ -18,7 +18,7 @@ enum class FrameFormat : std::uint8_t {
   /// RFC 7946 FeatureCollection: one Polygon per outer ring with its holes, outer rings
   /// counter-clockwise, holes clockwise whatever the result says, first point repeated at the end.
   /// Properties: area (without the holes), perimeter (with the holes'), particles, ring, identity,
-  /// frame, time. A ring of `farthest-particle` that crosses itself is written as it is.
+  /// parents, frame, time. A ring of `farthest-particle` that crosses itself is written as it is.
   kGeoJson,
   /// A picture: mesh edges, outline, particles; y up; longer side 1000 units, rounded to 0.001.
   kSvg,

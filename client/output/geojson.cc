@@ -57,8 +57,13 @@ void AppendFeature(std::string& out, const FrameRecord& frame, std::size_t outer
   out += R"(,"perimeter":)";
   AppendNumber(out, perimeter);
   AppendAll(out, R"(,"particles":)", rings.measures[outer].particle_count, R"(,"ring":)", outer,
-            R"(,"identity":)", rings.measures[outer].identity, R"(,"frame":)", frame.index,
-            R"(,"time":)");
+            R"(,"identity":)", rings.measures[outer].identity, R"(,"parents":[)");
+  bool first = true;
+  for (const std::uint64_t parent : rings.ParentsOf(outer)) {
+    AppendAll(out, first ? "" : ",", parent);
+    first = false;
+  }
+  AppendAll(out, R"(],"frame":)", frame.index, R"(,"time":)");
   AppendTime(out, frame.time);
   out += R"(},"geometry":{"type":"Polygon","coordinates":[)";
   AppendRing(out, rings.RingPoints(outer), true);

@@ -125,7 +125,13 @@ void AppendMeasures(std::string& out, const Rings& rings) {
     out += ',';
     AppendShown(out, measures.perimeter);
     // As text: the script's numbers end at 2^53.
-    AppendAll(out, ",", measures.particle_count, ",\"", measures.identity, "\"]");
+    AppendAll(out, ",", measures.particle_count, ",\"", measures.identity, "\",[");
+    bool first = true;
+    for (const std::uint64_t parent : rings.ParentsOf(ring)) {
+      AppendAll(out, first ? "\"" : ",\"", parent, "\"");
+      first = false;
+    }
+    out += "]]";
   }
   out += ']';
 }
@@ -139,7 +145,8 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
                            statistics.triangles_grid, R"(,"triangles":)", statistics.triangles);
   AppendAll(out, R"(,"self_intersections":)", statistics.self_intersections,
             R"(,"folded_triangles":)", statistics.folded_triangles, R"(,"dropped_holes":)",
-            statistics.dropped_holes, R"(,"dropped_components":)", statistics.dropped_components);
+            statistics.dropped_holes, R"(,"dropped_components":)", statistics.dropped_components,
+            R"(,"dropped_spray":)", statistics.dropped_spray);
   const std::pair<std::string_view, double> numbers[] = {
       {"time", frame.time},
       {"area", statistics.area},
@@ -221,6 +228,13 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
   }
   lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
+  if (parameters.min_component_area > 0) {
+    lines.emplace_back("smallest area",
+                       Concat(ShortestNumber(parameters.min_component_area), " squared spacings"));
+  }
+  if (parameters.min_component_particles > 0) {
+    lines.emplace_back("fewest particles", Concat(parameters.min_component_particles));
+  }
   return lines;
 }
 

@@ -16,9 +16,10 @@ namespace {
 constexpr std::array<std::string_view, 8> kBeforeStages = {
     "frame",          "particles", "polylines", "vertices",
     "triangles_grid", "triangles", "area",      "milliseconds"};
-constexpr std::array<std::string_view, 8> kAfterStages = {
-    "perimeter",          "self_intersections", "folded_triangles", "dropped_holes",
-    "dropped_components", "rings_digest",       "mesh_digest",      "time"};
+constexpr std::array<std::string_view, 9> kAfterStages = {
+    "perimeter",     "self_intersections", "folded_triangles",
+    "dropped_holes", "dropped_components", "dropped_spray",
+    "rings_digest",  "mesh_digest",        "time"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
 // "vertices" is a count and a stage: the unit keeps the names of columns apart.
@@ -67,6 +68,7 @@ class Row {
     Number(statistics.folded_triangles);
     Number(statistics.dropped_holes);
     Number(statistics.dropped_components);
+    Number(statistics.dropped_spray);
     Digest(frame.rings_digest);
     Digest(frame.mesh_digest);
     Number(frame.time);

@@ -119,6 +119,7 @@ class Page {
     ];
     if (frame.dropped_holes > 0) numbers.push(['Dropped holes', shown(frame.dropped_holes)]);
     if (frame.dropped_components > 0) numbers.push(['Dropped pieces', shown(frame.dropped_components)]);
+    if (frame.dropped_spray > 0) numbers.push(['Dropped spray', shown(frame.dropped_spray)]);
     if (frame.self_intersections > 0) numbers.push(['Self-crossings', shown(frame.self_intersections), 'alert']);
     if (frame.folded_triangles > 0) numbers.push(['Folded', shown(frame.folded_triangles), 'alert']);
     numbers.push(['Digests', `rings ${frame.rings_digest}, mesh ${frame.mesh_digest}`, 'digest']);
@@ -232,12 +233,13 @@ class Page {
     const box = this.picture.getBoundingClientRect();
     const lines = [`x ${shown(x, 5)}   y ${shown(y, 5)}`];
     if (ring >= 0) {
-      const [area, perimeter, particles, identity] = this.frames[this.position].measures[ring];
+      const [area, perimeter, particles, identity, parents] = this.frames[this.position].measures[ring];
       const hole = geometry.outerOf[ring] >= 0;
       lines.push(hole ? `hole ${ring} of ring ${geometry.outerOf[ring]}` : `ring ${ring}`);
       lines.push(`area ${shown(area, 6)}`, `perimeter ${shown(perimeter, 6)}`);
       if (!hole) lines.push(`particles ${shown(particles)}`);
       if (identity !== '0') lines.push(`identity ${identity}`);
+      if (parents.some((parent) => parent !== identity)) lines.push(`from ${parents.join(', ')}`);
     }
     tip.textContent = lines.join('\n');
     tip.hidden = false;

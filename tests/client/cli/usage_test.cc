@@ -23,7 +23,7 @@ void ExpectOneLine(const Ran& ran) {
 TEST(Usage, HelpTeachesEveryVerbByExamples) {
   const Ran help = RunPartiemc({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"replay", "info", "convert"}) {
+  for (const char* verb : {"replay", "info", "evaluate", "convert"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     const Ran verb_help = RunPartiemc({verb, "--help"});
     EXPECT_EQ(verb_help.exit_code, 0);
@@ -50,6 +50,9 @@ TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
       {"replay", kDamBreak, "--local", "--kernel-radius", "99"},
       {"replay", kDamBreak, "--local", "--kernel-radius", "wide"},
       {"replay", kDamBreak, "--local", "--clean", "maybe"},
+      {"replay", kDamBreak, "--local", "--min-area", "-1"},
+      {"replay", kDamBreak, "--local", "--min-area", "inf"},
+      {"replay", kDamBreak, "--local", "--min-particles", "-1"},
       {"replay", kDamBreak, "--local", "--rate", "0"},
       {"replay", kDamBreak, "--local", "--threads", "0"},
       {"replay", kDamBreak, "--threads", "2"},

@@ -87,6 +87,8 @@ inline Result SquareWithHoleAndIsland() {
   AddRing(result.rings, {0, 0, 4, 0, 4, 4, 0, 4}, kNoRing, 150, 7);
   AddRing(result.rings, {10, 0, 11, 0, 10, 1}, kNoRing, 5, 9);
   AddRing(result.rings, {1, 1, 1, 2, 2, 2, 2, 1}, 0);
+  result.rings.parents = {3, 7};  // The square goes on and took ring 3 in.
+  result.rings.parent_offsets = {0, 2, 2, 2};
   result.mesh.points = result.rings.points;
   result.mesh.triangles = {0, 1, 10, 0, 10, 7, 1, 2, 9, 1, 9, 10, 2, 3,
                            8, 2, 8,  9, 3,  0, 7, 3, 7, 8, 4, 5,  6};

@@ -144,6 +144,7 @@ TEST(GeoJson, PropertiesTellAreaWithoutHolesPerimeterParticlesIdentityFrameAndTi
                                                         {"particles", 150},
                                                         {"ring", 0},
                                                         {"identity", 7},
+                                                        {"parents", {3, 7}},
                                                         {"frame", 12},
                                                         {"time", 0.1}}));
 }

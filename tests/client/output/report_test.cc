@@ -161,7 +161,8 @@ TEST(Report, ThePageHoldsEveryFrameWithItsNumbersAndGeometry) {
   EXPECT_EQ(first.at("milliseconds"), 3);
   EXPECT_EQ(first.at("stages").size(), kStageCount);
   EXPECT_EQ(first.at("measures").size(), 3u);
-  EXPECT_EQ(first.at("measures")[0], (json{16.0, 16.0, 150, "7"}));
+  EXPECT_EQ(first.at("measures")[0], (json{16.0, 16.0, 150, "7", {"3", "7"}}));
+  EXPECT_TRUE(first.at("measures")[1][4].empty());
   EXPECT_EQ(first.at("box"), (json{0.0, 0.0, 11.0, 4.0}));
   EXPECT_TRUE(json::parse(numbers[1]).at("box").is_null());
   std::string bytes;
@@ -239,14 +240,18 @@ TEST(Report, ParametersAreDescribedUnderTheirNames) {
                                          .fill = Fill::kGrid,
                                          .spacing = 0.0303,
                                          .reference_radius = 1.25,
-                                         .clean = false});
-  EXPECT_THAT(lines,
-              ElementsAre(std::pair("placement", "farthest-particle"), std::pair("fill", "grid"),
-                          std::pair("spacing", "0.0303"), std::pair("kernel radius", "3 spacings"),
-                          std::pair("cell size", "1 spacings"),
-                          std::pair("reference radius", "1.25 spacings"),
-                          std::pair("surface offset", "0 spacings"),
-                          std::pair("normal memory", "on"), std::pair("clean", "off")));
+                                         .clean = false,
+                                         .min_component_area = 2.5,
+                                         .min_component_particles = 3});
+  EXPECT_THAT(
+      lines,
+      ElementsAre(std::pair("placement", "farthest-particle"), std::pair("fill", "grid"),
+                  std::pair("spacing", "0.0303"), std::pair("kernel radius", "3 spacings"),
+                  std::pair("cell size", "1 spacings"),
+                  std::pair("reference radius", "1.25 spacings"),
+                  std::pair("surface offset", "0 spacings"), std::pair("normal memory", "on"),
+                  std::pair("clean", "off"), std::pair("smallest area", "2.5 squared spacings"),
+                  std::pair("fewest particles", "3")));
 }
 
 TEST(ReportGeometry, RingsMeshAndParticlesComeBackWithinHalfAStep) {

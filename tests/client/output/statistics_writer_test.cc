@@ -18,7 +18,7 @@ constexpr const char* kHeader =
     "frame,particles,polylines,vertices,triangles_grid,triangles,area,milliseconds,"
     "bins_ms,field_ms,crossings_ms,rings_ms,normals_ms,vertices_ms,mesh_ms,"
     "perimeter,self_intersections,folded_triangles,dropped_holes,dropped_components,"
-    "rings_digest,mesh_digest,time";
+    "dropped_spray,rings_digest,mesh_digest,time";
 
 FrameRecord Record(const Result& result) {
   return {.index = 3,
@@ -46,9 +46,10 @@ TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
   result.statistics.folded_triangles = 2;
   result.statistics.dropped_holes = 3;
   result.statistics.dropped_components = 4;
+  result.statistics.dropped_spray = 5;
   EXPECT_EQ(Written(directory / "stats.csv", {Record(result)}),
             std::string(kHeader) +
-                "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,23.5,1,2,3,4,"
+                "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,23.5,1,2,3,4,5,"
                 "0123456789abcdef,000000000000000f,0.1\n");
 }
 

@@ -1,0 +1,36 @@
+// What `partiemc evaluate` prints and writes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluation/claims.h"
+#include "evaluation/paper.h"
+#include "evaluation/study.h"
+
+namespace partiemc::evaluation {
+
+struct Evaluation {
+  std::string set;  ///< Name of the synthetic set.
+  std::size_t sequences = 0;
+  std::vector<std::string> recordings;  ///< Names, for people.
+  std::vector<std::string> notes;       ///< What a reader should know: an estimated spacing, ...
+  Study study;
+  PaperRuns paper;
+  std::vector<Claim> claims;
+};
+
+/// The tables and the claims, for a terminal: synthetic sequences first, then recordings.
+std::string EvaluationText(const Evaluation& evaluation);
+
+/// A line per sequence, method and knowledge, with all metrics; absent ones are empty.
+std::string EvaluationCsv(const Study& study);
+
+/// One object: set, methods, rows, comparisons, claims, film, thinned, fills. Absent numbers are
+/// null.
+std::string EvaluationJson(const Evaluation& evaluation);
+
+/// One page that needs nothing else, no script either.
+std::string EvaluationHtml(const Evaluation& evaluation);
+
+}  // namespace partiemc::evaluation

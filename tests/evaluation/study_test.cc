@@ -1,0 +1,117 @@
+// All methods over all sequences.
+#include "evaluation/study.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+namespace partiemc::evaluation {
+namespace {
+
+using ::testing::HasSubstr;
+
+bool GoOn(std::size_t) { return true; }
+
+StudyPlan SmallPlan() {
+  StudyPlan plan;
+  for (const char* shape : {"disc", "star", "bar"}) {
+    plan.recipes.push_back({.name = shape, .shape = shape, .particles = 200, .frames = 3});
+  }
+  plan.methods = StudyMethods();
+  return plan;
+}
+
+TEST(Study, HasTheBaselineFirstAndEveryPlacement) {
+  const auto methods = StudyMethods();
+  EXPECT_EQ(methods.front().method.name, kBaseline);
+  std::set<Placement> placements;
+  std::set<std::string> names;
+  for (const StudyMethod& method : methods) {
+    placements.insert(method.method.parameters.placement);
+    names.insert(method.method.name);
+    EXPECT_TRUE(Validate(method.method.parameters).ok()) << method.method.name;
+  }
+  EXPECT_EQ(placements.size(), AllPlacements().size());
+  EXPECT_EQ(names.size(), methods.size());
+}
+
+TEST(Study, EachStepMethodHasExactlyOneStepOff) {
+  const VirtualPlaneSteps all;
+  std::set<std::string> names;
+  for (const StudyMethod& method : StepMethods()) {
+    const VirtualPlaneSteps& steps = method.method.parameters.steps;
+    const int off = (all.edge_vertices != steps.edge_vertices) + (all.normals != steps.normals) +
+                    (all.curvature != steps.curvature) + (all.support != steps.support) +
+                    (all.smoothing != steps.smoothing) + (all.area != steps.area);
+    EXPECT_EQ(off, 1) << method.method.name;
+    names.insert(method.method.name);
+  }
+  EXPECT_EQ(names.size(), 6u);
+}
+
+TEST(Study, RowsAreTheSameForOneAndThreeThreads) {
+  StudyPlan plan = SmallPlan();
+  const auto one = RunStudy(plan, GoOn);
+  plan.threads = 3;
+  const auto three = RunStudy(plan, GoOn);
+  ASSERT_TRUE(one.ok() && three.ok());
+  ASSERT_EQ(one->rows.size(), three->rows.size());
+  for (std::size_t k = 0; k < one->rows.size(); ++k) {
+    const Row& a = one->rows[k];
+    const Row& b = three->rows[k];
+    EXPECT_EQ(a.sequence, b.sequence);
+    EXPECT_EQ(a.method, b.method);
+    EXPECT_EQ(a.knowledge, b.knowledge);
+    for (const Metric metric : {Metric::kHausdorff, Metric::kMeanJitter, Metric::kCenterMean}) {
+      EXPECT_EQ(a[metric], b[metric]) << a.sequence << ' ' << a.method << ' ' << Name(metric);
+    }
+  }
+}
+
+TEST(Study, ReportsAsManyFramesAsItAnnounced) {
+  const StudyPlan plan = SmallPlan();
+  std::size_t frames = 0;
+  const auto study = RunStudy(plan, [&](std::size_t more) {
+    frames += more;
+    return true;
+  });
+  ASSERT_TRUE(study.ok());
+  EXPECT_EQ(frames, FrameTotal(plan));
+  // Six methods, of which one needs a spacing and is left out where there is none.
+  EXPECT_EQ(study->rows.size(), 3u * (6 + 5));
+}
+
+TEST(Study, EndsWhereItIsToldTo) {
+  std::size_t calls = 0;
+  const auto study = RunStudy(SmallPlan(), [&](std::size_t) { return ++calls < 2; });
+  EXPECT_EQ(study.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(calls, 2u);
+}
+
+TEST(Study, AnErrorNamesTheSequence) {
+  StudyPlan plan = SmallPlan();
+  plan.recipes.clear();
+  Sequence recording{.name = "broken.pemc", .group = Group::kRecording};
+  recording.frames.resize(2);
+  recording.frames[1].positions = {0, std::nan("")};
+  plan.recordings.push_back(recording);
+  const auto study = RunStudy(plan, GoOn);
+  EXPECT_EQ(study.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(study.status().message()), HasSubstr("broken.pemc, frame 1"));
+}
+
+TEST(Study, MeansLeaveOutWhatIsAbsentOrNotJudged) {
+  std::vector<Row> rows(3);
+  for (Row& row : rows) row.values.fill(kAbsent);
+  const auto at = static_cast<std::size_t>(Metric::kHausdorff);
+  rows[0].values[at] = 1;
+  rows[1].values[at] = 7;
+  rows[1].judged = false;
+  EXPECT_EQ(MeanOver(rows, Metric::kHausdorff), 1);
+  EXPECT_TRUE(std::isnan(MeanOver(rows, Metric::kBias)));
+}
+
+}  // namespace
+}  // namespace partiemc::evaluation
