@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "absl/strings/escaping.h"
+#include "output/html.h"
 #include "output/report_geometry.h"
 #include "output/text.h"
 #include "partiemc/status.h"
@@ -31,32 +32,6 @@ constexpr int kShownDigits = 7;
 // Outer rings below this share of the largest one do not decide what the picture shows: spray
 // that has left the scene would shrink everything else to a dot.
 constexpr double kMinorShare = 0.01;
-
-std::string EscapeHtml(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 /// Replaces every {{name}} of `text` by value(name). What a value holds is not looked at again.
 std::string Expand(std::string_view text,

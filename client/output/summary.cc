@@ -32,7 +32,7 @@ std::string Grouped(double value, int decimals) {
   if (end == std::string::npos) end = text.size();
   while (end > 3 && std::isdigit(static_cast<unsigned char>(text[end - 4]))) {
     end -= 3;
-    text.insert(end, ",");
+    text.insert(end, 1, ',');
   }
   return text;
 }

@@ -12,6 +12,7 @@
 #include "evaluation/report/report.h"
 #include "evaluation/report/table.h"
 #include "nlohmann/json.hpp"
+#include "output/html.h"
 
 namespace partiemc::evaluation {
 namespace {
@@ -113,7 +114,7 @@ TEST(Report, ThePageNeedsNothingElseAndEscapesNames) {
   EXPECT_THAT(page, Not(HasSubstr("https://")));
   EXPECT_THAT(page, Not(HasSubstr("nan")));
   for (const Claim& claim : Small().claims) {
-    EXPECT_THAT(page, HasSubstr(Escaped(claim.sentence)));
+    EXPECT_THAT(page, HasSubstr(client::EscapeHtml(claim.sentence)));
   }
 }
 

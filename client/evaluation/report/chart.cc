@@ -6,9 +6,12 @@
 #include "absl/strings/str_format.h"
 #include "evaluation/report/picture.h"
 #include "evaluation/report/table.h"
+#include "output/html.h"
 #include "output/text.h"
 
 namespace partiemc::evaluation {
+
+using client::EscapeHtml;
 namespace {
 
 constexpr double kWidth = 620, kHeight = 220;
@@ -59,14 +62,14 @@ class Axes {
 
 std::string Label(double x, const std::string& text) {
   return absl::StrFormat("<text x=\"%.1f\" y=\"%.0f\" text-anchor=\"middle\">%s</text>\n", x,
-                         kHeight - 8, Escaped(text));
+                         kHeight - 8, EscapeHtml(text));
 }
 
 std::string Open(const std::string& title) {
   return absl::StrFormat(
       "<figure class=\"plot\"><figcaption>%s</figcaption>\n"
       "<svg class=\"chart\" viewBox=\"0 0 %.0f %.0f\" role=\"img\" aria-label=\"%s\">\n",
-      Escaped(title), kWidth, kHeight, Escaped(title));
+      EscapeHtml(title), kWidth, kHeight, EscapeHtml(title));
 }
 
 std::string Close(std::span<const Series> series) {
@@ -75,7 +78,7 @@ std::string Close(std::span<const Series> series) {
     const double mean = std::accumulate(one.values.begin(), one.values.end(), 0.0) /
                         static_cast<double>(one.values.size());
     absl::StrAppendFormat(&out, "<li><i class=\"%s\"></i>%s <b>mean %s</b></li>", one.style,
-                          Escaped(one.name), Significant(mean));
+                          EscapeHtml(one.name), Significant(mean));
   }
   return out + "</ul></figure>\n";
 }
@@ -121,7 +124,8 @@ std::string BarChart(const std::string& title, std::span<const std::string> labe
           "<rect class=\"%s\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\">"
           "<title>%s, %s: %s</title></rect>\n",
           series[s].style, left + bar * static_cast<double>(s), axes.Y(value), 0.92 * bar,
-          kBottom - axes.Y(value), Escaped(series[s].name), Escaped(labels[k]), Significant(value));
+          kBottom - axes.Y(value), EscapeHtml(series[s].name), EscapeHtml(labels[k]),
+          Significant(value));
     }
   }
   return out + Close(series);

@@ -8,6 +8,7 @@
 #include "evaluation/report/picture.h"
 #include "evaluation/report/report.h"
 #include "evaluation/report/study_tables.h"
+#include "output/html.h"
 #include "output/text.h"
 
 namespace partiemc::client::page {
@@ -24,6 +25,7 @@ namespace {
 
 using client::AppendAll;
 using client::Concat;
+using client::EscapeHtml;
 
 std::string Mark(Finding finding) {
   constexpr std::string_view kWords[] = {"reproduces", "weaker", "does not reproduce"};
@@ -43,9 +45,9 @@ std::string Tally(const std::vector<Claim>& claims) {
 std::string ClaimList(const std::vector<Claim>& claims) {
   std::string out = "<ul class=\"claims\">\n";
   for (const Claim& claim : claims) {
-    AppendAll(out, "<li><span class=\"about\">", Escaped(claim.about), "</span><span>",
-              Mark(claim.finding), "<span class=\"subject\">", Escaped(claim.subject),
-              "</span></span><span>", Escaped(claim.sentence), "</span></li>\n");
+    AppendAll(out, "<li><span class=\"about\">", EscapeHtml(claim.about), "</span><span>",
+              Mark(claim.finding), "<span class=\"subject\">", EscapeHtml(claim.subject),
+              "</span></span><span>", EscapeHtml(claim.sentence), "</span></li>\n");
   }
   return out + "</ul>\n";
 }
@@ -56,7 +58,7 @@ std::string ClaimsAbout(const Evaluation& evaluation, std::string_view about) {
   for (const Claim& claim : evaluation.claims) {
     if (claim.about != about) continue;
     AppendAll(out, "<li><span>", Mark(claim.finding), "<span class=\"subject\">",
-              Escaped(claim.subject), "</span></span><span>", Escaped(claim.sentence),
+              EscapeHtml(claim.subject), "</span></span><span>", EscapeHtml(claim.sentence),
               "</span></li>\n");
   }
   return out + "</ul>\n";
@@ -188,13 +190,13 @@ std::string ThinningSection(const Evaluation& evaluation) {
 
 std::string GridSections(const Evaluation& evaluation) {
   const PaperRuns& runs = evaluation.paper;
-  return Section(
-             "Figure 11: merging on two grids",
-             Concat("32 and 64 cells across the bounding square of frame ", runs.grid_frame, " of ",
-                    Escaped(runs.film_name), "; without and with greedy merging, virtual-plane."),
-             PictureRow(runs.grid_shots) + ClaimsAbout(evaluation, "Figure 11")) +
+  return Section("Figure 11: merging on two grids",
+                 Concat("32 and 64 cells across the bounding square of frame ", runs.grid_frame,
+                        " of ", EscapeHtml(runs.film_name),
+                        "; without and with greedy merging, virtual-plane."),
+                 PictureRow(runs.grid_shots) + ClaimsAbout(evaluation, "Figure 11")) +
          Section("Figure 12: frames and their triangles",
-                 Concat("Four frames of ", Escaped(runs.film_name), ", virtual-plane, greedy."),
+                 Concat("Four frames of ", EscapeHtml(runs.film_name), ", virtual-plane, greedy."),
                  PictureRow(runs.film_shots) + ClaimsAbout(evaluation, "Figure 12")) +
          Section("Figure 13: two resolutions",
                  "The same frame; the paper: low resolution keeps shape and features.",
@@ -254,12 +256,12 @@ std::string NotesSection(const Evaluation& evaluation) {
       "nine tenths of the paper&#39;s effect are there; it is weaker if the direction is right and "
       "more than 2 % are left of it.</p>\n";
   for (const std::string& note : evaluation.notes) {
-    AppendAll(content, "<p class=\"headline\">", Escaped(note), "</p>\n");
+    AppendAll(content, "<p class=\"headline\">", EscapeHtml(note), "</p>\n");
   }
   content += "<div class=\"wide\"><table class=\"parameters\"><tbody>\n";
   for (const StudyMethod& method : evaluation.study.methods) {
-    AppendAll(content, "<tr><th scope=\"row\">", Escaped(method.method.name), "</th><td>",
-              Escaped(method.remark), "</td></tr>\n");
+    AppendAll(content, "<tr><th scope=\"row\">", EscapeHtml(method.method.name), "</th><td>",
+              EscapeHtml(method.remark), "</td></tr>\n");
   }
   return Section("How it was measured", "", content + "</tbody></table></div>\n");
 }
@@ -280,9 +282,9 @@ std::string EvaluationHtml(const Evaluation& evaluation) {
       "<meta name=\"color-scheme\" content=\"light dark\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
       "style-src 'unsafe-inline'\">\n<title>Evaluation: ",
-      Escaped(evaluation.set), " &middot; PartiEMC</title>\n<style>\n", client::page::kReportCss,
+      EscapeHtml(evaluation.set), " &middot; PartiEMC</title>\n<style>\n", client::page::kReportCss,
       page::kEvaluationCss, "</style>\n</head>\n<body>\n<header><h1>",
-      "Evaluation: ", Escaped(evaluation.set), "</h1><p>", Escaped(Subtitle(evaluation)),
+      "Evaluation: ", EscapeHtml(evaluation.set), "</h1><p>", EscapeHtml(Subtitle(evaluation)),
       "</p></header>\n<main>\n");
   out += Section("What of the paper reproduces",
                  "Computed from the runs on this page, for the paper&#39;s placement "

@@ -6,9 +6,12 @@
 
 #include "absl/strings/str_format.h"
 #include "evaluation/report/table.h"
+#include "output/html.h"
 #include "output/text.h"
 
 namespace partiemc::evaluation {
+
+using client::EscapeHtml;
 namespace {
 
 using client::AppendAll;
@@ -124,7 +127,7 @@ std::string Picture(const Shot& shot, const View& view) {
   std::string out = absl::StrFormat(
       "<figure class=\"shot\"><figcaption>%s</figcaption>\n"
       "<svg viewBox=\"0 0 %.0f %.1f\" role=\"img\" aria-label=\"%s\">\n",
-      Escaped(shot.title), kWidth, view.height(), Escaped(shot.title + ": " + shot.caption));
+      EscapeHtml(shot.title), kWidth, view.height(), EscapeHtml(shot.title + ": " + shot.caption));
   const std::string outline = OutlinePath(OutlineOf(shot.rings), view);
   if (shot.mesh.TriangleCount() == 0) {
     AppendPath(out, "inside", outline);
@@ -140,7 +143,7 @@ std::string Picture(const Shot& shot, const View& view) {
   }
   AppendPath(out, "outline", outline);
   AppendPath(out, "truth", OutlinePath(shot.truth, view));
-  AppendAll(out, "</svg><p>", Escaped(shot.caption), "</p></figure>\n");
+  AppendAll(out, "</svg><p>", EscapeHtml(shot.caption), "</p></figure>\n");
   return out;
 }
 

@@ -4,9 +4,12 @@
 #include <cmath>
 
 #include "absl/strings/str_format.h"
+#include "output/html.h"
 #include "output/text.h"
 
 namespace partiemc::evaluation {
+
+using client::EscapeHtml;
 namespace {
 
 using client::AppendAll;
@@ -45,48 +48,23 @@ std::string AsText(const Table& table) {
 }
 
 std::string AsHtml(const Table& table) {
-  std::string out = client::Concat("<h3>", Escaped(table.title), "</h3>\n");
-  if (!table.note.empty()) AppendAll(out, "<p class=\"headline\">", Escaped(table.note), "</p>\n");
+  std::string out = client::Concat("<h3>", EscapeHtml(table.title), "</h3>\n");
+  if (!table.note.empty())
+    AppendAll(out, "<p class=\"headline\">", EscapeHtml(table.note), "</p>\n");
   out += "<div class=\"wide\"><table><thead><tr><td></td>";
   for (const std::string& head : table.heads) {
-    AppendAll(out, "<th scope=\"col\">", Escaped(head), "</th>");
+    AppendAll(out, "<th scope=\"col\">", EscapeHtml(head), "</th>");
   }
   out += "</tr></thead><tbody>\n";
   for (const TableRow& row : table.rows) {
     AppendAll(out, row.part ? "<tr class=\"part\">" : "<tr>", "<th scope=\"row\">",
-              Escaped(row.name), "</th>");
+              EscapeHtml(row.name), "</th>");
     for (const Cell& cell : row.cells) {
-      AppendAll(out, cell.alert ? "<td class=\"alert\">" : "<td>", Escaped(cell.text), "</td>");
+      AppendAll(out, cell.alert ? "<td class=\"alert\">" : "<td>", EscapeHtml(cell.text), "</td>");
     }
     out += "</tr>\n";
   }
   return out + "</tbody></table></div>\n";
-}
-
-std::string Escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
 }
 
 std::string Fixed(double value, int digits) {

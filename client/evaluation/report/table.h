@@ -31,9 +31,6 @@ std::string AsText(const Table& table);
 /// A heading, the note and a <table>. Everything is escaped.
 std::string AsHtml(const Table& table);
 
-/// `text` for HTML, in text and in quoted attributes.
-std::string Escaped(std::string_view text);
-
 /// So many digits after the point; "-" for what is absent.
 std::string Fixed(double value, int digits);
 
