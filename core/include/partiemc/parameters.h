@@ -15,7 +15,7 @@ enum class Placement : std::uint8_t {
   kMarchingSquares,   ///< Linear interpolation of the level set on lattice edges.
   kQef,               ///< Marching squares plus one vertex per cell that minimises Eq. 14.
   kFarthestParticle,  ///< Section 3.5 to the letter: the farthest particle above the plane.
-  kVirtualPlane,      ///< The default: one vertex per cell moved along the stabilised normal.
+  kVirtualPlane,      ///< The default: vertices on planes that the particles near them support.
 };
 
 /// How the inside of the isoline is filled with triangles (paper, sections 3.7-3.8).
