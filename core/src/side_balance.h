@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <tuple>
 #include <vector>
@@ -20,6 +21,18 @@ namespace partiemc {
 /// Cost: n log n.
 class SideBalance {
  public:
+  struct Finding {
+    /// A point where sides are not balanced, or nothing if they are.
+    std::optional<Point> imbalance;
+    /// Ends of sides that lie inside of others, where sides cancel only piece by piece. Counted if
+    /// sides are balanced. None: every side cancels whole, hence is shared by two triangles, or by
+    /// a triangle and the boundary.
+    std::size_t t_junctions = 0;
+    Point t_junction;  ///< One of them.
+
+    friend bool operator==(const Finding&, const Finding&) = default;
+  };
+
   /// Requires: from != to.
   void Add(const Point& from, const Point& to) {
     if (SweepsBefore(from, to)) {
@@ -29,13 +42,14 @@ class SideBalance {
     }
   }
 
-  /// A point where sides are not balanced, or nothing if they are. Forgets the sides.
-  std::optional<Point> TakeImbalance() {
-    const std::optional<Point> slanted = CancelWholeSides();
+  /// What is wrong with the sides. Forgets them.
+  Finding Take() {
+    Finding finding;
+    finding.imbalance = CancelWholeSides();
     sides_.clear();
-    const std::optional<Point> imbalance = slanted.has_value() ? slanted : FindUnevenStep();
+    if (!finding.imbalance.has_value()) WalkSteps(finding);
     steps_.clear();
-    return imbalance;
+    return finding;
   }
 
  private:
@@ -44,11 +58,12 @@ class SideBalance {
     int sign;  // +1 if it runs from `lower` to `upper`.
   };
 
-  /// A place on a line along an axis where the sum of signs changes.
+  /// A place on a line along an axis where sides begin or end.
   struct Step {
     bool is_horizontal;
     double line, position;
-    int change;
+    int change;   // Of the sum of signs.
+    int opening;  // How many sides begin here, less those that end.
   };
 
   static auto Place(const Side& side) {
@@ -73,25 +88,35 @@ class SideBalance {
       const bool is_horizontal = lower.y == upper.y;
       if (!is_horizontal && lower.x != upper.x) return lower;
       const double line = is_horizontal ? lower.y : lower.x;
-      steps_.push_back({is_horizontal, line, is_horizontal ? lower.x : lower.y, sum});
-      steps_.push_back({is_horizontal, line, is_horizontal ? upper.x : upper.y, -sum});
+      const int count = sum < 0 ? -sum : sum;
+      steps_.push_back({is_horizontal, line, is_horizontal ? lower.x : lower.y, sum, count});
+      steps_.push_back({is_horizontal, line, is_horizontal ? upper.x : upper.y, -sum, -count});
     }
     return std::nullopt;
   }
 
-  /// Nothing is left on a line exactly when the changes at each of its places cancel.
-  std::optional<Point> FindUnevenStep() {
+  /// Nothing is left on a line exactly when the changes at each of its places cancel. A place lies
+  /// inside of the sides that are open before it and do not end there.
+  void WalkSteps(Finding& finding) {
     std::sort(steps_.begin(), steps_.end(),
               [](const Step& a, const Step& b) { return Place(a) < Place(b); });
+    int open = 0;  // Back at 0 at the end of every line.
     for (auto step = steps_.begin(); step != steps_.end();) {
       const auto first = step;
-      int sum = 0;
-      for (; step != steps_.end() && Place(*step) == Place(*first); ++step) sum += step->change;
-      if (sum == 0) continue;
-      return first->is_horizontal ? Point{first->position, first->line}
-                                  : Point{first->line, first->position};
+      const Point place = first->is_horizontal ? Point{first->position, first->line}
+                                               : Point{first->line, first->position};
+      int sum = 0, begun = 0;
+      for (; step != steps_.end() && Place(*step) == Place(*first); ++step) {
+        sum += step->change;
+        (step->opening > 0 ? begun : open) += step->opening;
+      }
+      if (sum != 0) {
+        finding = {.imbalance = place};
+        return;
+      }
+      if (open > 0 && finding.t_junctions++ == 0) finding.t_junction = place;
+      open += begun;
     }
-    return std::nullopt;
   }
 
   std::vector<Side> sides_;

@@ -314,8 +314,8 @@ absl::Status CheckAreas(const Result& result) {
                 ", the rings enclose ", ShortestNumber(ring_area.Value()));
 }
 
-/// Equal areas leave room for an overlap as large as a gap; balanced sides do not.
-absl::Status CheckCover(const Result& result) {
+/// How the sides of the triangles cancel each other and the segments of the rings run backwards.
+SideBalance::Finding BalanceSides(const Result& result) {
   SideBalance sides;
   const Rings& rings = result.rings;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
@@ -331,26 +331,58 @@ absl::Status CheckCover(const Result& result) {
     sides.Add(PointAt(result.mesh.points, triangles[i]),
               PointAt(result.mesh.points, triangles[next]));
   }
-  const std::optional<Point> imbalance = sides.TakeImbalance();
-  if (!imbalance.has_value()) return absl::OkStatus();
-  return Broken("M2: the triangles leave a gap or overlap at (", ShortestNumber(imbalance->x), ", ",
-                ShortestNumber(imbalance->y), ")");
+  return sides.Take();
+}
+
+/// Equal areas leave room for an overlap as large as a gap; balanced sides do not.
+absl::Status CheckCover(const SideBalance::Finding& sides) {
+  if (!sides.imbalance.has_value()) return absl::OkStatus();
+  return Broken("M2: the triangles leave a gap or overlap at (", ShortestNumber(sides.imbalance->x),
+                ", ", ShortestNumber(sides.imbalance->y), ")");
+}
+
+// --- M4 -----------------------------------------------------------------------------------------
+
+/// Requires M2. Around a vertex inside a side there would be triangles on one side of it and pieces
+/// of that side on the other, so that the side does not cancel whole; and where all sides cancel
+/// whole, triangles around such a vertex would overlap those at the side.
+absl::Status CheckM4(const SideBalance::Finding& sides) {
+  if (sides.t_junctions == 0) return absl::OkStatus();
+  return Broken("M4: ", sides.t_junctions, " vertices lie inside sides, one of them at (",
+                ShortestNumber(sides.t_junction.x), ", ", ShortestNumber(sides.t_junction.y), ")");
+}
+
+absl::Status CheckMesh(const Result& result, bool allows_t_junctions) {
+  if (absl::Status status = CheckM1(result.mesh); !status.ok()) return status;
+  for (const auto check : {CheckM3, CheckAreas}) {
+    if (absl::Status status = check(result); !status.ok()) return status;
+  }
+  const SideBalance::Finding sides = BalanceSides(result);
+  if (absl::Status status = CheckCover(sides); !status.ok()) return status;
+  return allows_t_junctions ? absl::OkStatus() : CheckM4(sides);
+}
+
+absl::Status CheckRings(const Rings& rings) {
+  for (const auto check : {CheckR1, CheckR2, CheckR3, CheckR4}) {
+    if (absl::Status status = check(rings); !status.ok()) return status;
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
 
 absl::Status Validate(const Result& result) {
-  const Rings& rings = result.rings;
-  for (const auto check : {CheckR1, CheckR2, CheckR3, CheckR4}) {
-    if (absl::Status status = check(rings); !status.ok()) return status;
-  }
+  if (absl::Status status = CheckRings(result.rings); !status.ok()) return status;
   // Fill::kNone makes no mesh, whatever the rings.
-  if (result.mesh == Mesh{}) return absl::OkStatus();
-  if (absl::Status status = CheckM1(result.mesh); !status.ok()) return status;
-  for (const auto check : {CheckM3, CheckAreas, CheckCover}) {
-    if (absl::Status status = check(result); !status.ok()) return status;
-  }
-  return absl::OkStatus();
+  return result.mesh == Mesh{} ? absl::OkStatus() : CheckMesh(result, true);
 }
+
+absl::Status Validate(const Result& result, Fill fill) {
+  if (absl::Status status = CheckRings(result.rings); !status.ok()) return status;
+  if (fill == Fill::kNone && result.mesh == Mesh{}) return absl::OkStatus();
+  return CheckMesh(result, fill != Fill::kConforming && fill != Fill::kPolygon);
+}
+
+std::size_t CountTJunctions(const Result& result) { return BalanceSides(result).t_junctions; }
 
 }  // namespace partiemc

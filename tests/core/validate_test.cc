@@ -316,17 +316,17 @@ TEST(Validate, GarbageIsRefusedWithoutAnAccident) {
 
 TEST(SideBalance, SidesCancelWholeOrPiecewiseAlongTheAxesOnly) {
   SideBalance sides;
-  EXPECT_EQ(sides.TakeImbalance(), std::nullopt);
+  EXPECT_EQ(sides.Take().imbalance, std::nullopt);
   sides.Add({0, 0}, {2, 1}), sides.Add({2, 1}, {0, 0});
-  EXPECT_EQ(sides.TakeImbalance(), std::nullopt);
+  EXPECT_EQ(sides.Take().imbalance, std::nullopt);
   sides.Add({0, 0}, {2, 0}), sides.Add({2, 0}, {1, 0}), sides.Add({1, 0}, {0, 0});
   sides.Add({3, 0}, {3, 5}), sides.Add({3, 5}, {3, 1}), sides.Add({3, 1}, {3, 0});
-  EXPECT_EQ(sides.TakeImbalance(), std::nullopt);
+  EXPECT_EQ(sides.Take().imbalance, std::nullopt);
   sides.Add({0, 0}, {2, 0}), sides.Add({2, 0}, {1, 0});
-  EXPECT_EQ(sides.TakeImbalance(), (Point{0, 0}));
+  EXPECT_EQ(sides.Take().imbalance, (Point{0, 0}));
   sides.Add({0, 0}, {2, 2}), sides.Add({2, 2}, {1, 1}), sides.Add({1, 1}, {0, 0});
-  EXPECT_TRUE(sides.TakeImbalance().has_value()) << "slanted sides must match whole";
-  EXPECT_EQ(sides.TakeImbalance(), std::nullopt) << "nothing is left over";
+  EXPECT_TRUE(sides.Take().imbalance.has_value()) << "slanted sides must match whole";
+  EXPECT_EQ(sides.Take().imbalance, std::nullopt) << "nothing is left over";
 }
 
 }  // namespace
