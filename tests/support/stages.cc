@@ -23,12 +23,20 @@ void Stages::Run(const Particles& frame, const ReconstructionParameters& wanted,
   const absl::Status status = BinParticles(particles.AsFrame(), parameters.plane, scale, {}, bins);
   ASSERT_TRUE(status.ok()) << status;
   SampleField(bins, scale, level_set);
-  RunFromCrossings(previous);
+  Trace();
+  RunFromRings(previous);
 }
 
 void Stages::RunOn(const std::function<double(int, int)>& function, TileCoordinate low,
                    TileCoordinate high, const Particles& frame,
                    const ReconstructionParameters& wanted, std::span<const CellNormal> previous) {
+  TraceOn(function, low, high, frame, wanted);
+  RunFromRings(previous);
+}
+
+void Stages::TraceOn(const std::function<double(int, int)>& function, TileCoordinate low,
+                     TileCoordinate high, const Particles& frame,
+                     const ReconstructionParameters& wanted) {
   particles = frame;
   SetScale(wanted);
   bins.Clear();
@@ -57,12 +65,15 @@ void Stages::RunOn(const std::function<double(int, int)>& function, TileCoordina
     }
     bins.offsets.push_back(static_cast<std::uint32_t>(bins.x.size()));
   }
-  RunFromCrossings(previous);
+  Trace();
 }
 
-void Stages::RunFromCrossings(std::span<const CellNormal> previous) {
+void Stages::Trace() {
   FindCrossings(bins.tiles, level_set, crossings);
   TraceRings(bins, level_set, scale, parameters, crossings, ring_scratch, topology);
+}
+
+void Stages::RunFromRings(std::span<const CellNormal> previous) {
   field.Build(bins, crossings, scale, true);
   EstimateNormals(bins, level_set, crossings, topology, field, parameters, previous, planes,
                   next_normals);

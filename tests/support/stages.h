@@ -52,12 +52,17 @@ struct Stages {
              TileCoordinate high, const Particles& frame, const ReconstructionParameters& wanted,
              std::span<const CellNormal> previous = {});
 
+  /// Stages 3 and 4 of such a level set.
+  void TraceOn(const std::function<double(int, int)>& function, TileCoordinate low,
+               TileCoordinate high, const Particles& frame, const ReconstructionParameters& wanted);
+
   /// Corners and value at each corner of an active cell.
   std::array<double, 4> CornerValues(const ActiveCell& cell) const;
 
  private:
   void SetScale(const ReconstructionParameters& wanted);
-  void RunFromCrossings(std::span<const CellNormal> previous);
+  void Trace();
+  void RunFromRings(std::span<const CellNormal> previous);
 };
 
 }  // namespace partiemc::support
