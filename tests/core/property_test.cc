@@ -45,6 +45,12 @@ Trial MakeTrial(std::uint64_t seed) {
   // Noise and clusters have no spacing worth the name: most frames are given theirs, and those
   // with volumes always.
   if (!trial.particles.volumes.empty() || random.Chance(0.7)) trial.parameters.spacing = spacing;
+  // What changes the rings of a few frames only.
+  support::Random rare(seed ^ 0x5eed2);
+  if (rare.Chance(0.1)) trial.parameters.min_component_area = rare.Uniform(0, 40);
+  if (rare.Chance(0.1)) trial.parameters.min_component_particles = rare.Below(20);
+  if (rare.Chance(0.1)) trial.parameters.spacing_rule = SpacingRule::kEveryFrame;
+  if (rare.Chance(0.1)) trial.parameters.surface_offset = rare.Uniform(-1, 1);
   return trial;
 }
 
