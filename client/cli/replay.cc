@@ -103,7 +103,7 @@ class Receiver {
   }
 
   void Check(const std::string& source) {
-    const absl::Status valid = Validate(event_.frame.result);
+    const absl::Status valid = Validate(event_.frame.result, *FindFill(flags_.fill));
     if (valid.ok()) return;
     // farthest-particle breaks guarantees in almost every frame: one example is enough.
     const std::uint64_t told = flags_.placement == Name(Placement::kFarthestParticle) ? 1 : 10;

@@ -12,6 +12,7 @@
 #include "absl/strings/str_format.h"
 #include "evaluation/random.h"
 #include "partiemc/reconstructor.h"
+#include "partiemc/validate.h"
 
 namespace partiemc::evaluation {
 namespace {
@@ -320,6 +321,9 @@ absl::Status PaperRunner::RunFill(const Evaluator& scene, int cells) {
     const auto results = scene.Reconstruct(MethodOf(Placement::kVirtualPlane, fill, cell_size), {});
     if (!results.ok()) return results.status();
     row.*triangles = static_cast<double>(results->front().statistics.triangles);
+    const std::size_t t_junctions = CountTJunctions(results->front());
+    if (fill == Fill::kGreedy) row.greedy_t_junctions = t_junctions;
+    if (fill == Fill::kConforming) row.conforming_t_junctions = t_junctions;
     const std::uint64_t now = DigestRings(results->front().rings);
     row.same_rings = row.same_rings && (fill == Fill::kGrid || now == digest);
     digest = now;

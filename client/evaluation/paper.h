@@ -60,6 +60,7 @@ struct FillRow {
   std::string shape;
   int cells = 32;
   double grid = 0, greedy = 0, conforming = 0, polygon = 0;
+  std::size_t greedy_t_junctions = 0, conforming_t_junctions = 0;
   bool same_rings = false;  ///< Between all fills, bit for bit.
 };
 

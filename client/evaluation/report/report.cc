@@ -108,6 +108,8 @@ void AppendFill(std::string& out, const FillRow& fill) {
   AppendAll(out, "{\"shape\":", JsonString(fill.shape), ",\"cells\":", fill.cells,
             ",\"grid\":", fill.grid, ",\"greedy\":", fill.greedy,
             ",\"conforming\":", fill.conforming, ",\"polygon\":", fill.polygon,
+            ",\"greedy_t_junctions\":", fill.greedy_t_junctions,
+            ",\"conforming_t_junctions\":", fill.conforming_t_junctions,
             ",\"same_rings\":", fill.same_rings ? "true" : "false", '}');
 }
 

@@ -217,11 +217,12 @@ Table SequenceTable(const Study& study, const Selection& selection, std::string_
 }
 
 Table FillTable(std::span<const FillRow> fills) {
-  Table table{"Triangles by fill, virtual-plane",
-              "One frame of about 1,000 particles; N cells across the shape's bounding square.",
-              {"grid", "greedy", "conforming", "polygon", "greedy saves", "conforming saves",
-               "polygon saves", "conforming / greedy", "rings"},
-              {}};
+  Table table{
+      "Triangles by fill, virtual-plane",
+      "One frame of about 1,000 particles; N cells across the shape's bounding square.",
+      {"grid", "greedy", "conforming", "polygon", "greedy saves", "conforming saves",
+       "polygon saves", "conforming / greedy", "T-junctions of greedy", "of conforming", "rings"},
+      {}};
   const auto percent = [](double part, double whole) {
     return Cell{absl::StrFormat("%.1f %%", 100 * (1 - part / whole))};
   };
@@ -238,6 +239,9 @@ Table FillTable(std::span<const FillRow> fills) {
                              percent(fill.conforming, fill.grid),
                              percent(fill.polygon, fill.grid),
                              {Fixed(fill.conforming / fill.greedy, 2)},
+                             {Fixed(static_cast<double>(fill.greedy_t_junctions), 0)},
+                             {Fixed(static_cast<double>(fill.conforming_t_junctions), 0),
+                              fill.conforming_t_junctions > 0},
                              {fill.same_rings ? "equal" : "differ", !fill.same_rings}}});
       grid += 1;
       greedy += fill.greedy / fill.grid;
@@ -255,6 +259,8 @@ Table FillTable(std::span<const FillRow> fills) {
                            percent(conforming, grid),
                            percent(polygon, grid),
                            {Fixed(conforming / greedy, 2)},
+                           {""},
+                           {""},
                            {""}}});
   }
   return table;
