@@ -86,34 +86,40 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
   return label_[RunAt(crossings, node)];
 }
 
-void Components::CountParticles(const ParticleBins& bins, const Crossings& crossings,
-                                std::span<std::uint64_t> counts, std::span<double> weights) const {
-  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-      if (!IsAtHome(bins.x[e], bins.y[e])) continue;
-      const int i = static_cast<int>(bins.x[e]);
-      const int j = static_cast<int>(bins.y[e]);
-      TilePlace nearest{kNoTile, 0, 0};
-      float nearest_distance = 4;  // Above the square of a cell's diagonal.
-      for (int corner = 0; corner < 4; ++corner) {
-        const int di = corner & 1;
-        const int dj = corner >> 1;
-        const TilePlace node = Normalise(bins.tiles, tile, i + di, j + dj);
-        if (!IsInside(crossings, node)) continue;
-        const float dx = bins.x[e] - static_cast<float>(i + di);
-        const float dy = bins.y[e] - static_cast<float>(j + dj);
-        const float distance = dx * dx + dy * dy;
-        if (distance < nearest_distance) {
-          nearest_distance = distance;
-          nearest = node;
-        }
-      }
-      if (nearest.tile == kNoTile) continue;
-      const std::uint32_t component = At(crossings, nearest);
-      ++counts[component];
-      if (!bins.weight.empty()) weights[component] += bins.weight[e];
+TilePlace Components::NearestInside(const ParticleBins& bins, const Crossings& crossings,
+                                    std::uint32_t tile, std::uint32_t entry) const {
+  const int i = static_cast<int>(bins.x[entry]);
+  const int j = static_cast<int>(bins.y[entry]);
+  // The nearest of the four corners is inside as a rule; of equal ones the lower, the more left.
+  const TilePlace closest =
+      Normalise(bins.tiles, tile, i + (bins.x[entry] - static_cast<float>(i) > 0.5f),
+                j + (bins.y[entry] - static_cast<float>(j) > 0.5f));
+  if (IsInside(crossings, closest)) return closest;
+  TilePlace nearest{kNoTile, 0, 0};
+  float nearest_distance = 4;  // Above the square of a cell's diagonal.
+  for (int corner = 0; corner < 4; ++corner) {
+    const int di = corner & 1;
+    const int dj = corner >> 1;
+    const TilePlace node = Normalise(bins.tiles, tile, i + di, j + dj);
+    if (!IsInside(crossings, node)) continue;
+    const float dx = bins.x[entry] - static_cast<float>(i + di);
+    const float dy = bins.y[entry] - static_cast<float>(j + dj);
+    const float distance = dx * dx + dy * dy;
+    if (distance < nearest_distance) {
+      nearest_distance = distance;
+      nearest = node;
     }
   }
+  return nearest;
+}
+
+void Components::CountParticles(const ParticleBins& bins, const Crossings& crossings,
+                                std::span<std::uint64_t> counts, std::span<double> weights) const {
+  ForEachParticle(bins, crossings,
+                  [&](std::uint32_t /*tile*/, std::uint32_t entry, std::uint32_t component) {
+                    ++counts[component];
+                    if (!bins.weight.empty()) weights[component] += bins.weight[entry];
+                  });
 }
 
 }  // namespace partiemc

@@ -27,13 +27,20 @@ class Components {
   template <typename Visit>
   void ForEachRun(const Crossings& crossings, Visit visit) const;
 
+  /// Calls visit(tile, entry, component) for each particle, by its entry in the list of its own
+  /// tile. A particle belongs to the inside corner of its cell that is nearest to it; none: to
+  /// nobody, and is not visited.
+  template <typename Visit>
+  void ForEachParticle(const ParticleBins& bins, const Crossings& crossings, Visit visit) const;
+
   /// Adds the particles of each component to `counts`, and their weights, where particles have
-  /// weights of their own, to `weights`; both have size() elements. A particle belongs to the
-  /// inside corner of its cell that is nearest to it; none: to nobody.
+  /// weights of their own, to `weights`; both have size() elements.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
                       std::span<std::uint64_t> counts, std::span<double> weights) const;
 
  private:
+  TilePlace NearestInside(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
+                          std::uint32_t entry) const;
   std::uint32_t RunAt(const Crossings& crossings, const TilePlace& node) const;
   std::uint32_t Root(std::uint32_t run);
   void Unite(std::uint32_t a, std::uint32_t b);
@@ -60,6 +67,18 @@ void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
         visit(tile, j, mask, label_[run++]);
         row &= ~mask;
       }
+    }
+  }
+}
+
+template <typename Visit>
+void Components::ForEachParticle(const ParticleBins& bins, const Crossings& crossings,
+                                 Visit visit) const {
+  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
+      if (!IsAtHome(bins.x[entry], bins.y[entry])) continue;
+      const TilePlace node = NearestInside(bins, crossings, tile, entry);
+      if (node.tile != kNoTile) visit(tile, entry, At(crossings, node));
     }
   }
 }
