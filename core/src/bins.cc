@@ -6,6 +6,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "distinct_ids.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -49,14 +50,18 @@ Axes AxesOf(Plane plane) {
   return {0, 1, 2};
 }
 
+Axes AxesOf(const Frame& frame, Plane plane) {
+  return frame.components == 3 ? AxesOf(plane) : AxesOf(Plane::kXy);
+}
+
 double Coordinate(const Frame& frame, std::size_t particle, int axis) {
   const std::size_t index = particle * frame.components + axis;
   return std::visit([index](auto view) { return static_cast<double>(view[index]); },
                     frame.positions);
 }
 
-std::string CoordinateField(std::size_t particle, int axis) {
-  return absl::StrCat("positions[", particle, "].", std::string(1, kAxisNames[axis]));
+std::string CoordinateField(std::string_view array, std::size_t particle, int axis) {
+  return absl::StrCat(std::string(array), "[", particle, "].", std::string(1, kAxisNames[axis]));
 }
 
 absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
@@ -71,16 +76,16 @@ absl::Status CheckCoordinates(const Frame& frame) {
     const double value =
         std::visit([k](auto view) { return static_cast<double>(view[k]); }, frame.positions);
     if (!std::isfinite(value)) {
-      return InvalidFrame(
-          kReasonNotFinite,
-          CoordinateField(k / frame.components, static_cast<int>(k % frame.components)),
-          ShortestNumber(value), "must be finite");
+      return InvalidFrame(kReasonNotFinite,
+                          CoordinateField("positions", k / frame.components,
+                                          static_cast<int>(k % frame.components)),
+                          ShortestNumber(value), "must be finite");
     }
     if (std::abs(value) > kMaxCoordinate) {
-      return InvalidFrame(
-          kReasonOutOfRange,
-          CoordinateField(k / frame.components, static_cast<int>(k % frame.components)),
-          ShortestNumber(value), "must be at most 1e69 in magnitude");
+      return InvalidFrame(kReasonOutOfRange,
+                          CoordinateField("positions", k / frame.components,
+                                          static_cast<int>(k % frame.components)),
+                          ShortestNumber(value), "must be at most 1e69 in magnitude");
     }
   }
   return absl::OkStatus();
@@ -106,7 +111,8 @@ absl::Status CheckPlanar(const Frame& frame, Plane plane) {
   if (thickness <= kPlanarTolerance * extent) return absl::OkStatus();
   const std::string axis(1, kAxisNames[axes.normal]);
   return InvalidFrame(
-      kReasonNotPlanar, CoordinateField(farthest, axes.normal), ShortestNumber(high[axes.normal]),
+      kReasonNotPlanar, CoordinateField("positions", farthest, axes.normal),
+      ShortestNumber(high[axes.normal]),
       absl::StrCat("particles must lie in the ", std::string(Name(plane)), " plane, but ", axis,
                    " ranges over [", ShortestNumber(low[axes.normal]), ", ",
                    ShortestNumber(high[axes.normal]), "]"));
@@ -126,6 +132,40 @@ absl::Status CheckVolumes(const Frame& frame) {
                           absl::StrCat("volumes[", k, "]"), ShortestNumber(volume),
                           "must be positive and finite");
     }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckIds(const Frame& frame) {
+  if (frame.ids.empty()) return absl::OkStatus();
+  if (frame.ids.size() != frame.ParticleCount()) {
+    return InvalidFrame(
+        kReasonCount, "ids", absl::StrCat(frame.ids.size(), " values"),
+        absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
+  }
+  const auto repeated = FindRepeated(frame.ids);
+  if (!repeated) return absl::OkStatus();
+  return InvalidFrame(kReasonDuplicate, absl::StrCat("ids[", repeated->again, "]"),
+                      absl::StrCat(frame.ids[repeated->again]),
+                      absl::StrCat("must be that of one particle only, but ids[", repeated->first,
+                                   "] is the same; leave ids out where particles have none"));
+}
+
+absl::Status CheckVelocities(const Frame& frame) {
+  if (frame.velocities.empty()) return absl::OkStatus();
+  const std::size_t components = static_cast<std::size_t>(frame.components);
+  if (frame.velocities.size() != components * frame.ParticleCount()) {
+    return InvalidFrame(kReasonCount, "velocities",
+                        absl::StrCat(frame.velocities.size(), " values"),
+                        absl::StrCat("must be empty or ", components, " per particle (",
+                                     frame.ParticleCount(), "), as positions are"));
+  }
+  for (std::size_t k = 0; k < frame.velocities.size(); ++k) {
+    if (std::isfinite(frame.velocities[k])) continue;
+    return InvalidFrame(
+        kReasonNotFinite,
+        CoordinateField("velocities", k / components, static_cast<int>(k % components)),
+        ShortestNumber(frame.velocities[k]), "must be finite");
   }
   return absl::OkStatus();
 }
@@ -165,7 +205,8 @@ absl::Status CheckDistance(const WorldPosition& position, std::size_t particle, 
   for (const auto& [axis, value] :
        {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
     if (!(std::abs(value / cell_size) <= kMaxCellsFromOrigin)) {
-      return InvalidFrame(kReasonOutOfRange, CoordinateField(particle, axis), ShortestNumber(value),
+      return InvalidFrame(kReasonOutOfRange, CoordinateField("positions", particle, axis),
+                          ShortestNumber(value),
                           absl::StrCat("must be within 2^30 cells of ", ShortestNumber(cell_size),
                                        " from the origin"));
     }
@@ -185,8 +226,14 @@ void ParticleBins::Clear() {
 }
 
 WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle) {
-  const Axes axes = frame.components == 3 ? AxesOf(plane) : AxesOf(Plane::kXy);
+  const Axes axes = AxesOf(frame, plane);
   return {Coordinate(frame, particle, axes.first), Coordinate(frame, particle, axes.second)};
+}
+
+PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle) {
+  const Axes axes = AxesOf(frame, plane);
+  const float* velocity = frame.velocities.data() + particle * frame.components;
+  return {velocity[axes.first], velocity[axes.second]};
 }
 
 absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits) {
@@ -210,7 +257,9 @@ absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limi
   if (frame.components == 3 && frame.ParticleCount() > 0) {
     if (absl::Status status = CheckPlanar(frame, plane); !status.ok()) return status;
   }
-  return CheckVolumes(frame);
+  if (absl::Status status = CheckVolumes(frame); !status.ok()) return status;
+  if (absl::Status status = CheckIds(frame); !status.ok()) return status;
+  return CheckVelocities(frame);
 }
 
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,

@@ -43,8 +43,15 @@ struct WorldPosition {
 };
 WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle);
 
+/// A velocity in the plane. Requires: the frame has velocities.
+struct PlaneVelocity {
+  float x, y;
+};
+PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle);
+
 /// OK if every number of the frame is usable: coordinates finite and in one plane, volumes
-/// positive. Errors: INVALID_ARGUMENT with a Violation that names the first particle at fault.
+/// positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a Violation that names
+/// the first particle at fault.
 absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits);
 
 /// Sorts the particles of a checked frame.

@@ -136,8 +136,9 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
     PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.point_field, b.planes,
                    parameters, scale},
                   b.next_area_offset, b.placed, result.rings);
-    ContinueRings(tiles, b.crossings, b.topology, b.placed, previous.history, b.identity_scratch,
-                  b.next_history, result.rings);
+    ContinueRings({frame, parameters.plane, b.bins, b.crossings, b.ring_scratch, b.topology,
+                   b.placed, scale.cell_size},
+                  previous.history, b.identity_scratch, b.next_history, result.rings);
     // The other placements do not cross: Validate checks that claim, the hot path trusts it.
     if (farthest) {
       result.statistics.self_intersections =

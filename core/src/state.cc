@@ -12,16 +12,17 @@
 namespace partiemc {
 namespace {
 
-// Layout, little-endian: magic, version, cell size, spacing (0: none), area offset (kNoOffset:
-// none), identities given, counts of normals, rings and runs, then these, checksum.
+// Layout, little-endian: magic, version, cell size, spacing (0: none), area offset, time (kAbsent:
+// none), identities given, counts of normals, rings, runs and samples, then these, checksum.
 constexpr std::uint32_t kMagic = 0x53504d45;  // "EMPS"
-constexpr std::uint32_t kVersion = 2;
-constexpr std::size_t kHeaderBytes = 4 + 4 + 8 + 8 + 8 + 8 + 3 * 8;
-constexpr std::uint64_t kNoOffset = 0x7ff8000000000000;           // Not a number.
+constexpr std::uint32_t kVersion = 3;
+constexpr std::size_t kHeaderBytes = 4 + 4 + 5 * 8 + 4 * 8;
+constexpr std::uint64_t kAbsent = 0x7ff8000000000000;             // Not a number.
 constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;  // No stream gets to the end.
 constexpr std::size_t kNormalBytes = 4 + 4 + 4 + 4;
-constexpr std::size_t kRingBytes = 8 + 4;
+constexpr std::size_t kRingBytes = 8 + 4 + 4 + 8 + 8;
 constexpr std::size_t kRunBytes = 4 + 4 + 4 + 4;
+constexpr std::size_t kSampleBytes = 8 + 4 + 4 + 4;
 constexpr std::size_t kChecksumBytes = 8;
 
 template <typename T>
@@ -76,13 +77,57 @@ absl::Status CheckNormals(const std::vector<CellNormal>& normals) {
   return absl::OkStatus();
 }
 
-absl::Status TakeAreaOffset(std::string_view& rest, std::optional<double>& offset) {
+std::optional<double> TakeOptional(std::string_view& rest) {
   const auto bits = Take<std::uint64_t>(rest);
-  if (bits == kNoOffset) return absl::OkStatus();
-  offset = std::bit_cast<double>(bits);
-  if (*offset >= -1 && *offset <= 1) return absl::OkStatus();
+  if (bits == kAbsent) return std::nullopt;
+  return std::bit_cast<double>(bits);
+}
+
+void PutOptional(std::optional<double> value, std::string& bytes) {
+  Put(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
+}
+
+absl::Status CheckAreaOffset(std::optional<double> offset) {
+  if (!offset || (*offset >= -1 && *offset <= 1)) return absl::OkStatus();
   return Corrupt(absl::StrCat("area offset ", ShortestNumber(*offset)),
                  "must be absent or in [-1, 1] spacings");
+}
+
+absl::Status CheckRings(const RingHistory& history) {
+  for (std::size_t k = 0; k < history.rings.size(); ++k) {
+    const KnownRing& ring = history.rings[k];
+    const std::uint64_t after = k == 0 ? 0 : history.rings[k - 1].identity;
+    if (ring.identity <= after || ring.identity > history.identities_given) {
+      return Corrupt(
+          absl::StrCat("identity ", ring.identity),
+          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
+    }
+    if (ring.outer != kNoRing && (!ring.is_hole || ring.outer >= history.rings.size() ||
+                                  history.rings[ring.outer].is_hole)) {
+      return Corrupt(absl::StrCat("ring ", k, " in ring ", ring.outer),
+                     "must be a hole in an outer ring, or stand alone");
+    }
+    if (!std::isfinite(ring.velocity_x) || !std::isfinite(ring.velocity_y)) {
+      return Corrupt(absl::StrCat("velocity of ring ", k), "must be finite");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSamples(const RingHistory& history) {
+  std::vector<std::uint32_t> count(history.rings.size());
+  for (std::size_t k = 0; k < history.samples.size(); ++k) {
+    const ParticleSample& sample = history.samples[k];
+    if (sample.ring >= history.rings.size() || history.rings[sample.ring].is_hole ||
+        ++count[sample.ring] > kMaxSamples) {
+      return Corrupt(absl::StrCat("sample ", k),
+                     absl::StrCat("must be one of at most ", kMaxSamples, " of an outer ring"));
+    }
+    if (k > 0 && history.samples[k - 1].hash >= sample.hash) {
+      return Corrupt(absl::StrCat("sample ", k), "must come after the one before it");
+    }
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CheckHistory(const RingHistory& history) {
@@ -90,15 +135,11 @@ absl::Status CheckHistory(const RingHistory& history) {
     return Corrupt(absl::StrCat(history.identities_given, " identities"),
                    absl::StrCat("must be at most ", kMaxIdentities));
   }
-  for (std::size_t k = 0; k < history.rings.size(); ++k) {
-    const std::uint64_t after = k == 0 ? 0 : history.rings[k - 1].identity;
-    const std::uint64_t identity = history.rings[k].identity;
-    if (identity <= after || identity > history.identities_given) {
-      return Corrupt(
-          absl::StrCat("identity ", identity),
-          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
-    }
+  if (history.time && !std::isfinite(*history.time)) {
+    return Corrupt(absl::StrCat("time ", ShortestNumber(*history.time)),
+                   "must be absent or finite");
   }
+  if (absl::Status status = CheckRings(history); !status.ok()) return status;
   for (std::size_t k = 0; k < history.runs.size(); ++k) {
     const NodeRun& run = history.runs[k];
     if (run.first > run.last || run.ring >= history.rings.size()) {
@@ -109,18 +150,19 @@ absl::Status CheckHistory(const RingHistory& history) {
       return Corrupt(absl::StrCat("run ", k), "must come after the one before it");
     }
   }
-  return absl::OkStatus();
+  return CheckSamples(history);
 }
 
 struct Counts {
-  std::uint64_t normals, rings, runs;
+  std::uint64_t normals, rings, runs, samples;
 };
 
 // Whether `bytes` is what so many elements take. Each count is bounded before it is multiplied.
 bool Fill(const Counts& counts, std::size_t bytes) {
   return counts.normals <= bytes / kNormalBytes && counts.rings <= bytes / kRingBytes &&
-         counts.runs <= bytes / kRunBytes &&
-         counts.normals * kNormalBytes + counts.rings * kRingBytes + counts.runs * kRunBytes ==
+         counts.runs <= bytes / kRunBytes && counts.samples <= bytes / kSampleBytes &&
+         counts.normals * kNormalBytes + counts.rings * kRingBytes + counts.runs * kRunBytes +
+                 counts.samples * kSampleBytes ==
              bytes;
 }
 
@@ -128,12 +170,21 @@ void PutHistory(const RingHistory& history, std::string& bytes) {
   for (const KnownRing& ring : history.rings) {
     Put(ring.identity, bytes);
     Put(std::uint32_t{ring.is_hole}, bytes);
+    Put(ring.outer, bytes);
+    Put(ring.velocity_x, bytes);
+    Put(ring.velocity_y, bytes);
   }
   for (const NodeRun& run : history.runs) {
     Put(run.row, bytes);
     Put(run.first, bytes);
     Put(run.last, bytes);
     Put(run.ring, bytes);
+  }
+  for (const ParticleSample& sample : history.samples) {
+    Put(sample.hash, bytes);
+    Put(sample.column, bytes);
+    Put(sample.row, bytes);
+    Put(sample.ring, bytes);
   }
 }
 
@@ -144,6 +195,9 @@ absl::Status TakeHistory(const Counts& counts, std::string_view& rest, RingHisto
     const auto kind = Take<std::uint32_t>(rest);
     if (kind > 1) return Corrupt(absl::StrCat("ring of kind ", kind), "must be of kind 0 or 1");
     ring.is_hole = kind == 1;
+    ring.outer = Take<std::uint32_t>(rest);
+    ring.velocity_x = Take<double>(rest);
+    ring.velocity_y = Take<double>(rest);
   }
   history.runs.resize(counts.runs);
   for (NodeRun& run : history.runs) {
@@ -151,6 +205,13 @@ absl::Status TakeHistory(const Counts& counts, std::string_view& rest, RingHisto
     run.first = Take<std::int32_t>(rest);
     run.last = Take<std::int32_t>(rest);
     run.ring = Take<std::uint32_t>(rest);
+  }
+  history.samples.resize(counts.samples);
+  for (ParticleSample& sample : history.samples) {
+    sample.hash = Take<std::uint64_t>(rest);
+    sample.column = Take<std::int32_t>(rest);
+    sample.row = Take<std::int32_t>(rest);
+    sample.ring = Take<std::uint32_t>(rest);
   }
   return CheckHistory(history);
 }
@@ -162,16 +223,18 @@ std::string Serialize(const State& state) {
   const RingHistory& history = state.history;
   bytes.reserve(kHeaderBytes + kNormalBytes * state.normals.size() +
                 kRingBytes * history.rings.size() + kRunBytes * history.runs.size() +
-                kChecksumBytes);
+                kSampleBytes * history.samples.size() + kChecksumBytes);
   Put(kMagic, bytes);
   Put(kVersion, bytes);
   Put(state.cell_size.value_or(0), bytes);
   Put(state.spacing.value_or(0), bytes);
-  Put(state.area_offset ? std::bit_cast<std::uint64_t>(*state.area_offset) : kNoOffset, bytes);
+  PutOptional(state.area_offset, bytes);
+  PutOptional(history.time, bytes);
   Put(history.identities_given, bytes);
   Put(static_cast<std::uint64_t>(state.normals.size()), bytes);
   Put(static_cast<std::uint64_t>(history.rings.size()), bytes);
   Put(static_cast<std::uint64_t>(history.runs.size()), bytes);
+  Put(static_cast<std::uint64_t>(history.samples.size()), bytes);
   for (const CellNormal& normal : state.normals) {
     Put(normal.column, bytes);
     Put(normal.row, bytes);
@@ -209,17 +272,21 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
                                 ", spacing ", ShortestNumber(state.spacing.value_or(0))),
                    "must both be absent or both be lengths");
   }
-  if (absl::Status status = TakeAreaOffset(rest, state.area_offset); !status.ok()) return status;
+  state.area_offset = TakeOptional(rest);
+  if (absl::Status status = CheckAreaOffset(state.area_offset); !status.ok()) return status;
+  state.history.time = TakeOptional(rest);
   state.history.identities_given = Take<std::uint64_t>(rest);
   Counts counts{};
   counts.normals = Take<std::uint64_t>(rest);
   counts.rings = Take<std::uint64_t>(rest);
   counts.runs = Take<std::uint64_t>(rest);
+  counts.samples = Take<std::uint64_t>(rest);
   if (!Fill(counts, rest.size())) {
-    return Corrupt(absl::StrCat(counts.normals, " normals, ", counts.rings, " rings and ",
-                                counts.runs, " runs in ", rest.size(), " bytes"),
-                   absl::StrCat("must be ", kNormalBytes, ", ", kRingBytes, " and ", kRunBytes,
-                                " bytes each"));
+    return Corrupt(
+        absl::StrCat(counts.normals, " normals, ", counts.rings, " rings, ", counts.runs,
+                     " runs and ", counts.samples, " samples in ", rest.size(), " bytes"),
+        absl::StrCat("must be ", kNormalBytes, ", ", kRingBytes, ", ", kRunBytes, " and ",
+                     kSampleBytes, " bytes each"));
   }
   state.normals.resize(counts.normals);
   for (CellNormal& normal : state.normals) {

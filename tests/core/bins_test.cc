@@ -205,6 +205,8 @@ struct BadFrame {
   std::string_view reason;
   std::string field;
   absl::StatusCode code = absl::StatusCode::kInvalidArgument;
+  std::vector<std::uint64_t> ids = {};
+  std::vector<float> velocities = {};
 };
 
 std::vector<double> With(std::size_t index, double value, std::size_t count = 40) {
@@ -212,6 +214,15 @@ std::vector<double> With(std::size_t index, double value, std::size_t count = 40
   for (std::size_t k = 0; k < count; ++k) positions[k] = static_cast<double>(k / 2);
   positions[index] = value;
   return positions;
+}
+
+// Two good particles with these ids and velocities.
+BadFrame BadTracks(std::string name, std::string_view reason, std::string field,
+                   std::vector<std::uint64_t> ids, std::vector<float> velocities) {
+  BadFrame bad{std::move(name), With(0, 0, 4), 2, {}, reason, std::move(field)};
+  bad.ids = std::move(ids);
+  bad.velocities = std::move(velocities);
+  return bad;
 }
 
 std::vector<BadFrame> BadFrames() {
@@ -243,6 +254,15 @@ std::vector<BadFrame> BadFrames() {
        {1.0f, static_cast<float>(kInfinity)},
        kReasonNotFinite,
        "volumes[1]"},
+      BadTracks("TooFewIds", kReasonCount, "ids", {7}, {}),
+      BadTracks("TooManyIds", kReasonCount, "ids", {1, 2, 3}, {}),
+      BadTracks("AnIdTwice", kReasonDuplicate, "ids[1]", {7, 7}, {}),
+      BadTracks("TooFewVelocities", kReasonCount, "velocities", {}, {1, 2, 3}),
+      BadTracks("VelocitiesOfThreeComponents", kReasonCount, "velocities", {}, {1, 2, 3, 4, 5, 6}),
+      BadTracks("VelocityNan", kReasonNotFinite, "velocities[1].x", {},
+                {1, 2, static_cast<float>(kNan), 4}),
+      BadTracks("VelocityInfinite", kReasonNotFinite, "velocities[0].y", {3, 9},
+                {1, static_cast<float>(-kInfinity), 3, 4}),
       {"TooManyParticles",
        With(0, 0, 202),
        2,
@@ -259,7 +279,9 @@ TEST_P(BadFrameTest, IsRefusedWithReasonAndField) {
   const BadFrame& bad = GetParam();
   const Frame frame{.positions = std::span<const double>(bad.positions),
                     .components = bad.components,
-                    .volumes = bad.volumes};
+                    .volumes = bad.volumes,
+                    .ids = bad.ids,
+                    .velocities = bad.velocities};
   const absl::Status status = CheckFrame(frame, Plane::kXy, {.max_particles = 100});
   EXPECT_EQ(status.code(), bad.code) << status;
   ASSERT_TRUE(FindViolation(status).has_value());
@@ -275,16 +297,28 @@ INSTANTIATE_TEST_SUITE_P(Bins, BadFrameTest, testing::ValuesIn(BadFrames()),
 TEST(Bins, AGoodFrameOfAnyKindIsAccepted) {
   const std::vector<float> flat = {0, 0, 5, 1, 0, 5, 0, 1, 5};
   const std::vector<float> volumes = {1, 2, 3};
+  const std::vector<std::uint64_t> ids = {5, ~0ull, 0};
   EXPECT_TRUE(CheckFrame({}, Plane::kXy, {}).ok());
-  EXPECT_TRUE(
-      CheckFrame({.positions = std::span<const float>(flat), .components = 3, .volumes = volumes},
-                 Plane::kXy, {.max_particles = 3})
-          .ok());
+  EXPECT_TRUE(CheckFrame({.positions = std::span<const float>(flat),
+                          .components = 3,
+                          .volumes = volumes,
+                          .ids = ids,
+                          .velocities = flat},
+                         Plane::kXy, {.max_particles = 3})
+                  .ok());
 }
 
 TEST(Bins, ThreeComponentsAreReadInTheirPlane) {
   const std::vector<double> xyz = {1, 2, 3};
-  const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
+  const std::vector<float> uvw = {4, 5, 6};
+  const Frame frame{.positions = std::span<const double>(xyz), .components = 3, .velocities = uvw};
+  const auto velocity = [&](Plane plane) {
+    const PlaneVelocity read = VelocityOf(frame, plane, 0);
+    return std::pair(read.x, read.y);
+  };
+  EXPECT_EQ(velocity(Plane::kXy), std::pair(4.0f, 5.0f));
+  EXPECT_EQ(velocity(Plane::kXz), std::pair(4.0f, 6.0f));
+  EXPECT_EQ(velocity(Plane::kYz), std::pair(5.0f, 6.0f));
   const auto read = [&](Plane plane) {
     const WorldPosition position = PositionOf(frame, plane, 0);
     return std::pair(position.x, position.y);

@@ -13,60 +13,16 @@
 
 #include "partiemc/partiemc.h"
 #include "support/reconstruct.h"
+#include "support/ring_stream.h"
 
 namespace partiemc {
 namespace {
 
 using support::Particles;
+using Stream = support::RingStream;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::UnorderedElementsAre;
-
-// A stream of frames at spacing 1.
-class Stream {
- public:
-  explicit Stream(const ReconstructionParameters& parameters = {.spacing = 1.0})
-      : reconstructor_(*Reconstructor::Create(parameters)) {}
-
-  const Rings& Next(const Particles& particles) {
-    const absl::Status status =
-        reconstructor_.Reconstruct(particles.AsFrame(), state_, workspace_, result_);
-    EXPECT_TRUE(status.ok()) << status;
-    return result_.rings;
-  }
-  absl::Status Try(const Particles& particles) {
-    return reconstructor_.Reconstruct(particles.AsFrame(), state_, workspace_, result_);
-  }
-  const Rings& rings() const { return result_.rings; }
-  State& state() { return state_; }
-
-  // The outer ring, or the hole, whose centroid is nearest to (x, y).
-  std::size_t Ring(double x, double y, bool hole = false) const {
-    std::size_t nearest = rings().RingCount();
-    double least = 1e300;
-    for (std::size_t ring = 0; ring < rings().RingCount(); ++ring) {
-      const RingMeasures& measures = rings().measures[ring];
-      const double distance = std::hypot(measures.centroid_x - x, measures.centroid_y - y);
-      if ((rings().outer_of[ring] != kNoRing) != hole || distance >= least) continue;
-      least = distance;
-      nearest = ring;
-    }
-    return nearest;
-  }
-  std::uint64_t Identity(double x, double y, bool hole = false) const {
-    return rings().measures[Ring(x, y, hole)].identity;
-  }
-  std::vector<std::uint64_t> Parents(double x, double y, bool hole = false) const {
-    const auto parents = rings().ParentsOf(Ring(x, y, hole));
-    return {parents.begin(), parents.end()};
-  }
-
- private:
-  Reconstructor reconstructor_;
-  State state_;
-  Workspace workspace_;
-  Result result_;
-};
 
 Particles Together(std::initializer_list<Particles> parts) {
   Particles all;

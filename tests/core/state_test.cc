@@ -20,8 +20,12 @@ State ExampleState() {
       {-5, -7, 0.6f, 0.8f}, {3, -7, 1, 0}, {-100, 2, 0, -1}, {1 << 30, 2, -0.8f, 0.6f}};
   state.area_offset = -0.03;
   state.history.identities_given = 9;
-  state.history.rings = {{2, false}, {5, true}, {9, false}};
+  state.history.time = 0.75;
+  state.history.rings = {{.identity = 2, .velocity_x = 0.5, .velocity_y = -3},
+                         {.identity = 5, .is_hole = true, .outer = 0},
+                         {.identity = 9}};
   state.history.runs = {{-7, -5, 3, 0}, {-7, 4, 4, 1}, {-7, 9, 12, 0}, {2, -100, 1 << 30, 2}};
+  state.history.samples = {{3, -5, -7, 0}, {1ull << 40, 1 << 30, 2, 2}, {~0ull, 9, -7, 0}};
   return state;
 }
 
@@ -46,8 +50,10 @@ std::string Patched(std::string bytes, std::size_t at, T value) {
 }
 
 constexpr std::size_t kVersionAt = 4, kCellSizeAt = 8, kSpacingAt = 16, kOffsetAt = 24,
-                      kGivenAt = 32, kNormalCountAt = 40, kRingCountAt = 48, kRunCountAt = 56,
-                      kNormalsAt = 64, kRingsAt = kNormalsAt + 4 * 16, kRunsAt = kRingsAt + 3 * 12;
+                      kTimeAt = 32, kGivenAt = 40, kNormalCountAt = 48, kRingCountAt = 56,
+                      kRunCountAt = 64, kSampleCountAt = 72, kNormalsAt = 80,
+                      kRingsAt = kNormalsAt + 4 * 16, kRunsAt = kRingsAt + 3 * 32,
+                      kSamplesAt = kRunsAt + 4 * 16;
 
 void ExpectRefused(std::string_view bytes, std::string_view what) {
   const auto state = ParseState(bytes);
@@ -63,8 +69,8 @@ TEST(State, ComesBackAsItWas) {
 }
 
 TEST(State, TakesAsManyBytesAsItsHeaderSays) {
-  EXPECT_EQ(Serialize(State{}).size(), 72u);
-  EXPECT_EQ(Serialize(ExampleState()).size(), 72u + 4 * 16 + 3 * 12 + 4 * 16);
+  EXPECT_EQ(Serialize(State{}).size(), 88u);
+  EXPECT_EQ(Serialize(ExampleState()).size(), 88u + 4 * 16 + 3 * 32 + 4 * 16 + 3 * 20);
 }
 
 TEST(State, EveryTruncationIsRefused) {
@@ -96,8 +102,8 @@ TEST(State, HostileCountsAreRefusedBeforeAnythingIsAllocated) {
        {std::uint64_t{0}, std::uint64_t{3}, std::uint64_t{5}, std::uint64_t{1} << 32,
         std::uint64_t{1} << 60, (std::uint64_t{1} << 60) + 4,
         std::numeric_limits<std::uint64_t>::max()}) {
-    for (const std::size_t at : {kNormalCountAt, kRingCountAt, kRunCountAt}) {
-      if (at == kRingCountAt && count == 3) continue;  // The right one.
+    for (const std::size_t at : {kNormalCountAt, kRingCountAt, kRunCountAt, kSampleCountAt}) {
+      if ((at == kRingCountAt || at == kSampleCountAt) && count == 3) continue;  // The right one.
       ExpectRefused(Sealed(Patched(body, at, count)), "a wrong count");
     }
   }
@@ -109,9 +115,11 @@ TEST(State, HostileCountsAreRefusedBeforeAnythingIsAllocated) {
 }
 
 TEST(State, OtherVersionsAreRefusedByNumber) {
-  const auto state = ParseState(Sealed(Patched(BodyOf(ExampleState()), kVersionAt, 77u)));
-  ASSERT_FALSE(state.ok());
-  EXPECT_NE(state.status().message().find("77"), absl::string_view::npos);
+  for (const auto& [version, told] : {std::pair(2u, "version 2;"), std::pair(77u, "version 77;")}) {
+    const auto state = ParseState(Sealed(Patched(BodyOf(ExampleState()), kVersionAt, version)));
+    ASSERT_FALSE(state.ok());
+    EXPECT_NE(state.status().message().find(told), absl::string_view::npos) << state.status();
+  }
 }
 
 TEST(State, LengthsThatAreNoneAreRefused) {
@@ -147,11 +155,38 @@ TEST(State, AnAreaOffsetBeyondASpacingIsRefused) {
 TEST(State, RingsWithoutOrderKindOrAnIdentityThatWasGivenAreRefused) {
   const std::string body = BodyOf(ExampleState());
   ExpectRefused(Sealed(Patched(body, kRingsAt, std::uint64_t{0})), "no identity");
-  ExpectRefused(Sealed(Patched(body, kRingsAt + 12, std::uint64_t{2})), "twice the same");
-  ExpectRefused(Sealed(Patched(body, kRingsAt + 12, std::uint64_t{9})), "out of order");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 32, std::uint64_t{2})), "twice the same");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 32, std::uint64_t{9})), "out of order");
   ExpectRefused(Sealed(Patched(body, kGivenAt, std::uint64_t{8})), "one that was not given yet");
   ExpectRefused(Sealed(Patched(body, kGivenAt, ~std::uint64_t{0})), "none left to give");
   ExpectRefused(Sealed(Patched(body, kRingsAt + 8, 2u)), "of another kind");
+}
+
+TEST(State, RingsInWhatIsNoOuterRingOrWithoutAFiniteMotionAreRefused) {
+  const std::string body = BodyOf(ExampleState());
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 32 + 12, 1u)), "a hole in itself");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 32 + 12, 3u)), "a hole in no ring");
+  ExpectRefused(Sealed(Patched(body, kRingsAt + 12, 2u)), "an outer ring in another one");
+  for (const double value :
+       {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::quiet_NaN()}) {
+    ExpectRefused(Sealed(Patched(body, kRingsAt + 16, value)), "velocity");
+    ExpectRefused(Sealed(Patched(body, kRingsAt + 24, value)), "velocity");
+    ExpectRefused(Sealed(Patched(body, kTimeAt, value)), "time");
+  }
+}
+
+TEST(State, SamplesWithoutOrderOrAnOuterRingOrTooManyAreRefused) {
+  const std::string body = BodyOf(ExampleState());
+  ExpectRefused(Sealed(Patched(body, kSamplesAt + 16, 3u)), "a ring that is not there");
+  ExpectRefused(Sealed(Patched(body, kSamplesAt + 16, 1u)), "of a hole");
+  ExpectRefused(Sealed(Patched(body, kSamplesAt, std::uint64_t{1} << 40)), "twice the same");
+  ExpectRefused(Sealed(Patched(body, kSamplesAt + 20, std::uint64_t{2})), "out of order");
+  State state = ExampleState();
+  state.history.samples.clear();
+  for (std::uint64_t k = 0; k < kMaxSamples; ++k) state.history.samples.push_back({k, 0, 0, 2});
+  EXPECT_EQ(*ParseState(Serialize(state)), state);
+  state.history.samples.push_back({kMaxSamples, 0, 0, 2});
+  ExpectRefused(Serialize(state), "one too many");
 }
 
 TEST(State, RunsWithoutOrderNodesOrARingAreRefused) {
@@ -208,7 +243,9 @@ TEST(State, AnyAcceptedStateIsSafeToGoOnFrom) {
       const auto reconstructor = Reconstructor::Create({}, {.max_tiles = 2000});
       Workspace workspace;
       Result result;
-      const support::Particles body = support::MovingBody(0);
+      support::Particles body = support::MovingBody(0);
+      for (std::size_t k = 0; k < body.size(); ++k) body.ids.push_back(k);
+      body.time = 1e300;
       const absl::Status status =
           reconstructor->Reconstruct(body.AsFrame(), state, workspace, result);
       EXPECT_TRUE(status.ok() || FindViolation(status).has_value()) << status;

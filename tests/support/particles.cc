@@ -39,10 +39,19 @@ Particles AnyShape(Random& random) {
 
 }  // namespace
 
+void Particles::Add(const Particles& others) {
+  xy.insert(xy.end(), others.xy.begin(), others.xy.end());
+  ids.insert(ids.end(), others.ids.begin(), others.ids.end());
+  velocities.insert(velocities.end(), others.velocities.begin(), others.velocities.end());
+}
+
 Frame Particles::AsFrame() const {
   Frame frame;
   frame.positions = std::span<const double>(xy);
   frame.volumes = volumes;
+  frame.ids = ids;
+  frame.velocities = velocities;
+  frame.time = time;
   return frame;
 }
 
@@ -196,9 +205,15 @@ Particles Permuted(const Particles& particles, Random& random) {
     std::swap(order[k], order[random.Below(k + 1)]);
   }
   Particles permuted;
+  permuted.time = particles.time;
   for (const std::size_t k : order) {
     permuted.Add(particles.x(k), particles.y(k));
     if (!particles.volumes.empty()) permuted.volumes.push_back(particles.volumes[k]);
+    if (!particles.ids.empty()) permuted.ids.push_back(particles.ids[k]);
+    if (!particles.velocities.empty()) {
+      permuted.velocities.push_back(particles.velocities[2 * k]);
+      permuted.velocities.push_back(particles.velocities[2 * k + 1]);
+    }
   }
   return permuted;
 }

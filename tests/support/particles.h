@@ -13,7 +13,10 @@ namespace partiemc::support {
 /// A frame that owns its particles.
 struct Particles {
   std::vector<double> xy;
-  std::vector<float> volumes;  ///< Empty, or one per particle.
+  std::vector<float> volumes;      ///< Empty, or one per particle.
+  std::vector<std::uint64_t> ids;  ///< Likewise.
+  std::vector<float> velocities;   ///< Empty, or x, y per particle.
+  double time = 0;
 
   std::size_t size() const { return xy.size() / 2; }
   double x(std::size_t k) const { return xy[2 * k]; }
@@ -22,7 +25,8 @@ struct Particles {
     xy.push_back(px);
     xy.push_back(py);
   }
-  void Add(const Particles& others) { xy.insert(xy.end(), others.xy.begin(), others.xy.end()); }
+  /// Particles with the ids and velocities that they have.
+  void Add(const Particles& others);
   /// A view; valid as long as this object is and does not change.
   Frame AsFrame() const;
 };

@@ -20,6 +20,18 @@ struct Frame {
   /// Area that each particle stands for, in world units squared, positive and finite. Empty: h^2.
   std::span<const float> volumes = {};
 
+  /// What the same particle has in every frame; no two particles of a frame share one. Empty: none.
+  std::span<const std::uint64_t> ids = {};
+
+  /// Interleaved as `positions`, in world units per unit of `time`. Finite. Empty: none.
+  std::span<const float> velocities = {};
+
+  /// Simulation time. Velocities count between frames of which the later one has the larger time.
+  double time = 0;
+
+  // Ids, velocities and time decide identities of rings and nothing else (core/METHOD.md,
+  // "Identities"): outlines, meshes and digests are the same without them.
+
   std::size_t ParticleCount() const {
     return std::visit([](auto view) { return view.size(); }, positions) /
            static_cast<std::size_t>(components);

@@ -42,10 +42,10 @@ class Reconstructor {
 
   /// Reconstructs one frame. Runs its parallel parts in the caller's oneTBB arena; the result has
   /// the same bits for any number of threads.
-  /// Errors: INVALID_ARGUMENT (a coordinate that is not finite, a wrong count, particles outside
-  /// one plane), RESOURCE_EXHAUSTED (more particles or tiles than the limits allow), each with a
-  /// Violation; `state` is then as it was and `result` is empty.
-  /// Cost: linear in particles and tiles; n log n in the points of the rings.
+  /// Errors: INVALID_ARGUMENT (a coordinate that is not finite, a wrong count, an id twice,
+  /// particles outside one plane), RESOURCE_EXHAUSTED (more particles or tiles than the limits
+  /// allow), each with a Violation; `state` is then as it was and `result` is empty. Cost: linear
+  /// in particles and tiles; n log n in the points of the rings.
   absl::Status Reconstruct(const Frame& frame, State& state, Workspace& workspace, Result& result,
                            StageObserver* observer = nullptr) const;
 

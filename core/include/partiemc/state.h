@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "partiemc/result.h"
 
 namespace partiemc {
 
@@ -24,6 +25,8 @@ struct CellNormal {
 struct KnownRing {
   std::uint64_t identity = 0;
   bool is_hole = false;
+  std::uint32_t outer = kNoRing;  ///< Of a hole: index of its outer ring, where that is known.
+  double velocity_x = 0, velocity_y = 0;  ///< Mean of its particles, world units per time; 0: none.
 
   friend bool operator==(const KnownRing&, const KnownRing&) = default;
 };
@@ -37,12 +40,27 @@ struct NodeRun {
   friend bool operator==(const NodeRun&, const NodeRun&) = default;
 };
 
+/// At most this many particles of an outer ring are remembered.
+inline constexpr std::uint32_t kMaxSamples = 16;
+
+/// A particle of the last frame, by a hash of its id that no other id has, and where it was.
+struct ParticleSample {
+  std::uint64_t hash = 0;
+  std::int32_t column = 0, row = 0;  ///< The nearest node, in cells from the origin.
+  std::uint32_t ring = 0;            ///< Index in RingHistory::rings of an outer ring.
+
+  friend bool operator==(const ParticleSample&, const ParticleSample&) = default;
+};
+
 /// What is needed to tell which ring of the next frame continues which ring of this one. Its size
-/// follows the length of the outline: a run has two ends on it.
+/// follows the length of the outline: a run has two ends on it, a ring has a bounded number of
+/// samples.
 struct RingHistory {
-  std::uint64_t identities_given = 0;  ///< They are 1 to this number; none is given twice.
-  std::vector<KnownRing> rings;        ///< By identity.
-  std::vector<NodeRun> runs;           ///< By row, then column; disjoint. Each ring has one.
+  std::uint64_t identities_given = 0;   ///< They are 1 to this number; none is given twice.
+  std::optional<double> time;           ///< Of the last frame; finite.
+  std::vector<KnownRing> rings;         ///< By identity.
+  std::vector<NodeRun> runs;            ///< By row, then column; disjoint. Each ring has one.
+  std::vector<ParticleSample> samples;  ///< By hash. Of a ring those of the least hashes.
 
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
@@ -67,12 +85,13 @@ struct State {
   friend bool operator==(const State&, const State&) = default;
 };
 
-/// Bytes with a version and a checksum; the same on every machine. Size: 72 bytes, 16 per normal,
-/// 12 per ring and 16 per run.
+/// Bytes with a version and a checksum; the same on every machine. Size: 88 bytes, 16 per normal,
+/// 32 per ring, 16 per run and 20 per sample.
 std::string Serialize(const State& state);
 
 /// The state that Serialize wrote. Errors: INVALID_ARGUMENT (reason CORRUPT_STATE) for anything
-/// else; bytes are untrusted, every count is checked against their number before it is believed.
+/// else, other versions included; bytes are untrusted, every count is checked against their number
+/// before it is believed.
 absl::StatusOr<State> ParseState(std::string_view bytes);
 
 }  // namespace partiemc

@@ -1,0 +1,47 @@
+#include "distinct_ids.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <vector>
+
+#include "support/random.h"
+
+namespace partiemc {
+namespace {
+
+void ExpectAsByMap(const std::vector<std::uint64_t>& ids) {
+  const auto found = FindRepeated(ids);
+  std::map<std::uint64_t, std::size_t> seen;
+  for (std::size_t k = 0; k < ids.size(); ++k) {
+    const auto [first, is_new] = seen.emplace(ids[k], k);
+    if (is_new) continue;
+    ASSERT_TRUE(found.has_value());
+    EXPECT_EQ(found->first, first->second);
+    EXPECT_EQ(found->again, k);
+    return;
+  }
+  EXPECT_FALSE(found.has_value());
+}
+
+TEST(DistinctIds, TheFirstRepetitionIsFoundInAnyRange) {
+  constexpr std::uint64_t kLargest = ~std::uint64_t{0};
+  ExpectAsByMap({});
+  ExpectAsByMap({kLargest});
+  ExpectAsByMap({0, kLargest, 0});
+  ExpectAsByMap({kLargest, kLargest});
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    support::Random random(seed);
+    const std::size_t count = 1 + random.Below(200);
+    // From dense to sparse; with few and with many repetitions.
+    const std::size_t range = count << random.Below(16);
+    const std::uint64_t lowest = random.Chance(0.5) ? 0 : kLargest - range;
+    std::vector<std::uint64_t> ids(count);
+    for (std::uint64_t& id : ids) id = lowest + random.Below(range);
+    ExpectAsByMap(ids);
+  }
+}
+
+}  // namespace
+}  // namespace partiemc
