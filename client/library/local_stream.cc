@@ -45,6 +45,8 @@ struct OwnedFrame {
   std::variant<std::vector<float>, std::vector<double>> positions;
   int components = 2;
   std::vector<float> volumes;
+  std::vector<std::uint64_t> ids;
+  std::vector<float> velocities;
 
   void Assign(const Frame& frame) {
     std::visit(
@@ -57,10 +59,16 @@ struct OwnedFrame {
         frame.positions);
     components = frame.components;
     volumes.assign(frame.volumes.begin(), frame.volumes.end());
+    ids.assign(frame.ids.begin(), frame.ids.end());
+    velocities.assign(frame.velocities.begin(), frame.velocities.end());
   }
 
   Frame View() const {
-    Frame frame{.components = components, .volumes = volumes};
+    Frame frame{.components = components,
+                .volumes = volumes,
+                .ids = ids,
+                .velocities = velocities,
+                .time = time};
     std::visit([&frame](const auto& vector) { frame.positions = std::span(vector); }, positions);
     return frame;
   }

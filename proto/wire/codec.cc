@@ -145,14 +145,17 @@ absl::Status CheckOptionalArray(std::string field, const std::string& bytes, std
                               " particles"));
 }
 
-absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, std::size_t particles) {
+absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, const PositionLayout& layout,
+                                 std::size_t particles) {
   if (auto status = CheckOptionalArray("ids", message.ids(), particles, 8); !status.ok()) {
     return status;
   }
   if (auto status = CheckOptionalArray("volumes", message.volumes(), particles, 4); !status.ok()) {
     return status;
   }
-  if (auto status = CheckOptionalArray("velocities", message.velocities(), particles, 8);
+  const std::size_t velocity_bytes = static_cast<std::size_t>(layout.components) * sizeof(float);
+  if (auto status =
+          CheckOptionalArray("velocities", message.velocities(), particles, velocity_bytes);
       !status.ok()) {
     return status;
   }
@@ -289,11 +292,14 @@ absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message) {
                                 " bytes, as position_format says"));
   }
   const std::size_t particles = positions.size() / layout.ParticleBytes();
-  if (auto status = CheckOptionalArrays(message, particles); !status.ok()) return status;
+  if (auto status = CheckOptionalArrays(message, layout, particles); !status.ok()) return status;
 
   Frame frame;
   frame.components = layout.components;
   frame.volumes = ViewBytes<float>(message.volumes());
+  frame.ids = ViewBytes<std::uint64_t>(message.ids());
+  frame.velocities = ViewBytes<float>(message.velocities());
+  frame.time = message.time();
   if (layout.component_bytes == sizeof(float)) {
     frame.positions = ViewBytes<float>(positions);
   } else {
@@ -306,6 +312,9 @@ void EncodeFrame(const Frame& frame, v1::ParticleFrame& message) {
   message.set_position_format(FormatOf(frame));
   std::visit([&](auto view) { AssignBytes(view, *message.mutable_positions()); }, frame.positions);
   AssignBytes(frame.volumes, *message.mutable_volumes());
+  AssignBytes(frame.ids, *message.mutable_ids());
+  AssignBytes(frame.velocities, *message.mutable_velocities());
+  message.set_time(frame.time);
 }
 
 void EncodeFrameError(const absl::Status& status, std::uint64_t sequence,

@@ -68,7 +68,7 @@ void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 /// needed for alignment either: a std::string keeps its bytes at a multiple of 8 (asserted).
 /// Errors: INVALID_ARGUMENT with a Violation (reasons BYTE_COUNT, UNSUPPORTED).
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message);
-/// Replaces positions, position_format and volumes of `message`, reusing its buffers.
+/// Replaces what the core uses of `message` (all but sequence and scalars), reusing its buffers.
 /// Requires: frame.components is 2 or 3.
 void EncodeFrame(const Frame& frame, v1::ParticleFrame& message);
 

@@ -1,6 +1,8 @@
 // The library against the real server, over a real port.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -62,6 +64,71 @@ TEST(RealServer, GivesTheSameBitsAsTheCoreInThisProcess) {
   const Digests remote_digests = Replay(**remote);
   EXPECT_EQ(remote_digests.size(), kFrames);
   EXPECT_EQ(remote_digests, Replay(**local));
+}
+
+// A body that stays and a drop that leaps over it, with what particles may bring along.
+struct Leap {
+  std::vector<float> positions, velocities;
+  std::vector<std::uint64_t> ids;
+
+  explicit Leap(int frame) {
+    for (int k = 0; k < 200; ++k) Add(k % 20, k / 20, k, 0, 0);
+    for (int k = 0; k < 16; ++k) Add(40 * frame + k % 4, 20 + k / 4, 1000 + k, 80, 0);
+  }
+  void Add(int x, int y, int id, float vx, float vy) {
+    positions.insert(positions.end(), {static_cast<float>(x), static_cast<float>(y)});
+    velocities.insert(velocities.end(), {vx, vy});
+    ids.push_back(static_cast<std::uint64_t>(id));
+  }
+};
+
+// The rings of all frames, and of one that is refused, number 3.
+std::vector<Rings> LeapThrough(FrameStream& stream, bool with_ids, bool with_velocities) {
+  std::vector<Rings> rings;
+  Event event;
+  for (int k = 0; k < 6; ++k) {
+    Leap leap(k);
+    if (k == 2) leap.ids[1] = leap.ids[0];
+    if (k == 2) leap.velocities[1] = std::numeric_limits<float>::quiet_NaN();
+    Frame frame{.positions = std::span<const float>(leap.positions), .time = 1e9};
+    if (with_ids) frame.ids = leap.ids;
+    if (with_velocities) frame.velocities = leap.velocities;
+    EXPECT_TRUE(stream.Send(frame, 0.5 * k).ok());
+    EXPECT_TRUE(stream.Receive(event).ok());
+    if (k == 2 && (with_ids || with_velocities)) {
+      EXPECT_EQ(event.kind, Event::Kind::kRefusal);
+      EXPECT_EQ(event.message, with_ids ? "ids[1]: 0; must be that of one particle only, but "
+                                          "ids[0] is the same; leave ids out where particles have "
+                                          "none"
+                                        : "velocities[0].y: nan; must be finite");
+      continue;
+    }
+    EXPECT_EQ(event.kind, Event::Kind::kResult) << event.message;
+    rings.push_back(event.frame.result.rings);
+  }
+  return rings;
+}
+
+TEST(RealServer, TellsIdentitiesByIdsAndVelocitiesAsTheCoreInThisProcessDoes) {
+  const auto server = server::Server::Start({.address = {.host = "127.0.0.1", .port = 0}});
+  ASSERT_TRUE(server.ok()) << server.status();
+  const std::string address = "127.0.0.1:" + std::to_string((*server)->address().port);
+  for (const auto& [with_ids, with_velocities] :
+       {std::pair(true, false), {false, true}, {true, true}, {false, false}}) {
+    const auto remote =
+        Stream::Open(address, {.parameters = {.spacing = 1}, .outputs = {.normals = true}});
+    ASSERT_TRUE(remote.ok()) << remote.status();
+    const auto local = LocalStream::Open({.parameters = {.spacing = 1}});
+    ASSERT_TRUE(local.ok()) << local.status();
+    const std::vector<Rings> rings = LeapThrough(**local, with_ids, with_velocities);
+    EXPECT_EQ(LeapThrough(**remote, with_ids, with_velocities), rings);
+    // The body and the drop are the same all the way, or the drop is new in every frame.
+    const bool is_told = with_ids || with_velocities;
+    const Rings& last = rings.back();
+    ASSERT_EQ(last.measures.size(), 2u);
+    EXPECT_EQ(rings.size(), is_told ? 5u : 6u);
+    EXPECT_EQ(std::max(last.measures[0].identity, last.measures[1].identity), is_told ? 2u : 7u);
+  }
 }
 
 TEST(RealServer, TellsItsVersionAndLimits) {

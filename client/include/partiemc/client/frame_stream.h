@@ -80,10 +80,11 @@ class FrameStream {
   virtual const StreamInfo& info() const = 0;
 
   /// Sends one frame and returns its number. `frame` is copied or serialised before the call
-  /// returns. Waits while `frames_in_flight` frames are sent and not yet received.
-  /// Errors: one that carries a Violation (FindViolation) refuses this frame alone, uses up no
-  /// number, and the stream goes on; any other has ended the stream. FAILED_PRECONDITION after
-  /// FinishSending. DEADLINE_EXCEEDED when the wait lasts longer than the stream's deadline.
+  /// returns; its time is `time`, whatever Frame::time says. Waits while `frames_in_flight` frames
+  /// are sent and not yet received. Errors: one that carries a Violation (FindViolation) refuses
+  /// this frame alone, uses up no number, and the stream goes on; any other has ended the stream.
+  /// FAILED_PRECONDITION after FinishSending. DEADLINE_EXCEEDED when the wait lasts longer than the
+  /// stream's deadline.
   virtual absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) = 0;
 
   /// No more frames will come; answers to those sent are still to be received.
