@@ -97,7 +97,10 @@ bool FrameFeeder::Pace(std::size_t sent) {
 bool FrameFeeder::SendOne(FramePointer owned) {
   const RecordedFrame& recorded = *owned;
   Frame frame{.positions = std::span<const double>(recorded.positions),
-              .volumes = recorded.volumes};
+              .volumes = recorded.volumes,
+              .ids = recorded.ids};
+  // Without a time, velocities tell nothing of the way from frame to frame.
+  if (recorded.time) frame.velocities = recorded.velocities;
   if (recorded.float32) {  // Half of the bytes, and nothing is lost.
     as_float32_.assign(recorded.positions.size(), 0);
     for (std::size_t k = 0; k < as_float32_.size(); ++k) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 #include "client/input/text.h"
@@ -39,6 +40,11 @@ bool HasThreeAxes(const ParticleRows& rows) {
 
 std::array<std::size_t, 2> AxesWithout(std::size_t dropped) {
   return {dropped == 0 ? std::size_t{1} : 0, dropped == 2 ? std::size_t{1} : 2};
+}
+
+void TellOnce(bool& told, const ParticleRows& rows, std::string_view what,
+              std::vector<std::string>& notices) {
+  if (!std::exchange(told, true)) notices.push_back(Concat(rows.source, ": ", what));
 }
 
 std::string PlaneName(std::size_t dropped) {
@@ -139,6 +145,12 @@ void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows,
       frame.velocities[2 * i] = rows.velocities[axes[0]][i];
       frame.velocities[2 * i + 1] = rows.velocities[axes[1]][i];
     }
+    const bool usable = std::all_of(frame.velocities.begin(), frame.velocities.end(),
+                                    [](float velocity) { return std::isfinite(velocity); });
+    if (!usable) {
+      frame.velocities.clear();
+      TellOnce(told_velocities_, rows, "velocities are ignored: not all are finite", notices);
+    }
   }
   frame.ids.clear();
   if (rows.has_ids) {
@@ -146,7 +158,11 @@ void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows,
     std::sort(sorted_ids_.begin(), sorted_ids_.end());
     const bool unique =
         std::adjacent_find(sorted_ids_.begin(), sorted_ids_.end()) == sorted_ids_.end();
-    if (unique) frame.ids = rows.ids;
+    if (unique) {
+      frame.ids = rows.ids;
+    } else {
+      TellOnce(told_ids_, rows, "ids are ignored: several particles have the same", notices);
+    }
   }
   frame.volumes.clear();
   if (!rows.has_volumes) return;
@@ -155,10 +171,7 @@ void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows,
                                   [](float volume) { return volume > 0 && std::isfinite(volume); });
   if (usable) return;
   frame.volumes.clear();
-  if (!told_volumes_) {
-    notices.push_back(Concat(rows.source, ": volumes are ignored: not all are above 0 and finite"));
-  }
-  told_volumes_ = true;
+  TellOnce(told_volumes_, rows, "volumes are ignored: not all are above 0 and finite", notices);
 }
 
 }  // namespace partiemc::client::input

@@ -36,6 +36,8 @@ class PlaneProjection {
   std::optional<Plane> plane_;
   double largest_extent_ = 0;  // Of the frames so far: what the tolerance is relative to.
   bool told_volumes_ = false;
+  bool told_velocities_ = false;
+  bool told_ids_ = false;
   bool told_plane_of_two_ = false;
   std::vector<std::uint64_t> sorted_ids_;
 };

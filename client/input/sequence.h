@@ -24,7 +24,7 @@ struct RecordedFrame {
   bool float32 = false;        ///< The recording holds float32, so that `positions` lost nothing.
   std::vector<float> volumes;  ///< Area per particle, all positive and finite; empty if none.
   std::vector<std::uint64_t> ids;  ///< Unique within the frame; empty if none.
-  std::vector<float> velocities;   ///< vx, vy interleaved, in the plane of `positions`; or empty.
+  std::vector<float> velocities;   ///< vx, vy interleaved, as `positions`, finite; empty if none.
 
   std::size_t ParticleCount() const { return positions.size() / 2; }
 };

@@ -52,7 +52,8 @@ class RecordingWriter {
   ~RecordingWriter();
 
   /// Appends a frame: time, positions, ids, volumes and velocities; its index is its place in the
-  /// recording. A frame without a time gets its index as time.
+  /// recording. A frame without a time gets its index as time and loses its velocities, which tell
+  /// nothing without one.
   /// Errors: INVALID_ARGUMENT (float32 is not enough); those of AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
@@ -73,7 +74,7 @@ bool IsRecording(const std::string& path);
 /// Reads a recording. A file that was cut off ends after its last whole block with a notice; a
 /// damaged block is kDataLoss. Every block is checked before a frame of it is delivered. The file
 /// is not trusted: a block is at most 1 GiB, memory grows with what is really in it. Ids are
-/// delivered as they are.
+/// delivered as they are; velocities of a frame, only where all of them are finite.
 class RecordingReader final : public Sequence {
  public:
   /// `frames` as in SequenceOptions.

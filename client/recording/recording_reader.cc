@@ -1,5 +1,6 @@
 #include <google/protobuf/io/coded_stream.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <utility>
@@ -55,6 +56,9 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   wire::CopyBytes(message.ids(), frame.ids);
   wire::CopyBytes(message.volumes(), frame.volumes);
   wire::CopyBytes(message.velocities(), frame.velocities);
+  const bool finite = std::all_of(frame.velocities.begin(), frame.velocities.end(),
+                                  [](float velocity) { return std::isfinite(velocity); });
+  if (!finite) frame.velocities.clear();
   for (const float volume : frame.volumes) {
     if (!(volume > 0 && std::isfinite(volume))) {
       return absl::DataLossError("a volume is not positive and finite");

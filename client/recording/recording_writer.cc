@@ -74,7 +74,10 @@ class RecordingWriter::Impl {
     if (!status.ok()) return status;
     wire::AssignBytes(std::span<const std::uint64_t>(frame.ids), *message_.mutable_ids());
     wire::AssignBytes(std::span<const float>(frame.volumes), *message_.mutable_volumes());
-    wire::AssignBytes(std::span<const float>(frame.velocities), *message_.mutable_velocities());
+    // The index that stands for a missing time is not the time that velocities are about.
+    wire::AssignBytes(
+        frame.time ? std::span<const float>(frame.velocities) : std::span<const float>(),
+        *message_.mutable_velocities());
     AppendDelimited(message_, block_);
     ++frame_count_;
     ++block_frames_;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <sstream>
 #include <thread>
+#include <tuple>
 
 #include "client/cli/program.h"
 
@@ -68,6 +69,59 @@ TEST(Replay, InProcessWritesEveryOutputAndATable) {
   expected.insert(expected.end(), {"report.html", "stats.csv"});
   EXPECT_EQ(FilesIn(directory.path()), expected);
   EXPECT_THAT(Column(Content(directory.Path("stats.csv")), "frame"), ElementsAre("10", "11", "12"));
+}
+
+// A block that stays and one that leaps over it, with the columns that `header` names.
+void WriteLeap(const TemporaryDirectory& directory, const std::string& header, bool with_times) {
+  for (int frame = 0; frame < 4; ++frame) {
+    std::ofstream file(directory.Path("frame_" + std::to_string(frame) + ".csv"));
+    file << header << "\n";
+    for (int k = 0; k < 36; ++k) {
+      file << k << "," << k % 6 << "," << k / 6 << ",0,0\n";
+      file << 100 + k << "," << k % 6 << "," << k / 6 + 30 * (frame + 1) << ",0,60\n";
+    }
+  }
+  if (!with_times) return;
+  std::ofstream times(directory.Path("times.csv"));
+  times << "frame,t\n0,0\n1,0.5\n2,1\n3,1.5\n";
+}
+
+// The frames of a replay at spacing 1 as GeoJSON, which tells identities.
+std::vector<std::string> Outlines(const std::string& input, std::vector<std::string> where) {
+  const TemporaryDirectory output;
+  where.insert(where.begin(), {"replay", input, "--quiet", "--spacing", "1", "--output-dir",
+                               output.Path("frames"), "--format", "geojson"});
+  const Ran ran = RunPartiemc(where);
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  std::vector<std::string> frames;
+  for (const std::string& file : FilesIn(output.path())) {
+    frames.push_back(Content(output.Path(file)));
+  }
+  EXPECT_THAT(frames, SizeIs(4));
+  return frames;
+}
+
+TEST(Replay, RingsThatLeapKeepTheirIdentityByIdsOrByVelocitiesWithTimes) {
+  const std::string kWithIds = "id,x,y,a,b", kWithVelocities = "a,x,y,vx,vy",
+                    kWithNeither = "a,x,y,b,c";
+  ServerProgram server;
+  for (const auto& [header, with_times, is_kept] : {std::tuple(kWithIds, false, true),
+                                                    {kWithVelocities, true, true},
+                                                    {kWithVelocities, false, false},
+                                                    {kWithNeither, true, false}}) {
+    SCOPED_TRACE(header + (with_times ? " with times" : " without times"));
+    const TemporaryDirectory directory;
+    WriteLeap(directory, header, with_times);
+    const std::vector<std::string> local = Outlines(directory.path().string(), {"--local"});
+    EXPECT_THAT(local.at(3), HasSubstr(is_kept ? "\"identity\":2" : "\"identity\":5"));
+    EXPECT_EQ(Outlines(directory.path().string(), {"--server", server.address()}), local);
+    // A recording made of it has the same outlines, and times where there were none.
+    const TemporaryDirectory recordings;
+    ASSERT_EQ(
+        RunPartiemc({"convert", directory.path().string(), recordings.Path("a.pemc")}).exit_code,
+        0);
+    EXPECT_EQ(Outlines(recordings.Path("a.pemc"), {"--local"}), local);
+  }
 }
 
 TEST(Replay, UsesTheSpacingThatTheRecordingKnowsUnlessToldOtherwise) {

@@ -80,6 +80,20 @@ TEST(Csv, WhatIsNotFiniteIsPassedOnForTheCoreToJudge) {
 TEST(Csv, RepeatedIdsAreNoIds) {
   EXPECT_THAT(Read("x,y,gid\n1,2,4294967295\n3,4,4294967295\n").ids, IsEmpty());
   EXPECT_THAT(Read("x,y,id\n1,2,0.5\n3,4,1\n").ids, IsEmpty());
+  const InputDirectory directory;
+  directory.Write("a0.csv", "x,y,id\n1,2,7\n3,4,7\n");
+  directory.Write("a1.csv", "x,y,id\n1,2,7\n3,4,7\n");
+  const ReadSequence read = ReadAll(directory.Write("a2.csv", "x,y,id\n1,2,7\n3,4,7\n"));
+  EXPECT_THAT(read.notices, ElementsAre(testing::HasSubstr("ids are ignored")));
+}
+
+TEST(Csv, VelocitiesAreTakenOnlyWhereAllAreFinite) {
+  const InputDirectory directory;
+  const ReadSequence read =
+      ReadAll(directory.Write("a.csv", "x,y,vx,vy\n1,2,0.25,1\n3,4,nan,0\n5,6,1e99,0\n"));
+  EXPECT_THAT(read.frames.at(0).velocities, IsEmpty());
+  EXPECT_EQ(read.frames.at(0).ParticleCount(), 3u);
+  EXPECT_THAT(read.notices, ElementsAre(testing::HasSubstr("velocities are ignored")));
 }
 
 TEST(Csv, VolumesAreTakenOnlyWhereAllArePositive) {

@@ -151,6 +151,20 @@ TEST_F(Recording, GivesBackEveryBitOfFloat64FramesWhenAskedTo) {
   EXPECT_FALSE(read.frames[0].float32);
 }
 
+TEST_F(Recording, LeavesOutVelocitiesThatTellNothing) {
+  auto frames = RandomFrames(3);
+  frames[0].time.reset();
+  frames[1].velocities[1] = std::numeric_limits<float>::quiet_NaN();
+  Write(Path(), frames);
+  const WhatWasRead read = Read(Path());
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  ASSERT_THAT(read.frames, SizeIs(3));
+  EXPECT_THAT(read.frames[0].velocities, IsEmpty());
+  EXPECT_THAT(read.frames[1].velocities, IsEmpty());
+  EXPECT_EQ(read.frames[1].positions.size(), frames[1].positions.size());
+  EXPECT_EQ(read.frames[2].velocities, frames[2].velocities);
+}
+
 TEST_F(Recording, KeepsWhatIsNotFinite) {
   auto frames = RandomFrames(1);
   frames[0].positions[0] = std::numeric_limits<float>::quiet_NaN();
