@@ -59,6 +59,7 @@ std::set<std::string> PackageSet(const SourceTree& tree, const std::string& set)
 const std::map<std::string, std::vector<std::string>>& PackagesByName() {
   static const std::map<std::string, std::vector<std::string>> packages = {
       {"absl", {"libabsl-dev"}},
+      {"benchmark", {"libbenchmark-dev"}},
       {"CLI11", {"libcli11-dev"}},
       {"gRPC", {"libgrpc++-dev", "protobuf-compiler-grpc"}},
       {"GTest", {"libgtest-dev", "libgmock-dev"}},
