@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout release recordings sanitized core-alone consumer)
+readonly all_steps=(layout release recordings sanitized core-alone consumer bench)
 
 usage() {
   cat <<'USAGE'
@@ -16,6 +16,7 @@ Steps, all of them by default:
   sanitized   core and sessions under AddressSanitizer and UndefinedBehaviorSanitizer
   core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
+  bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
 Builds are kept in build/, so that a second run compiles only what has changed.
 USAGE
 }
@@ -126,6 +127,8 @@ step_core-alone() {
 }
 
 step_consumer() { check "consumer" tests/consumer/run.sh build/release core client; }
+
+step_bench() { check "bench" tests/bench/run.sh --quick --check; }
 
 if $install; then
   headline "packages"
