@@ -1,328 +1,295 @@
 #include "bins.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
 #include <cmath>
-#include <limits>
+#include <span>
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "distinct_ids.h"
+#include "coordinate_block.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
 namespace {
 
-// Positions are rounded to this fraction of a cell: a tile with the widest margin spans less than
-// 2^7 cells, so that 24 bits of mantissa hold any position in it exactly.
-constexpr int kFractionBits = 17;
-constexpr double kUnitsPerCell = 1 << kFractionBits;
-constexpr float kCellsPerUnit = 1.0f / (1 << kFractionBits);
-constexpr int kTileUnitShift = kFractionBits + kTileShift;
-
-// Beyond this a double no longer resolves a millionth of a cell.
-constexpr double kMaxCellsFromOrigin = 1 << 30;
-
-// The largest coordinate in world units: that many cells of the largest spacing. Squares of
-// distances stay finite.
-constexpr double kMaxCoordinate = 1e69;
-
-// How far three-component positions may leave their plane, relative to their extent in it: above
-// the noise of a simulator's rounding, far below anything that a third dimension would need.
-constexpr double kPlanarTolerance = 1e-5;
-
 constexpr double kPi = 3.14159265358979323846;
 
-constexpr char kAxisNames[] = "xyz";
+// Sides of a tile that a kernel crosses, as in BinStretch.
+enum Side : std::uint32_t { kLeft = 1, kRight = 2, kLower = 4, kUpper = 8 };
+constexpr int kSideBits = 4;
 
-struct Axes {
-  int first, second, normal;
-};
+// A tile's place in its own Neighbourhood.
+constexpr int kHere = 4;
 
-Axes AxesOf(Plane plane) {
-  switch (plane) {
-    case Plane::kXy:
-      return {0, 1, 2};
-    case Plane::kXz:
-      return {0, 2, 1};
-    case Plane::kYz:
-      return {1, 2, 0};
-  }
-  return {0, 1, 2};
-}
-
-Axes AxesOf(const Frame& frame, Plane plane) {
-  return frame.components == 3 ? AxesOf(plane) : AxesOf(Plane::kXy);
-}
-
-double Coordinate(const Frame& frame, std::size_t particle, int axis) {
-  const std::size_t index = particle * frame.components + axis;
-  return std::visit([index](auto view) { return static_cast<double>(view[index]); },
-                    frame.positions);
-}
-
-std::string CoordinateField(std::string_view array, std::size_t particle, int axis) {
-  return absl::StrCat(std::string(array), "[", particle, "].", std::string(1, kAxisNames[axis]));
-}
-
-absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
-                          std::string rule) {
-  return ViolationError(absl::StatusCode::kInvalidArgument,
-                        {std::string(reason), std::move(field), std::move(value), std::move(rule)});
-}
-
-absl::Status CheckCoordinates(const Frame& frame) {
-  const std::size_t values = std::visit([](auto view) { return view.size(); }, frame.positions);
-  for (std::size_t k = 0; k < values; ++k) {
-    const double value =
-        std::visit([k](auto view) { return static_cast<double>(view[k]); }, frame.positions);
-    if (!std::isfinite(value)) {
-      return InvalidFrame(kReasonNotFinite,
-                          CoordinateField("positions", k / frame.components,
-                                          static_cast<int>(k % frame.components)),
-                          ShortestNumber(value), "must be finite");
-    }
-    if (std::abs(value) > kMaxCoordinate) {
-      return InvalidFrame(kReasonOutOfRange,
-                          CoordinateField("positions", k / frame.components,
-                                          static_cast<int>(k % frame.components)),
-                          ShortestNumber(value), "must be at most 1e69 in magnitude");
+// The neighbours, by their place in Neighbourhood, that a kernel reaches which crosses the sides of
+// its index; the tile itself in any case.
+constexpr std::array<std::uint16_t, 16> ReachedBySides() {
+  std::array<std::uint16_t, 16> reached{};
+  for (unsigned sides = 0; sides < 16; ++sides) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const bool column = dx == 0 || (sides & (dx < 0 ? kLeft : kRight)) != 0;
+        const bool row = dy == 0 || (sides & (dy < 0 ? kLower : kUpper)) != 0;
+        if (column && row) reached[sides] |= 1 << ((dy + 1) * 3 + dx + 1);
+      }
     }
   }
-  return absl::OkStatus();
+  return reached;
 }
+constexpr std::array<std::uint16_t, 16> kReachedBySides = ReachedBySides();
 
-absl::Status CheckPlanar(const Frame& frame, Plane plane) {
-  const Axes axes = AxesOf(plane);
-  double low[3], high[3];
-  std::fill(low, low + 3, std::numeric_limits<double>::infinity());
-  std::fill(high, high + 3, -std::numeric_limits<double>::infinity());
-  std::size_t farthest = 0;
-  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double value = Coordinate(frame, k, axis);
-      if (axis == axes.normal && value > high[axis]) farthest = k;
-      low[axis] = std::min(low[axis], value);
-      high[axis] = std::max(high[axis], value);
-    }
-  }
-  const double extent =
-      std::max(high[axes.first] - low[axes.first], high[axes.second] - low[axes.second]);
-  const double thickness = high[axes.normal] - low[axes.normal];
-  if (thickness <= kPlanarTolerance * extent) return absl::OkStatus();
-  const std::string axis(1, kAxisNames[axes.normal]);
-  return InvalidFrame(
-      kReasonNotPlanar, CoordinateField("positions", farthest, axes.normal),
-      ShortestNumber(high[axes.normal]),
-      absl::StrCat("particles must lie in the ", std::string(Name(plane)), " plane, but ", axis,
-                   " ranges over [", ShortestNumber(low[axes.normal]), ", ",
-                   ShortestNumber(high[axes.normal]), "]"));
-}
-
-absl::Status CheckVolumes(const Frame& frame) {
-  if (frame.volumes.empty()) return absl::OkStatus();
-  if (frame.volumes.size() != frame.ParticleCount()) {
-    return InvalidFrame(
-        kReasonCount, "volumes", absl::StrCat(frame.volumes.size(), " values"),
-        absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
-  }
-  for (std::size_t k = 0; k < frame.volumes.size(); ++k) {
-    const float volume = frame.volumes[k];
-    if (!(volume > 0) || !std::isfinite(volume)) {
-      return InvalidFrame(std::isfinite(volume) ? kReasonOutOfRange : kReasonNotFinite,
-                          absl::StrCat("volumes[", k, "]"), ShortestNumber(volume),
-                          "must be positive and finite");
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckIds(const Frame& frame) {
-  if (frame.ids.empty()) return absl::OkStatus();
-  if (frame.ids.size() != frame.ParticleCount()) {
-    return InvalidFrame(
-        kReasonCount, "ids", absl::StrCat(frame.ids.size(), " values"),
-        absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
-  }
-  const auto repeated = FindRepeated(frame.ids);
-  if (!repeated) return absl::OkStatus();
-  return InvalidFrame(kReasonDuplicate, absl::StrCat("ids[", repeated->again, "]"),
-                      absl::StrCat(frame.ids[repeated->again]),
-                      absl::StrCat("must be that of one particle only, but ids[", repeated->first,
-                                   "] is the same; leave ids out where particles have none"));
-}
-
-absl::Status CheckVelocities(const Frame& frame) {
-  if (frame.velocities.empty()) return absl::OkStatus();
-  const std::size_t components = static_cast<std::size_t>(frame.components);
-  if (frame.velocities.size() != components * frame.ParticleCount()) {
-    return InvalidFrame(kReasonCount, "velocities",
-                        absl::StrCat(frame.velocities.size(), " values"),
-                        absl::StrCat("must be empty or ", components, " per particle (",
-                                     frame.ParticleCount(), "), as positions are"));
-  }
-  for (std::size_t k = 0; k < frame.velocities.size(); ++k) {
-    if (std::isfinite(frame.velocities[k])) continue;
-    return InvalidFrame(
-        kReasonNotFinite,
-        CoordinateField("velocities", k / components, static_cast<int>(k % components)),
-        ShortestNumber(frame.velocities[k]), "must be finite");
-  }
-  return absl::OkStatus();
-}
-
-// A position in units of 2^-17 cells from the world's origin.
-struct Units {
-  std::int64_t x, y;
-};
-
-Units ToUnits(const WorldPosition& position, double cell_size) {
-  return {static_cast<std::int64_t>(std::floor(position.x / cell_size * kUnitsPerCell + 0.5)),
-          static_cast<std::int64_t>(std::floor(position.y / cell_size * kUnitsPerCell + 0.5))};
-}
-
-struct TileRange {
-  std::int32_t x0, x1, y0, y1;  // Inclusive.
-};
-
-TileRange TilesReached(Units units, std::int64_t reach) {
-  const auto tile = [](std::int64_t coordinate) {
-    return static_cast<std::int32_t>(coordinate >> kTileUnitShift);
-  };
-  return {tile(units.x - reach), tile(units.x + reach), tile(units.y - reach),
-          tile(units.y + reach)};
-}
-
+// Calls visit(place in Neighbourhood) for each tile that a kernel reaches.
 template <typename Visit>
-void ForEachTile(const TileRange& range, Visit visit) {
-  for (std::int32_t y = range.y0; y <= range.y1; ++y) {
-    for (std::int32_t x = range.x0; x <= range.x1; ++x) visit(TileCoordinate{y, x});
+void ForEachReached(std::uint32_t sides, Visit visit) {
+  for (std::uint32_t bits = kReachedBySides[sides]; bits != 0; bits &= bits - 1) {
+    visit(std::countr_zero(bits));
   }
 }
 
-absl::Status CheckDistance(const WorldPosition& position, std::size_t particle, Plane plane,
-                           double cell_size) {
-  const Axes axes = AxesOf(plane);
-  for (const auto& [axis, value] :
-       {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
-    if (!(std::abs(value / cell_size) <= kMaxCellsFromOrigin)) {
-      return InvalidFrame(kReasonOutOfRange, CoordinateField("positions", particle, axis),
-                          ShortestNumber(value),
-                          absl::StrCat("must be within 2^30 cells of ", ShortestNumber(cell_size),
-                                       " from the origin"));
+// How far beyond its kernel a particle needs tiles, in cells: an inside node is within reach of a
+// particle, the rest of an active cell within one cell of it, and any node of a small hole within
+// the radius of a disc of the hole's area of its ring.
+double TileMargin(const Scale& scale) {
+  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
+}
+
+// Five bits, moved five places apart: times the bits of a row, the bits of a box.
+constexpr std::array<std::uint32_t, 32> SpreadBits() {
+  std::array<std::uint32_t, 32> spread{};
+  for (unsigned bits = 0; bits < 32; ++bits) {
+    for (int k = 0; k < 5; ++k) spread[bits] |= (bits >> k & 1) << 5 * k;
+  }
+  return spread;
+}
+constexpr std::array<std::uint32_t, 32> kSpreadBits = SpreadBits();
+
+// The homes met last, by the low bits of their coordinates: a body of up to 64 x 64 tiles finds all
+// of its homes here, without a probe of the directory that would have to be guessed.
+class RecentHomes {
+ public:
+  RecentHomes() { index_.fill(kNoTile); }
+
+  std::uint32_t Insert(TileCoordinate tile, TileDirectory& homes) {
+    constexpr int kMask = (1 << kBits) - 1;
+    std::uint32_t& index = index_[(tile.y & kMask) << kBits | (tile.x & kMask)];
+    if (index == kNoTile || homes[index] != tile) index = homes.Insert(tile);
+    return index;
+  }
+
+ private:
+  static constexpr int kBits = 6;
+  std::array<std::uint32_t, 1 << 2 * kBits> index_;
+};
+
+// First pass over a stretch: finds home tiles and counts. Returns false if a particle is too far
+// from the origin, or if there are more than `max_tiles`.
+template <typename Reader>
+bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, const Reach& reach,
+               std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {
+  stretch.homes.Clear();
+  stretch.crossing.clear();
+  stretch.reached.clear();
+  RecentHomes recent;
+  CoordinateBlock block;
+  for (std::size_t start = first; start < last; start += kBlockParticles) {
+    const int count = static_cast<int>(std::min<std::size_t>(kBlockParticles, last - start));
+    for (int k = 0; k < count; ++k) {
+      const WorldPosition position = reader[start + k];
+      block.units[2 * k] = position.x * reach.units_per_world;
+      block.units[2 * k + 1] = position.y * reach.units_per_world;
+    }
+    if (!FindTiles(2 * count, reach, block, scratch.positions.data() + 2 * start)) return false;
+    for (int k = 0; k < count; ++k) {
+      const std::uint32_t index =
+          recent.Insert({block.tile[2 * k + 1], block.tile[2 * k]}, stretch.homes);
+      if (index == stretch.reached.size()) {
+        if (index == max_tiles) return false;
+        stretch.crossing.emplace_back();
+        stretch.reached.push_back(0);
+      }
+      const std::uint32_t sides = block.sides[2 * k] | block.sides[2 * k + 1] << 2;
+      ++stretch.crossing[index][sides];
+      stretch.reached[index] |= block.reached[2 * k] * kSpreadBits[block.reached[2 * k + 1]];
+      scratch.home[start + k] = index << kSideBits | sides;
     }
   }
-  return absl::OkStatus();
+  return true;
 }
+
+// Joins the tiles of all stretches in `tiles`. Returns false if they are more than `max_tiles`.
+bool CollectTiles(BinScratch& scratch, std::size_t max_tiles, TileDirectory& tiles) {
+  scratch.reached.clear();
+  for (const BinStretch& stretch : scratch.stretches) {
+    for (std::size_t k = 0; k < stretch.homes.size(); ++k) {
+      const std::uint32_t index = tiles.Insert(stretch.homes[k]);
+      if (index == scratch.reached.size()) scratch.reached.push_back(0);
+      scratch.reached[index] |= stretch.reached[k];
+    }
+    if (tiles.size() > max_tiles) return false;
+  }
+  const std::size_t homes = tiles.size();
+  for (std::size_t k = 0; k < homes; ++k) {
+    const TileCoordinate home = tiles[k];
+    for (std::uint32_t bits = scratch.reached[k]; bits != 0; bits &= bits - 1) {
+      const int place = std::countr_zero(bits);
+      tiles.Insert({home.y + place / 5 - 2, home.x + place % 5 - 2});
+    }
+    if (tiles.size() > max_tiles) return false;
+  }
+  return true;
+}
+
+// Counts how many entries a stretch has in each tile.
+void CountEntries(const TileDirectory& tiles, BinStretch& stretch) {
+  stretch.entries.assign(tiles.size(), 0);
+  stretch.tile.resize(stretch.homes.size());
+  for (std::size_t k = 0; k < stretch.homes.size(); ++k) {
+    stretch.tile[k] = tiles.Find(stretch.homes[k]);
+    const Neighbourhood& near = tiles.neighbours(stretch.tile[k]);
+    for (std::uint32_t sides = 0; sides < stretch.crossing[k].size(); ++sides) {
+      const std::uint32_t count = stretch.crossing[k][sides];
+      if (count == 0) continue;
+      ForEachReached(sides, [&](int place) { stretch.entries[near[place]] += count; });
+    }
+  }
+}
+
+// Turns the counts of all stretches into the places of their first entries: a tile's list has the
+// entries of the first stretch, then those of the second.
+void PlaceEntries(ParticleBins& bins) {
+  const std::size_t tiles = bins.tiles.size();
+  bins.offsets.resize(tiles + 1);
+  std::uint32_t next = 0;
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    bins.offsets[tile] = next;
+    for (BinStretch& stretch : bins.scratch.stretches) {
+      const std::uint32_t count = stretch.entries[tile];
+      stretch.entries[tile] = next;
+      next += count;
+    }
+  }
+  bins.offsets[tiles] = next;
+  bins.home_count.assign(tiles, 0);
+  for (const BinStretch& stretch : bins.scratch.stretches) {
+    for (std::size_t k = 0; k < stretch.tile.size(); ++k) {
+      for (const std::uint32_t count : stretch.crossing[k]) {
+        bins.home_count[stretch.tile[k]] += count;
+      }
+    }
+  }
+}
+
+// Second pass over a stretch: writes its entries.
+void FillEntries(std::size_t first, std::size_t last, std::span<const float> volumes,
+                 double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
+  constexpr auto kSize = static_cast<float>(kTileSize);
+  const float* positions = bins.scratch.positions.data();
+  BinEntry* entries = bins.entries.data();
+  for (std::size_t k = first; k < last; ++k) {
+    const std::uint32_t home = bins.scratch.home[k];
+    const std::uint32_t tile = stretch.tile[home >> kSideBits];
+    const float x = positions[2 * k];
+    const float y = positions[2 * k + 1];
+    const auto add = [&](std::uint32_t to, float at_x, float at_y) {
+      const std::uint32_t entry = stretch.entries[to]++;
+      entries[entry] = {at_x, at_y, static_cast<std::uint32_t>(k)};
+      if (!volumes.empty()) {
+        bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
+      }
+    };
+    add(tile, x, y);
+    const std::uint32_t sides = home & ((1u << kSideBits) - 1);
+    if (sides == 0) continue;
+    const Neighbourhood& near = bins.tiles.neighbours(tile);
+    ForEachReached(sides, [&](int place) {
+      if (place == kHere) return;
+      add(near[place], x - static_cast<float>(place % 3 - 1) * kSize,
+          y - static_cast<float>(place / 3 - 1) * kSize);
+    });
+  }
+}
+
+// Why FindHomes or CollectTiles gave up: the first particle too far away, else too many tiles.
+absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, const Reach& reach,
+                     std::size_t max_tiles) {
+  const Axes axes = AxesOf(frame, plane);
+  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
+    const WorldPosition position = PositionOf(frame, plane, k);
+    for (const auto& [axis, value] :
+         {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
+      if (IsNearOrigin(value * reach.units_per_world)) continue;
+      return InvalidFrame(kReasonOutOfRange, CoordinateField("positions", k, axis),
+                          ShortestNumber(value),
+                          absl::StrCat("must be within 2^30 cells of ",
+                                       ShortestNumber(scale.cell_size), " from the origin"));
+    }
+  }
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonTooManyTiles), "positions",
+       absl::StrCat("more than ", max_tiles, " tiles of 32 x 32 cells"),
+       absl::StrCat("must reach at most ", max_tiles, " tiles: is the spacing of ",
+                    ShortestNumber(scale.spacing * scale.cell_size), " right?")});
+}
+
+// A stretch has at least so many particles, and there are at most so many of them: enough for the
+// tasks to balance, few enough that counts by stretch and tile stay below the particles.
+constexpr std::size_t kMinStretch = 1 << 15;
+constexpr std::size_t kMaxStretches = 16;
 
 }  // namespace
 
 void ParticleBins::Clear() {
   tiles.Clear();
   offsets.clear();
-  x.clear();
-  y.clear();
+  home_count.clear();
+  entries.clear();
   weight.clear();
-  source.clear();
-}
-
-WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle) {
-  const Axes axes = AxesOf(frame, plane);
-  return {Coordinate(frame, particle, axes.first), Coordinate(frame, particle, axes.second)};
-}
-
-PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle) {
-  const Axes axes = AxesOf(frame, plane);
-  const float* velocity = frame.velocities.data() + particle * frame.components;
-  return {velocity[axes.first], velocity[axes.second]};
-}
-
-absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits) {
-  const std::size_t values = std::visit([](auto view) { return view.size(); }, frame.positions);
-  if (frame.components != 2 && frame.components != 3) {
-    return InvalidFrame(kReasonOutOfRange, "components", absl::StrCat(frame.components),
-                        "must be 2 or 3");
-  }
-  if (values % frame.components != 0) {
-    return InvalidFrame(kReasonCount, "positions", absl::StrCat(values, " values"),
-                        absl::StrCat("must be ", frame.components, " per particle"));
-  }
-  if (frame.ParticleCount() > limits.max_particles) {
-    return ViolationError(
-        absl::StatusCode::kResourceExhausted,
-        {std::string(kReasonTooManyParticles), "positions",
-         absl::StrCat(frame.ParticleCount(), " particles"),
-         absl::StrCat("must be at most ", limits.max_particles, " in one frame")});
-  }
-  if (absl::Status status = CheckCoordinates(frame); !status.ok()) return status;
-  if (frame.components == 3 && frame.ParticleCount() > 0) {
-    if (absl::Status status = CheckPlanar(frame, plane); !status.ok()) return status;
-  }
-  if (absl::Status status = CheckVolumes(frame); !status.ok()) return status;
-  if (absl::Status status = CheckIds(frame); !status.ok()) return status;
-  return CheckVelocities(frame);
 }
 
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
                           const FrameLimits& limits, ParticleBins& bins) {
-  bins.Clear();
+  bins.tiles.Clear();
+  BinScratch& scratch = bins.scratch;
   const std::size_t count = frame.ParticleCount();
-  const auto reach = static_cast<std::int64_t>(std::ceil(scale.kernel_radius * kUnitsPerCell));
-  // An inside node is within reach of a particle, the rest of an active cell within one cell of
-  // it, and any node of a small hole within the radius of a disc of the hole's area of its ring.
-  const double margin = 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
-  const auto tile_reach = reach + static_cast<std::int64_t>(std::ceil(margin * kUnitsPerCell));
+  const Reach reach = ReachOf(scale, TileMargin(scale));
+  scratch.home.resize(count);
+  scratch.positions.resize(2 * count);
+  const std::size_t length = std::max(kMinStretch, (count + kMaxStretches - 1) / kMaxStretches);
+  scratch.stretches.resize((count + length - 1) / length);
+  const auto for_each_stretch = [&](auto visit) {
+    tbb::parallel_for(std::size_t{0}, scratch.stretches.size(), [&](std::size_t k) {
+      visit(scratch.stretches[k], k * length, std::min(count, (k + 1) * length));
+    });
+  };
 
-  for (std::size_t k = 0; k < count; ++k) {
-    const WorldPosition position = PositionOf(frame, plane, k);
-    if (absl::Status status = CheckDistance(position, k, plane, scale.cell_size); !status.ok()) {
-      return status;
-    }
-    ForEachTile(TilesReached(ToUnits(position, scale.cell_size), tile_reach),
-                [&](TileCoordinate tile) { bins.tiles.Insert(tile); });
-    if (bins.tiles.size() > limits.max_tiles) {
-      return ViolationError(
-          absl::StatusCode::kResourceExhausted,
-          {std::string(kReasonTooManyTiles), "positions",
-           absl::StrCat("more than ", limits.max_tiles, " tiles of 32 x 32 cells"),
-           absl::StrCat("must reach at most ", limits.max_tiles, " tiles: is the spacing of ",
-                        ShortestNumber(scale.spacing * scale.cell_size), " right?")});
-    }
+  std::atomic<bool> found = true;
+  VisitPositions(frame, plane, [&](const auto& reader) {
+    for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
+      if (!FindHomes(reader, first, last, reach, limits.max_tiles, stretch, scratch)) found = false;
+    });
+  });
+  if (!found || !CollectTiles(scratch, limits.max_tiles, bins.tiles)) {
+    return Refusal(frame, plane, scale, reach, limits.max_tiles);
   }
   bins.tiles.Seal();
-
-  bins.offsets.assign(bins.tiles.size() + 1, 0);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Units units = ToUnits(PositionOf(frame, plane, k), scale.cell_size);
-    ForEachTile(TilesReached(units, reach),
-                [&](TileCoordinate tile) { ++bins.offsets[bins.tiles.Find(tile) + 1]; });
-  }
-  for (std::size_t t = 0; t < bins.tiles.size(); ++t) bins.offsets[t + 1] += bins.offsets[t];
+  for_each_stretch(
+      [&](BinStretch& stretch, std::size_t, std::size_t) { CountEntries(bins.tiles, stretch); });
+  PlaceEntries(bins);
 
   const std::size_t entries = bins.offsets.back();
-  bins.x.resize(entries);
-  bins.y.resize(entries);
-  bins.source.resize(entries);
-  if (!frame.volumes.empty()) bins.weight.resize(entries);
+  bins.entries.resize(entries);
+  bins.weight.resize(frame.volumes.empty() ? 0 : entries);
   const double weight_per_world_volume =
       scale.weight_per_volume / scale.cell_size / scale.cell_size;
-  for (std::size_t k = 0; k < count; ++k) {
-    const Units units = ToUnits(PositionOf(frame, plane, k), scale.cell_size);
-    ForEachTile(TilesReached(units, reach), [&](TileCoordinate tile) {
-      const std::uint32_t entry = bins.offsets[bins.tiles.Find(tile)]++;
-      const auto relative = [](std::int64_t value, std::int32_t origin) {
-        return static_cast<float>(value - (std::int64_t{origin} << kTileUnitShift)) * kCellsPerUnit;
-      };
-      bins.x[entry] = relative(units.x, tile.x);
-      bins.y[entry] = relative(units.y, tile.y);
-      bins.source[entry] = static_cast<std::uint32_t>(k);
-      if (!frame.volumes.empty()) {
-        bins.weight[entry] = static_cast<float>(frame.volumes[k] * weight_per_world_volume);
-      }
-    });
-  }
-  // Filling moved every offset to the end of its tile, which is the start of the next.
-  for (std::size_t t = bins.tiles.size(); t > 0; --t) bins.offsets[t] = bins.offsets[t - 1];
-  bins.offsets[0] = 0;
+  for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
+    FillEntries(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
+  });
   return absl::OkStatus();
 }
 

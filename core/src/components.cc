@@ -1,9 +1,19 @@
 #include "components.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <bit>
+#include <limits>
 #include <numeric>
 
 namespace partiemc {
+namespace {
+
+constexpr std::uint32_t kNoComponent = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t kSeveralComponents = kNoComponent - 1;
+
+}  // namespace
 
 std::uint32_t Components::RunAt(const Crossings& crossings, const TilePlace& node) const {
   const std::uint32_t starts = RunStarts(crossings.tiles[node.tile].inside[node.j]);
@@ -33,34 +43,42 @@ void Components::Unite(std::uint32_t a, std::uint32_t b) {
 
 void Components::UniteRuns(const TileDirectory& directory, const Crossings& crossings,
                            std::uint32_t tile) {
-  for (int j = 0; j < kTileSize; ++j) {
-    const std::uint32_t row = crossings.tiles[tile].inside[j];
-    if (row == 0) continue;
-    const TilePlace right = Normalise(directory, tile, kTileSize, j);
-    if (row >> (kTileSize - 1) && right.tile != kNoTile &&
-        (crossings.tiles[right.tile].inside[j] & 1)) {
-      Unite(RunAt(crossings, {tile, kTileSize - 1, j}), RunAt(crossings, right));
-    }
-    const TilePlace above = Normalise(directory, tile, 0, j + 1);
-    if (above.tile == kNoTile) continue;
-    // One node of each stretch that both rows share joins the two runs.
-    std::uint32_t shared = row & crossings.tiles[above.tile].inside[above.j];
+  const BitRows& rows = crossings.tiles[tile].inside;
+  const std::uint32_t right = directory.neighbours(tile)[5];
+  const std::uint32_t above = directory.neighbours(tile)[7];
+  const bool full = IsFull(rows);
+  // One node of each stretch that two rows share joins their runs.
+  const auto unite_rows = [&](int j, std::uint32_t upper_tile, int upper_j) {
+    std::uint32_t shared = rows[j] & crossings.tiles[upper_tile].inside[upper_j];
     while (shared != 0) {
       const int i = std::countr_zero(shared);
-      Unite(RunAt(crossings, {tile, i, j}), RunAt(crossings, {above.tile, i, above.j}));
+      Unite(RunAt(crossings, {tile, i, j}), RunAt(crossings, {upper_tile, i, upper_j}));
       shared &= ~LowestRun(shared);
+    }
+  };
+  for (int j = 0; !full && j + 1 < kTileSize; ++j) unite_rows(j, tile, j + 1);
+  if (above != kNoTile) unite_rows(kTileSize - 1, above, 0);
+  if (right == kNoTile) return;
+  // Both full: one row speaks for all.
+  const int last = full && IsFull(crossings.tiles[right].inside) ? 1 : kTileSize;
+  for (int j = 0; j < last; ++j) {
+    if (rows[j] >> (kTileSize - 1) && (crossings.tiles[right].inside[j] & 1)) {
+      Unite(RunAt(crossings, {tile, kTileSize - 1, j}), RunAt(crossings, {right, 0, j}));
     }
   }
 }
 
 void Components::Label(const TileDirectory& directory, const Crossings& crossings) {
-  const std::size_t rows = crossings.tiles.size() * kTileSize;
-  first_run_.resize(rows);
+  first_run_.resize(crossings.tiles.size() * kTileSize);
   std::uint32_t runs = 0;
-  for (std::size_t k = 0; k < rows; ++k) {
-    first_run_[k] = runs;
-    runs += static_cast<std::uint32_t>(
-        std::popcount(RunStarts(crossings.tiles[k / kTileSize].inside[k % kTileSize])));
+  for (std::size_t tile = 0; tile < crossings.tiles.size(); ++tile) {
+    const BitRows& rows = crossings.tiles[tile].inside;
+    const bool full = IsFull(rows);
+    for (int j = 0; j < kTileSize; ++j) {
+      first_run_[tile * kTileSize + j] = runs;
+      if (!full) runs += static_cast<std::uint32_t>(std::popcount(RunStarts(rows[j])));
+    }
+    runs += full;
   }
   label_.resize(runs);
   std::iota(label_.begin(), label_.end(), 0u);
@@ -86,14 +104,66 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
   return label_[RunAt(crossings, node)];
 }
 
+// The component of all inside nodes of a tile and of its cells' corners beyond it.
+std::uint32_t Components::ComponentSeenFrom(const TileDirectory& directory,
+                                            const Crossings& crossings, std::uint32_t tile) const {
+  std::uint32_t seen = kNoComponent;
+  const auto see = [&](const TilePlace& node) {
+    if (!IsInside(crossings, node)) return;
+    const std::uint32_t component = At(crossings, node);
+    if (seen == kNoComponent) seen = component;
+    if (seen != component) seen = kSeveralComponents;
+  };
+  for (int j = 0; j <= kTileSize && seen != kSeveralComponents; ++j) {
+    const TilePlace first = Normalise(directory, tile, 0, j);
+    if (first.tile != kNoTile) {
+      std::uint32_t starts = RunStarts(crossings.tiles[first.tile].inside[first.j]);
+      for (; starts != 0; starts &= starts - 1) {
+        see({first.tile, std::countr_zero(starts), first.j});
+      }
+    }
+    see(Normalise(directory, tile, kTileSize, j));
+  }
+  return seen;
+}
+
+Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossings& crossings,
+                                          std::uint32_t tile) const {
+  if (bins.home_count[tile] == 0) return {kNoComponent, 0, 0};
+  const bool full = IsFull(crossings.tiles[tile].inside);
+  const std::uint32_t component =
+      full ? label_[first_run_[tile * kTileSize]] : ComponentSeenFrom(bins.tiles, crossings, tile);
+  if (component == kNoComponent || component == kSeveralComponents) return {component, 0, 0};
+  if (full && bins.weight.empty()) return {component, bins.home_count[tile], 0};
+
+  // Cells with an inside corner.
+  BitRows cells;
+  NodeRow lower = InsideRow(bins.tiles, crossings.tiles, tile, 0);
+  for (int j = 0; j < kTileSize; ++j) {
+    const NodeRow upper = InsideRow(bins.tiles, crossings.tiles, tile, j + 1);
+    cells[j] = lower.left | lower.right | upper.left | upper.right;
+    lower = upper;
+  }
+  TileShare share{component, 0, 0};
+  for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
+    const BinEntry& entry = bins.entries[e];
+    if (!IsAtHome(entry)) continue;
+    const bool counts = cells[static_cast<int>(entry.y)] >> static_cast<int>(entry.x) & 1;
+    share.count += counts;
+    if (counts && !bins.weight.empty()) share.weight += bins.weight[e];
+  }
+  return share;
+}
+
 TilePlace Components::NearestInside(const ParticleBins& bins, const Crossings& crossings,
                                     std::uint32_t tile, std::uint32_t entry) const {
-  const int i = static_cast<int>(bins.x[entry]);
-  const int j = static_cast<int>(bins.y[entry]);
+  const float x = bins.entries[entry].x;
+  const float y = bins.entries[entry].y;
+  const int i = static_cast<int>(x);
+  const int j = static_cast<int>(y);
   // The nearest of the four corners is inside as a rule; of equal ones the lower, the more left.
-  const TilePlace closest =
-      Normalise(bins.tiles, tile, i + (bins.x[entry] - static_cast<float>(i) > 0.5f),
-                j + (bins.y[entry] - static_cast<float>(j) > 0.5f));
+  const TilePlace closest = Normalise(bins.tiles, tile, i + (x - static_cast<float>(i) > 0.5f),
+                                      j + (y - static_cast<float>(j) > 0.5f));
   if (IsInside(crossings, closest)) return closest;
   TilePlace nearest{kNoTile, 0, 0};
   float nearest_distance = 4;  // Above the square of a cell's diagonal.
@@ -102,8 +172,8 @@ TilePlace Components::NearestInside(const ParticleBins& bins, const Crossings& c
     const int dj = corner >> 1;
     const TilePlace node = Normalise(bins.tiles, tile, i + di, j + dj);
     if (!IsInside(crossings, node)) continue;
-    const float dx = bins.x[entry] - static_cast<float>(i + di);
-    const float dy = bins.y[entry] - static_cast<float>(j + dj);
+    const float dx = x - static_cast<float>(i + di);
+    const float dy = y - static_cast<float>(j + dj);
     const float distance = dx * dx + dy * dy;
     if (distance < nearest_distance) {
       nearest_distance = distance;
@@ -114,12 +184,29 @@ TilePlace Components::NearestInside(const ParticleBins& bins, const Crossings& c
 }
 
 void Components::CountParticles(const ParticleBins& bins, const Crossings& crossings,
-                                std::span<std::uint64_t> counts, std::span<double> weights) const {
-  ForEachParticle(bins, crossings,
-                  [&](std::uint32_t /*tile*/, std::uint32_t entry, std::uint32_t component) {
-                    ++counts[component];
-                    if (!bins.weight.empty()) weights[component] += bins.weight[entry];
-                  });
+                                std::span<std::uint64_t> counts, std::span<double> weights) {
+  const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
+  shares_.resize(tiles);
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, tiles),
+                    [&](const tbb::blocked_range<std::uint32_t>& range) {
+                      for (std::uint32_t tile = range.begin(); tile < range.end(); ++tile) {
+                        shares_[tile] = ShareOf(bins, crossings, tile);
+                      }
+                    });
+  for (std::uint32_t tile = 0; tile < tiles; ++tile) {
+    const TileShare& share = shares_[tile];
+    if (share.component == kNoComponent) continue;
+    if (share.component != kSeveralComponents) {
+      counts[share.component] += share.count;
+      weights[share.component] += share.weight;
+      continue;
+    }
+    ForEachParticleOf(bins, crossings, tile,
+                      [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+                        ++counts[component];
+                        if (!bins.weight.empty()) weights[component] += bins.weight[entry];
+                      });
+  }
 }
 
 }  // namespace partiemc

@@ -35,10 +35,25 @@ class Components {
 
   /// Adds the particles of each component to `counts`, and their weights, where particles have
   /// weights of their own, to `weights`; both have size() elements.
+  /// In parallel over tiles: only where a tile sees several components is a particle asked for its
+  /// nearest corner, and where all of a tile is inside none is asked for anything.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
-                      std::span<std::uint64_t> counts, std::span<double> weights) const;
+                      std::span<std::uint64_t> counts, std::span<double> weights);
 
  private:
+  // What the particles of one tile add to the components.
+  struct TileShare {
+    std::uint32_t component;  // kNoComponent: none; kSeveralComponents: not counted yet.
+    std::uint32_t count;
+    double weight;
+  };
+
+  std::uint32_t ComponentSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                                  std::uint32_t tile) const;
+  TileShare ShareOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile) const;
+  template <typename Visit>
+  void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
+                         Visit visit) const;
   TilePlace NearestInside(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
                           std::uint32_t entry) const;
   std::uint32_t RunAt(const Crossings& crossings, const TilePlace& node) const;
@@ -46,10 +61,19 @@ class Components {
   void Unite(std::uint32_t a, std::uint32_t b);
   void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
 
-  std::vector<std::uint32_t> first_run_;  // By tile * 32 + row.
-  std::vector<std::uint32_t> label_;      // By run: parent while uniting, then the component.
+  // By tile * 32 + row. The rows of a tile that is all inside are one run.
+  std::vector<std::uint32_t> first_run_;
+  std::vector<std::uint32_t> label_;  // By run: parent while uniting, then the component.
+  std::vector<TileShare> shares_;     // By tile.
   std::uint32_t count_ = 0;
 };
+
+/// Whether all nodes of a tile are inside.
+inline bool IsFull(const BitRows& rows) {
+  std::uint32_t all = ~std::uint32_t{0};
+  for (const std::uint32_t row : rows) all &= row;
+  return all == ~std::uint32_t{0};
+}
 
 /// The bits of a row at which a run of ones begins.
 inline std::uint32_t RunStarts(std::uint32_t row) { return row & ~(row << 1); }
@@ -59,9 +83,9 @@ inline std::uint32_t LowestRun(std::uint32_t row) { return row & ~(row + (row & 
 
 template <typename Visit>
 void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
-  std::uint32_t run = 0;
   for (std::uint32_t tile = 0; tile < crossings.tiles.size(); ++tile) {
     for (int j = 0; j < kTileSize; ++j) {
+      std::uint32_t run = first_run_[tile * kTileSize + j];
       for (std::uint32_t row = crossings.tiles[tile].inside[j]; row != 0;) {
         const std::uint32_t mask = LowestRun(row);
         visit(tile, j, mask, label_[run++]);
@@ -72,14 +96,20 @@ void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
 }
 
 template <typename Visit>
+void Components::ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings,
+                                   std::uint32_t tile, Visit visit) const {
+  for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
+    if (!IsAtHome(bins.entries[entry])) continue;
+    const TilePlace node = NearestInside(bins, crossings, tile, entry);
+    if (node.tile != kNoTile) visit(tile, entry, At(crossings, node));
+  }
+}
+
+template <typename Visit>
 void Components::ForEachParticle(const ParticleBins& bins, const Crossings& crossings,
                                  Visit visit) const {
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
-      if (!IsAtHome(bins.x[entry], bins.y[entry])) continue;
-      const TilePlace node = NearestInside(bins, crossings, tile, entry);
-      if (node.tile != kNoTile) visit(tile, entry, At(crossings, node));
-    }
+    ForEachParticleOf(bins, crossings, tile, visit);
   }
 }
 

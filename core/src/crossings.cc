@@ -61,24 +61,10 @@ unsigned CaseOf(const NodeRow& lower, const NodeRow& upper, int i) {
          (upper.left >> i & 1) << 3;
 }
 
-void MarkInside(const std::array<float, kTileNodes>& values, BitRows& inside) {
-  for (int j = 0; j < kTileSize; ++j) {
-    std::uint32_t row = 0;
-    for (int i = 0; i < kTileSize; ++i) {
-      row |= static_cast<std::uint32_t>(values[j * kTileSize + i] < 0) << i;
-    }
-    inside[j] = row;
-  }
-}
-
-struct Counts {
-  std::uint32_t cells = 0, segments = 0;
-};
-
 // Marks active and interior cells and counts cells and segments.
-Counts ClassifyCells(const TileDirectory& directory, std::vector<TileBits>& tiles,
-                     std::uint32_t tile) {
-  Counts counts;
+CrossingCounts ClassifyCells(const TileDirectory& directory, std::vector<TileBits>& tiles,
+                             std::uint32_t tile) {
+  CrossingCounts counts;
   NodeRow lower = InsideRow(directory, tiles, tile, 0);
   for (int j = 0; j < kTileSize; ++j) {
     const NodeRow upper = InsideRow(directory, tiles, tile, j + 1);
@@ -158,17 +144,17 @@ void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
                    Crossings& crossings) {
   const std::size_t tile_count = directory.size();
   crossings.tiles.resize(tile_count);
-  ForEachTile(tile_count, [&](std::uint32_t tile) {
-    MarkInside(level_set.tiles[tile], crossings.tiles[tile].inside);
-  });
+  ForEachTile(tile_count,
+              [&](std::uint32_t tile) { crossings.tiles[tile].inside = level_set.inside[tile]; });
 
-  std::vector<Counts> counts(tile_count);
+  std::vector<CrossingCounts>& counts = crossings.counts;
+  counts.resize(tile_count);
   ForEachTile(tile_count, [&](std::uint32_t tile) {
     counts[tile] = ClassifyCells(directory, crossings.tiles, tile);
   });
-  Counts total;
+  CrossingCounts total;
   for (std::size_t tile = 0; tile < tile_count; ++tile) {
-    const Counts here = counts[tile];
+    const CrossingCounts here = counts[tile];
     counts[tile] = total;
     crossings.tiles[tile].first_cell = total.cells;
     total = {total.cells + here.cells, total.segments + here.segments};

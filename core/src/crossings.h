@@ -46,10 +46,17 @@ struct TileBits {
   std::uint32_t first_cell = 0;  ///< Index of the tile's first active cell.
 };
 
+/// Cells and segments of a tile, or before it.
+struct CrossingCounts {
+  std::uint32_t cells = 0, segments = 0;
+};
+
 struct Crossings {
   std::vector<TileBits> tiles;
   std::vector<ActiveCell> cells;  ///< By tile, row, column.
   std::vector<Segment> segments;  ///< By cell.
+
+  std::vector<CrossingCounts> counts;  ///< Scratch, by tile.
 };
 
 /// Finds the active cells of a level set and their segments.

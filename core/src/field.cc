@@ -4,102 +4,125 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+
+#include "level_set_formula.h"
+#include "tile_kernels.h"
 
 namespace partiemc {
 namespace {
 
-using NodeValues = std::array<float, kTileNodes>;
-
-// Kernel sums at the nodes of one tile. The mean is relative to the node, so that it loses no
-// digits where the tile's corner is far.
-struct KernelSums {
-  NodeValues weight;    // sum k
-  NodeValues moment_x;  // sum k (x_i - x)
-  NodeValues moment_y;
-  NodeValues density;  // sum w k; used only where weights differ from particle to particle
-};
-
-// Nodes of a row or column that a particle at `centre` reaches, clipped to the tile.
-struct NodeRange {
-  int first, last;  // Inclusive; empty when last < first.
-};
-
-NodeRange NodesReached(float centre, float radius) {
-  const int first = static_cast<int>(std::ceil(centre - radius));
-  const int last = static_cast<int>(std::floor(centre + radius));
-  return {std::max(first, 0), std::min(last, kTileSize - 1)};
+TileEntries EntriesOf(const ParticleBins& bins, std::size_t tile) {
+  const std::uint32_t first = bins.offsets[tile];
+  return {bins.entries.data() + first, bins.weight.empty() ? nullptr : bins.weight.data() + first,
+          bins.offsets[tile + 1] - first};
 }
 
-template <bool kWeighted>
-void ScatterParticle(float x, float y, float w, float radius, float inverse_square,
-                     KernelSums& sums) {
-  const NodeRange columns = NodesReached(x, radius);
-  const NodeRange rows = NodesReached(y, radius);
-  for (int j = rows.first; j <= rows.last; ++j) {
-    const float dy = y - static_cast<float>(j);
-    const int row = j * kTileSize;
-    for (int i = columns.first; i <= columns.last; ++i) {
-      const float dx = x - static_cast<float>(i);
-      const float t = std::max(0.0f, 1.0f - (dx * dx + dy * dy) * inverse_square);
-      const float k = t * t * t;
-      sums.weight[row + i] += k;
-      sums.moment_x[row + i] += k * dx;
-      sums.moment_y[row + i] += k * dy;
-      if constexpr (kWeighted) sums.density[row + i] += w * k;
-    }
+// What a sum of kernels is worth: with weights of their own, particles bring them along.
+float WeightOf(const ParticleBins& bins, const Scale& scale) {
+  return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
+}
+
+// First pass: the density at every node, and what follows from it alone.
+void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::size_t tile,
+                  LevelSet& level_set) {
+  alignas(64) NodeSums sums;
+  ScatterKernel(EntriesOf(bins, tile), static_cast<float>(scale.kernel_radius), sums);
+  ClassifyNodes(sums, WeightOf(bins, scale), scale, level_set.tiles[tile].data(),
+                level_set.sure_inside[tile], level_set.sure_outside[tile]);
+  level_set.inside[tile] = level_set.sure_inside[tile];
+}
+
+// The nodes of which not all four neighbours and the node itself are in the class of `rows`, where
+// nodes of tiles that do not exist are all in it or all not.
+BitRows Uneven(const TileDirectory& directory, const std::vector<BitRows>& rows, bool beyond,
+               std::uint32_t tile) {
+  const Neighbourhood& near = directory.neighbours(tile);
+  const auto row = [&](std::uint32_t of, int j) {
+    return of != kNoTile ? rows[of][j] : beyond ? ~std::uint32_t{0} : 0;
+  };
+  BitRows uneven;
+  std::uint32_t below = row(near[1], kTileSize - 1);
+  for (int j = 0; j < kTileSize; ++j) {
+    const std::uint32_t here = rows[tile][j];
+    const std::uint32_t above = j + 1 < kTileSize ? rows[tile][j + 1] : row(near[7], 0);
+    const std::uint32_t left = here << 1 | row(near[3], j) >> (kTileSize - 1);
+    const std::uint32_t right = here >> 1 | row(near[5], j) << (kTileSize - 1);
+    uneven[j] = ~(here & below & above & left & right);
+    below = here;
   }
+  return uneven;
 }
 
-void ScatterTile(const ParticleBins& bins, std::size_t tile, const Scale& scale, KernelSums& sums) {
-  const auto radius = static_cast<float>(scale.kernel_radius);
-  const auto inverse_square = static_cast<float>(1 / (scale.kernel_radius * scale.kernel_radius));
-  sums.weight.fill(0);
-  sums.moment_x.fill(0);
-  sums.moment_y.fill(0);
-  sums.density.fill(0);
-  for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    if (bins.weight.empty()) {
-      ScatterParticle<false>(bins.x[e], bins.y[e], 0, radius, inverse_square, sums);
-    } else {
-      ScatterParticle<true>(bins.x[e], bins.y[e], bins.weight[e], radius, inverse_square, sums);
-    }
-  }
+// The nodes whose exact value may be asked for: the density leaves the side open of them or of a
+// neighbour, or a neighbour is on the other side.
+BitRows BandOf(const TileDirectory& directory, const LevelSet& level_set, std::uint32_t tile) {
+  BitRows band = Uneven(directory, level_set.sure_inside, false, tile);
+  const BitRows other = Uneven(directory, level_set.sure_outside, true, tile);
+  for (int j = 0; j < kTileSize; ++j) band[j] &= other[j];
+  return band;
 }
 
-void LevelSetOfTile(const KernelSums& sums, bool weighted, const Scale& scale, NodeValues& values) {
+// Second pass: F at the nodes of `band`.
+void SampleBand(const ParticleBins& bins, const Scale& scale, std::size_t tile, const BitRows& band,
+                LevelSet& level_set) {
+  MomentSums sums;
+  CellMask mask;
+  const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
+  const bool masked = reach < kMaskMargin;
+  // A node is reached from the cells whose far side is less than the radius before it.
+  if (masked) mask = Widened(band, reach, reach - 1);
+  ScatterMoments(EntriesOf(bins, tile), static_cast<float>(scale.kernel_radius),
+                 masked ? &mask : nullptr, sums);
+  const LevelSetFormula<float> formula(scale);
+  const NodeSums& weighted = bins.weight.empty() ? sums.kernel : sums.weighted;
+  const float weight = WeightOf(bins, scale);
   const auto reference_radius = static_cast<float>(scale.reference_radius);
-  const auto uniform_weight = static_cast<float>(scale.uniform_weight);
-  const auto guard = static_cast<float>(scale.guard);
-  const auto slope = static_cast<float>(scale.guard_slope);
-  const auto void_value = static_cast<float>(scale.VoidValue());
-  for (int node = 0; node < kTileNodes; ++node) {
-    const float k = sums.weight[node];
-    if (k <= 0) {
-      values[node] = void_value;
-      continue;
+  for (int j = 0; j < kTileSize; ++j) {
+    for (std::uint32_t bits = band[j]; bits != 0; bits &= bits - 1) {
+      const int i = std::countr_zero(bits);
+      const int node = SumIndex(i, j);
+      const float k = sums.kernel[node];
+      float value = level_set.void_value;
+      if (k > 0) {
+        const float mean_x = sums.moment_x[node] / k;
+        const float mean_y = sums.moment_y[node] / k;
+        const float phi = std::sqrt(mean_x * mean_x + mean_y * mean_y) - reference_radius;
+        value = formula.Value(weight * weighted[node], phi);
+      }
+      level_set.tiles[tile][j * kTileSize + i] = value;
+      const std::uint32_t bit = std::uint32_t{1} << i;
+      std::uint32_t& inside = level_set.inside[tile][j];
+      inside = value < 0 ? inside | bit : inside & ~bit;
     }
-    const float mean_x = sums.moment_x[node] / k;
-    const float mean_y = sums.moment_y[node] / k;
-    const float phi = std::sqrt(mean_x * mean_x + mean_y * mean_y) - reference_radius;
-    const float f = weighted ? sums.density[node] : uniform_weight * k;
-    values[node] = std::max(phi, (guard - f) * slope);
   }
+}
+
+template <typename Visit>
+void ForEachTile(const ParticleBins& bins, Visit visit) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(bins.tiles.size())),
+      [&](const tbb::blocked_range<std::uint32_t>& range) {
+        for (std::uint32_t tile = range.begin(); tile < range.end(); ++tile) visit(tile);
+      });
 }
 
 }  // namespace
 
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set) {
+  const std::size_t tiles = bins.tiles.size();
   level_set.void_value = static_cast<float>(scale.VoidValue());
-  level_set.tiles.resize(bins.tiles.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bins.tiles.size()),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      KernelSums sums;
-                      for (std::size_t tile = range.begin(); tile < range.end(); ++tile) {
-                        ScatterTile(bins, tile, scale, sums);
-                        LevelSetOfTile(sums, !bins.weight.empty(), scale, level_set.tiles[tile]);
-                      }
-                    });
+  level_set.tiles.resize(tiles);
+  level_set.inside.resize(tiles);
+  level_set.sure_inside.resize(tiles);
+  level_set.sure_outside.resize(tiles);
+  ForEachTile(bins, [&](std::uint32_t tile) { ClassifyTile(bins, scale, tile, level_set); });
+  ForEachTile(bins, [&](std::uint32_t tile) {
+    const BitRows band = BandOf(bins.tiles, level_set, tile);
+    const bool any = std::any_of(band.begin(), band.end(), [](auto row) { return row != 0; });
+    if (any) SampleBand(bins, scale, tile, band, level_set);
+  });
 }
 
 }  // namespace partiemc

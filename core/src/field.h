@@ -10,11 +10,18 @@
 
 namespace partiemc {
 
-/// The level set with its guard, F = max(|x - xbar| - r, (g - f) R / 1.164), in cells: negative
-/// inside. Node (i, j) of a tile is value j * 32 + i.
+/// The level set F (level_set_formula.h), in cells: negative inside. Node (i, j) of a tile is value
+/// j * 32 + i.
+///
+/// Values are exact at both ends of every lattice edge that the isoline crosses. Anywhere else only
+/// the sign is F's: where the density alone decides the side, of a node and of its four neighbours,
+/// the value is the branch that does.
 struct LevelSet {
   std::vector<std::array<float, kTileNodes>> tiles;
-  float void_value = 0;  ///< F where no particle reaches, hence in tiles that do not exist.
+  std::vector<BitRows> inside;  ///< By tile: the nodes at which F < 0.
+  float void_value = 0;         ///< F where no particle reaches, hence in tiles that do not exist.
+
+  std::vector<BitRows> sure_inside, sure_outside;  ///< By tile, scratch: the density decides.
 
   /// F at the node (i, j) of `tile`, 0 <= i, j <= 32: the last row and column are the neighbours'.
   float At(const TileDirectory& directory, std::uint32_t tile, int i, int j) const {
@@ -24,9 +31,11 @@ struct LevelSet {
   }
 };
 
-/// Samples F at every node of every tile of `bins`.
+/// Samples F at the nodes of every tile of `bins`: the density everywhere, the weighted mean only
+/// where the density leaves the side of a node or of one of its neighbours open.
 /// Accuracy: 1e-5 relative to f = 1 for f, for nodes and particles as rounded by the bins.
-/// Deterministic: each node's sums run over its tile's list in order, whatever the threads.
+/// Deterministic: each node's sums run over its tile's list in order, whatever the threads and
+/// whatever the instruction set. Parallel over tiles.
 /// Cost: linear in the entries of the bins, times the square of the kernel radius in cells.
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 

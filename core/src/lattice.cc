@@ -10,33 +10,9 @@ void TileDirectory::Clear() {
   std::fill(slots_.begin(), slots_.end(), kNoTile);
 }
 
-std::size_t TileDirectory::Slot(TileCoordinate tile) const {
-  // Fibonacci hashing of the pair; neighbouring tiles land far apart.
-  const auto x = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.x));
-  const auto y = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.y));
-  std::uint64_t key = (y << 32 | x) * 0x9e3779b97f4a7c15u;
-  key ^= key >> 29;
-  const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = key & mask;
-  while (slots_[slot] != kNoTile && tiles_[slots_[slot]] != tile) slot = (slot + 1) & mask;
-  return slot;
-}
-
 void TileDirectory::Grow() {
   slots_.assign(std::max<std::size_t>(64, 2 * slots_.size()), kNoTile);
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) slots_[Slot(tiles_[tile])] = tile;
-}
-
-void TileDirectory::Insert(TileCoordinate tile) {
-  if (2 * (tiles_.size() + 1) > slots_.size()) Grow();
-  const std::size_t slot = Slot(tile);
-  if (slots_[slot] != kNoTile) return;
-  slots_[slot] = static_cast<std::uint32_t>(tiles_.size());
-  tiles_.push_back(tile);
-}
-
-std::uint32_t TileDirectory::Find(TileCoordinate tile) const {
-  return slots_.empty() ? kNoTile : slots_[Slot(tile)];
 }
 
 void TileDirectory::Seal() {

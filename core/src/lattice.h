@@ -38,8 +38,9 @@ class TileDirectory {
   /// Forgets all tiles, keeps the memory.
   void Clear();
 
-  /// Adds a tile unless it is there. Cost: constant on average.
-  void Insert(TileCoordinate tile);
+  /// Adds a tile unless it is there. Returns its index, in the order in which tiles came.
+  /// Cost: constant on average.
+  std::uint32_t Insert(TileCoordinate tile);
 
   /// Sorts the tiles and links neighbours. Afterwards indices are positions in the sorted order.
   void Seal();
@@ -60,6 +61,32 @@ class TileDirectory {
   std::vector<Neighbourhood> neighbours_;
   std::vector<std::uint32_t> slots_;  // Open addressing, linear probing; kNoTile marks a free slot.
 };
+
+inline std::size_t TileDirectory::Slot(TileCoordinate tile) const {
+  // Fibonacci hashing of the pair; neighbouring tiles land far apart.
+  const auto x = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.x));
+  const auto y = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.y));
+  std::uint64_t key = (y << 32 | x) * 0x9e3779b97f4a7c15u;
+  key ^= key >> 29;
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t slot = key & mask;
+  while (slots_[slot] != kNoTile && tiles_[slots_[slot]] != tile) slot = (slot + 1) & mask;
+  return slot;
+}
+
+inline std::uint32_t TileDirectory::Insert(TileCoordinate tile) {
+  if (2 * (tiles_.size() + 1) > slots_.size()) Grow();
+  std::uint32_t& index = slots_[Slot(tile)];
+  if (index == kNoTile) {
+    index = static_cast<std::uint32_t>(tiles_.size());
+    tiles_.push_back(tile);
+  }
+  return index;
+}
+
+inline std::uint32_t TileDirectory::Find(TileCoordinate tile) const {
+  return slots_.empty() ? kNoTile : slots_[Slot(tile)];
+}
 
 /// A node or cell by its tile and its place in it, 0 <= i, j < 32.
 struct TilePlace {

@@ -1,12 +1,14 @@
 // The level set and its gradient at any point near the isoline, not only at nodes.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "bins.h"
 #include "crossings.h"
+#include "point_kernels.h"
 #include "scale.h"
 
 namespace partiemc {
@@ -17,22 +19,23 @@ struct FieldSample {
   double mean_x = 0, mean_y = 0;          ///< xbar - x, the weighted mean relative to the point.
   double phi = 0;                         ///< |x - xbar| - r
   double phi_x = 0, phi_y = 0;            ///< grad phi; 0 where x = xbar.
-  double value = 0;                       ///< F = max(phi, (g - f) R / 1.164)
-  double gradient_x = 0, gradient_y = 0;  ///< grad F, of the larger branch.
+  double value = 0;                       ///< F (level_set_formula.h)
+  double gradient_x = 0, gradient_y = 0;  ///< grad F, of the branch that F is.
   bool has_support = false;               ///< Whether any particle is within the kernel radius.
 };
 
-/// Particles of the tiles near the isoline, sorted into buckets of about a cell, so that a point
+/// Particles near the isoline, sorted into buckets of about a cell, so that a point
 /// looks at its surroundings instead of its whole tile.
 class PointField {
  public:
-  /// Indexes the tiles that have active cells; with `neighbours`, those next to them too.
-  /// Cost: linear in the entries of those tiles.
+  /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
+  /// cells away from one, along each axis. Cost: linear in the entries of those cells' tiles.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
-             bool neighbours);
+             double wander);
 
-  /// Samples at a point of an indexed tile, in cells relative to the tile, 0 <= x, y <= 32.
-  /// Deterministic: particles are summed by bucket, then in the order of the bins.
+  /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
+  /// Requires: the tile is indexed. Particles miss where Covers is false.
+  /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoint).
   /// Cost: the particles within a kernel radius and a bucket.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
@@ -46,25 +49,45 @@ class PointField {
 
   bool IsIndexed(std::uint32_t tile) const { return first_bucket_[tile] != kNoTile; }
 
+  /// Whether a point of a tile, 0 <= x, y < 32, is near enough to an active cell.
+  bool Covers(std::uint32_t tile, double x, double y) const {
+    return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
+  }
+
  private:
   struct BucketRange {
     int first, last;  // Inclusive.
   };
   BucketRange Buckets(double centre, double radius) const;
 
-  void MarkTiles(const ParticleBins& bins, const Crossings& crossings, bool neighbours);
+  int Bucket(double coordinate) const;
+  PointSums SumAt(std::uint32_t tile, double x, double y) const;
+  void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
+  std::uint32_t ChooseEntries(const ParticleBins& bins, std::uint32_t tile);
   void SortTile(const ParticleBins& bins, std::uint32_t tile);
 
   Scale scale_;
-  double bucket_size_ = 1;  // Cells.
-  double margin_ = 0;       // Cells that buckets extend beyond the tile on each side.
+  double buckets_per_cell_ = 1;
+  double margin_ = 0;  // Cells that buckets extend beyond the tile on each side.
   int bucket_columns_ = 0;
+  std::vector<BitRows> asked_;               // Per tile: the cells in which points may lie.
   std::vector<std::uint32_t> first_bucket_;  // Per tile: into bucket_offsets_, or kNoTile.
   std::vector<std::uint32_t> first_entry_;   // Per tile: into the arrays below.
   std::vector<std::uint32_t> bucket_offsets_;
   std::vector<float> x_, y_, weight_;
   std::vector<std::uint32_t> source_;
+  std::vector<std::uint32_t> chosen_, bucket_;  // Scratch: entries of the bins, and their buckets.
 };
+
+inline int PointField::Bucket(double coordinate) const {
+  // Truncation rounds down: nothing is farther from its tile than the margin.
+  const int index = static_cast<int>((coordinate + margin_) * buckets_per_cell_);
+  return std::clamp(index, 0, bucket_columns_ - 1);
+}
+
+inline PointField::BucketRange PointField::Buckets(double centre, double radius) const {
+  return {Bucket(centre - radius), Bucket(centre + radius)};
+}
 
 template <typename Visit>
 void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radius,

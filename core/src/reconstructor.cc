@@ -90,6 +90,21 @@ absl::StatusOr<double> LightestVolume(const Frame& frame, double spacing) {
   return lightest;
 }
 
+// How far from active cells a placement asks for the field, in cells: `farthest-particle` at the
+// mean of the particles around a cell, `virtual-plane` where Newton steps of its roots end.
+double WanderOf(Placement placement, const Scale& scale) {
+  switch (placement) {
+    case Placement::kFarthestParticle:
+      return scale.kernel_radius + 1;
+    case Placement::kVirtualPlane:
+      return 2;
+    case Placement::kMarchingSquares:
+    case Placement::kQef:
+      break;
+  }
+  return 0;
+}
+
 void Summarise(const Workspace::Buffers& buffers, const Lengths& lengths, Result& result) {
   FrameStatistics& statistics = result.statistics;
   statistics.tiles = buffers.bins.tiles.size();
@@ -123,11 +138,9 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
     TraceRings(b.bins, b.level_set, scale, parameters, b.crossings, b.ring_scratch, b.topology);
   }
   const bool farthest = parameters.placement == Placement::kFarthestParticle;
-  // These two ask for the field beyond the cells of the isoline.
-  const bool wanders = farthest || parameters.placement == Placement::kVirtualPlane;
   {
     const StageScope scope(observer, Stage::kNormals);
-    b.point_field.Build(b.bins, b.crossings, scale, wanders);
+    b.point_field.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale));
     EstimateNormals(b.bins, b.level_set, b.crossings, b.topology, b.point_field, parameters,
                     previous.normals, b.planes, b.next_normals);
   }

@@ -119,9 +119,9 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous, RingT
 
   const auto follow_id = [&](std::uint32_t tile, std::uint32_t entry, std::uint32_t ring) {
     const TileCoordinate& origin = input.bins.tiles[tile];
-    const ParticleSample now{HashOf(frame.ids[input.bins.source[entry]]),
-                             NearestNode(origin.x, input.bins.x[entry]),
-                             NearestNode(origin.y, input.bins.y[entry]), ring};
+    const ParticleSample now{HashOf(frame.ids[input.bins.entries[entry].source]),
+                             NearestNode(origin.x, input.bins.entries[entry].x),
+                             NearestNode(origin.y, input.bins.entries[entry].y), ring};
     TakeSample(now, t);
     if (const ParticleSample* const before = known.Find(now)) {
       t.found.push_back(
@@ -137,7 +137,8 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous, RingT
         if (ring == kNoRing) return;
         if (has_ids) follow_id(tile, entry, ring);
         if (!has_velocities) return;
-        const PlaneVelocity velocity = VelocityOf(frame, input.plane, input.bins.source[entry]);
+        const PlaneVelocity velocity =
+            VelocityOf(frame, input.plane, input.bins.entries[entry].source);
         t.sum_x[ring] += units.Of(velocity.x);
         t.sum_y[ring] += units.Of(velocity.y);
       });

@@ -79,8 +79,8 @@ void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopolog
 // Sets every node that the ring encloses. The ring crosses a row of the lattice in pairs of
 // horizontal edges; the nodes between the two of a pair are enclosed.
 void FillRing(const TileDirectory& directory, const RingTopology& rings, std::size_t ring,
-              Crossings& crossings) {
-  std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
+              Crossings& crossings, std::vector<std::pair<std::int64_t, std::int64_t>>& edges) {
+  edges.clear();
   for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
     const Segment& segment = crossings.segments[rings.segments[k]];
     if (segment.entry & 1) continue;  // A vertical edge.
@@ -137,7 +137,7 @@ void Clean(const ParticleBins& bins, const LevelSet& level_set, const Scale& sca
   for (std::size_t ring = 0; ring + 1 < rings.offsets.size(); ++ring) {
     const double area = AreaOf(bins, level_set, crossings, rings, ring, scratch.points);
     if (area < 0 && -area < min_area) {
-      FillRing(bins.tiles, rings, ring, crossings);
+      FillRing(bins.tiles, rings, ring, crossings, scratch.edges);
       ++rings.dropped_holes;
     }
   }
@@ -152,7 +152,7 @@ void Clean(const ParticleBins& bins, const LevelSet& level_set, const Scale& sca
 void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& crossings,
           RingScratch& scratch, RingTopology& rings) {
   const std::size_t ring_count = rings.offsets.size() - 1;
-  std::vector<std::uint32_t> outer_ring(scratch.components.size(), kNoRing);
+  scratch.outer_ring.assign(scratch.components.size(), kNoRing);
   scratch.component_of_ring.resize(ring_count);
   scratch.area.resize(ring_count);
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
@@ -160,7 +160,7 @@ void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& 
     const std::uint32_t component = scratch.components.At(crossings, nodes.inside);
     scratch.component_of_ring[ring] = component;
     scratch.area[ring] = AreaOf(bins, level_set, crossings, rings, ring, scratch.points);
-    if (scratch.area[ring] >= 0) outer_ring[component] = static_cast<std::uint32_t>(ring);
+    if (scratch.area[ring] >= 0) scratch.outer_ring[component] = static_cast<std::uint32_t>(ring);
   }
   rings.outer_of.assign(ring_count, kNoRing);
   rings.particle_count.assign(ring_count, 0);
@@ -168,7 +168,7 @@ void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& 
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
     const std::uint32_t component = scratch.component_of_ring[ring];
     if (scratch.area[ring] < 0) {
-      rings.outer_of[ring] = outer_ring[component];
+      rings.outer_of[ring] = scratch.outer_ring[component];
     } else {
       rings.particle_count[ring] = scratch.particle_count[component];
       rings.particle_weight[ring] = scratch.particle_weight[component];

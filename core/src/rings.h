@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "bins.h"
@@ -34,6 +35,8 @@ struct RingScratch {
   std::vector<double> particle_weight;
   std::vector<std::uint8_t> visited;
   std::vector<LatticePoint> points;
+  std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
+  std::vector<std::uint32_t> outer_ring;                     // By component.
   std::vector<std::uint32_t> component_of_ring;
   std::vector<double> area;  // By ring, in cells.
   CrossedRows rows;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "level_set_formula.h"
+
 namespace partiemc {
 namespace {
 
@@ -13,13 +15,16 @@ constexpr double kFourOverPi = 1.27323954473516268615;
 constexpr double kGuardFactor = 0.9;
 // A lone particle must survive, hence never more than this share of the lightest one's own f.
 constexpr double kGuardShareOfLightest = 0.7;
+// Above this density a node is inside, whatever the weighted mean says: f is about 1 inside and
+// 0.5 on a flat boundary, and at the edge of a void of six particles' area about 0.6.
+constexpr double kSaturation = 0.85;
 // Slope of f across a flat boundary, measured in 1 / R: makes F a length on both branches.
 constexpr double kBoundarySlope = 1.164;
 
 }  // namespace
 
 double Scale::VoidValue() const {
-  return std::max(kernel_radius - reference_radius, guard * guard_slope);
+  return LevelSetFormula<double>(*this).Value(0, kernel_radius - reference_radius);
 }
 
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
@@ -35,6 +40,7 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
       scale.weight_per_volume * (lightest_volume / cell_size / cell_size);
   const double beta = parameters.kernel_radius;
   scale.guard = std::min(kGuardFactor / (beta * beta), kGuardShareOfLightest * lightest_weight);
+  scale.saturation = kSaturation;
   scale.guard_slope = scale.kernel_radius / kBoundarySlope;
   return scale;
 }

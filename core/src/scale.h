@@ -15,6 +15,7 @@ struct Scale {
   double uniform_weight = 0;     ///< w of a particle of volume h^2, so that f is about 1 inside.
   double weight_per_volume = 0;  ///< w of a particle of volume 1 cell^2.
   double guard = 0;              ///< g: where f is below it there is no inside.
+  double saturation = 0;         ///< t: where f is above it there is no outside.
   double guard_slope = 0;        ///< R / 1.164: turns a lack of density into a length.
 
   /// Value of the level set where no particle reaches.

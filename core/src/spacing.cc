@@ -1,5 +1,9 @@
 #include "spacing.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -25,17 +29,24 @@ double Along(const WorldPosition& position, int axis) {
   return axis == 0 ? position.x : position.y;
 }
 
+// Below so many positions a task would cost more than it saves.
+constexpr std::size_t kMinParallel = 1 << 13;
+
 // Orders positions into an implicit balanced k-d tree: the middle of a range splits it.
 void BuildTree(std::span<WorldPosition> positions, int axis) {
-  while (positions.size() > 1) {
-    const std::size_t middle = positions.size() / 2;
-    std::nth_element(positions.begin(), positions.begin() + middle, positions.end(),
-                     [axis](const WorldPosition& a, const WorldPosition& b) {
-                       return Along(a, axis) < Along(b, axis);
-                     });
-    BuildTree(positions.first(middle), 1 - axis);
-    positions = positions.subspan(middle + 1);
-    axis = 1 - axis;
+  if (positions.size() < 2) return;
+  const std::size_t middle = positions.size() / 2;
+  std::nth_element(positions.begin(), positions.begin() + middle, positions.end(),
+                   [axis](const WorldPosition& a, const WorldPosition& b) {
+                     return Along(a, axis) < Along(b, axis);
+                   });
+  const auto build_lower = [=] { BuildTree(positions.first(middle), 1 - axis); };
+  const auto build_upper = [=] { BuildTree(positions.subspan(middle + 1), 1 - axis); };
+  if (positions.size() >= kMinParallel) {
+    tbb::parallel_invoke(build_lower, build_upper);
+  } else {
+    build_lower();
+    build_upper();
   }
 }
 
@@ -77,23 +88,29 @@ double MedianOf(std::vector<double>& values) {
 std::optional<double> EstimateSpacing(const Frame& frame, Plane plane) {
   const std::size_t count = frame.ParticleCount();
   Positions positions(count);
-  for (std::size_t k = 0; k < count; ++k) positions[k] = PositionOf(frame, plane, k);
+  VisitPositions(frame, plane, [&](const auto& reader) {
+    for (std::size_t k = 0; k < count; ++k) positions[k] = reader[k];
+  });
   // Sorted and without duplicates: the tree is the same for any order of the particles, and no
   // query wades through a million copies of itself.
-  std::sort(positions.begin(), positions.end(),
-            [](const auto& a, const auto& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  tbb::parallel_sort(positions.begin(), positions.end(), [](const auto& a, const auto& b) {
+    return a.x != b.x ? a.x < b.x : a.y < b.y;
+  });
   const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
   positions.erase(std::unique(positions.begin(), positions.end(), same), positions.end());
   BuildTree(positions, 0);
 
   const std::uint64_t stride = std::max<std::size_t>(1, positions.size() / kSampleSize);
   const double infinity = std::numeric_limits<double>::infinity();
-  std::vector<double> distances;
+  Positions asked;
   for (const WorldPosition& position : positions) {
-    if (HashOf(position) % stride != 0) continue;
-    const double square = NearestSquare(positions, position, 0, infinity);
-    if (square < infinity) distances.push_back(std::sqrt(square));
+    if (HashOf(position) % stride == 0) asked.push_back(position);
   }
+  std::vector<double> distances(asked.size());
+  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t k) {
+    distances[k] = std::sqrt(NearestSquare(positions, asked[k], 0, infinity));
+  });
+  std::erase(distances, infinity);
   if (distances.empty()) return std::nullopt;
   const double median = MedianOf(distances);
   std::erase_if(distances, [&](double distance) { return distance > kLonelyRatio * median; });

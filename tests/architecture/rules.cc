@@ -70,6 +70,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"Protobuf", {"libprotobuf-dev", "protobuf-compiler"}},
       {"spdlog", {"libspdlog-dev"}},
       {"TBB", {"libtbb-dev"}},
+      {"hwy", {"libhwy-dev"}},
       {"Threads", {}},
       {"VTK", {"libvtk9-dev"}},
       {"ZLIB", {"zlib1g-dev"}},

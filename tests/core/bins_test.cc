@@ -42,8 +42,8 @@ class RandomBins : public testing::TestWithParam<int> {
   void ForEachEntry(Visit visit) const {
     for (std::size_t tile = 0; tile < bins_.tiles.size(); ++tile) {
       for (std::uint32_t e = bins_.offsets[tile]; e < bins_.offsets[tile + 1]; ++e) {
-        visit(tile, e, static_cast<double>(bins_.x[e]) + 32.0 * bins_.tiles[tile].x,
-              static_cast<double>(bins_.y[e]) + 32.0 * bins_.tiles[tile].y);
+        visit(tile, e, static_cast<double>(bins_.entries[e].x) + 32.0 * bins_.tiles[tile].x,
+              static_cast<double>(bins_.entries[e].y) + 32.0 * bins_.tiles[tile].y);
       }
     }
   }
@@ -57,7 +57,7 @@ class RandomBins : public testing::TestWithParam<int> {
 TEST_P(RandomBins, EachParticleIsAtHomeInExactlyOneTile) {
   std::vector<int> homes(particles_.size());
   ForEachEntry([&](std::size_t, std::uint32_t e, double, double) {
-    homes[bins_.source[e]] += IsAtHome(bins_.x[e], bins_.y[e]);
+    homes[bins_.entries[e].source] += IsAtHome(bins_.entries[e]);
   });
   for (std::size_t k = 0; k < homes.size(); ++k) EXPECT_EQ(homes[k], 1) << "particle " << k;
 }
@@ -65,8 +65,8 @@ TEST_P(RandomBins, EachParticleIsAtHomeInExactlyOneTile) {
 TEST_P(RandomBins, EachParticleStandsInEveryTileWhoseNodesItsKernelReaches) {
   std::vector<std::vector<bool>> listed(bins_.tiles.size(), std::vector<bool>(particles_.size()));
   ForEachEntry([&](std::size_t tile, std::uint32_t e, double, double) {
-    EXPECT_FALSE(listed[tile][bins_.source[e]]) << "listed twice";
-    listed[tile][bins_.source[e]] = true;
+    EXPECT_FALSE(listed[tile][bins_.entries[e].source]) << "listed twice";
+    listed[tile][bins_.entries[e].source] = true;
   });
   for (std::size_t k = 0; k < particles_.size(); ++k) {
     const double x = particles_.x(k) / scale_.cell_size;
@@ -102,7 +102,7 @@ TEST_P(RandomBins, TilesReachACellAndTheRadiusOfASmallHoleBeyondEveryKernel) {
 TEST_P(RandomBins, AParticleHasTheSamePositionInEachOfItsTiles) {
   std::vector<double> x(particles_.size(), kNan), y(particles_.size(), kNan);
   ForEachEntry([&](std::size_t, std::uint32_t e, double px, double py) {
-    const std::uint32_t k = bins_.source[e];
+    const std::uint32_t k = bins_.entries[e].source;
     if (std::isnan(x[k])) {
       x[k] = px;
       y[k] = py;
@@ -118,10 +118,10 @@ TEST_P(RandomBins, AParticleHasTheSamePositionInEachOfItsTiles) {
 
 TEST_P(RandomBins, EntriesOfATileStandInTheOrderOfTheFrame) {
   ASSERT_EQ(bins_.offsets.size(), bins_.tiles.size() + 1);
-  EXPECT_EQ(bins_.offsets.back(), bins_.source.size());
+  EXPECT_EQ(bins_.offsets.back(), bins_.entries.size());
   for (std::size_t tile = 0; tile < bins_.tiles.size(); ++tile) {
     for (std::uint32_t e = bins_.offsets[tile] + 1; e < bins_.offsets[tile + 1]; ++e) {
-      EXPECT_LT(bins_.source[e - 1], bins_.source[e]);
+      EXPECT_LT(bins_.entries[e - 1].source, bins_.entries[e].source);
     }
   }
 }
@@ -134,7 +134,7 @@ TEST_P(RandomBins, WeightsAreVolumesInUnitsOfTheKernel) {
   ForEachEntry([&](std::size_t, std::uint32_t e, double, double) {
     const double radius = scale_.kernel_radius * scale_.cell_size;
     const double expected =
-        particles_.volumes[bins_.source[e]] * 4 / (std::acos(-1) * radius * radius);
+        particles_.volumes[bins_.entries[e].source] * 4 / (std::acos(-1) * radius * radius);
     EXPECT_NEAR(bins_.weight[e], expected, 1e-6 * expected);
   });
 }
@@ -144,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, RandomBins, testing::Range(1, 21));
 TEST(Bins, AFrameWithoutParticlesHasNoTiles) {
   const ParticleBins bins = Bin({}, ScaleOf(1, 3, 1));
   EXPECT_EQ(bins.tiles.size(), 0u);
-  EXPECT_TRUE(bins.source.empty());
+  EXPECT_TRUE(bins.entries.empty());
   EXPECT_EQ(bins.offsets, std::vector<std::uint32_t>{0});
 }
 
@@ -163,7 +163,11 @@ TEST(Bins, WhatAnEarlierFrameLeftBehindIsForgotten) {
   const support::Particles next = support::Lattice(3, 3, 100, 100);
   ASSERT_TRUE(BinParticles(next.AsFrame(), Plane::kXy, scale, {}, bins).ok());
   const ParticleBins fresh = Bin(next, scale);
-  EXPECT_EQ(bins.x, fresh.x);
+  ASSERT_EQ(bins.entries.size(), fresh.entries.size());
+  for (std::size_t k = 0; k < fresh.entries.size(); ++k) {
+    EXPECT_EQ(bins.entries[k].x, fresh.entries[k].x);
+    EXPECT_EQ(bins.entries[k].source, fresh.entries[k].source);
+  }
   EXPECT_EQ(bins.offsets, fresh.offsets);
   EXPECT_TRUE(bins.weight.empty());
 }

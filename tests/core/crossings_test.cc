@@ -12,6 +12,7 @@
 
 #include "support/oracle.h"
 #include "support/random.h"
+#include "support/stages.h"
 
 namespace partiemc {
 namespace {
@@ -30,14 +31,7 @@ struct Contour {
       for (std::int32_t x = low.x; x <= high.x; ++x) tiles.Insert({y, x});
     }
     tiles.Seal();
-    level_set.void_value = 1;
-    level_set.tiles.resize(tiles.size());
-    for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
-      for (int node = 0; node < kTileNodes; ++node) {
-        level_set.tiles[tile][node] = static_cast<float>(
-            function(32 * tiles[tile].x + node % kTileSize, 32 * tiles[tile].y + node / kTileSize));
-      }
-    }
+    level_set = support::LevelSetOf(function, tiles);
     FindCrossings(tiles, level_set, crossings);
   }
 

@@ -68,7 +68,11 @@ double FieldOracle::Phi(Vector at) const {
 
 double FieldOracle::Guard(Vector at) const { return (guard_ - Density(at)) * radius_ / 1.164; }
 
-double FieldOracle::Value(Vector at) const { return std::max(Phi(at), Guard(at)); }
+double FieldOracle::Saturation(Vector at) const { return (0.85 - Density(at)) * radius_ / 1.164; }
+
+double FieldOracle::Value(Vector at) const {
+  return std::min(std::max(Phi(at), Guard(at)), Saturation(at));
+}
 
 template <typename Function>
 Vector FieldOracle::CentralDifferences(Function function, Vector at) const {

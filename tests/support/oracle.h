@@ -29,7 +29,8 @@ class FieldOracle {
   std::optional<Vector> Mean(Vector at) const;  ///< xbar, Eq. 3-4; nothing without support.
   double Phi(Vector at) const;                  ///< Eq. 5; R - r without support.
   double Guard(Vector at) const;                ///< (g - f) R / 1.164
-  double Value(Vector at) const;                ///< F = max(phi, guard)
+  double Saturation(Vector at) const;           ///< (t - f) R / 1.164
+  double Value(Vector at) const;                ///< F = min(max(phi, guard), saturation)
   Vector PhiGradient(Vector at) const;          ///< By central differences.
   Vector ValueGradient(Vector at) const;        ///< By central differences.
   double kernel_radius() const { return radius_; }

@@ -6,6 +6,24 @@
 
 namespace partiemc::support {
 
+LevelSet LevelSetOf(const std::function<double(int, int)>& function, const TileDirectory& tiles) {
+  LevelSet level_set;
+  level_set.void_value = 1;
+  level_set.tiles.resize(tiles.size());
+  level_set.inside.resize(tiles.size());
+  for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
+    for (int node = 0; node < kTileNodes; ++node) {
+      const int i = node % kTileSize;
+      const int j = node / kTileSize;
+      const auto value = static_cast<float>(
+          function(tiles[tile].x * kTileSize + i, tiles[tile].y * kTileSize + j));
+      level_set.tiles[tile][node] = value;
+      level_set.inside[tile][j] |= static_cast<std::uint32_t>(value < 0) << i;
+    }
+  }
+  return level_set;
+}
+
 void Stages::SetScale(const ReconstructionParameters& wanted) {
   parameters = Resolve(wanted);
   const double spacing = parameters.spacing.value();
@@ -44,26 +62,22 @@ void Stages::TraceOn(const std::function<double(int, int)>& function, TileCoordi
     for (std::int32_t x = low.x; x <= high.x; ++x) bins.tiles.Insert({y, x});
   }
   bins.tiles.Seal();
-  level_set.void_value = 1;
-  level_set.tiles.resize(bins.tiles.size());
+  level_set = LevelSetOf(function, bins.tiles);
   bins.offsets = {0};
   for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
     const int column = bins.tiles[tile].x * kTileSize;
     const int row = bins.tiles[tile].y * kTileSize;
-    for (int node = 0; node < kTileNodes; ++node) {
-      level_set.tiles[tile][node] =
-          static_cast<float>(function(column + node % kTileSize, row + node / kTileSize));
-    }
+    bins.home_count.push_back(0);
     for (std::size_t k = 0; k < particles.size(); ++k) {
       const double px = particles.x(k) / scale.cell_size - column;
       const double py = particles.y(k) / scale.cell_size - row;
       const double reach = scale.kernel_radius;
       if (std::min(px, py) < -reach || std::max(px, py) > kTileSize + reach) continue;
-      bins.x.push_back(static_cast<float>(px));
-      bins.y.push_back(static_cast<float>(py));
-      bins.source.push_back(static_cast<std::uint32_t>(k));
+      bins.entries.push_back(
+          {static_cast<float>(px), static_cast<float>(py), static_cast<std::uint32_t>(k)});
+      bins.home_count.back() += IsAtHome(bins.entries.back());
     }
-    bins.offsets.push_back(static_cast<std::uint32_t>(bins.x.size()));
+    bins.offsets.push_back(static_cast<std::uint32_t>(bins.entries.size()));
   }
   Trace();
 }
@@ -74,7 +88,7 @@ void Stages::Trace() {
 }
 
 void Stages::RunFromRings(std::span<const CellNormal> previous) {
-  field.Build(bins, crossings, scale, true);
+  field.Build(bins, crossings, scale, scale.kernel_radius + 1);
   EstimateNormals(bins, level_set, crossings, topology, field, parameters, previous, planes,
                   next_normals);
   const Frame frame = particles.AsFrame();

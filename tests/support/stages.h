@@ -20,6 +20,9 @@
 
 namespace partiemc::support {
 
+/// A level set with values of `function` at nodes (column, row).
+LevelSet LevelSetOf(const std::function<double(int, int)>& function, const TileDirectory& tiles);
+
 /// What the stages make of one frame. Not movable once run: later results refer to earlier ones.
 struct Stages {
   ReconstructionParameters parameters;  ///< Resolved.

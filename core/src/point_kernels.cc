@@ -1,0 +1,116 @@
+#include "point_kernels.h"
+
+// Highway compiles the rest of this file once for each target.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "point_kernels.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Lanes = hn::CappedTag<double, kPointPadding>;
+using Vector = hn::Vec<Lanes>;
+using FloatLanes = hn::Rebind<float, Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+// Vectors that make up the four partial sums.
+constexpr int kParts = kPointPadding / kLanes;
+
+// sum w k etc. follow from the others where all weights are the same.
+enum Channel { kKernel, kMomentX, kMomentY, kSlopeX, kSlopeY, kXx, kXy, kYx, kYy, kSums };
+enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
+
+HWY_INLINE Vector LoadDouble(const float* values) {
+  return hn::PromoteTo(Lanes(), hn::LoadU(FloatLanes(), values));
+}
+
+template <bool kWeighted>
+HWY_INLINE void AddEntries(const PointQuery& query, std::uint32_t entry, int left, Vector* sums) {
+  const Lanes d;
+  const Vector dx = hn::Sub(LoadDouble(query.entry_x + entry), hn::Set(d, query.x));
+  const Vector dy = hn::Sub(LoadDouble(query.entry_y + entry), hn::Set(d, query.y));
+  const Vector inverse_square = hn::Set(d, query.inverse_square);
+  const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+  Vector t = hn::Sub(hn::Set(d, 1.0), hn::Mul(square, inverse_square));
+  // Lanes past the end of the row hold other entries, or none.
+  const auto is_entry = hn::Lt(hn::Iota(d, 0.0), hn::Set(d, static_cast<double>(left)));
+  t = hn::IfThenElseZero(is_entry, hn::Max(hn::Zero(d), t));
+  const Vector t2 = hn::Mul(t, t);
+  const Vector k = hn::Mul(t2, t);
+  const Vector slope = hn::Mul(hn::Mul(hn::Set(d, 6.0), t2), inverse_square);
+  const Vector kx = hn::Mul(slope, dx);
+  const Vector ky = hn::Mul(slope, dy);
+  const auto add = [&](int channel, Vector term) { sums[channel] = hn::Add(sums[channel], term); };
+  add(kKernel, k);
+  add(kMomentX, hn::Mul(k, dx));
+  add(kMomentY, hn::Mul(k, dy));
+  add(kSlopeX, kx);
+  add(kSlopeY, ky);
+  add(kXx, hn::Mul(kx, dx));
+  add(kXy, hn::Mul(ky, dx));
+  add(kYx, hn::Mul(kx, dy));
+  add(kYy, hn::Mul(ky, dy));
+  if constexpr (kWeighted) {
+    const Vector w = LoadDouble(query.weight + entry);
+    add(kDensity, hn::Mul(w, k));
+    add(kDensityX, hn::Mul(w, kx));
+    add(kDensityY, hn::Mul(w, ky));
+  }
+}
+
+template <bool kWeighted>
+PointSums Sum(const PointQuery& query) {
+  constexpr int kChannels = kWeighted ? int{kWeightedSums} : int{kSums};
+  const Lanes d;
+  Vector sums[kParts][kChannels];
+  for (auto& part : sums) {
+    for (Vector& sum : part) sum = hn::Zero(d);
+  }
+  for (int row = 0; row < query.rows; ++row) {
+    const std::uint32_t* offsets = query.offsets + row * query.row_stride;
+    const std::uint32_t end = offsets[query.columns];
+    for (std::uint32_t entry = offsets[0]; entry < end; entry += kPointPadding) {
+      for (int part = 0; part < kParts; ++part) {
+        const int left = static_cast<int>(end - entry) - part * kLanes;
+        AddEntries<kWeighted>(query, entry + part * kLanes, left, sums[part]);
+      }
+    }
+  }
+  double totals[kWeightedSums] = {};
+  for (int channel = 0; channel < kChannels; ++channel) {
+    HWY_ALIGN double parts[kPointPadding];
+    for (int part = 0; part < kParts; ++part) {
+      hn::StoreU(sums[part][channel], d, parts + part * kLanes);
+    }
+    totals[channel] = (parts[0] + parts[1]) + (parts[2] + parts[3]);
+  }
+  if constexpr (!kWeighted) {
+    totals[kDensity] = query.uniform_weight * totals[kKernel];
+    totals[kDensityX] = query.uniform_weight * totals[kSlopeX];
+    totals[kDensityY] = query.uniform_weight * totals[kSlopeY];
+  }
+  return {totals[kKernel], totals[kMomentX], totals[kMomentY],  totals[kSlopeX],
+          totals[kSlopeY], totals[kXx],      totals[kXy],       totals[kYx],
+          totals[kYy],     totals[kDensity], totals[kDensityX], totals[kDensityY]};
+}
+
+PointSums SumAtPoint(const PointQuery& query) {
+  return query.weight != nullptr ? Sum<true>(query) : Sum<false>(query);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace partiemc {
+
+HWY_EXPORT(SumAtPoint);
+
+PointSums SumAtPoint(const PointQuery& query) { return HWY_DYNAMIC_DISPATCH(SumAtPoint)(query); }
+
+}  // namespace partiemc
+#endif  // HWY_ONCE
