@@ -56,8 +56,9 @@ Deviation Jitter(const Curve& carried, const Curve& next, const SegmentIndex* ca
 /// `contour` (world units) sampled every kSampleStep spacings and carried from `frame` to the next.
 Outline Carried(const Outline& contour, const Motion& motion, std::size_t frame, double spacing);
 
-/// The same for recordings: every point moves by the mean displacement of the particles within two
-/// spacings, weighted by the kernel (1 - s^2)^3, of the nearest particle where there is none.
+/// The same for recordings: every point moves by an affine field fitted to the displacements of the
+/// particles within three spacings, weighted by the kernel (1 - s^2)^3, and as the nearest particle
+/// where there is none.
 /// Displacements come from identities where both frames have them, else from velocities, by the
 /// time between the frames. Nothing if there is neither.
 std::optional<Outline> Advected(const Outline& contour, const SequenceFrame& from,

@@ -152,6 +152,24 @@ TEST(Advection, UsesVelocitiesWhereThereAreNoIdentities) {
   EXPECT_FALSE(Advected(contour, FrameOf(particles, 0), to, 1).has_value());
 }
 
+// A contour has all of its particles on one side: their mean would lag behind by the shear over the
+// distance to their centre, 0.1 of it here.
+TEST(Advection, FollowsAShearBeyondTheOutermostParticles) {
+  std::vector<Point> particles;
+  for (int k = 0; k < 400; ++k) particles.push_back({k % 20 - 9.5, k / 20 - 19.5});
+  SequenceFrame from = FrameOf(particles, 0);
+  for (std::size_t k = 0; k < particles.size(); ++k) from.ids.push_back(k + 1);
+  for (Point& p : particles) p.x += 0.1 * p.y;
+  SequenceFrame to = FrameOf(particles, 1);
+  to.ids = from.ids;
+  Outline contour;
+  contour.AddLoop(std::vector<Point>{{0, 0}, {-1, 0}, {-1, -10}});
+  const auto advected = Advected(contour, from, to, 1);
+  ASSERT_TRUE(advected.has_value());
+  EXPECT_NEAR(advected->points[0].x, 0, 0.05);
+  EXPECT_NEAR(advected->points[0].y, 0, 1e-12);
+}
+
 TEST(Defects, CountsFoldsCrossingsAndWrongNormals) {
   Outline eight;
   eight.AddLoop(std::vector<Point>{{0, 0}, {2, 2}, {2, 0}, {0, 2}});
