@@ -13,14 +13,14 @@ namespace {
 constexpr std::uint64_t kMinPooledParticles = 30;
 
 // Volumes of recordings are 1-4 % off: more than this is not theirs to decide. In spacings.
-constexpr double kMaxOffset = 0.05;
+constexpr double kMaxOffset = 0.1;
 // Wishes beyond the first number fade, beyond the second they are ignored. In spacings.
 constexpr double kFadeFrom = 0.2;
 constexpr double kFadeTo = 0.4;
 
 // Share of the difference to the wish that a frame makes good. Following at once turns every change
 // of topology into a jump of the whole outline.
-constexpr double kFollow = 0.5;
+constexpr double kFollow = 0.4;
 
 // Longest mitre, as a multiple of the offset.
 constexpr double kMaxMitre = 2;

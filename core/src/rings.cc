@@ -9,7 +9,7 @@ namespace {
 
 // Holes of less area than this many particles have are dents of the level set, not voids of the
 // fluid (core/METHOD.md, "Cleaning").
-constexpr double kMinHoleParticles = 6;
+constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
 void Trace(const TileDirectory& directory, const Crossings& crossings,

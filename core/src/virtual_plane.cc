@@ -15,8 +15,9 @@ namespace {
 constexpr double kMaxEdgeStep = 0.3;
 
 // Shorter rings stay at their roots: the windows below would meet their own ends.
-constexpr double kMinRefinedLength = 12;  // Spacings.
-constexpr std::size_t kMinRefinedVertices = 16;
+// Where drops form and vanish, refining short ones costs more calm than it gains shape.
+constexpr double kMinRefinedLength = 24;  // Spacings.
+constexpr std::size_t kMinRefinedVertices = 24;
 
 // Reaches of the windows along a ring, in spacings. Each was the best of a coarse scan on the
 // tuning set; a factor of 1.5 either way changes no ratio by more than a few percent.
@@ -25,8 +26,10 @@ constexpr double kBilateralReach = 6;
 constexpr double kCurvatureReach = 2;
 constexpr double kSmoothingReach = 3;
 
-// The kernel rounds a boundary of curvature kappa off by about half of h^2 kappa.
-constexpr double kRoundingPerCurvature = 0.5;
+// The kernel rounds a boundary of curvature kappa off by about half of h^2 kappa, and fills it by
+// more where it is concave: in a notch the particles of both flanks count.
+constexpr double kRoundingPerConvexCurvature = 0.5;
+constexpr double kRoundingPerConcaveCurvature = 0.8;
 
 // Particles that support a plane, in spacings: in a disc around the vertex, near it along the
 // plane, not beyond the plane, and with a weight that falls from the plane to twice the spacing
@@ -181,6 +184,12 @@ double SupportAt(const VertexInput& input, const RingVertices& v, std::size_t i,
   return std::clamp(sum / weight + h / 2, -kMaxSupportShift * h, kMaxSupportShift * h);
 }
 
+// How far the kernel has moved a boundary of this curvature inward.
+double RoundingOf(double curvature, double spacing) {
+  const double share = curvature > 0 ? kRoundingPerConvexCurvature : kRoundingPerConcaveCurvature;
+  return share * spacing * spacing * curvature;
+}
+
 // Step 3: how far each vertex's plane moves along its normal. Of the support only the variation
 // along the ring counts: its mean depends on how the particles are arranged, not on the shape.
 void ShiftPlanes(const VertexInput& input, const RingView& ring, RingVertices& v) {
@@ -190,7 +199,7 @@ void ShiftPlanes(const VertexInput& input, const RingView& ring, RingVertices& v
   for (std::size_t k = 0; k < ring.size(); ++k) {
     const std::size_t i = ring.index(k);
     const double curvature = CurvatureAt(ring, v, k, h);
-    v.base[i] = steps.curvature ? kRoundingPerCurvature * h * h * curvature : 0;
+    v.base[i] = steps.curvature ? RoundingOf(curvature, h) : 0;
     v.shift[i] = steps.support ? SupportAt(input, v, i, curvature) - v.base[i] : 0;
     sum += v.weight[i] * v.shift[i];
     weight += v.weight[i];
