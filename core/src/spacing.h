@@ -9,12 +9,16 @@
 
 namespace partiemc {
 
-/// Median distance of a particle to its nearest neighbour at another position, in world units;
-/// nothing without two distinct positions. Particles with no neighbour within four times that
-/// median (spray, lone ones) are left out and the median is taken once more. Of large frames a
-/// sample is asked, chosen by the bits of the positions: the answer does not depend on the order
-/// of the particles.
-/// Requires: a checked frame. Cost: n log n for the tree, a query for at most 2^14 particles or so.
+/// The side of the square that each particle stands for where bodies are filled: 1 / sqrt(density),
+/// in world units; nothing without two distinct positions. The density is the mean of kernel sums
+/// at points that particles surround, so that neither edges nor noise nor a random thinning of the
+/// particles matter; distances to the nearest neighbour shrink under both (core/METHOD.md, "How the
+/// paper is read", 11). Where bodies are too thin to surround a point, and on lattices, which it
+/// tells exactly, it is the median distance to the nearest neighbour at another position; particles
+/// with none within four times that median (spray, lone ones) are left out and it is taken once
+/// more. Of large frames a sample is asked, chosen by the bits of the positions: the answer does
+/// not depend on the order of the particles. Requires: a checked frame. Cost: n log n for the tree,
+/// a few queries for at most 2^14 particles or so.
 std::optional<double> EstimateSpacing(const Frame& frame, Plane plane);
 
 }  // namespace partiemc

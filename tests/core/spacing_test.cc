@@ -26,38 +26,61 @@ TEST(Spacing, OfALatticeLargerThanTheSampleIsItsConstantToo) {
   EXPECT_EQ(Estimate(support::Lattice(300, 200)), 1.0);
 }
 
-TEST(Spacing, IsTheMedianDistanceToTheNearestNeighbour) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    SCOPED_TRACE(testing::Message() << "seed " << seed);
-    support::Random random(seed);
-    const Particles particles = support::Blob(random, 12);
-    // No particle is lone here, so that nothing is left out.
-    EXPECT_DOUBLE_EQ(*Estimate(particles), support::MedianNearestNeighbour(particles));
+TEST(Spacing, IsThatOfTheDensityHoweverTheParticlesAreArranged) {
+  for (const double jitter : {0.1, 0.3, 0.5}) {
+    support::Random random(11);
+    Particles particles;
+    for (int j = 0; j < 250; ++j) {
+      for (int i = 0; i < 250; ++i) {
+        particles.Add(i + random.Uniform(-jitter, jitter), j + random.Uniform(-jitter, jitter));
+      }
+    }
+    EXPECT_NEAR(*Estimate(particles), 1, 0.01) << "jitter " << jitter;
+  }
+  support::Random random(12);
+  EXPECT_NEAR(*Estimate(support::Noise(random, 40'000, 100)), 1, 0.03);
+}
+
+// Most neighbours of a thinned lattice are still at its constant.
+TEST(Spacing, GrowsAsParticlesAreTakenAwayAtRandom) {
+  for (const double kept : {0.8, 0.5, 0.3}) {
+    support::Random random(13);
+    Particles particles;
+    for (int j = 0; j < 80; ++j) {
+      for (int i = 0; i < 80; ++i) {
+        if (random.Uniform(0, 1) < kept) particles.Add(i, j);
+      }
+    }
+    const double expected = 80 / std::sqrt(static_cast<double>(particles.size()));
+    EXPECT_NEAR(*Estimate(particles) / expected, 1, 0.03) << kept;
+    EXPECT_LT(support::MedianNearestNeighbour(particles) / expected, 0.96) << kept;
   }
 }
 
-TEST(Spacing, OfALargeFrameIsWithinThreePercentOfTheMedianOfAll) {
-  support::Random random(11);
-  Particles particles;
-  for (int j = 0; j < 250; ++j) {
-    for (int i = 0; i < 250; ++i) {
-      particles.Add(i + random.Uniform(-0.3, 0.3), j + random.Uniform(-0.3, 0.3));
-    }
+TEST(Spacing, WhereBodiesAreThinIsTheMedianDistanceToTheNearestNeighbour) {
+  support::Random random(14);
+  Particles film;
+  for (int k = 0; k < 300; ++k) {
+    film.Add(0.5 * k + random.Uniform(-0.2, 0.2), random.Uniform(-0.1, 0.1));
   }
-  Particles part;  // The brute force is quadratic: the same distribution, a tenth of the particles.
-  for (std::size_t k = 0; k < 6250; ++k) part.Add(particles.x(k), particles.y(k));
-  EXPECT_NEAR(*Estimate(particles), support::MedianNearestNeighbour(part), 0.03);
+  EXPECT_DOUBLE_EQ(*Estimate(film), support::MedianNearestNeighbour(film));
 }
 
 TEST(Spacing, IgnoresSprayAndLoneParticles) {
   support::Random random(12);
   const Particles body = support::Blob(random, 12);
-  Particles particles = body;
   // Two fifths as many lone ones would shift the median of all.
   const int lone = static_cast<int>(body.size() * 2 / 5);
-  particles.Add(support::Shifted(support::Scaled(support::Lattice(lone, 1), 50), 100, 100));
-  EXPECT_DOUBLE_EQ(*Estimate(particles), support::MedianNearestNeighbour(body));
+  const Particles spray =
+      support::Shifted(support::Scaled(support::Lattice(lone, 1), 50), 100, 100);
+  Particles particles = body;
+  particles.Add(spray);
+  EXPECT_NEAR(*Estimate(particles), *Estimate(body), 0.01);
   EXPECT_GT(support::MedianNearestNeighbour(particles), support::MedianNearestNeighbour(body));
+
+  Particles film = support::Lattice(100, 1);
+  film.Add(support::Shifted(support::Scaled(support::Lattice(40, 1), 50), 300, 100));
+  EXPECT_EQ(Estimate(film), 1.0);
 }
 
 TEST(Spacing, IgnoresDuplicates) {
