@@ -19,8 +19,8 @@ constexpr double kFadeFrom = 0.2;
 constexpr double kFadeTo = 0.4;
 
 // Share of the difference to the wish that a frame makes good. Following at once turns every change
-// of topology into a jump of the whole outline.
-constexpr double kFollow = 0.4;
+// of topology into a jump of the whole outline (core/METHOD.md, "The default placement", 6).
+constexpr double kFollow = 0.6;
 
 // Longest mitre, as a multiple of the offset.
 constexpr double kMaxMitre = 2;

@@ -79,6 +79,7 @@ void SampleBand(const ParticleBins& bins, const Scale& scale, std::size_t tile, 
   const NodeSums& weighted = bins.weight.empty() ? sums.kernel : sums.weighted;
   const float weight = WeightOf(bins, scale);
   const auto reference_radius = static_cast<float>(scale.reference_radius);
+  const auto inverse_square = static_cast<float>(1 / (scale.kernel_radius * scale.kernel_radius));
   for (int j = 0; j < kTileSize; ++j) {
     for (std::uint32_t bits = band[j]; bits != 0; bits &= bits - 1) {
       const int i = std::countr_zero(bits);
@@ -89,7 +90,10 @@ void SampleBand(const ParticleBins& bins, const Scale& scale, std::size_t tile, 
         const float mean_x = sums.moment_x[node] / k;
         const float mean_y = sums.moment_y[node] / k;
         const float phi = std::sqrt(mean_x * mean_x + mean_y * mean_y) - reference_radius;
-        value = formula.Value(weight * weighted[node], phi);
+        const float share = inverse_square / k;
+        const float spread =
+            LargerEigenvalue(sums.xx[node] * share, sums.xy[node] * share, sums.yy[node] * share);
+        value = formula.Value(weight * weighted[node], phi, spread);
       }
       level_set.tiles[tile][j * kTileSize + i] = value;
       const std::uint32_t bit = std::uint32_t{1} << i;

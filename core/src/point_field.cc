@@ -144,6 +144,36 @@ PointSums PointField::SumAt(std::uint32_t tile, double x, double y) const {
                      .row_stride = bucket_columns_});
 }
 
+namespace {
+
+// The spread of the particles (level_set_formula.h) and its gradient.
+struct Spread {
+  double value, x, y;
+};
+
+Spread SpreadOf(const PointSums& sums, double inverse_square) {
+  const double share = inverse_square / sums.kernel;
+  const double xx = sums.kxx * share;
+  const double xy = sums.kxy * share;
+  const double yy = sums.kyy * share;
+  const double value = LargerEigenvalue(xx, xy, yy);
+  // The eigenvector's square e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue; where both
+  // are the same, either direction is as good.
+  const double gap = 2 * value - (xx + yy);
+  const double exx = gap > 0 ? (value - yy) / gap : 0.5;
+  const double exy = gap > 0 ? xy / gap : 0;
+  const double eyy = 1 - exx;
+  // ds = e . dM e, where M is a ratio of sums, and d_a = x_i - x falls as x grows.
+  const auto along = [&](double dxx, double dxy, double dyy, double slope) {
+    return (exx * dxx + 2 * exy * dxy + eyy * dyy) * share - value * slope / sums.kernel;
+  };
+  return {value,
+          along(sums.xxx - 2 * sums.moment_x, sums.xxy - sums.moment_y, sums.xyy, sums.slope_x),
+          along(sums.xxy, sums.xyy - sums.moment_x, sums.yyy - 2 * sums.moment_y, sums.slope_y)};
+}
+
+}  // namespace
+
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
   const PointSums sums = SumAt(tile, x, y);
   FieldSample sample;
@@ -162,16 +192,21 @@ FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
     // grad |v| with v = x - xbar = -mean and d xbar_a / dx_b = (sum k_b (d_a - mean_a)) / sum k.
     const double jxx = (sums.xx - sample.mean_x * sums.slope_x) / sums.kernel;
     const double jxy = (sums.xy - sample.mean_x * sums.slope_y) / sums.kernel;
-    const double jyx = (sums.yx - sample.mean_y * sums.slope_x) / sums.kernel;
+    const double jyx = (sums.xy - sample.mean_y * sums.slope_x) / sums.kernel;
     const double jyy = (sums.yy - sample.mean_y * sums.slope_y) / sums.kernel;
     sample.phi_x = (sample.mean_x * jxx + sample.mean_y * jyx - sample.mean_x) / distance;
     sample.phi_y = (sample.mean_x * jxy + sample.mean_y * jyy - sample.mean_y) / distance;
   }
   const LevelSetFormula<double> formula(scale_);
-  sample.value = formula.Value(sums.density, sample.phi);
+  const Spread spread = SpreadOf(sums, 1 / (scale_.kernel_radius * scale_.kernel_radius));
+  sample.spread = spread.value;
+  sample.value = formula.Value(sums.density, sample.phi, spread.value);
   if (sample.value == sample.phi) {
     sample.gradient_x = sample.phi_x;
     sample.gradient_y = sample.phi_y;
+  } else if (sample.value == formula.Gap(spread.value)) {
+    sample.gradient_x = spread.x * scale_.gap_slope;
+    sample.gradient_y = spread.y * scale_.gap_slope;
   } else {
     // Guard and saturation fall with the density alike.
     sample.gradient_x = -sums.density_x * scale_.guard_slope;

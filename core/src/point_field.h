@@ -19,6 +19,7 @@ struct FieldSample {
   double mean_x = 0, mean_y = 0;          ///< xbar - x, the weighted mean relative to the point.
   double phi = 0;                         ///< |x - xbar| - r
   double phi_x = 0, phi_y = 0;            ///< grad phi; 0 where x = xbar.
+  double spread = 0;                      ///< s
   double value = 0;                       ///< F (level_set_formula.h)
   double gradient_x = 0, gradient_y = 0;  ///< grad F, of the branch that F is.
   bool has_support = false;               ///< Whether any particle is within the kernel radius.

@@ -20,7 +20,24 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 constexpr int kParts = kPointPadding / kLanes;
 
 // sum w k etc. follow from the others where all weights are the same.
-enum Channel { kKernel, kMomentX, kMomentY, kSlopeX, kSlopeY, kXx, kXy, kYx, kYy, kSums };
+enum Channel {
+  kKernel,
+  kMomentX,
+  kMomentY,
+  kSlopeX,
+  kSlopeY,
+  kKxx,
+  kKxy,
+  kKyy,
+  kXx,
+  kXy,
+  kYy,
+  kXxx,
+  kXxy,
+  kXyy,
+  kYyy,
+  kSums
+};
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
 
 HWY_INLINE Vector LoadDouble(const float* values) {
@@ -45,14 +62,25 @@ HWY_INLINE void AddEntries(const PointQuery& query, std::uint32_t entry, int lef
   const Vector ky = hn::Mul(slope, dy);
   const auto add = [&](int channel, Vector term) { sums[channel] = hn::Add(sums[channel], term); };
   add(kKernel, k);
-  add(kMomentX, hn::Mul(k, dx));
-  add(kMomentY, hn::Mul(k, dy));
+  const Vector moment_x = hn::Mul(k, dx);
+  const Vector moment_y = hn::Mul(k, dy);
+  add(kMomentX, moment_x);
+  add(kMomentY, moment_y);
   add(kSlopeX, kx);
   add(kSlopeY, ky);
-  add(kXx, hn::Mul(kx, dx));
-  add(kXy, hn::Mul(ky, dx));
-  add(kYx, hn::Mul(kx, dy));
-  add(kYy, hn::Mul(ky, dy));
+  add(kKxx, hn::Mul(moment_x, dx));
+  add(kKxy, hn::Mul(moment_x, dy));
+  add(kKyy, hn::Mul(moment_y, dy));
+  const Vector xx = hn::Mul(kx, dx);
+  const Vector xy = hn::Mul(kx, dy);
+  const Vector yy = hn::Mul(ky, dy);
+  add(kXx, xx);
+  add(kXy, xy);
+  add(kYy, yy);
+  add(kXxx, hn::Mul(xx, dx));
+  add(kXxy, hn::Mul(xx, dy));
+  add(kXyy, hn::Mul(yy, dx));
+  add(kYyy, hn::Mul(yy, dy));
   if constexpr (kWeighted) {
     const Vector w = LoadDouble(query.weight + entry);
     add(kDensity, hn::Mul(w, k));
@@ -92,9 +120,24 @@ PointSums Sum(const PointQuery& query) {
     totals[kDensityX] = query.uniform_weight * totals[kSlopeX];
     totals[kDensityY] = query.uniform_weight * totals[kSlopeY];
   }
-  return {totals[kKernel], totals[kMomentX], totals[kMomentY],  totals[kSlopeX],
-          totals[kSlopeY], totals[kXx],      totals[kXy],       totals[kYx],
-          totals[kYy],     totals[kDensity], totals[kDensityX], totals[kDensityY]};
+  return {.kernel = totals[kKernel],
+          .moment_x = totals[kMomentX],
+          .moment_y = totals[kMomentY],
+          .slope_x = totals[kSlopeX],
+          .slope_y = totals[kSlopeY],
+          .kxx = totals[kKxx],
+          .kxy = totals[kKxy],
+          .kyy = totals[kKyy],
+          .xx = totals[kXx],
+          .xy = totals[kXy],
+          .yy = totals[kYy],
+          .xxx = totals[kXxx],
+          .xxy = totals[kXxy],
+          .xyy = totals[kXyy],
+          .yyy = totals[kYyy],
+          .density = totals[kDensity],
+          .density_x = totals[kDensityX],
+          .density_y = totals[kDensityY]};
 }
 
 PointSums SumAtPoint(const PointQuery& query) {

@@ -23,7 +23,9 @@ struct PointSums {
   double kernel;                ///< sum k
   double moment_x, moment_y;    ///< sum k d
   double slope_x, slope_y;      ///< sum dk / da
-  double xx, xy, yx, yy;        ///< sum (dk / da) d_b, named ba
+  double kxx, kxy, kyy;         ///< sum k d_a d_b
+  double xx, xy, yy;            ///< sum (dk / da) d_b, the same for a and b exchanged
+  double xxx, xxy, xyy, yyy;    ///< sum (dk / da) d_b d_c, the same in any order
   double density;               ///< sum w k
   double density_x, density_y;  ///< sum w dk / da
 };

@@ -18,13 +18,21 @@ constexpr double kGuardShareOfLightest = 0.7;
 // Above this density a node is inside, whatever the weighted mean says: f is about 1 inside and
 // 0.5 on a flat boundary, and at the edge of a void of six particles' area about 0.6.
 constexpr double kSaturation = 0.85;
+// Gaps between bodies (core/METHOD.md, "Gaps"): inside of bodies and on their boundaries the spread
+// is 0.1; half-way across a gap of 1.7 spacings it is 0.21.
+constexpr double kGapSpread = 0.21;
+// A lone particle's spread at its reference radius is (r / R)^2. An outline that is asked for
+// farther out than usual must not be cut off: the calibrated radii come to 0.21, too, or less.
+constexpr double kGapSpreadPerReference = 2.4;
+// Slope of the spread outside of a flat boundary, in 1 / R.
+constexpr double kSpreadSlope = 0.45;
 // Slope of f across a flat boundary, measured in 1 / R: makes F a length on both branches.
 constexpr double kBoundarySlope = 1.164;
 
 }  // namespace
 
 double Scale::VoidValue() const {
-  return LevelSetFormula<double>(*this).Value(0, kernel_radius - reference_radius);
+  return LevelSetFormula<double>(*this).Value(0, kernel_radius - reference_radius, 0);
 }
 
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
@@ -42,6 +50,9 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
   scale.guard = std::min(kGuardFactor / (beta * beta), kGuardShareOfLightest * lightest_weight);
   scale.saturation = kSaturation;
   scale.guard_slope = scale.kernel_radius / kBoundarySlope;
+  const double reference = scale.reference_radius / scale.kernel_radius;
+  scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);
+  scale.gap_slope = scale.kernel_radius / kSpreadSlope;
   return scale;
 }
 

@@ -17,6 +17,8 @@ struct Scale {
   double guard = 0;              ///< g: where f is below it there is no inside.
   double saturation = 0;         ///< t: where f is above it there is no outside.
   double guard_slope = 0;        ///< R / 1.164: turns a lack of density into a length.
+  double gap_spread = 0;         ///< s0: where particles are spread wider than it, there is a gap.
+  double gap_slope = 0;          ///< R / 0.45: turns spread into a length.
 
   /// Value of the level set where no particle reaches.
   double VoidValue() const;

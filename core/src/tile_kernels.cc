@@ -163,8 +163,13 @@ void ScatterMomentsLoop(const TileEntries& entries, float radius, const CellMask
         const Vector dy = hn::Set(d, y - static_cast<float>(row));
         const int at = SumIndex(column, row);
         AddTo(sums.kernel.data() + at, k);
-        AddTo(sums.moment_x.data() + at, hn::Mul(k, terms.dx));
-        AddTo(sums.moment_y.data() + at, hn::Mul(k, dy));
+        const Vector kx = hn::Mul(k, terms.dx);
+        const Vector ky = hn::Mul(k, dy);
+        AddTo(sums.moment_x.data() + at, kx);
+        AddTo(sums.moment_y.data() + at, ky);
+        AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
+        AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
+        AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
         if constexpr (kWeighted) {
           AddTo(sums.weighted.data() + at, hn::Mul(k, hn::Set(d, entries.weight[e])));
         }
@@ -178,6 +183,9 @@ void ScatterMoments(const TileEntries& entries, float radius, const CellMask* ma
   sums.kernel.fill(0);
   sums.moment_x.fill(0);
   sums.moment_y.fill(0);
+  sums.xx.fill(0);
+  sums.xy.fill(0);
+  sums.yy.fill(0);
   if (entries.weight != nullptr) {
     sums.weighted.fill(0);
     ScatterMomentsLoop<true>(entries, radius, mask, sums);

@@ -40,6 +40,9 @@ struct alignas(64) MomentSums {
   NodeSums kernel;    ///< sum k
   NodeSums moment_x;  ///< sum k (x_i - x)
   NodeSums moment_y;
+  NodeSums xx;  ///< sum k (x_i - x)^2, and so on.
+  NodeSums xy;
+  NodeSums yy;
   NodeSums weighted;  ///< sum w k; only where weights differ from particle to particle.
 };
 

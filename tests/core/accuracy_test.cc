@@ -88,9 +88,7 @@ bool ExpectPointAgrees(const FieldSample& sample, const FieldOracle& oracle, Vec
   // Where there are kinks nearby the oracle's differences see both of their sides: between the
   // branches of F, and where x - xbar = 0. At the rim of the support they see outside.
   if (!mean || oracle.KernelSum(at) < 1e-3) return false;
-  if (std::abs(oracle.Phi(at) - oracle.Guard(at)) < 1e-3 * radius) return false;
-  const double outer = std::max(oracle.Phi(at), oracle.Guard(at));
-  if (std::abs(outer - oracle.Saturation(at)) < 1e-3 * radius) return false;
+  if (oracle.CreaseMargin(at) < 1e-3 * radius) return false;
   if (std::hypot(mean->x - at.x, mean->y - at.y) < 1e-3 * radius) return false;
   const Vector gradient = oracle.ValueGradient(at);
   const double tolerance = kGradientTolerance * std::max(1.0, std::hypot(gradient.x, gradient.y));

@@ -131,11 +131,9 @@ TEST(Field, ALoneParticleIsSurroundedByCirclesOfItsDistance) {
   Stages stages;
   stages.Run(particles, {.spacing = 1.0});
   const std::uint32_t tile = stages.bins.tiles.Find({0, 0});
-  for (const int i : {1, 2}) {
-    // Where it is not cut off by the guard, phi is the distance less r.
-    EXPECT_NEAR(stages.level_set.At(stages.bins.tiles, tile, i, 0),
-                i - stages.scale.reference_radius, 1e-6);
-  }
+  // Where neither the guard nor the gap are above it, phi is the distance less r.
+  EXPECT_NEAR(stages.level_set.At(stages.bins.tiles, tile, 1, 0), 1 - stages.scale.reference_radius,
+              1e-6);
 }
 
 TEST(Field, NodesThatNoParticleReachesHaveTheValueOfTheVoid) {
@@ -225,6 +223,28 @@ TEST(Field, AShiftByWholeCellsShiftsItBitForBit) {
         };
         EXPECT_EQ(value(here, x, y), value(there, x + dx, y + dy)) << x << ", " << y;
       }
+    }
+  }
+}
+
+// Two half-planes of particles, a gap between their boundaries: the mean of the particles alone
+// sees an inside half-way across it as long as any kernel reaches both.
+TEST(Field, ABodyEndsAtAGapOfTwoSpacingsAndGoesOnAcrossOneOfHalfASpacing) {
+  for (const double gap : {0.5, 2.0, 2.5, 3.0}) {
+    support::Particles particles = support::Lattice(20, 6, 0, -6);
+    particles.Add(support::Lattice(20, 6, 0, gap));
+    Stages stages;
+    stages.Run(particles, {.spacing = 1.0, .cell_size = 0.25});
+    const double middle = 4 * (-1 + gap) / 2;  // Between the centres at -1 and at `gap`, in cells.
+    const int column = 4 * 10;
+    const int row = static_cast<int>(std::lround(middle));
+    const TileCoordinate place{row >> 5, column >> 5};
+    const float value = stages.level_set.At(stages.bins.tiles, stages.bins.tiles.Find(place),
+                                            column & 31, row & 31);
+    if (gap < 1) {
+      EXPECT_LT(value, 0) << gap;
+    } else {
+      EXPECT_GT(value, 0) << gap;
     }
   }
 }

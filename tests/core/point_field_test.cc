@@ -30,8 +30,8 @@ TEST_P(PointFieldTest, ValueAndGradientAgreeWithTheEquationsOfThePaper) {
   stages.Run(support::Snapped(particles, cell),
              {.spacing = 1.0, .kernel_radius = random.Uniform(1.5, 8), .cell_size = cell});
   const support::FieldOracle oracle(stages.particles, stages.parameters, 1.0);
-  int on_phi = 0, on_guard = 0;
-  for (int k = 0; k < 3000 && on_phi + on_guard < 400; ++k) {
+  int on_phi = 0, on_guard = 0, on_gap = 0;
+  for (int k = 0; k < 3000 && on_phi + on_guard + on_gap < 400; ++k) {
     // Round any particle, every other time one of the lone ones, where the guard rules.
     const std::size_t lone = random.Chance(0.5) ? particles.size() - 10 : 0;
     const std::size_t near = lone + random.Below(particles.size() - lone);
@@ -49,9 +49,7 @@ TEST_P(PointFieldTest, ValueAndGradientAgreeWithTheEquationsOfThePaper) {
     // Where the kernel sum is tiny the mean is a quotient of roundings, and nearer than a step of
     // the differences to the crease between the branches they see both.
     if (oracle.KernelSum(at) < 1e-3) continue;
-    if (std::abs(oracle.Phi(at) - oracle.Guard(at)) < 1e-3) continue;
-    const double saturation = oracle.Saturation(at);
-    if (std::abs(std::max(oracle.Phi(at), oracle.Guard(at)) - saturation) < 1e-3) continue;
+    if (oracle.CreaseMargin(at) < 1e-3) continue;
     EXPECT_TRUE(sample.has_support);
     EXPECT_NEAR(sample.density, oracle.Density(at), 1e-5);
     EXPECT_NEAR(sample.phi * cell, oracle.Phi(at), 1e-5);
@@ -70,10 +68,14 @@ TEST_P(PointFieldTest, ValueAndGradientAgreeWithTheEquationsOfThePaper) {
       EXPECT_NEAR(sample.gradient_x, gradient.x, tolerance);
       EXPECT_NEAR(sample.gradient_y, gradient.y, tolerance);
     }
-    if (saturation > oracle.Value(at)) ++(oracle.Phi(at) > oracle.Guard(at) ? on_phi : on_guard);
+    const double value = oracle.Value(at);
+    on_phi += value == oracle.Phi(at);
+    on_guard += value == oracle.Guard(at);
+    on_gap += value == oracle.Gap(at);
   }
   EXPECT_GT(on_phi, 20);
   EXPECT_GT(on_guard, 0);
+  EXPECT_GT(on_gap, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, PointFieldTest, testing::Range(1, 13));

@@ -167,12 +167,12 @@ double HoleArea(const Stages& stages) {
   return 0;
 }
 
-TEST(Rings, HolesBelowSixParticlesAreDroppedAndLargerOnesKept) {
+TEST(Rings, HolesBelowTwoParticlesAreDroppedAndLargerOnesKept) {
   // Holes on a tile's corner, on a seam and within a tile; spacings of one and of two cells.
   int dropped = 0, kept = 0;
   for (const auto& [cx, cy] : {std::pair(32.0, 32.0), {31.6, 28.3}, {36.2, 35.4}}) {
     for (const double spacing : {1.0, 2.0}) {
-      for (const double radius : {0.9, 1.2, 1.38, 1.6, 2.2}) {
+      for (const double radius : {0.6, 0.75, 0.9, 1.2, 1.6}) {
         const Particles particles = At({{24, 32}});
         ReconstructionParameters parameters = Plain(false);
         parameters.spacing = spacing;
@@ -184,7 +184,7 @@ TEST(Rings, HolesBelowSixParticlesAreDroppedAndLargerOnesKept) {
         parameters.clean = true;
         Stages clean;
         clean.RunOn(Holed{cx, cy, radius * spacing}, kLow, kHigh, particles, parameters);
-        const bool small = area < 6 * spacing * spacing;
+        const bool small = area < 2 * spacing * spacing;
         EXPECT_EQ(clean.topology.dropped_holes, small ? 1u : 0u) << "area " << area;
         EXPECT_EQ(clean.topology.RingCount(), small ? 1u : 2u);
         EXPECT_TRUE(Validate(clean.result).ok()) << Validate(clean.result);
@@ -200,7 +200,7 @@ TEST(Rings, TheCellsOfADroppedHoleBecomeInterior) {
   Stages full, dropped;
   full.RunOn([](int x, int y) { return Circle(x, y, 32, 32, 12); }, kLow, kHigh, At({{24, 32}}),
              Plain(true));
-  dropped.RunOn(Holed{32, 32, 1.2}, kLow, kHigh, At({{24, 32}}), Plain(true));
+  dropped.RunOn(Holed{32, 32, 0.75}, kLow, kHigh, At({{24, 32}}), Plain(true));
   for (std::size_t tile = 0; tile < full.crossings.tiles.size(); ++tile) {
     EXPECT_EQ(full.crossings.tiles[tile].interior, dropped.crossings.tiles[tile].interior);
   }
@@ -230,11 +230,15 @@ TEST(Rings, AnIslandInADroppedHoleGoesWithItAndItsParticlesCountForTheBody) {
     return x == 32 && y == 32 ? -1.0 : Holed{32, 32, 1.36}(x, y);
   };
   const Particles particles = At({{24, 32}, {32, 32}});
+  ReconstructionParameters parameters = Plain(false);
+  parameters.spacing = 2;
+  parameters.cell_size = 0.5;
   Stages unclean;
-  unclean.RunOn(island, kLow, kHigh, particles, Plain(false));
+  unclean.RunOn(island, kLow, kHigh, particles, parameters);
   ASSERT_EQ(unclean.topology.RingCount(), 3u);
+  parameters.clean = true;
   Stages clean;
-  clean.RunOn(island, kLow, kHigh, particles, Plain(true));
+  clean.RunOn(island, kLow, kHigh, particles, parameters);
   EXPECT_EQ(clean.topology.RingCount(), 1u);
   EXPECT_EQ(clean.topology.dropped_holes, 1u);
   EXPECT_EQ(clean.topology.particle_count, (std::vector<std::uint64_t>{2}));

@@ -68,10 +68,42 @@ double FieldOracle::Phi(Vector at) const {
 
 double FieldOracle::Guard(Vector at) const { return (guard_ - Density(at)) * radius_ / 1.164; }
 
+// The largest mean square of the particles' distances along a direction. As a function of the angle
+// it is a + b cos 2 angle + c sin 2 angle: three directions tell the three numbers.
+double FieldOracle::Spread(Vector at) const {
+  const double weight = KernelSum(at);
+  if (weight == 0) return 0;
+  const auto along = [&](double angle) {
+    double sum = 0;
+    for (std::size_t k = 0; k < particles_.size(); ++k) {
+      const double distance =
+          (particles_.x(k) - at.x) * std::cos(angle) + (particles_.y(k) - at.y) * std::sin(angle);
+      sum += Kernel(k, at) * distance * distance;
+    }
+    return sum / (weight * radius_ * radius_);
+  };
+  const double p = along(0);
+  const double q = along(kPi / 3);
+  const double r = along(2 * kPi / 3);
+  const double mean = (p + q + r) / 3;
+  return mean + std::hypot(p - mean, (q - r) / std::sqrt(3.0));
+}
+
+double FieldOracle::Gap(Vector at) const {
+  const double reference = reference_radius_ / radius_;
+  return (Spread(at) - std::max(0.21, 2.4 * reference * reference)) * radius_ / 0.45;
+}
+
 double FieldOracle::Saturation(Vector at) const { return (0.85 - Density(at)) * radius_ / 1.164; }
 
 double FieldOracle::Value(Vector at) const {
-  return std::min(std::max(Phi(at), Guard(at)), Saturation(at));
+  return std::min(std::max({Phi(at), Guard(at), Gap(at)}), Saturation(at));
+}
+
+double FieldOracle::CreaseMargin(Vector at) const {
+  std::array<double, 3> outer = {Phi(at), Guard(at), Gap(at)};
+  std::sort(outer.begin(), outer.end());
+  return std::min(outer[2] - outer[1], std::abs(outer[2] - Saturation(at)));
 }
 
 template <typename Function>

@@ -29,8 +29,11 @@ class FieldOracle {
   std::optional<Vector> Mean(Vector at) const;  ///< xbar, Eq. 3-4; nothing without support.
   double Phi(Vector at) const;                  ///< Eq. 5; R - r without support.
   double Guard(Vector at) const;                ///< (g - f) R / 1.164
+  double Spread(Vector at) const;               ///< s; 0 without support.
+  double Gap(Vector at) const;                  ///< (s - s0) R / 0.45
   double Saturation(Vector at) const;           ///< (t - f) R / 1.164
-  double Value(Vector at) const;                ///< F = min(max(phi, guard), saturation)
+  double Value(Vector at) const;                ///< F = min(max(phi, guard, gap), saturation)
+  double CreaseMargin(Vector at) const;         ///< What F lacks to another of its branches.
   Vector PhiGradient(Vector at) const;          ///< By central differences.
   Vector ValueGradient(Vector at) const;        ///< By central differences.
   double kernel_radius() const { return radius_; }
