@@ -30,6 +30,8 @@ constexpr double kSmoothingReach = 3;
 // more where it is concave: in a notch the particles of both flanks count.
 constexpr double kRoundingPerConvexCurvature = 0.5;
 constexpr double kRoundingPerConcaveCurvature = 0.8;
+// Tighter bends than this are noise: no kernel resolves them. In 1 / spacings.
+constexpr double kMaxCurvature = 0.6;
 
 // Particles that support a plane, in spacings: in a disc around the vertex, near it along the
 // plane, not beyond the plane, and with a weight that falls from the plane to twice the spacing
@@ -156,7 +158,8 @@ double CurvatureAt(const RingView& ring, const RingVertices& v, std::size_t k, d
         w * along * Dot({v.normal[j].x - v.normal[i].x, v.normal[j].y - v.normal[i].y}, tangent);
     square += w * along * along;
   });
-  return square > 0 ? turn / square : 0;
+  const double max_curvature = kMaxCurvature / spacing;
+  return square > 0 ? std::clamp(turn / square, -max_curvature, max_curvature) : 0;
 }
 
 // How far outside the vertex the particles near its plane put the boundary: their weighted mean
