@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+from fractions import Fraction
 
 import numpy
 from shapely.geometry import Polygon
@@ -109,12 +110,19 @@ def broken_polygons(polygons):
     return words
 
 
+def is_folded(corners):
+    """Exactly: slivers of a triangulation may be thinner than the rounding of their area."""
+    (ax, ay), (bx, by), (cx, cy) = [[Fraction(float(x)) for x in corner] for corner in corners]
+    return (bx - ax) * (cy - ay) <= (cx - ax) * (by - ay)
+
+
 def broken_mesh(points, triangles, ring_area):
     words = []
     corners = points[triangles]
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
-    folded = int(numpy.sum(areas <= 0))
+    size = numpy.abs(points).max(initial=0) ** 2
+    folded = sum(is_folded(corners[k]) for k in numpy.flatnonzero(areas <= 1e-12 * size))
     if folded:
         words.append(f"{folded} folded triangles")
     if abs(areas.sum() - ring_area) > AREA_TOLERANCE * abs(ring_area):
