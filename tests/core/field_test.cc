@@ -1,7 +1,6 @@
 #include "field.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -10,6 +9,7 @@
 #include <cstring>
 #include <optional>
 
+#include "support/instruction_sets.h"
 #include "support/oracle.h"
 #include "support/particles.h"
 #include "support/stages.h"
@@ -160,20 +160,15 @@ TEST(Field, DensityInsideALatticeIsAboutOneSoThatOnlyTheBoundaryIsNearZero) {
 // Processors differ in their vectors: each kind that this one has must give the bits of all others.
 TEST(Field, HasTheSameBitsForAnyInstructionSet) {
   support::Random random(9);
-  const std::vector<std::int64_t> supported = hwy::SupportedAndGeneratedTargets();
-  ASSERT_FALSE(supported.empty());
   for (const double radius : {1.5, 2.0, 3.0, 4.0, 5.7, 8.0}) {
     support::Particles particles = SmallScene(random, 1.0, radius > 3);
     std::vector<LevelSet> results;
-    for (const std::int64_t target : supported) {
-      hwy::SetSupportedTargetsForTest(target);
-      hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    support::ForEachInstructionSet([&] {
       Stages stages;
       stages.Run(particles, {.spacing = 1.0, .kernel_radius = radius});
       results.push_back(stages.level_set);
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    });
+    ASSERT_FALSE(results.empty());
     for (const LevelSet& result : results) {
       EXPECT_EQ(result.inside, results[0].inside);
       ASSERT_EQ(result.tiles.size(), results[0].tiles.size());

@@ -9,6 +9,7 @@
 
 #include "partiemc/partiemc.h"
 #include "partiemc/validate.h"
+#include "support/instruction_sets.h"
 #include "support/reconstruct.h"
 
 namespace partiemc {
@@ -80,6 +81,30 @@ TEST_P(Metamorphic, OneTwoOrSevenThreadsAndFreshOrUsedWorkspacesGiveTheSameBits)
     if (threads == 1) end = state;
     EXPECT_EQ(state, end);
   }
+}
+
+TEST_P(Metamorphic, AnyInstructionSetGivesTheSameBits) {
+  const auto reconstructor = Reconstructor::Create({.placement = GetParam()});
+  std::vector<Result> expected;
+  State end;
+  const int sets = support::ForEachInstructionSet([&] {
+    std::vector<Result> results(4);
+    State state;
+    Workspace workspace;
+    for (int k = 0; k < 4; ++k) {
+      Particles body = support::MovingBody(k);
+      if (k % 2 == 1) body.volumes.assign(body.size(), 0.9f);
+      Result& result = results[static_cast<std::size_t>(k)];
+      ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), state, workspace, result).ok());
+    }
+    if (expected.empty()) {
+      expected = results;
+      end = state;
+    }
+    for (std::size_t k = 0; k < results.size(); ++k) ExpectSameBits(results[k], expected[k]);
+    EXPECT_EQ(state, end);
+  });
+  EXPECT_GT(sets, 0);
 }
 
 TEST_P(Metamorphic, AWorkspaceMayServeOtherStreamsInBetween) {
