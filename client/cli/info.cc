@@ -11,22 +11,6 @@
 namespace partiemc::client {
 namespace {
 
-std::string JsonString(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      AppendAll(out, '\\', c);
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      constexpr std::string_view kDigits = "0123456789abcdef";
-      AppendAll(out, "\\u00", kDigits[static_cast<std::size_t>(c >> 4)],
-                kDigits[static_cast<std::size_t>(c & 15)]);
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
-}
-
 std::vector<std::string> NamesOf(const auto& values) {
   std::vector<std::string> names;
   for (const auto value : values) names.emplace_back(Name(value));

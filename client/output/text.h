@@ -45,6 +45,23 @@ std::string Concat(const Parts&... parts) {
   return out;
 }
 
+/// `text` as a JSON string, quotes and all.
+inline std::string JsonString(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      AppendAll(out, '\\', c);
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      constexpr std::string_view kDigits = "0123456789abcdef";
+      AppendAll(out, "\\u00", kDigits[static_cast<std::size_t>(c >> 4)],
+                kDigits[static_cast<std::size_t>(c & 15)]);
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
 /// The 16 hexadecimal digits of a digest.
 inline std::string DigestText(std::uint64_t digest) {
   std::string text(16, '0');
