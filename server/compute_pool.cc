@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/heap.h"
+
 namespace partiemc::server {
 namespace {
 
@@ -21,8 +23,9 @@ constexpr bool kShareArena = true;
 // of one frame can pick up pieces of another, but never another frame as a whole. There are as many
 // runners as the arena has places: small frames then run side by side, and a large one that is
 // alone gets every place for its pieces.
-ComputePool::ComputePool(unsigned threads)
-    : parallelism_(oneapi::tbb::global_control::max_allowed_parallelism,
+ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time)
+    : warm_time_(warm_time),
+      parallelism_(oneapi::tbb::global_control::max_allowed_parallelism,
                    kShareArena ? std::max(threads, 1u) : 1u),
       arena_(static_cast<int>(std::max(threads, 1u))) {
   runners_.reserve(std::max(threads, 1u));
@@ -49,20 +52,63 @@ void ComputePool::Submit(Job job) {
 }
 
 void ComputePool::Run() {
-  Worker worker;
   oneapi::tbb::task_arena own_arena(1);
   oneapi::tbb::task_arena& arena = kShareArena ? arena_ : own_arena;
+  std::unique_lock lock(mutex_);
   for (;;) {
-    Job job;
-    {
-      std::unique_lock lock(mutex_);
-      job_came_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
-      if (jobs_.empty()) return;
-      job = std::move(jobs_.front());
-      jobs_.pop_front();
-    }
-    arena.execute([&] { job(worker); });
+    WaitForJob(lock);
+    if (jobs_.empty()) return;
+    Job job = std::move(jobs_.front());
+    jobs_.pop_front();
+    std::unique_ptr<Worker> worker = TakeWorker();
+    lock.unlock();
+    arena.execute([&] { job(*worker); });
+    job = nullptr;  // What it holds ends without the lock.
+    lock.lock();
+    idle_.push_back(std::move(worker));
+    Drop(TakeOutlived(), lock);
   }
+}
+
+// Returns when there is a job or never will be.
+void ComputePool::WaitForJob(std::unique_lock<std::mutex>& lock) {
+  const auto over = [this] { return stopping_ || !jobs_.empty(); };
+  while (!over()) {
+    const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
+    if (warm) {
+      job_came_.wait_for(lock, warm_time_, over);
+    } else {
+      job_came_.wait(lock);
+    }
+    Drop(TakeOutlived(), lock);
+  }
+}
+
+std::unique_ptr<Worker> ComputePool::TakeWorker() {
+  if (idle_.empty()) return std::make_unique<Worker>();
+  std::unique_ptr<Worker> worker = std::move(idle_.back());
+  idle_.pop_back();
+  return worker;
+}
+
+ComputePool::Workers ComputePool::TakeOutlived() {
+  Workers outlived;
+  const auto now = WarmSize::Clock::now();
+  std::erase_if(idle_, [&](std::unique_ptr<Worker>& worker) {
+    if (!worker->particles.Outlived(now, warm_time_)) return false;
+    outlived.push_back(std::move(worker));
+    return true;
+  });
+  return outlived;
+}
+
+// Lets `lock` go while memory is given back.
+void ComputePool::Drop(Workers workers, std::unique_lock<std::mutex>& lock) {
+  if (workers.empty()) return;
+  lock.unlock();
+  workers.clear();
+  GiveBackFreedMemory();
+  lock.lock();
 }
 
 }  // namespace partiemc::server

@@ -4,37 +4,38 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
 
-#include "partiemc/reconstructor.h"
-#include "partiemc/result.h"
-#include "partiemc/state.h"
+#include "server/worker.h"
 
 namespace partiemc::server {
 
-/// What a worker keeps warm from frame to frame, whichever stream they belong to.
-struct Worker {
-  Workspace workspace;
-  Result result;
-  State next_state;  ///< Becomes the stream's state once the frame has been answered.
-};
+/// For how long a worker keeps buffers that it has no use for.
+inline constexpr std::chrono::seconds kWarmTime(10);
 
 /// Runs jobs in the order in which they were submitted, several at once, all parallel parts of all
 /// of them in one oneTBB arena. A stream submits its next frame only when the one before is done,
 /// so that this order is a round robin over the streams that have work: a stream of large frames
 /// delays every other by one of its frames at most, never by its backlog.
+///
+/// Memory: a job gets the worker that was used last, so that one stream keeps one of them warm,
+/// however many threads there are. A worker that for `warm_time` has had no frame of at least a
+/// quarter of its largest is dropped with all of its buffers: after a large frame an idle server,
+/// or one with small frames, soon holds no more than it needs.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
 
   /// `threads` is what all jobs together may use, at least 1. While it lives, the whole process
   /// gives oneTBB no more than that.
-  explicit ComputePool(unsigned threads);
+  explicit ComputePool(unsigned threads, WarmSize::Clock::duration warm_time = kWarmTime);
   /// Runs what was submitted, then joins.
   ~ComputePool();
   ComputePool(const ComputePool&) = delete;
@@ -46,13 +47,22 @@ class ComputePool {
   unsigned threads() const { return static_cast<unsigned>(runners_.size()); }
 
  private:
-  void Run();
+  using Workers = std::vector<std::unique_ptr<Worker>>;
 
+  void Run();
+  // With the lock held; those that get it let it go for a while:
+  void WaitForJob(std::unique_lock<std::mutex>& lock);
+  std::unique_ptr<Worker> TakeWorker();
+  Workers TakeOutlived();
+  static void Drop(Workers workers, std::unique_lock<std::mutex>& lock);
+
+  const WarmSize::Clock::duration warm_time_;
   oneapi::tbb::global_control parallelism_;
   oneapi::tbb::task_arena arena_;
   std::mutex mutex_;
   std::condition_variable job_came_;
   std::deque<Job> jobs_;   // Guarded by mutex_.
+  Workers idle_;           // Guarded by mutex_. The one that was used last is the last.
   bool stopping_ = false;  // Guarded by mutex_.
   std::vector<std::thread> runners_;
 };

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "server/health_check.h"
+#include "server/heap.h"
 #include "server/logging.h"
 #include "server/options.h"
 #include "server/server.h"
@@ -39,6 +40,7 @@ absl::Status WritePortFile(const std::string& path, const Address& address) {
 }
 
 int Serve(const CommandLine& line) {
+  KeepFreedMemory();
   // Before gRPC starts threads, so that these signals wait for sigwait and interrupt nobody.
   sigset_t signals;
   sigemptyset(&signals);

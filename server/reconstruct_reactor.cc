@@ -52,7 +52,10 @@ void ReconstructReactor::OnReadDone(bool ok) {
   }
 }
 
-void ReconstructReactor::OnWriteDone(bool ok) { flow_->WriteDone(ok); }
+void ReconstructReactor::OnWriteDone(bool ok) {
+  messages_.Written(written_, written_slot_);
+  flow_->WriteDone(ok);
+}
 
 void ReconstructReactor::OnCancel() { flow_->Cancelled(); }
 
@@ -67,6 +70,8 @@ void ReconstructReactor::StartRead(std::size_t slot) {
 }
 
 void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
+  written_ = what;
+  written_slot_ = slot;
   ServerBidiReactor::StartWrite(&messages_.response(what, slot));
 }
 

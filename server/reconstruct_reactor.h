@@ -1,13 +1,14 @@
 // The gRPC door of a producer's stream: translates between gRPC's callbacks and a StreamFlow.
+// Messages pass as bytes: a frame is parsed where it is computed, into memory that is warm.
 #pragma once
 
+#include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
 #include <cstddef>
 #include <memory>
 
 #include "absl/status/status.h"
-#include "partiemc/v1/reconstruction.pb.h"
 #include "server/compute_pool.h"
 #include "server/limits.h"
 #include "server/stream_flow.h"
@@ -17,9 +18,8 @@
 namespace partiemc::server {
 
 /// Deletes itself when gRPC is done with it. No callback of it blocks.
-class ReconstructReactor final
-    : public grpc::ServerBidiReactor<v1::ReconstructRequest, v1::ReconstructResponse>,
-      private StreamDoor {
+class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
+                                 private StreamDoor {
  public:
   /// The arguments outlive the call.
   ReconstructReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
@@ -41,6 +41,9 @@ class ReconstructReactor final
   StreamRegistry& registry_;
   StreamMessages messages_;
   std::size_t read_slot_ = 0;  // Of the read that is going on.
+  // The write that is going on.
+  Outgoing written_ = Outgoing::kAnswer;
+  std::size_t written_slot_ = 0;
   std::shared_ptr<StreamFlow> flow_;
 };
 

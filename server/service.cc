@@ -24,8 +24,8 @@ absl::Status AnswerCall(const v1::ReconstructFrameRequest& request, const Server
   auto session = Session::Open(*parameters, limits.frame);
   if (!session.ok()) return session.status();
   wire::EncodeParameters(session->parameters(), *response.mutable_parameters());
-  return AnswerFrame(request.frame(), session->next_sequence(), *outputs, limits, *session, worker,
-                     *response.mutable_frame());
+  return AnswerFrame(DecodeFrameWithin(request.frame(), limits), session->next_sequence(), *outputs,
+                     *session, worker, *response.mutable_frame());
 }
 
 // Refuses the call as soon as it comes.
@@ -58,7 +58,7 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::ReconstructRequest, v1::ReconstructResponse>* Service::Reconstruct(
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruct(
     grpc::CallbackServerContext* context) {
   return new ReconstructReactor(*context, limits_, registry_, pool_);
 }

@@ -15,13 +15,21 @@ namespace partiemc::server {
 /// The reason of RESOURCE_EXHAUSTED for a ReconstructFrame too many (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 
-class Service final : public v1::ReconstructionService::CallbackService {
+/// The generated service, in which Reconstruct passes messages as bytes.
+using ServiceBase = v1::ReconstructionService::WithRawCallbackMethod_Reconstruct<
+    v1::ReconstructionService::WithCallbackMethod_ReconstructFrame<
+        v1::ReconstructionService::WithCallbackMethod_WatchStream<
+            v1::ReconstructionService::WithCallbackMethod_ListStreams<
+                v1::ReconstructionService::WithCallbackMethod_GetServerInfo<
+                    v1::ReconstructionService::Service>>>>>;
+
+class Service final : public ServiceBase {
  public:
   /// The arguments outlive the service.
   Service(const ServerLimits& limits, StreamRegistry& registry, ComputePool& pool)
       : limits_(limits), registry_(registry), pool_(pool) {}
 
-  grpc::ServerBidiReactor<v1::ReconstructRequest, v1::ReconstructResponse>* Reconstruct(
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Reconstruct(
       grpc::CallbackServerContext* context) override;
   grpc::ServerUnaryReactor* ReconstructFrame(grpc::CallbackServerContext* context,
                                              const v1::ReconstructFrameRequest* request,

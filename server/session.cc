@@ -9,6 +9,13 @@
 
 namespace partiemc::server {
 
+absl::Status OutOfMemory(std::string value) {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonOutOfMemory), "frame", std::move(value),
+       "must fit into the server's memory; send a smaller frame or try again later"});
+}
+
 absl::StatusOr<Session> Session::Open(const ReconstructionParameters& parameters,
                                       const FrameLimits& limits) {
   auto reconstructor = Reconstructor::Create(parameters, limits);
@@ -34,15 +41,12 @@ absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>
   } catch (const std::bad_alloc&) {
     // What the workspace holds is anybody's guess now, and its memory is wanted.
     worker = Worker();
-    return ViolationError(
-        absl::StatusCode::kResourceExhausted,
-        {std::string(kReasonOutOfMemory), "frame",
-         absl::StrCat(frame->ParticleCount(), " particles"),
-         "must fit into the server's memory; send a smaller frame or try again later"});
+    return OutOfMemory(absl::StrCat(frame->ParticleCount(), " particles"));
   }
 }
 
 absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver) {
+  worker.particles.Used(frame.ParticleCount(), WarmSize::Clock::now());
   // The core commits a frame that it accepts, but `deliver` may still refuse it: work on a copy.
   worker.next_state = state_;
   StageClock clock;

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "absl/functional/function_ref.h"
@@ -16,7 +17,7 @@
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
 #include "partiemc/state.h"
-#include "server/compute_pool.h"
+#include "server/worker.h"
 
 namespace partiemc::server {
 
@@ -24,6 +25,9 @@ namespace partiemc::server {
 inline constexpr std::string_view kReasonSequenceGap = "SEQUENCE_GAP";
 inline constexpr std::string_view kReasonSequenceDuplicate = "SEQUENCE_DUPLICATE";
 inline constexpr std::string_view kReasonOutOfMemory = "OUT_OF_MEMORY";
+
+/// RESOURCE_EXHAUSTED with the Violation of a frame, of size `value`, that memory is lacking for.
+absl::Status OutOfMemory(std::string value);
 
 /// Reads the clock for the core, which has none.
 class StageClock final : public StageObserver {

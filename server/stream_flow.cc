@@ -9,6 +9,20 @@
 namespace partiemc::server {
 namespace {
 
+std::string Name(RequestKind kind) {
+  switch (kind) {
+    case RequestKind::kMalformed:
+      return "malformed";
+    case RequestKind::kEmpty:
+      return "empty";
+    case RequestKind::kOpen:
+      return "open";
+    case RequestKind::kFrame:
+      return "frame";
+  }
+  return "";
+}
+
 absl::Status BrokenProtocol(std::string found, std::string rule) {
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
@@ -57,18 +71,18 @@ void StreamFlow::TakeRequest(RequestKind kind) {
   if (phase_ == Phase::kOpening) {
     opening_ = kind == RequestKind::kOpen;
     if (opening_) return;
-    End(BrokenProtocol(kind == RequestKind::kFrame ? "frame" : "empty",
-                       "the first must be `open`"));
+    End(BrokenProtocol(Name(kind), "the first must be `open`"));
   } else if (phase_ == Phase::kStreaming) {
     switch (kind) {
       case RequestKind::kFrame:
         ++read_;
         break;
       case RequestKind::kOpen:
-        End(BrokenProtocol("open", "comes once; after it every request must be `frame`"));
+        End(BrokenProtocol(Name(kind), "comes once; after it every request must be `frame`"));
         break;
+      case RequestKind::kMalformed:
       case RequestKind::kEmpty:
-        End(BrokenProtocol("empty", "must be `frame`"));
+        End(BrokenProtocol(Name(kind), "must be `frame`"));
         break;
     }
   }

@@ -23,7 +23,7 @@ inline constexpr std::string_view kReasonDraining = "DRAINING";
 absl::Status DrainingError();
 
 /// What a request turned out to be.
-enum class RequestKind { kEmpty, kOpen, kFrame };
+enum class RequestKind { kMalformed, kEmpty, kOpen, kFrame };
 
 /// What StreamDoor::StartWrite is to send.
 enum class Outgoing { kOpened, kAnswer, kDraining };

@@ -1,20 +1,40 @@
 #include "server/stream_messages.h"
 
+#include <memory>
+#include <new>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "wire/message_bytes.h"
 
 namespace partiemc::server {
 namespace {
 
-absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, std::uint64_t max_bytes) {
-  if (const std::size_t bytes = frame.ByteSizeLong(); bytes > max_bytes) {
-    return ViolationError(absl::StatusCode::kResourceExhausted,
-                          {std::string(kReasonFrameBytes), "frame", absl::StrCat(bytes, " bytes"),
-                           absl::StrCat("must be at most ", max_bytes, " bytes")});
+// What a worker keeps warm of messages: a frame's arrays are views into `request`.
+struct FrameMessages final : DoorBuffers {
+  v1::ReconstructRequest request;
+  v1::ReconstructResponse result;  // Never an error, whose coming would drop its buffers.
+};
+
+// Taken from the worker for as long as they are used: a session that has run out of memory drops
+// all that its worker holds. No other kind of door has put anything else there.
+std::unique_ptr<FrameMessages> TakeMessages(Worker& worker) {
+  if (worker.door_buffers == nullptr) return std::make_unique<FrameMessages>();
+  return std::unique_ptr<FrameMessages>(static_cast<FrameMessages*>(worker.door_buffers.release()));
+}
+
+// Parses a request that holds a frame into `request`, whose buffers are used again.
+absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request) {
+  request.mutable_frame()->Clear();
+  try {
+    if (wire::MergeBytes(bytes, request)) return absl::OkStatus();
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory(absl::StrCat(bytes.Length(), " bytes"));
   }
-  return wire::DecodeFrame(frame);
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonMalformed), "frame",
+                         absl::StrCat(bytes.Length(), " bytes"), "must be a ParticleFrame"});
 }
 
 // Parts of the protocol that this server does not speak are refused, not ignored.
@@ -41,15 +61,24 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
   message.set_max_streams(limits.max_streams);
 }
 
-absl::Status AnswerFrame(const v1::ParticleFrame& frame, std::uint64_t sequence,
-                         const wire::Outputs& outputs, const ServerLimits& limits, Session& session,
-                         Worker& worker, v1::ReconstructedFrame& message) {
+absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame,
+                                        const ServerLimits& limits) {
+  if (const std::size_t bytes = frame.ByteSizeLong(); bytes > limits.max_frame_bytes) {
+    return ViolationError(absl::StatusCode::kResourceExhausted,
+                          {std::string(kReasonFrameBytes), "frame", absl::StrCat(bytes, " bytes"),
+                           absl::StrCat("must be at most ", limits.max_frame_bytes, " bytes")});
+  }
+  return wire::DecodeFrame(frame);
+}
+
+absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
+                         const wire::Outputs& outputs, Session& session, Worker& worker,
+                         v1::ReconstructedFrame& message) {
   const auto deliver = [&](const Result& result, const StageClock& clock) {
     return wire::EncodeResult(result, {clock.stages_ms(), clock.TotalMs()}, outputs, message);
   };
-  auto status =
-      session.Answer(sequence, DecodeFrameWithin(frame, limits.max_frame_bytes), worker, deliver);
-  if (status.ok()) message.set_time(frame.time());
+  auto status = session.Answer(sequence, frame, worker, deliver);
+  if (status.ok()) message.set_time(frame->time);
   return status;
 }
 
@@ -58,24 +87,28 @@ StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& regis
       registry_(registry),
       requests_(limits.frames_in_flight),
       answers_(limits.frames_in_flight) {
-  v1::StreamNotice& notice = *draining_.mutable_notice();
+  v1::ReconstructResponse draining;
+  v1::StreamNotice& notice = *draining.mutable_notice();
   notice.set_kind(v1::StreamNotice::KIND_DRAINING);
   notice.set_message("the server is going away: finish reading, then connect elsewhere");
+  draining_ = wire::ToBytes(draining);
 }
 
-RequestKind StreamMessages::Kind(std::size_t slot) const {
-  switch (requests_[slot].request_case()) {
-    case v1::ReconstructRequest::kOpen:
+RequestKind StreamMessages::Kind(std::size_t slot) {
+  using v1::ReconstructRequest;
+  switch (wire::HeldField(requests_[slot], ReconstructRequest::kFrameFieldNumber).value_or(-1)) {
+    case ReconstructRequest::kOpenFieldNumber:
       return RequestKind::kOpen;
-    case v1::ReconstructRequest::kFrame:
+    case ReconstructRequest::kFrameFieldNumber:
       return RequestKind::kFrame;
-    case v1::ReconstructRequest::REQUEST_NOT_SET:
-      break;
+    case 0:
+      return RequestKind::kEmpty;
+    default:
+      return RequestKind::kMalformed;
   }
-  return RequestKind::kEmpty;
 }
 
-const v1::ReconstructResponse& StreamMessages::response(Outgoing what, std::size_t slot) const {
+grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
   switch (what) {
     case Outgoing::kOpened:
       return opened_;
@@ -88,7 +121,15 @@ const v1::ReconstructResponse& StreamMessages::response(Outgoing what, std::size
 }
 
 absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
-  const v1::OpenStream& open = requests_[slot].open();
+  v1::ReconstructRequest request;
+  const bool parsed = wire::MergeBytes(requests_[slot], request);
+  requests_[slot].Clear();
+  if (!parsed) {
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonProtocol), "request", "malformed", "must be a ReconstructRequest"});
+  }
+  const v1::OpenStream& open = request.open();
   if (auto status = CheckCapabilities(open); !status.ok()) return status;
   const auto parameters = wire::DecodeParameters(open.parameters());
   if (!parameters.ok()) return parameters.status();
@@ -103,28 +144,37 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
   session_ = *std::move(session);
   outputs_ = *outputs;
 
-  v1::StreamOpened& opened = *opened_.mutable_opened();
+  v1::ReconstructResponse response;
+  v1::StreamOpened& opened = *response.mutable_opened();
   opened.set_stream_id(stream->id);
   wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
   opened.set_frames_in_flight(limits_.frames_in_flight);
   EncodeLimits(limits_, *opened.mutable_limits());
   opened.set_next_sequence(session_->next_sequence());
+  opened_ = wire::ToBytes(response);
   return stream;
 }
 
 Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
-  const v1::ParticleFrame& frame = requests_[slot].frame();
-  v1::ReconstructResponse& answer = answers_[slot];
-  const auto status = AnswerFrame(frame, frame.sequence(), outputs_, limits_, *session_, worker,
-                                  *answer.mutable_frame());
-  if (status.ok()) {
-    answer.mutable_frame()->set_sequence(frame.sequence());
-  } else {
-    wire::EncodeFrameError(status, frame.sequence(), session_->next_sequence(),
-                           *answer.mutable_error());
-  }
-  // An idle stream does not sit on the memory of its last frames.
+  std::unique_ptr<FrameMessages> messages = TakeMessages(worker);
+  const absl::Status parsed = ParseFrame(requests_[slot], messages->request);
   requests_[slot].Clear();
+  const v1::ParticleFrame& request = messages->request.frame();
+  v1::ReconstructedFrame& result = *messages->result.mutable_frame();
+  const absl::Status status =
+      AnswerFrame(parsed.ok() ? DecodeFrameWithin(request, limits_) : parsed, request.sequence(),
+                  outputs_, *session_, worker, result);
+  if (status.ok()) {
+    result.set_sequence(request.sequence());
+    answers_[slot] = wire::ToBytes(messages->result);
+  } else {
+    v1::ReconstructResponse error;
+    wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
+                           *error.mutable_error());
+    answers_[slot] = wire::ToBytes(error);
+    messages->request.Clear();  // Nothing has checked its size.
+  }
+  worker.door_buffers = std::move(messages);
   return {.is_result = status.ok(), .last_sequence = session_->next_sequence() - 1};
 }
 

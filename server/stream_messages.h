@@ -1,6 +1,8 @@
 // The messages of one stream and the session behind them, whatever door they travel through.
 #pragma once
 
+#include <grpcpp/support/byte_buffer.h>
+
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -19,37 +21,48 @@ namespace partiemc::server {
 
 /// Beside the reasons of sessions, of the core and of the codec (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonFrameBytes = "FRAME_BYTES";
+inline constexpr std::string_view kReasonMalformed = "MALFORMED";
 
 void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
 
-/// Has `session` answer `frame`, taken to have the given sequence number, and writes the result
-/// into `message`. Errors: those of Session::Answer; also FRAME_BYTES, for a frame that is larger
-/// than was announced, which uses up its sequence number.
-absl::Status AnswerFrame(const v1::ParticleFrame& frame, std::uint64_t sequence,
-                         const wire::Outputs& outputs, const ServerLimits& limits, Session& session,
-                         Worker& worker, v1::ReconstructedFrame& message);
+/// As wire::DecodeFrame. Errors: those of it; FRAME_BYTES for a frame that is larger than was
+/// announced.
+absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits);
 
-/// Not thread-safe as a whole: StreamFlow's promises to a StreamDoor are what it relies on.
+/// Has `session` answer `frame`, taken to have the given sequence number, and writes the result
+/// into `message`. Errors: those of Session::Answer.
+absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
+                         const wire::Outputs& outputs, Session& session, Worker& worker,
+                         v1::ReconstructedFrame& message);
+
+/// Slots hold messages as bytes, and only from their reading or until their writing: what a frame
+/// needs besides belongs to the worker that answers it, so that an idle stream holds next to
+/// nothing. Not thread-safe as a whole: StreamFlow's promises to a StreamDoor are what it relies
+/// on.
 class StreamMessages {
  public:
   /// One slot for each of limits.frames_in_flight.
   StreamMessages(const ServerLimits& limits, StreamRegistry& registry);
 
-  v1::ReconstructRequest& request(std::size_t slot) { return requests_[slot]; }
-  RequestKind Kind(std::size_t slot) const;
-  const v1::ReconstructResponse& response(Outgoing what, std::size_t slot) const;
+  grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
+  RequestKind Kind(std::size_t slot);
+  const grpc::ByteBuffer& response(Outgoing what, std::size_t slot) { return Response(what, slot); }
+  /// The response has been written: lets go of it.
+  void Written(Outgoing what, std::size_t slot) { Response(what, slot).Clear(); }
 
   /// As StreamDoor::Open and StreamDoor::Answer; gives the stream as it was opened.
   absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamFlow& flow);
   Answered Answer(std::size_t slot, Worker& worker);
 
  private:
+  grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
+
   const ServerLimits& limits_;
   StreamRegistry& registry_;
-  std::vector<v1::ReconstructRequest> requests_;
-  std::vector<v1::ReconstructResponse> answers_;
-  v1::ReconstructResponse opened_;
-  v1::ReconstructResponse draining_;
+  std::vector<grpc::ByteBuffer> requests_;
+  std::vector<grpc::ByteBuffer> answers_;
+  grpc::ByteBuffer opened_;
+  grpc::ByteBuffer draining_;
   std::optional<Session> session_;  // Once open.
   wire::Outputs outputs_;
 };

@@ -1,10 +1,12 @@
 #include "library/stream_call.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "library/channel.h"
+#include "wire/message_bytes.h"
 
 namespace partiemc::client {
 namespace {
@@ -18,6 +20,13 @@ constexpr std::chrono::seconds kEndTimeout(1);
 // A server may announce any window; this one bounds the memory of this side.
 constexpr std::size_t kMaxFramesInFlight = 64;
 
+// What a message of gRPC holds at most, less room for what is round the frame.
+constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() - 64;
+
+std::string MethodName() {
+  return absl::StrCat("/", v1::ReconstructionService::service_full_name(), "/Reconstruct");
+}
+
 std::string Seconds(std::chrono::milliseconds duration) {
   return absl::StrCat(static_cast<double>(duration.count()) / 1000, " s");
 }
@@ -26,9 +35,7 @@ std::string Seconds(std::chrono::milliseconds duration) {
 
 Stream::Call::Call(std::shared_ptr<grpc::Channel> channel, std::string address,
                    std::chrono::milliseconds deadline)
-    : address_(std::move(address)),
-      deadline_(deadline),
-      stub_(v1::ReconstructionService::NewStub(std::move(channel))) {
+    : address_(std::move(address)), deadline_(deadline), stub_(std::move(channel)) {
   spare_.push_back(std::make_unique<v1::ReconstructResponse>());
 }
 
@@ -39,7 +46,8 @@ Stream::Call::~Call() {
 }
 
 absl::Status Stream::Call::Open(const StreamOptions& options) {
-  v1::OpenStream& open = *requests_[slot_].mutable_open();
+  v1::ReconstructRequest request;
+  v1::OpenStream& open = *request.mutable_open();
   open.set_stream_name(options.name);
   wire::EncodeParameters(options.parameters, *open.mutable_parameters());
   wire::EncodeOutputs({.mesh = options.outputs.mesh,
@@ -48,15 +56,14 @@ absl::Status Stream::Call::Open(const StreamOptions& options) {
                       *open.mutable_outputs());
   open.mutable_labels()->insert(options.labels.begin(), options.labels.end());
 
-  stub_->async()->Reconstruct(&context_, this);
+  stub_.PrepareBidiStreamingCall(&context_, MethodName(), {}, this);
   Lock lock(mutex_);
   started_ = hold_ = true;
   progress_at_ = Clock::now();
   AddHold();
   StartCall();
   ReadNext(lock);
-  Write(lock, requests_[slot_]);
-  slot_ ^= 1;
+  Write(lock, wire::ToBytes(request));
 
   const auto due = progress_at_ + deadline_;
   changed_.wait_until(lock, due, [this] { return !ready_.empty() || done_; });
@@ -116,26 +123,26 @@ absl::StatusOr<std::uint64_t> Stream::Call::Send(const Frame& frame, double time
   const std::uint64_t sequence = next_sequence_;
   lock.unlock();
 
-  v1::ParticleFrame& message = *requests_[slot_].mutable_frame();
-  wire::EncodeFrame(frame, message);
-  message.set_sequence(sequence);
-  message.set_time(time);
-  const std::uint64_t bytes = message.ByteSizeLong();
-  const std::uint64_t limit = info_.limits.max_frame_bytes;
-  if (limit > 0 && bytes > limit) {
+  Frame timed = frame;
+  timed.time = time;
+  const wire::FrameRequest request(timed, sequence);
+  const std::uint64_t bytes = request.frame_bytes();
+  const std::uint64_t announced = info_.limits.max_frame_bytes;
+  const std::uint64_t limit = announced == 0 ? kMaxFrameBytes : std::min(announced, kMaxFrameBytes);
+  if (bytes > limit) {
     return ViolationError(absl::StatusCode::kResourceExhausted,
                           {.reason = "MESSAGE_TOO_LARGE",
                            .field = "frame",
                            .value = absl::StrCat(bytes, " bytes"),
                            .rule = absl::StrCat("the server takes at most ", limit)});
   }
+  grpc::ByteBuffer request_bytes = request.ToBytes();
   lock.lock();
   ready = WaitToSend(lock, /*for_window=*/false);
   if (!ready.ok()) return ready;
   if (next_sequence_ == next_answer_) progress_at_ = Clock::now();
   ++next_sequence_;
-  Write(lock, requests_[slot_]);
-  slot_ ^= 1;
+  Write(lock, std::move(request_bytes));
   return sequence;
 }
 
@@ -308,11 +315,12 @@ absl::Status Stream::Call::Fail(absl::Status failure) {
   return failure_;
 }
 
-void Stream::Call::Write(Lock& lock, v1::ReconstructRequest& request) {
+void Stream::Call::Write(Lock& lock, grpc::ByteBuffer request) {
   writing_ = true;
   ++outside_operations_;
+  request_.Swap(&request);
   lock.unlock();
-  StartWrite(&request);
+  StartWrite(&request_);
   lock.lock();
   EndOutsideOperation(lock);
 }
@@ -346,6 +354,7 @@ void Stream::Call::OnWriteDone(bool ok) {
   // A failed write is told by the end of the reads and by OnDone, with its reason.
   const std::scoped_lock lock(mutex_);
   writing_ = !ok;
+  request_.Clear();
   changed_.notify_all();
 }
 

@@ -9,6 +9,7 @@
 // of gRPC's threads; it is given back once nothing more can be read.
 #pragma once
 
+#include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
@@ -30,7 +31,7 @@
 namespace partiemc::client {
 
 class Stream::Call final
-    : private grpc::ClientBidiReactor<v1::ReconstructRequest, v1::ReconstructResponse> {
+    : private grpc::ClientBidiReactor<grpc::ByteBuffer, v1::ReconstructResponse> {
  public:
   Call(std::shared_ptr<grpc::Channel> channel, std::string address,
        std::chrono::milliseconds deadline);
@@ -55,7 +56,7 @@ class Stream::Call final
   void OnDone(const grpc::Status& status) override;
 
   // The following expect `lock` to be held; those that start an operation let it go meanwhile.
-  void Write(Lock& lock, v1::ReconstructRequest& request);
+  void Write(Lock& lock, grpc::ByteBuffer request);
   void ReadNext(Lock& lock);
   void EndOutsideOperation(Lock& lock);
   void ReleaseHoldWhenIdle(Lock& lock);
@@ -72,18 +73,15 @@ class Stream::Call final
   const std::string address_;
   const std::chrono::milliseconds deadline_;
   StreamInfo info_;
-  std::unique_ptr<v1::ReconstructionService::Stub> stub_;
+  grpc::TemplatedGenericStub<grpc::ByteBuffer, v1::ReconstructResponse> stub_;
   grpc::ClientContext context_;
-
-  // Two requests: one is written while the next one is encoded.
-  v1::ReconstructRequest requests_[2];
-  int slot_ = 0;                      // Of the sender's thread alone.
   wire::ReconstructedFrame decoded_;  // Of the receiver's thread alone.
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::unique_ptr<v1::ReconstructResponse>> spare_;
   std::unique_ptr<v1::ReconstructResponse> reading_;
+  grpc::ByteBuffer request_;  // While it is being written.
   std::deque<std::unique_ptr<v1::ReconstructResponse>> ready_;
   std::uint64_t next_sequence_ = 1;  // Of the next frame to be sent.
   std::uint64_t next_answer_ = 1;    // Of the next answer to be received.

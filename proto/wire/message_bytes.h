@@ -1,0 +1,55 @@
+// Messages as gRPC carries them: for calls that take bytes in place of messages, so that large
+// arrays are copied once and buffers are kept from message to message.
+#pragma once
+
+#include <google/protobuf/message_lite.h>
+#include <grpcpp/support/byte_buffer.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "partiemc/frame.h"
+#include "partiemc/v1/reconstruction.pb.h"
+
+namespace partiemc::wire {
+
+/// Of a message that is nothing but a oneof of the fields 1 to `last`: the number of the one that
+/// it holds, 0 where it holds none, nothing where `bytes` is no message. What is in the fields is
+/// not looked at.
+std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
+
+/// Adds what `bytes` holds to `message`; strings that are there and empty keep their memory. False
+/// where `bytes` is no such message; `message` may then hold a part of it.
+bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message);
+
+/// Requires: a message of less than 2 GiB.
+grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message);
+
+/// A ReconstructRequest that holds a frame, as EncodeFrame and ToBytes would make it, but without a
+/// message between the caller's arrays and the bytes.
+class FrameRequest {
+ public:
+  /// A view of `frame`. Requires: frame.components is 2 or 3.
+  FrameRequest(const Frame& frame, std::uint64_t sequence);
+
+  /// Of its ParticleFrame alone: what Limits.max_frame_bytes counts.
+  std::uint64_t frame_bytes() const { return frame_bytes_; }
+
+  /// Copies each array once. Requires: frame_bytes() < 2^31 - 16.
+  grpc::ByteBuffer ToBytes() const;
+
+ private:
+  struct Array {
+    int field;
+    std::span<const std::byte> bytes;
+  };
+
+  v1::ParticleFrame scalars_;  // All but the arrays.
+  std::array<Array, 4> arrays_;
+  std::uint64_t frame_bytes_ = 0;
+};
+
+}  // namespace partiemc::wire

@@ -1,0 +1,14 @@
+// How this process holds memory that it has freed. Does nothing where the C library is not glibc.
+#pragma once
+
+namespace partiemc::server {
+
+/// Has freed memory stay at hand: a frame's bytes come and go at the pace of the stream, and pages
+/// that go back to the system each time cost more than the copying. To be called before the first
+/// thread is started.
+void KeepFreedMemory();
+
+/// Gives back what is free now. Milliseconds; for quiet moments.
+void GiveBackFreedMemory();
+
+}  // namespace partiemc::server

@@ -1,0 +1,50 @@
+// What a worker keeps warm from frame to frame, and for how long.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <memory>
+
+#include "partiemc/reconstructor.h"
+#include "partiemc/result.h"
+#include "partiemc/state.h"
+
+namespace partiemc::server {
+
+/// Tells when buffers have grown beyond what they are used for: nothing of at least a quarter of
+/// the largest size that they have seen has come for a while, or nothing at all.
+class WarmSize {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  void Used(std::size_t size, Clock::time_point now) {
+    largest_ = std::max(largest_, size);
+    if (size >= largest_ / 4) needed_ = now;
+  }
+  bool Outlived(Clock::time_point now, Clock::duration warm_time) const {
+    return largest_ > 0 && now - needed_ >= warm_time;
+  }
+  bool used() const { return largest_ > 0; }
+
+ private:
+  std::size_t largest_ = 0;
+  Clock::time_point needed_;
+};
+
+/// The buffers of whoever turns messages into frames and back; sessions know nothing of them.
+class DoorBuffers {
+ public:
+  virtual ~DoorBuffers() = default;
+};
+
+/// What a worker keeps warm from frame to frame, whichever stream they belong to.
+struct Worker {
+  Workspace workspace;
+  Result result;
+  State next_state;  ///< Becomes the stream's state once the frame has been answered.
+  std::unique_ptr<DoorBuffers> door_buffers;
+  WarmSize particles;  ///< Of the frames that it has worked on.
+};
+
+}  // namespace partiemc::server
