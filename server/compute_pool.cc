@@ -39,16 +39,16 @@ ComputePool::~ComputePool() {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
-  job_came_.notify_all();
+  task_came_.notify_all();
   for (std::thread& runner : runners_) runner.join();
 }
 
-void ComputePool::Submit(Job job) {
+void ComputePool::Submit(Job job, Afterwards afterwards) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    tasks_.push_back({std::move(job), std::move(afterwards)});
   }
-  job_came_.notify_one();
+  task_came_.notify_one();
 }
 
 void ComputePool::Run() {
@@ -56,29 +56,33 @@ void ComputePool::Run() {
   oneapi::tbb::task_arena& arena = kShareArena ? arena_ : own_arena;
   std::unique_lock lock(mutex_);
   for (;;) {
-    WaitForJob(lock);
-    if (jobs_.empty()) return;
-    Job job = std::move(jobs_.front());
-    jobs_.pop_front();
-    std::unique_ptr<Worker> worker = TakeWorker();
-    lock.unlock();
-    arena.execute([&] { job(*worker); });
-    job = nullptr;  // What it holds ends without the lock.
+    WaitForTask(lock);
+    if (tasks_.empty()) return;
+    {
+      const Task task = std::move(tasks_.front());
+      tasks_.pop_front();
+      std::unique_ptr<Worker> worker = TakeWorker();
+      lock.unlock();
+      arena.execute([&] { task.job(*worker); });
+      lock.lock();
+      idle_.push_back(std::move(worker));
+      lock.unlock();
+      task.afterwards();
+    }
     lock.lock();
-    idle_.push_back(std::move(worker));
     Drop(TakeOutlived(), lock);
   }
 }
 
-// Returns when there is a job or never will be.
-void ComputePool::WaitForJob(std::unique_lock<std::mutex>& lock) {
-  const auto over = [this] { return stopping_ || !jobs_.empty(); };
+// Returns when there is a task, or never will be.
+void ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
+  const auto over = [this] { return stopping_ || !tasks_.empty(); };
   while (!over()) {
     const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
     if (warm) {
-      job_came_.wait_for(lock, warm_time_, over);
+      task_came_.wait_for(lock, warm_time_, over);
     } else {
-      job_came_.wait(lock);
+      task_came_.wait(lock);
     }
     Drop(TakeOutlived(), lock);
   }

@@ -32,6 +32,7 @@ inline constexpr std::chrono::seconds kWarmTime(10);
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
+  using Afterwards = std::function<void()>;
 
   /// `threads` is what all jobs together may use, at least 1. While it lives, the whole process
   /// gives oneTBB no more than that.
@@ -41,17 +42,23 @@ class ComputePool {
   ComputePool(const ComputePool&) = delete;
   ComputePool& operator=(const ComputePool&) = delete;
 
-  /// Never blocks on computing. Jobs must not throw. Safe from any thread, jobs included.
-  void Submit(Job job);
+  /// Runs `job`, then `afterwards`, which has no worker any more: what it submits gets the same
+  /// one. Never blocks on computing. Neither may throw. Safe from any thread, jobs included.
+  void Submit(
+      Job job, Afterwards afterwards = [] {});
 
   unsigned threads() const { return static_cast<unsigned>(runners_.size()); }
 
  private:
+  struct Task {
+    Job job;
+    Afterwards afterwards;
+  };
   using Workers = std::vector<std::unique_ptr<Worker>>;
 
   void Run();
   // With the lock held; those that get it let it go for a while:
-  void WaitForJob(std::unique_lock<std::mutex>& lock);
+  void WaitForTask(std::unique_lock<std::mutex>& lock);
   std::unique_ptr<Worker> TakeWorker();
   Workers TakeOutlived();
   static void Drop(Workers workers, std::unique_lock<std::mutex>& lock);
@@ -60,10 +67,10 @@ class ComputePool {
   oneapi::tbb::global_control parallelism_;
   oneapi::tbb::task_arena arena_;
   std::mutex mutex_;
-  std::condition_variable job_came_;
-  std::deque<Job> jobs_;   // Guarded by mutex_.
-  Workers idle_;           // Guarded by mutex_. The one that was used last is the last.
-  bool stopping_ = false;  // Guarded by mutex_.
+  std::condition_variable task_came_;
+  std::deque<Task> tasks_;  // Guarded by mutex_.
+  Workers idle_;            // Guarded by mutex_. The one that was used last is the last.
+  bool stopping_ = false;   // Guarded by mutex_.
   std::vector<std::thread> runners_;
 };
 

@@ -135,19 +135,21 @@ StreamCounts StreamFlow::counts() const {
 }
 
 void StreamFlow::Compute(std::size_t slot, Worker& worker) {
-  bool wanted = false;
   {
     const std::lock_guard lock(mutex_);
-    wanted = phase_ != Phase::kAbandoned;
+    if (phase_ == Phase::kAbandoned) return;
   }
-  Answered answered;
-  if (wanted) answered = door_.Answer(slot, worker);
+  answered_ = door_.Answer(slot, worker);
+}
+
+void StreamFlow::Computed() {
   On([&] {
     computing_ = false;
     ++computed_;
-    if (!wanted) return;
-    ++(answered.is_result ? counts_.frames : counts_.frame_errors);
-    counts_.last_sequence = answered.last_sequence;
+    const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
+    if (!answered) return;
+    ++(answered->is_result ? counts_.frames : counts_.frame_errors);
+    counts_.last_sequence = answered->last_sequence;
   });
 }
 
@@ -207,8 +209,8 @@ void StreamFlow::Perform(Actions actions) {
   const auto self = shared_from_this();
   for (;;) {
     if (actions.compute) {
-      pool_.Submit(
-          [self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); });
+      pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
+                   [self] { self->Computed(); });
     }
     if (actions.write) door_.StartWrite(*actions.write, actions.write_slot);
     if (actions.finish) door_.Finish(*actions.finish);

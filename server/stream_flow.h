@@ -118,10 +118,13 @@ class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
   void Perform(Actions actions);
   void Open();
   void Compute(std::size_t slot, Worker& worker);
+  void Computed();
 
   StreamDoor& door_;
   ComputePool& pool_;
   const std::size_t window_;
+
+  std::optional<Answered> answered_;  // From Compute to Computed, which it precedes.
 
   mutable std::mutex mutex_;  // Guards everything below.
   Phase phase_ = Phase::kOpening;

@@ -1,0 +1,134 @@
+// Messages as bytes: what is written without a message reads as one, and what is no message is
+// told.
+#include "wire/message_bytes.h"
+
+#include <grpcpp/support/slice.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "partiemc/v1/reconstruction.pb.h"
+#include "wire/codec.h"
+
+namespace partiemc::wire {
+namespace {
+
+constexpr int kLast = v1::ReconstructRequest::kFrameFieldNumber;
+
+// In pieces of `piece` bytes, as a connection may deliver them.
+grpc::ByteBuffer InPieces(const std::string& text, std::size_t piece) {
+  std::vector<grpc::Slice> slices;
+  for (std::size_t at = 0; at < text.size(); at += piece)
+    slices.emplace_back(text.substr(at, piece));
+  return {slices.data(), slices.size()};
+}
+
+v1::ReconstructRequest Parsed(grpc::ByteBuffer bytes) {
+  v1::ReconstructRequest request;
+  EXPECT_TRUE(MergeBytes(bytes, request));
+  return request;
+}
+
+template <typename T>
+std::vector<T> Numbers(std::size_t count) {
+  std::vector<T> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), T{1});
+  return numbers;
+}
+
+// A frame with every array, in every format, is the message that EncodeFrame makes.
+template <typename T>
+void ExpectSameAsMessage(int components, std::size_t particles) {
+  const auto positions = Numbers<T>(particles * static_cast<std::size_t>(components));
+  const auto volumes = Numbers<float>(particles);
+  const auto ids = Numbers<std::uint64_t>(particles);
+  const auto velocities = Numbers<float>(positions.size());
+  const Frame frame{.positions = std::span<const T>(positions),
+                    .components = components,
+                    .volumes = volumes,
+                    .ids = ids,
+                    .velocities = velocities,
+                    .time = 0.25};
+  v1::ReconstructRequest expected;
+  EncodeFrame(frame, *expected.mutable_frame());
+  expected.mutable_frame()->set_sequence(300);
+  const FrameRequest request(frame, 300);
+  EXPECT_EQ(request.frame_bytes(), expected.frame().ByteSizeLong());
+  const grpc::ByteBuffer bytes = request.ToBytes();
+  EXPECT_EQ(bytes.Length(), expected.ByteSizeLong());
+  EXPECT_EQ(Parsed(bytes).SerializeAsString(), expected.SerializeAsString());
+}
+
+TEST(FrameRequest, IsTheMessageThatEncodeFrameMakes) {
+  for (const int components : {2, 3}) {
+    for (const std::size_t particles : {0, 1, 20, 300'000}) {
+      ExpectSameAsMessage<float>(components, particles);
+      ExpectSameAsMessage<double>(components, particles);
+    }
+  }
+}
+
+TEST(FrameRequest, LeavesOutWhatAFrameHasNot) {
+  const std::vector<float> positions = {1, 2};
+  const FrameRequest request({.positions = std::span<const float>(positions)}, 1);
+  const v1::ReconstructRequest parsed = Parsed(request.ToBytes());
+  EXPECT_EQ(parsed.frame().position_format(), v1::POSITION_FORMAT_FLOAT32_2);
+  EXPECT_TRUE(parsed.frame().ids().empty());
+}
+
+TEST(HeldField, IsTheOneOfTheOneofThatComesLast) {
+  v1::ReconstructRequest open, frame;
+  open.mutable_open()->set_stream_name("name");
+  frame.mutable_frame()->set_positions(std::string(1000, 'p'));
+  const std::string open_text = open.SerializeAsString(), frame_text = frame.SerializeAsString();
+  const std::string unknown = "\x18\x05\x22\x02hi";  // Field 3, a number; field 4, two bytes.
+  for (const std::size_t piece : {1, 7, 4096}) {
+    const auto held = [&](const std::string& text) {
+      grpc::ByteBuffer bytes = InPieces(text, piece);
+      return HeldField(bytes, kLast);
+    };
+    EXPECT_EQ(held(open_text), v1::ReconstructRequest::kOpenFieldNumber);
+    EXPECT_EQ(held(frame_text), v1::ReconstructRequest::kFrameFieldNumber);
+    EXPECT_EQ(held(frame_text + open_text), v1::ReconstructRequest::kOpenFieldNumber);
+    EXPECT_EQ(held(open_text + frame_text + unknown), v1::ReconstructRequest::kFrameFieldNumber);
+    EXPECT_EQ(held(unknown), 0);
+    EXPECT_EQ(held(frame_text.substr(0, frame_text.size() - 1)), std::nullopt);
+    EXPECT_EQ(held(frame_text + "\x07"), std::nullopt) << "7 is no type of a field";
+  }
+  grpc::ByteBuffer empty = ToBytes(v1::ReconstructRequest());
+  EXPECT_EQ(HeldField(empty, kLast), 0);
+}
+
+TEST(MergeBytes, WritesIntoTheMemoryThatIsThere) {
+  v1::ReconstructRequest request;
+  request.mutable_frame()->set_positions(std::string(5000, 'a'));
+  const std::string large = request.SerializeAsString();
+  request.mutable_frame()->set_positions(std::string(3000, 'b'));
+  const std::string small = request.SerializeAsString();
+
+  v1::ReconstructRequest reused;
+  grpc::ByteBuffer bytes = InPieces(large, 512);
+  ASSERT_TRUE(MergeBytes(bytes, reused));
+  const char* const memory = reused.frame().positions().data();
+  reused.mutable_frame()->Clear();
+  bytes = InPieces(small, 512);
+  ASSERT_TRUE(MergeBytes(bytes, reused));
+  EXPECT_EQ(reused.frame().positions(), std::string(3000, 'b'));
+  EXPECT_EQ(reused.frame().positions().data(), memory);
+}
+
+TEST(MergeBytes, TellsWhatIsNoMessage) {
+  v1::ReconstructRequest request;
+  request.mutable_frame()->set_positions("0123456789");
+  const std::string text = request.SerializeAsString();
+  for (std::size_t size = 1; size < text.size(); ++size) {
+    grpc::ByteBuffer bytes = InPieces(text.substr(0, size), 4);
+    v1::ReconstructRequest into;
+    EXPECT_FALSE(MergeBytes(bytes, into)) << size << " of " << text.size() << " bytes";
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::wire

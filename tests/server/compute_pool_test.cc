@@ -1,0 +1,139 @@
+// The pool that computes: which worker a task gets, and how long a worker keeps its buffers. Also
+// under ThreadSanitizer.
+#include "server/compute_pool.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <set>
+#include <thread>
+#include <utility>
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using TimePoint = WarmSize::Clock::time_point;
+
+constexpr seconds kLongEnough(20);
+
+TEST(WarmSize, OutlivesItsUseWhenNothingOfAQuarterOfItComes) {
+  const TimePoint start;
+  WarmSize size;
+  EXPECT_FALSE(size.Outlived(start + seconds(100), seconds(10))) << "nothing has been used";
+  size.Used(1000, start);
+  EXPECT_FALSE(size.Outlived(start + seconds(9), seconds(10)));
+  EXPECT_TRUE(size.Outlived(start + seconds(10), seconds(10)));
+  size.Used(250, start + seconds(9));
+  EXPECT_FALSE(size.Outlived(start + seconds(18), seconds(10)));
+  size.Used(249, start + seconds(18));
+  EXPECT_TRUE(size.Outlived(start + seconds(19), seconds(10)));
+}
+
+// Submits `task` and waits until it is through.
+void RunAndWait(ComputePool& pool, const ComputePool::Job& task) {
+  std::promise<void> done;
+  pool.Submit(task, [&] { done.set_value(); });
+  done.get_future().wait();
+}
+
+TEST(ComputePool, ATaskAfterAnotherGetsTheSameWorkerOnAnyThread) {
+  ComputePool pool(4);
+  std::set<const Worker*> workers;
+  std::promise<void> done;
+  // As a stream does it: the next frame is submitted when the one before is through.
+  std::function<void(int)> submit = [&](int left) {
+    pool.Submit([&](Worker& worker) { workers.insert(&worker); },
+                [&, left] {
+                  if (left > 0) submit(left - 1);
+                  if (left == 0) done.set_value();
+                });
+  };
+  submit(200);
+  done.get_future().wait();
+  EXPECT_EQ(workers.size(), 1u);
+}
+
+TEST(ComputePool, TasksAtTheSameTimeHaveWorkersOfTheirOwn) {
+  ComputePool pool(2);
+  std::promise<const Worker*> first, second;
+  auto first_worker = first.get_future().share(), second_worker = second.get_future().share();
+  // Each ends only when the other one has begun.
+  pool.Submit([&](Worker& worker) {
+    first.set_value(&worker);
+    second_worker.wait();
+  });
+  pool.Submit([&](Worker& worker) {
+    second.set_value(&worker);
+    first_worker.wait();
+  });
+  EXPECT_NE(first_worker.get(), second_worker.get());
+}
+
+// Tells when it is destroyed.
+class Mourned final : public DoorBuffers {
+ public:
+  explicit Mourned(std::promise<void> gone) : gone_(std::move(gone)) {}
+  ~Mourned() override { gone_.set_value(); }
+
+ private:
+  std::promise<void> gone_;
+};
+
+// Has a worker work on a large frame; the future is there when its buffers are gone.
+std::future<void> WorkOnALargeFrame(ComputePool& pool) {
+  std::promise<void> gone;
+  std::future<void> future = gone.get_future();
+  auto buffers =
+      std::make_shared<std::unique_ptr<DoorBuffers>>(std::make_unique<Mourned>(std::move(gone)));
+  RunAndWait(pool, [buffers](Worker& worker) {
+    worker.particles.Used(1'000'000, WarmSize::Clock::now());
+    worker.door_buffers = std::move(*buffers);
+  });
+  return future;
+}
+
+TEST(ComputePool, AnIdleWorkerIsDroppedAfterAWhile) {
+  ComputePool pool(2, milliseconds(50));
+  const TimePoint start = WarmSize::Clock::now();
+  const std::future<void> gone = WorkOnALargeFrame(pool);
+  ASSERT_EQ(gone.wait_for(kLongEnough), std::future_status::ready);
+  EXPECT_GE(WarmSize::Clock::now() - start, milliseconds(50));
+}
+
+TEST(ComputePool, AWorkerThatIsTooLargeForItsFramesIsDroppedAfterAWhile) {
+  ComputePool pool(1, milliseconds(50));
+  const std::future<void> gone = WorkOnALargeFrame(pool);
+  const TimePoint give_up = WarmSize::Clock::now() + kLongEnough;
+  // Never idle for as long as it would take.
+  while (gone.wait_for(milliseconds(1)) != std::future_status::ready) {
+    ASSERT_LT(WarmSize::Clock::now(), give_up);
+    RunAndWait(pool, [](Worker& worker) { worker.particles.Used(1000, WarmSize::Clock::now()); });
+  }
+}
+
+TEST(ComputePool, AWorkerInUseIsKept) {
+  ComputePool pool(1, milliseconds(500));
+  std::future<void> gone = WorkOnALargeFrame(pool);
+  const TimePoint until = WarmSize::Clock::now() + milliseconds(1200);
+  int frames = 0;
+  TimePoint last = WarmSize::Clock::now();
+  while (WarmSize::Clock::now() < until) {
+    RunAndWait(pool,
+               [](Worker& worker) { worker.particles.Used(300'000, WarmSize::Clock::now()); });
+    // On a machine so busy that the worker was idle for too long, nothing can be said.
+    if (WarmSize::Clock::now() - last > milliseconds(250)) GTEST_SKIP();
+    last = WarmSize::Clock::now();
+    ++frames;
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  EXPECT_GT(frames, 1);
+  EXPECT_EQ(gone.wait_for(seconds(0)), std::future_status::timeout);
+}
+
+}  // namespace
+}  // namespace partiemc::server
