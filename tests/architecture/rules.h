@@ -19,7 +19,9 @@ Violations CoreIsPlain(const SourceTree& tree);
 /// stages only; no other source than reconstructor.cc reaches all of them.
 Violations StagesKeepTheirOrder(const SourceTree& tree);
 
-/// Sessions of the server reach neither gRPC nor Protobuf, so that they run under ThreadSanitizer.
+/// The sources of partiemc_server_session and their headers (sessions, the flow and registry of
+/// streams, the pool that computes) reach neither gRPC nor Protobuf, so that they run under
+/// ThreadSanitizer.
 Violations SessionsAreFreeOfGrpc(const SourceTree& tree);
 
 /// Server and client never include each other, nor link to each other.

@@ -101,11 +101,24 @@ TEST(Architecture, SessionsAreFreeOfGrpc) {
 }
 
 TEST(Architecture, ASessionThatReachesAMessageIsSeen) {
-  const SourceTree direct = Planted("server/session_extra.h", "#include <grpcpp/grpcpp.h>\n");
-  EXPECT_THAT(SessionsAreFreeOfGrpc(direct), Contains(HasSubstr("reaches grpcpp/grpcpp.h")));
-  SourceTree tree = Planted("server/session_extra.h", "#include \"detour.h\"\n");
+  for (const std::string file : {"compute_pool.h", "session.cc", "stream_flow.h", "stream_flow.cc",
+                                 "stream_registry.cc", "heap.h"}) {
+    const SourceTree tree = Planted("server/" + file, "\n#include <grpcpp/grpcpp.h>\n");
+    EXPECT_THAT(SessionsAreFreeOfGrpc(tree),
+                Contains("server/" + file + ": reaches grpcpp/grpcpp.h"));
+  }
+  SourceTree tree = Planted("server/worker.h", "\n#include \"detour.h\"\n");
   tree["server/detour.h"] = "#include \"partiemc/v1/reconstruction.pb.h\"\n";
   EXPECT_THAT(SessionsAreFreeOfGrpc(tree), Contains(HasSubstr("reconstruction.pb.h")));
+}
+
+TEST(Architecture, ASessionLibraryThatIsGoneIsSeen) {
+  SourceTree tree = Project();
+  tree.erase("server/CMakeLists.txt");
+  EXPECT_THAT(SessionsAreFreeOfGrpc(tree), testing::SizeIs(1));
+  EXPECT_THAT(
+      SessionsAreFreeOfGrpc(Without("server/CMakeLists.txt", "partiemc_server_session STATIC")),
+      testing::SizeIs(1));
 }
 
 TEST(Architecture, ServerAndClientAreStrangers) {
