@@ -36,17 +36,19 @@ TEST(WarmSize, OutlivesItsUseWhenNothingOfAQuarterOfItComes) {
 
 // Submits `task` and waits until it is through.
 void RunAndWait(ComputePool& pool, const ComputePool::Job& task) {
-  std::promise<void> done;
-  pool.Submit(task, [&] { done.set_value(); });
-  done.get_future().wait();
+  // Shared, because the thread that keeps the promise may still be in it when the other goes on.
+  const auto done = std::make_shared<std::promise<void>>();
+  pool.Submit(task, [done] { done->set_value(); });
+  done->get_future().wait();
 }
 
 TEST(ComputePool, ATaskAfterAnotherGetsTheSameWorkerOnAnyThread) {
-  ComputePool pool(4);
   std::set<const Worker*> workers;
   std::promise<void> done;
+  std::function<void(int)> submit;
+  ComputePool pool(4);  // Ends before what its tasks use.
   // As a stream does it: the next frame is submitted when the one before is through.
-  std::function<void(int)> submit = [&](int left) {
+  submit = [&](int left) {
     pool.Submit([&](Worker& worker) { workers.insert(&worker); },
                 [&, left] {
                   if (left > 0) submit(left - 1);
@@ -59,10 +61,11 @@ TEST(ComputePool, ATaskAfterAnotherGetsTheSameWorkerOnAnyThread) {
 }
 
 TEST(ComputePool, TasksAtTheSameTimeHaveWorkersOfTheirOwn) {
-  ComputePool pool(2);
   std::promise<const Worker*> first, second;
-  auto first_worker = first.get_future().share(), second_worker = second.get_future().share();
-  // Each ends only when the other one has begun.
+  const auto first_worker = first.get_future().share();
+  const auto second_worker = second.get_future().share();
+  ComputePool pool(2);  // Ends before what its tasks use.
+  // Each task ends only when the other one has begun.
   pool.Submit([&](Worker& worker) {
     first.set_value(&worker);
     second_worker.wait();
