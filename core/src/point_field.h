@@ -25,6 +25,15 @@ struct FieldSample {
   bool has_support = false;               ///< Whether any particle is within the kernel radius.
 };
 
+/// Entries around a point in memory: row after row of buckets, each a contiguous span. Vectors may
+/// read up to kPointPadding entries past the end of a row.
+struct NearRows {
+  const float *x, *y;            ///< By entry, in cells relative to the tile.
+  const std::uint32_t* offsets;  ///< First bucket of the first row.
+  int rows, columns;             ///< Buckets to look at.
+  int row_stride;                ///< Buckets from one row to the next.
+};
+
 /// Particles near the isoline, sorted into buckets of about a cell, so that a point
 /// looks at its surroundings instead of its whole tile.
 class PointField {
@@ -44,6 +53,9 @@ class PointField {
   /// and for some more. Requires: radius <= kernel radius.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
+
+  /// The same particles for a kernel of vectors.
+  NearRows RowsNear(std::uint32_t tile, double x, double y, double radius) const;
 
   /// Index in the frame of the particle of an entry.
   std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
@@ -88,6 +100,18 @@ inline int PointField::Bucket(double coordinate) const {
 
 inline PointField::BucketRange PointField::Buckets(double centre, double radius) const {
   return {Bucket(centre - radius), Bucket(centre + radius)};
+}
+
+inline NearRows PointField::RowsNear(std::uint32_t tile, double x, double y, double radius) const {
+  const BucketRange columns = Buckets(x, radius);
+  const BucketRange rows = Buckets(y, radius);
+  return {.x = x_.data(),
+          .y = y_.data(),
+          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * bucket_columns_ +
+                     columns.first,
+          .rows = rows.last - rows.first + 1,
+          .columns = columns.last - columns.first + 1,
+          .row_stride = bucket_columns_};
 }
 
 template <typename Visit>

@@ -1,11 +1,15 @@
 #include "virtual_plane.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "placement.h"
+#include "plane_support.h"
+#include "ring_windows.h"
 
 namespace partiemc {
 namespace {
@@ -25,6 +29,9 @@ constexpr double kNormalReach = 2.5;
 constexpr double kBilateralReach = 6;
 constexpr double kCurvatureReach = 2;
 constexpr double kSmoothingReach = 3;
+constexpr double kWidestReach =
+    std::max({kNormalReach, kBilateralReach, kCurvatureReach, kSmoothingReach});
+static_assert(2 * kWidestReach <= kMinRefinedLength, "a window must not meet its own end");
 
 // The kernel rounds a boundary of curvature kappa off by about half of h^2 kappa, and fills it by
 // more where it is concave: in a notch the particles of both flanks count.
@@ -47,26 +54,11 @@ constexpr double kSupportTrust = 0.6;
 // Edge vertices nearer than this to the chord of their neighbours say nothing, in spacings.
 constexpr double kThinningDistance = 0.02;
 
-double Power8(double x) {
-  const double x2 = x * x;
-  const double x4 = x2 * x2;
-  return x4 * x4;
-}
-
 double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
 
-// (1 - (d / reach)^2)^2, 0 beyond the reach.
-double Window(double distance, double reach) {
-  const double t = 1 - distance * distance / (reach * reach);
-  return t > 0 ? t * t : 0;
-}
-
-// Falls from 1 to 0.1 at 30 degrees: what lies beyond a corner has no say.
-double AngleWeight(const LatticePoint& a, const LatticePoint& b) {
-  const double cosine = Dot(a, b);
-  if (cosine <= 0) return 0;
-  const double power = Power8(cosine);
-  return power * power;
+double Distance(const LatticePoint& a, const LatticePoint& b) {
+  const LatticePoint chord{b.x - a.x, b.y - a.y};
+  return std::sqrt(Dot(chord, chord));
 }
 
 LatticePoint UnitOr(const LatticePoint& v, const LatticePoint& fallback) {
@@ -124,67 +116,108 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   }
 }
 
-// Step 2: normals averaged along the ring, first by distance, then also by angle.
-void SmoothNormals(const VertexInput& input, const RingView& ring, RingVertices& v) {
-  for (const bool bilateral : {false, true}) {
-    const double reach = (bilateral ? kBilateralReach : kNormalReach) * input.scale.spacing;
-    for (std::size_t k = 0; k < ring.size(); ++k) {
-      const LatticePoint normal = v.normal[ring.index(k)];
-      LatticePoint sum;
-      ring.ForEachNear(k, reach, [&](std::size_t j, double distance) {
-        double w = v.weight[j] * Window(distance, reach);
-        if (bilateral) w *= AngleWeight(normal, v.normal[j]);
-        sum.x += w * v.normal[j].x;
-        sum.y += w * v.normal[j].y;
-      });
-      v.next_normal[ring.index(k)] = UnitOr(sum, normal);
-    }
-    for (std::size_t k = 0; k < ring.size(); ++k) {
-      v.normal[ring.index(k)] = v.next_normal[ring.index(k)];
-    }
+// Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
+UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
+  const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
+  const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
+  if (count < kMinRefinedVertices) return {};
+  const auto length_after = [&](std::size_t k) {
+    return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
+  };
+  double length = 0;
+  for (std::size_t k = 0; k < count; ++k) length += length_after(k);
+  if (length < kMinRefinedLength * input.scale.spacing) return {};
+  // As many vertices as the widest window holds behind the last vertex, or before the first one.
+  const double reach = kWidestReach * input.scale.spacing;
+  std::size_t after = 0;
+  for (double distance = length_after(count - 1); distance < reach; ++after) {
+    distance += length_after(after % count);
   }
+  std::size_t before = 0;
+  for (double distance = 0; distance < reach; ++before) {
+    distance += length_after(count - 1 - before % count);
+  }
+  return {static_cast<std::uint32_t>(count),
+          static_cast<std::uint32_t>(std::max(after, before) + kWindowPadding)};
 }
 
-// Curvature of the ring at a vertex: how normals turn along the tangent; positive where convex.
-double CurvatureAt(const RingView& ring, const RingVertices& v, std::size_t k, double spacing) {
-  const std::size_t i = ring.index(k);
-  const LatticePoint tangent{-v.normal[i].y, v.normal[i].x};
-  const double reach = kCurvatureReach * spacing;
-  double turn = 0, square = 0;
-  ring.ForEachNear(k, reach, [&](std::size_t j, double distance) {
-    const double w = v.weight[j] * Window(distance, reach);
-    const double along = Dot({v.point[j].x - v.point[i].x, v.point[j].y - v.point[i].y}, tangent);
-    turn +=
-        w * along * Dot({v.normal[j].x - v.normal[i].x, v.normal[j].y - v.normal[i].y}, tangent);
-    square += w * along * along;
-  });
-  const double max_curvature = kMaxCurvature / spacing;
-  return square > 0 ? std::clamp(turn / square, -max_curvature, max_curvature) : 0;
+// Copies what the steps need, and measures the ring.
+void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) {
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    ring.x[k] = v.point[first + k].x;
+    ring.y[k] = v.point[first + k].y;
+    ring.normal_x[k] = v.normal[first + k].x;
+    ring.normal_y[k] = v.normal[first + k].y;
+  }
+  for (double* values : {ring.x, ring.y, ring.normal_x, ring.normal_y}) {
+    ring.Repeat(values, 0, ring.count);
+  }
+  ring.arc[0] = 0;
+  for (std::ptrdiff_t k = 0; k + 1 < ring.count + ring.margin; ++k) {
+    ring.arc[k + 1] =
+        ring.arc[k] + Distance({ring.x[k], ring.y[k]}, {ring.x[k + 1], ring.y[k + 1]});
+  }
+  for (std::ptrdiff_t k = 0; k > -ring.margin; --k) {
+    ring.arc[k - 1] =
+        ring.arc[k] - Distance({ring.x[k - 1], ring.y[k - 1]}, {ring.x[k], ring.y[k]});
+  }
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    ring.weight[k] = (ring.arc[k + 1] - ring.arc[k - 1]) / 2;
+  }
+  ring.Repeat(ring.weight, 0, ring.count);
+}
+
+// Calls body(begin, end) for stretches of a ring, in parallel where it is long.
+template <typename Body>
+void ForEachStretch(const UnrolledRing& ring, Body body) {
+  constexpr std::ptrdiff_t kStretch = 512;
+  if (ring.count <= kStretch) {
+    body(0, ring.count);
+    return;
+  }
+  tbb::parallel_for(std::ptrdiff_t{0}, (ring.count + kStretch - 1) / kStretch,
+                    [&](std::ptrdiff_t stretch) {
+                      const std::ptrdiff_t begin = stretch * kStretch;
+                      body(begin, std::min(begin + kStretch, ring.count));
+                    });
+}
+
+// Step 2: normals averaged along the ring, first by distance, then also by angle.
+void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
+  for (const bool by_angle : {false, true}) {
+    const double reach = (by_angle ? kBilateralReach : kNormalReach) * input.scale.spacing;
+    ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      MeanNormals(ring, begin, end, reach, by_angle);
+      ring.Repeat(ring.next_x, begin, end);
+      ring.Repeat(ring.next_y, begin, end);
+    });
+    std::swap(ring.normal_x, ring.next_x);
+    std::swap(ring.normal_y, ring.next_y);
+  }
 }
 
 // How far outside the vertex the particles near its plane put the boundary: their weighted mean
 // distance to the parabola of the given curvature, plus half a spacing. 0 without particles.
-double SupportAt(const VertexInput& input, const RingVertices& v, std::size_t i, double curvature) {
+double SupportAt(const VertexInput& input, std::size_t segment, const UnrolledRing& ring,
+                 std::ptrdiff_t k, double curvature) {
   const double h = input.scale.spacing;
-  const TilePoint p = Locate(input, i / 2, v.point[i]);
+  const TilePoint p = Locate(input, segment, {ring.x[k], ring.y[k]});
   if (p.tile == kNoTile) return 0;
-  const LatticePoint normal = v.normal[i];
   const double radius = std::min(kSupportRadius * h, input.scale.kernel_radius);
-  double sum = 0, weight = 0;
-  input.field.ForEachNear(p.tile, p.x, p.y, radius, [&](double x, double y, std::uint32_t) {
-    const LatticePoint d{x - p.x, y - p.y};
-    const double along = normal.x * d.y - normal.y * d.x;
-    const double above = Dot(d, normal);
-    if (Dot(d, d) >= radius * radius || above >= kSupportHeight * h) return;
-    const double distance = above + curvature * along * along / 2;
-    const double depth = distance / h + kSupportDepth;
-    if (depth <= 0) return;
-    const double w = Window(along, kSupportHalfWidth * h) * Power8(depth);
-    sum += w * distance;
-    weight += w;
-  });
-  if (weight <= 0) return 0;
-  return std::clamp(sum / weight + h / 2, -kMaxSupportShift * h, kMaxSupportShift * h);
+  const SupportSums sums = SumSupport(input.field.RowsNear(p.tile, p.x, p.y, radius),
+                                      {.radius = radius,
+                                       .half_width = kSupportHalfWidth * h,
+                                       .height = kSupportHeight * h,
+                                       .spacing = h,
+                                       .depth = kSupportDepth},
+                                      {.x = p.x,
+                                       .y = p.y,
+                                       .normal_x = ring.normal_x[k],
+                                       .normal_y = ring.normal_y[k],
+                                       .curvature = curvature});
+  if (sums.weight <= 0) return 0;
+  return std::clamp(sums.distance / sums.weight + h / 2, -kMaxSupportShift * h,
+                    kMaxSupportShift * h);
 }
 
 // How far the kernel has moved a boundary of this curvature inward.
@@ -195,112 +228,89 @@ double RoundingOf(double curvature, double spacing) {
 
 // Step 3: how far each vertex's plane moves along its normal. Of the support only the variation
 // along the ring counts: its mean depends on how the particles are arranged, not on the shape.
-void ShiftPlanes(const VertexInput& input, const RingView& ring, RingVertices& v) {
+void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const UnrolledRing& ring) {
   const double h = input.scale.spacing;
+  const double max_curvature = kMaxCurvature / h;
   const VirtualPlaneSteps& steps = input.parameters.steps;
+  ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    MeanCurvature(ring, begin, end, kCurvatureReach * h);
+    for (std::ptrdiff_t k = begin; k < end; ++k) {
+      const double curvature = std::clamp(ring.shift[k], -max_curvature, max_curvature);
+      ring.base[k] = steps.curvature ? RoundingOf(curvature, h) : 0;
+      ring.shift[k] =
+          steps.support ? SupportAt(input, first_segment + k / 2, ring, k, curvature) - ring.base[k]
+                        : 0;
+    }
+  });
   double sum = 0, weight = 0;
-  for (std::size_t k = 0; k < ring.size(); ++k) {
-    const std::size_t i = ring.index(k);
-    const double curvature = CurvatureAt(ring, v, k, h);
-    v.base[i] = steps.curvature ? RoundingOf(curvature, h) : 0;
-    v.shift[i] = steps.support ? SupportAt(input, v, i, curvature) - v.base[i] : 0;
-    sum += v.weight[i] * v.shift[i];
-    weight += v.weight[i];
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    sum += ring.weight[k] * ring.shift[k];
+    weight += ring.weight[k];
   }
   const double mean = weight > 0 ? sum / weight : 0;
-  for (std::size_t k = 0; k < ring.size(); ++k) {
-    const std::size_t i = ring.index(k);
-    v.base[i] += kSupportTrust * (v.shift[i] - mean);
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    ring.base[k] += kSupportTrust * (ring.shift[k] - mean);
   }
+  ring.Repeat(ring.base, 0, ring.count);
 }
 
 // Step 4: every vertex to the weighted mean of what its neighbours' planes say, along its normal.
 // A circle stays as it is: of two points of it, the mean normal is perpendicular to their chord.
-void SmoothPositions(const VertexInput& input, const RingView& ring, RingVertices& v) {
-  const double reach = kSmoothingReach * input.scale.spacing;
-  for (std::size_t k = 0; k < ring.size(); ++k) {
-    const std::size_t i = ring.index(k);
-    v.shift[i] = v.base[i];
-    if (!input.parameters.steps.smoothing) continue;
-    double sum = 0, weight = 0;
-    ring.ForEachNear(k, reach, [&](std::size_t j, double distance) {
-      const double w =
-          v.weight[j] * Window(distance, reach) * AngleWeight(v.normal[i], v.normal[j]);
-      const LatticePoint chord{v.point[j].x - v.point[i].x, v.point[j].y - v.point[i].y};
-      const double offset = (Dot(v.normal[i], chord) + Dot(v.normal[j], chord)) / 2;
-      sum += w * (offset + v.base[j] - v.base[i]);
-      weight += w;
-    });
-    if (weight > 0) v.shift[i] += sum / weight;
-  }
-  for (std::size_t k = 0; k < ring.size(); ++k) {
-    const std::size_t i = ring.index(k);
-    v.point[i].x += v.shift[i] * v.normal[i].x;
-    v.point[i].y += v.shift[i] * v.normal[i].y;
-  }
+void SmoothPositions(const VertexInput& input, std::size_t first, const UnrolledRing& ring,
+                     RingVertices& v) {
+  ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    if (input.parameters.steps.smoothing) {
+      MeanShift(ring, begin, end, kSmoothingReach * input.scale.spacing);
+    } else {
+      std::copy(ring.base + begin, ring.base + end, ring.shift + begin);
+    }
+    for (std::ptrdiff_t k = begin; k < end; ++k) {
+      v.normal[first + k] = {ring.normal_x[k], ring.normal_y[k]};
+      v.point[first + k] = {ring.x[k] + ring.shift[k] * ring.normal_x[k],
+                            ring.y[k] + ring.shift[k] * ring.normal_y[k]};
+    }
+  });
 }
 
 // Step 5: drops edge vertices that lie on the chord of the cell vertices beside them.
-void Thin(const VertexInput& input, const RingView& ring, RingVertices& v) {
+void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const double min_distance = kThinningDistance * input.scale.spacing;
-  for (std::size_t k = 0; k < ring.size(); k += 2) {
-    const LatticePoint& a = v.point[ring.index(k == 0 ? ring.size() - 1 : k - 1)];
-    const LatticePoint& p = v.point[ring.index(k)];
-    const LatticePoint& b = v.point[ring.index(k + 1)];
+  const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
+  const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
+  for (std::size_t k = first; k < last; k += 2) {
+    const LatticePoint& a = v.point[(k == first ? last : k) - 1];
+    const LatticePoint& p = v.point[k];
+    const LatticePoint& b = v.point[k + 1];
     const LatticePoint chord{b.x - a.x, b.y - a.y};
     const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
-    v.is_kept[ring.index(k)] = input.parameters.steps.edge_vertices &&
-                               std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));
+    v.is_kept[k] = input.parameters.steps.edge_vertices &&
+                   std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));
+    v.is_kept[k + 1] = 1;
   }
 }
 
 }  // namespace
 
-double RingView::Measure() const {
-  double length = 0;
-  for (std::size_t k = 0; k < count_; ++k) {
-    const LatticePoint& a = vertices_.point[first_ + k];
-    const LatticePoint& b = vertices_.point[first_ + (k + 1 == count_ ? 0 : k + 1)];
-    const double dx = b.x - a.x;
-    const double dy = b.y - a.y;
-    vertices_.step[first_ + k] = std::sqrt(dx * dx + dy * dy);
-    length += vertices_.step[first_ + k];
-  }
-  for (std::size_t k = 0; k < count_; ++k) {
-    const std::size_t before = k == 0 ? count_ - 1 : k - 1;
-    vertices_.weight[first_ + k] =
-        (vertices_.step[first_ + before] + vertices_.step[first_ + k]) / 2;
-  }
-  return length;
-}
-
-void RingVertices::Resize(std::size_t count) {
-  point.resize(count);
-  root.resize(count);
-  normal.resize(count);
-  step.resize(count);
-  weight.resize(count);
-  base.resize(count);
-  shift.resize(count);
-  next_normal.resize(count);
-  is_kept.assign(count, 1);
-}
-
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
-  const std::size_t segments = input.topology.segments.size();
-  vertices.Resize(2 * segments);
-  tbb::parallel_for(std::size_t{0}, segments,
+  const RingTopology& topology = input.topology;
+  vertices.Resize(2 * topology.segments.size());
+  tbb::parallel_for(std::size_t{0}, topology.segments.size(),
                     [&](std::size_t segment) { FindRoots(input, segment, vertices); });
-  tbb::parallel_for(std::size_t{0}, input.topology.RingCount(), [&](std::size_t r) {
-    const std::size_t first = input.topology.offsets[r];
-    const RingView ring(vertices, 2 * first, 2 * (input.topology.offsets[r + 1] - first));
-    const double length = ring.Measure();
-    if (ring.size() >= kMinRefinedVertices && length >= kMinRefinedLength * input.scale.spacing) {
-      if (input.parameters.steps.normals) SmoothNormals(input, ring, vertices);
-      ShiftPlanes(input, ring, vertices);
-      SmoothPositions(input, ring, vertices);
+  UnrolledRings& unrolled = vertices.unrolled;
+  unrolled.sizes().resize(topology.RingCount());
+  tbb::parallel_for(std::size_t{0}, topology.RingCount(), [&](std::size_t ring) {
+    unrolled.sizes()[ring] = SizeOf(input, ring, vertices);
+  });
+  unrolled.Allocate();
+  tbb::parallel_for(std::size_t{0}, topology.RingCount(), [&](std::size_t r) {
+    if (UnrolledRing ring = unrolled[r]; ring.count > 0) {
+      const std::size_t first_segment = topology.offsets[r];
+      Unroll(vertices, 2 * first_segment, ring);
+      if (input.parameters.steps.normals) SmoothNormals(input, ring);
+      ShiftPlanes(input, first_segment, ring);
+      SmoothPositions(input, 2 * first_segment, ring, vertices);
     }
-    Thin(input, ring, vertices);
+    Thin(input, r, vertices);
   });
 }
 

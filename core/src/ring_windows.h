@@ -1,0 +1,33 @@
+// Sums over windows along a ring, in the vectors of the processor at hand.
+#pragma once
+
+#include <cstddef>
+
+#include "unrolled_rings.h"
+
+namespace partiemc {
+
+/// What vectors read beyond a window that ends in a margin.
+inline constexpr std::ptrdiff_t kWindowPadding = 8;
+
+/// Each function sums, for each of the vertices [begin, end) of a ring, over the vertices j less
+/// than `reach` from it along the ring, with weights that begin with l_j B(d, reach)
+/// (core/METHOD.md, "The default placement"). A vertex per lane, neighbours in the order of the
+/// ring: the bits are the same whatever the width of the vectors and wherever a stretch begins.
+/// Requires: the ring is at least two reaches long; its margins hold the vertices within a reach of
+/// its ends and kWindowPadding more.
+
+/// Unit mean of the normals, into next_x and next_y; with `by_angle`, weighted by the angle between
+/// them, too (max(0, n_i . n_j)^16). The vertex's own normal where they cancel out.
+void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
+                 bool by_angle);
+
+/// How normals turn along the tangent, positive where the ring is convex, into shift.
+void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+                   double reach);
+
+/// The mean of what the neighbours' planes say, shifted by their bases, along the vertex's normal,
+/// weighted by angle, into shift.
+void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach);
+
+}  // namespace partiemc
