@@ -4,7 +4,12 @@
 // hold segments that reach it.
 #include "intersections.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <limits>
 
@@ -48,7 +53,9 @@ class Grids {
         // still make few candidates (half of it costs a quarter more); the second bound keeps
         // indices below 2^27, the third keeps sizes above zero when all points coincide.
         finest_(std::max(
-            {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {}
+            {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {
+    for (int level = 0; level < kLevels; ++level) per_length_[level] = 1 / CellSize(level);
+  }
 
   /// The first level whose cells hold a box of `extent`; 28 at most, by the bounds of the finest.
   int LevelFor(double extent) const {
@@ -59,11 +66,11 @@ class Grids {
 
   double CellSize(int level) const { return finest_ * static_cast<double>(1u << level); }
 
-  std::int64_t Column(double x, double cell_size) const {
-    return static_cast<std::int64_t>((x - origin_.x) / cell_size);
+  std::int64_t Column(double x, int level) const {
+    return static_cast<std::int64_t>((x - origin_.x) * per_length_[level]);
   }
-  std::int64_t Row(double y, double cell_size) const {
-    return static_cast<std::int64_t>((y - origin_.y) / cell_size);
+  std::int64_t Row(double y, int level) const {
+    return static_cast<std::int64_t>((y - origin_.y) * per_length_[level]);
   }
 
   static std::uint64_t Key(int level, std::int64_t column, std::int64_t row) {
@@ -74,11 +81,21 @@ class Grids {
  private:
   Point origin_;
   double finest_;
+  std::array<double, kLevels> per_length_;  // By level: 1 / size of its cells.
 };
 
-/// Fibonacci hashing: the high bits of the product depend on all bits of the key.
+// Cells of a block of this many by this many share a line of the cache: neighbours on a ring, and
+// all that they are compared with, are found in few of them.
+constexpr int kBlockBits = 2;
+constexpr std::uint64_t kInBlock = (1u << kBlockBits) - 1;
+constexpr std::size_t kBlockSlots = std::size_t{1} << (2 * kBlockBits);
+
+/// Fibonacci hashing of the block: the high bits of the product depend on all bits of the key.
 std::size_t SlotOf(std::uint64_t cell, std::size_t slot_count) {
-  return static_cast<std::size_t>((cell * 0x9e3779b97f4a7c15u) >> 32) & (slot_count - 1);
+  const std::uint64_t block = cell & ~(kInBlock << kIndexBits | kInBlock);
+  const std::uint64_t in_block = (cell >> kIndexBits & kInBlock) << kBlockBits | (cell & kInBlock);
+  const std::uint64_t hash = (block * 0x9e3779b97f4a7c15u) >> 32;
+  return static_cast<std::size_t>(hash * kBlockSlots | in_block) & (slot_count - 1);
 }
 
 /// Whether `second`, which begins where `first` ends, lies on it for more than that point.
@@ -124,16 +141,18 @@ Box CollectSegments(std::span<const double> points, std::span<const std::uint32_
 std::uint32_t FillGrids(const Grids& grids, TouchingPairsBuffers& buffers) {
   std::vector<Segment>& segments = buffers.segments;
   std::vector<std::uint32_t>& slots = buffers.slots;
-  slots.assign(std::bit_ceil(2 * segments.size()), kNone);
-  std::uint32_t used_levels = 0;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
+  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t i) {
     Segment& segment = segments[i];
     const Box box = BoxAround(segment);
     segment.level = grids.LevelFor(Extent(box));
+    segment.cell = Grids::Key(segment.level, grids.Column(box.left, segment.level),
+                              grids.Row(box.bottom, segment.level));
+  });
+  slots.assign(std::max(std::bit_ceil(2 * segments.size()), kBlockSlots), kNone);
+  std::uint32_t used_levels = 0;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    Segment& segment = segments[i];
     used_levels |= 1u << segment.level;
-    const double size = grids.CellSize(segment.level);
-    segment.cell =
-        Grids::Key(segment.level, grids.Column(box.left, size), grids.Row(box.bottom, size));
     std::uint32_t& slot = slots[SlotOf(segment.cell, slots.size())];
     segment.next_in_slot = slot;
     slot = static_cast<std::uint32_t>(i);
@@ -141,38 +160,54 @@ std::uint32_t FillGrids(const Grids& grids, TouchingPairsBuffers& buffers) {
   return used_levels;
 }
 
-/// Counts the pairs of segment i with segments of `level` that it may touch: their lower left
-/// corners lie no farther to the right and above than its box, and less than a cell to the left and
-/// below.
-std::size_t CountInLevel(const Grids& grids, TouchingPairsBuffers& buffers, std::uint32_t i,
-                         int level) {
+/// Calls visit(j) for the pairs of segment i with segments j of `level` that count. What i may
+/// touch has its lower left corner no farther to the right and above than the box of i, and less
+/// than a cell to the left and below.
+template <typename Visit>
+void ForEachPairInLevel(const Grids& grids, const TouchingPairsBuffers& buffers, std::uint32_t i,
+                        int level, Visit visit) {
   const std::span<const Segment> segments = buffers.segments;
   const std::span<const std::uint32_t> slots = buffers.slots;
   const Box box = BoxAround(segments[i]);
-  const double size = grids.CellSize(level);
-  const std::int64_t first_column = std::max<std::int64_t>(grids.Column(box.left, size) - 1, 0);
-  const std::int64_t last_column = grids.Column(box.right, size);
-  const std::int64_t first_row = std::max<std::int64_t>(grids.Row(box.bottom, size) - 1, 0);
-  const std::int64_t last_row = grids.Row(box.top, size);
+  const std::int64_t first_column = std::max<std::int64_t>(grids.Column(box.left, level) - 1, 0);
+  const std::int64_t last_column = grids.Column(box.right, level);
+  const std::int64_t first_row = std::max<std::int64_t>(grids.Row(box.bottom, level) - 1, 0);
+  const std::int64_t last_row = grids.Row(box.top, level);
   // Of two segments of one level, the earlier one finds the pair.
   const bool finds_all = segments[i].level < level;
 
-  std::size_t count = 0;
   for (std::int64_t row = first_row; row <= last_row; ++row) {
     for (std::int64_t column = first_column; column <= last_column; ++column) {
       const std::uint64_t cell = Grids::Key(level, column, row);
       for (std::uint32_t j = slots[SlotOf(cell, slots.size())]; j != kNone;
            j = segments[j].next_in_slot) {
         if (segments[j].cell != cell || (!finds_all && j <= i)) continue;
-        if (!TouchesMoreThanItMust(segments, i, j)) continue;
-        ++count;
-        if (buffers.pairs.size() < segments.size()) buffers.pairs.emplace_back(i, j);
-        buffers.example_first = std::min(i, j);
-        buffers.example_second = std::max(i, j);
+        if (TouchesMoreThanItMust(segments, i, j)) visit(j);
       }
     }
   }
-  return count;
+}
+
+/// Calls visit(j) for all pairs that segment i finds.
+template <typename Visit>
+void ForEachPair(const Grids& grids, const TouchingPairsBuffers& buffers, std::uint32_t used_levels,
+                 std::uint32_t i, Visit visit) {
+  for (int level = buffers.segments[i].level; used_levels >> level != 0; ++level) {
+    if ((used_levels >> level & 1u) != 0) ForEachPairInLevel(grids, buffers, i, level, visit);
+  }
+}
+
+/// Whether any two segments have a point in common, the usual case being that none have.
+bool HasPair(const Grids& grids, const TouchingPairsBuffers& buffers, std::uint32_t used_levels) {
+  std::atomic<bool> has_pair = false;
+  tbb::parallel_for(
+      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(buffers.segments.size())),
+      [&](const tbb::blocked_range<std::uint32_t>& range) {
+        for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
+          ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t) { has_pair = true; });
+        }
+      });
+  return has_pair;
 }
 
 }  // namespace
@@ -189,11 +224,16 @@ std::size_t CountTouchingPairs(std::span<const double> points,
   const Grids grids(bounds, extents / static_cast<double>(segments.size()));
 
   const std::uint32_t used_levels = FillGrids(grids, buffers);
+  if (!HasPair(grids, buffers, used_levels)) return 0;
+  // They are listed in the order of the segments, whatever the number of threads.
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < segments.size(); ++i) {
-    for (int level = segments[i].level; used_levels >> level != 0; ++level) {
-      if ((used_levels >> level & 1u) != 0) count += CountInLevel(grids, buffers, i, level);
-    }
+    ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t j) {
+      ++count;
+      if (buffers.pairs.size() < segments.size()) buffers.pairs.emplace_back(i, j);
+      buffers.example_first = std::min(i, j);
+      buffers.example_second = std::max(i, j);
+    });
   }
   return count;
 }
