@@ -197,14 +197,17 @@ void ForEachPair(const Grids& grids, const TouchingPairsBuffers& buffers, std::u
   }
 }
 
-/// Whether any two segments have a point in common, the usual case being that none have.
-bool HasPair(const Grids& grids, const TouchingPairsBuffers& buffers, std::uint32_t used_levels) {
+/// Finds out which segments find pairs; returns whether any does.
+bool FindPairs(const Grids& grids, TouchingPairsBuffers& buffers, std::uint32_t used_levels) {
   std::atomic<bool> has_pair = false;
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(buffers.segments.size())),
       [&](const tbb::blocked_range<std::uint32_t>& range) {
         for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
-          ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t) { has_pair = true; });
+          ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t) {
+            buffers.segments[i].finds_pair = true;
+            has_pair.store(true, std::memory_order_relaxed);
+          });
         }
       });
   return has_pair;
@@ -224,10 +227,12 @@ std::size_t CountTouchingPairs(std::span<const double> points,
   const Grids grids(bounds, extents / static_cast<double>(segments.size()));
 
   const std::uint32_t used_levels = FillGrids(grids, buffers);
-  if (!HasPair(grids, buffers, used_levels)) return 0;
-  // They are listed in the order of the segments, whatever the number of threads.
+  // Nearly all frames have no pair. Pairs are listed in the order of the segments, whatever the
+  // number of threads.
+  if (!FindPairs(grids, buffers, used_levels)) return 0;
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < segments.size(); ++i) {
+    if (!segments[i].finds_pair) continue;
     ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t j) {
       ++count;
       if (buffers.pairs.size() < segments.size()) buffers.pairs.emplace_back(i, j);

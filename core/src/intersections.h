@@ -20,6 +20,7 @@ struct TouchingPairsBuffers {
     std::uint32_t previous = 0;      // The segment that ends at `a`.
     std::uint32_t next_in_slot = 0;  // A list of segments whose cells share a slot.
     int level = 0;                   // Of its grid.
+    bool finds_pair = false;         // Whether it is the earlier one of a pair that counts.
   };
   std::vector<Segment> segments;
   std::vector<std::uint32_t> slots;
