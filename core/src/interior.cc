@@ -1,9 +1,14 @@
 #include "interior.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace partiemc {
 namespace {
@@ -91,6 +96,9 @@ bool TakeRowAbove(const TileDirectory& directory, MergeScratch& scratch, int row
 // cells on both of its sides, and dividing by the cell size rounds.
 constexpr double kTouchMargin = 1.0 / 1024;
 
+// Points that a task takes at least.
+constexpr std::size_t kExcludeGrain = 256;
+
 // A box in cells of the lattice.
 struct CellBox {
   double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
@@ -105,16 +113,40 @@ struct CellBox {
   }
 };
 
+// Takes the cells of one tile that lie in `columns` and rows [first, last] of it out. Several tasks
+// may do so at the same time: whoever comes first, the same cells are left.
+void ExcludeFromTile(BitRows& interior, std::uint32_t columns, int first, int last) {
+  for (int j = first; j <= last; ++j) {
+    std::atomic_ref<std::uint32_t> row(interior[j]);
+    if ((row.load(std::memory_order_relaxed) & columns) != 0) {
+      row.fetch_and(~columns, std::memory_order_relaxed);
+    }
+  }
+}
+
 void ExcludeBox(const TileDirectory& directory, const CellBox& box, std::vector<TileBits>& tiles) {
   const auto cell = [](double coordinate) {
     return static_cast<std::int64_t>(std::floor(coordinate));
   };
-  for (std::int64_t j = cell(box.y0 - kTouchMargin); j <= cell(box.y1 + kTouchMargin); ++j) {
-    for (std::int64_t i = cell(box.x0 - kTouchMargin); i <= cell(box.x1 + kTouchMargin); ++i) {
-      const std::uint32_t tile = directory.Find(
-          {static_cast<std::int32_t>(j >> kTileShift), static_cast<std::int32_t>(i >> kTileShift)});
+  const std::int64_t x0 = cell(box.x0 - kTouchMargin);
+  const std::int64_t x1 = cell(box.x1 + kTouchMargin);
+  const std::int64_t y0 = cell(box.y0 - kTouchMargin);
+  const std::int64_t y1 = cell(box.y1 + kTouchMargin);
+  // The part of [first, last] in the k-th stretch of kTileSize, relative to its start.
+  const auto part = [](std::int64_t k, std::int64_t first, std::int64_t last) {
+    const std::int64_t start = k << kTileShift;
+    return std::pair(static_cast<int>(std::max(first - start, std::int64_t{0})),
+                     static_cast<int>(std::min(last - start, std::int64_t{kTileSize - 1})));
+  };
+  for (std::int64_t row = y0 >> kTileShift; row <= y1 >> kTileShift; ++row) {
+    for (std::int64_t column = x0 >> kTileShift; column <= x1 >> kTileShift; ++column) {
+      const std::uint32_t tile =
+          directory.Find({static_cast<std::int32_t>(row), static_cast<std::int32_t>(column)});
       if (tile == kNoTile) continue;
-      tiles[tile].interior[j & (kTileSize - 1)] &= ~(std::uint32_t{1} << (i & (kTileSize - 1)));
+      const auto [left, right] = part(column, x0, x1);
+      const auto [first, last] = part(row, y0, y1);
+      const std::uint32_t columns = (~std::uint32_t{0} >> (kTileSize - 1 - right + left)) << left;
+      ExcludeFromTile(tiles[tile].interior, columns, first, last);
     }
   }
 }
@@ -124,9 +156,12 @@ void ExcludeBox(const TileDirectory& directory, const CellBox& box, std::vector<
 void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
                          std::span<const std::uint32_t> offsets, std::span<const double> roots,
                          double cell_size, std::vector<TileBits>& tiles) {
-  for (std::size_t ring = 0; ring + 1 < offsets.size(); ++ring) {
-    for (std::size_t k = offsets[ring]; k < offsets[ring + 1]; ++k) {
-      const std::size_t next = k + 1 == offsets[ring + 1] ? offsets[ring] : k + 1;
+  using Range = tbb::blocked_range<std::size_t>;
+  tbb::parallel_for(Range(0, points.size() / 2, kExcludeGrain), [&](const Range& range) {
+    auto after = std::upper_bound(offsets.begin(), offsets.end(), range.begin());
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      while (k == *after) ++after;
+      const std::size_t next = k + 1 == *after ? *(after - 1) : k + 1;
       CellBox box;
       for (const std::size_t end : {k, next}) {
         box.Add(points.data() + 2 * end, cell_size);
@@ -134,7 +169,7 @@ void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double>
       }
       ExcludeBox(directory, box, tiles);
     }
-  }
+  });
 }
 
 void TraceStaircases(const TileDirectory& directory, const std::vector<TileBits>& tiles,

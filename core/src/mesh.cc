@@ -1,5 +1,7 @@
 #include "mesh.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -27,9 +29,11 @@ class MeshBuilder {
   std::uint32_t Vertex(std::int64_t x, std::int64_t y);
   void AddRingLoops();
   void AddStaircaseLoops(bool reversed);
+  std::uint32_t OuterRingAt(const TilePlace& inside_node) const;
   absl::Status TriangulateLoops(TriangleClass triangle_class);
   void AddTriangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, TriangleClass triangle_class);
   void AddRectangle(const CellRectangle& rectangle);
+  absl::Status FillBand();
   void FillGrid();
   void FillGreedy();
   absl::Status FillInterior();
@@ -82,40 +86,39 @@ std::uint32_t MeshBuilder::Vertex(std::int64_t x, std::int64_t y) {
                           static_cast<int>(y & (kTileSize - 1))});
 }
 
+// Loops are grouped by components, each named by its outer ring.
 void MeshBuilder::AddRingLoops() {
   const std::vector<std::uint32_t>& offsets =
       MovesVertices() ? input_.topology.offsets : input_.rings.offsets;
-  for (std::size_t ring = 0; ring + 1 < offsets.size(); ++ring) {
-    for (std::uint32_t k = offsets[ring]; k < offsets[ring + 1]; ++k) {
-      scratch_.loop_points.push_back(k);
-    }
-    scratch_.loop_offsets.push_back(static_cast<std::uint32_t>(scratch_.loop_points.size()));
+  for (std::uint32_t ring = 0; ring + 1 < offsets.size(); ++ring) {
+    for (std::uint32_t k = offsets[ring]; k < offsets[ring + 1]; ++k) scratch_.loops.AddPoint(k);
+    const std::uint32_t outer = input_.topology.outer_of[ring];
+    scratch_.loops.EndLoop(outer == kNoRing ? ring : outer);
   }
+}
+
+std::uint32_t MeshBuilder::OuterRingAt(const TilePlace& inside_node) const {
+  const RingScratch& scratch = input_.ring_scratch;
+  return scratch.outer_ring[scratch.components.At(input_.crossings, inside_node)];
 }
 
 void MeshBuilder::AddStaircaseLoops(bool reversed) {
   const Staircases& staircases = scratch_.staircases;
   for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
-    const std::size_t start = scratch_.loop_points.size();
     for (std::uint32_t k = staircases.offsets[loop]; k < staircases.offsets[loop + 1]; ++k) {
-      scratch_.loop_points.push_back(Vertex(staircases.corners[k]));
+      scratch_.loops.AddPoint(Vertex(staircases.corners[k]));
     }
-    if (reversed) std::reverse(scratch_.loop_points.begin() + start, scratch_.loop_points.end());
-    scratch_.loop_offsets.push_back(static_cast<std::uint32_t>(scratch_.loop_points.size()));
+    // The corners of interior cells are inside, in one component: cells stay on their side of every
+    // ring, or were excluded.
+    scratch_.loops.EndLoop(OuterRingAt(staircases.corners[staircases.offsets[loop]]), reversed);
   }
 }
 
 absl::Status MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
-  scratch_.triangles.clear();
-  const bool done = scratch_.triangulator.Triangulate(mesh_.points, scratch_.loop_points,
-                                                      scratch_.loop_offsets, scratch_.triangles);
-  scratch_.loop_points.clear();
-  scratch_.loop_offsets.assign(1, 0);
-  if (!done) return absl::InternalError("mesh: the rings of this frame cannot be triangulated");
-  for (std::size_t k = 0; k < scratch_.triangles.size(); k += 3) {
-    AddTriangle(scratch_.triangles[k], scratch_.triangles[k + 1], scratch_.triangles[k + 2],
-                triangle_class);
+  if (!scratch_.loops.Triangulate(mesh_.points, mesh_.triangles)) {
+    return absl::InternalError("mesh: the rings of this frame cannot be triangulated");
   }
+  mesh_.classes.resize(mesh_.triangles.size() / 3, triangle_class);
   return absl::OkStatus();
 }
 
@@ -148,8 +151,6 @@ void MeshBuilder::FillGrid() {
 }
 
 void MeshBuilder::FillGreedy() {
-  scratch_.rectangles.clear();
-  MergeCells(input_.directory, input_.crossings.tiles, scratch_.merge, scratch_.rectangles);
   for (const CellRectangle& rectangle : scratch_.rectangles) AddRectangle(rectangle);
 }
 
@@ -170,6 +171,20 @@ absl::Status MeshBuilder::FillInterior() {
       break;
   }
   return absl::OkStatus();
+}
+
+// Triangulates the loops of the band, and meanwhile finds the rectangles of the interior, which do
+// not depend on it.
+absl::Status MeshBuilder::FillBand() {
+  absl::Status status;
+  tbb::parallel_invoke([&] { status = TriangulateLoops(TriangleClass::kBoundary); },
+                       [&] {
+                         if (input_.parameters.fill != Fill::kGreedy) return;
+                         scratch_.rectangles.clear();
+                         MergeCells(input_.directory, input_.crossings.tiles, scratch_.merge,
+                                    scratch_.rectangles);
+                       });
+  return status;
 }
 
 // Replaces the middles of the segments by the vertices of the rings. A triangle of which two
@@ -253,8 +268,7 @@ std::uint64_t MeshBuilder::CountFolded() const {
 
 void MeshBuilder::Reset() {
   mesh_.Clear();
-  scratch_.loop_points.clear();
-  scratch_.loop_offsets.assign(1, 0);
+  scratch_.loops.Clear();
   for (const std::uint32_t key : scratch_.touched_nodes) scratch_.vertex_of_node[key] = kUnset;
   scratch_.touched_nodes.clear();
   const std::size_t nodes = input_.directory.size() * kTileNodes;
@@ -274,9 +288,7 @@ absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
     CollectRingPoints();
     AddRingLoops();
     if (fill != Fill::kPolygon) AddStaircaseLoops(true);
-    if (absl::Status status = TriangulateLoops(TriangleClass::kBoundary); !status.ok()) {
-      return status;
-    }
+    if (absl::Status status = FillBand(); !status.ok()) return status;
     if (absl::Status status = FillInterior(); !status.ok()) return status;
     if (MovesVertices()) MoveVertices();
     if (fill != Fill::kPolygon) {

@@ -7,11 +7,11 @@
 #include "absl/status/status.h"
 #include "crossings.h"
 #include "interior.h"
+#include "loop_groups.h"
 #include "normals.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "rings.h"
-#include "triangulate.h"
 #include "vertices.h"
 
 namespace partiemc {
@@ -21,17 +21,16 @@ struct MeshScratch {
   Staircases staircases;
   MergeScratch merge;
   std::vector<CellRectangle> rectangles;
-  Triangulator triangulator;
-  std::vector<std::uint32_t> loop_points, loop_offsets;
+  LoopGroups loops;
   std::vector<std::uint32_t> vertex_of_node;  // By tile * 1024 + node; only touched ones are set.
   std::vector<std::uint32_t> touched_nodes;
   std::vector<double> points;  // Of a connectivity that is not yet the mesh's.
-  std::vector<std::uint32_t> triangles;
 };
 
 struct MeshInput {
   const TileDirectory& directory;
-  Crossings& crossings;  ///< Interior cells that the rings touch are taken out.
+  Crossings& crossings;             ///< Interior cells that the rings touch are taken out.
+  const RingScratch& ring_scratch;  ///< Components, and the outer rings of them.
   const RingTopology& topology;
   const std::vector<CellPlane>& planes;
   const PlacedVertices& placed;

@@ -159,9 +159,9 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
     }
   }
   const StageScope scope(observer, Stage::kMesh);
-  return BuildMesh(
-      {tiles, b.crossings, b.topology, b.planes, b.placed, result.rings, parameters, scale},
-      b.mesh_scratch, result.mesh, result.statistics);
+  return BuildMesh({tiles, b.crossings, b.ring_scratch, b.topology, b.planes, b.placed,
+                    result.rings, parameters, scale},
+                   b.mesh_scratch, result.mesh, result.statistics);
 }
 
 }  // namespace
