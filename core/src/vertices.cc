@@ -166,7 +166,8 @@ void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
     PlaceSegment(input, k, placed.points.data() + 2 * per_segment * k);
   });
 
-  std::vector<std::uint32_t> kept_as(topology.RingCount(), kNoRing);
+  std::vector<std::uint32_t>& kept_as = placed.kept_as;
+  kept_as.assign(topology.RingCount(), kNoRing);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
     if (!AppendRing(input, ring, per_segment, placed, rings)) continue;
     kept_as[ring] = static_cast<std::uint32_t>(rings.measures.size());

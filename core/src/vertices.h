@@ -25,6 +25,8 @@ struct PlacedVertices {
   /// Per segment of RingTopology: index in Rings::points of the vertex of its cell (of its entry
   /// crossing for `marching-squares`), or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
+  std::vector<std::uint32_t>
+      kept_as;  ///< Per ring of RingTopology: its index in Rings, or kNoRing.
   /// `virtual-plane` only: the vertices on their way, and where each point of the rings may retreat
   /// to, interleaved, in world units.
   RingVertices vertices;

@@ -42,14 +42,15 @@ namespace {
 using support::Particles;
 
 struct AllocationCase {
+  Placement placement;
   Fill fill;
   int threads;
   bool volumes;
 };
 
 void PrintTo(const AllocationCase& tested, std::ostream* out) {
-  *out << Name(tested.fill) << ", " << tested.threads << " threads"
-       << (tested.volumes ? ", volumes" : "");
+  *out << Name(tested.placement) << ", " << Name(tested.fill) << ", " << tested.threads
+       << " threads" << (tested.volumes ? ", volumes" : "");
 }
 
 class WarmFrame : public testing::TestWithParam<AllocationCase> {};
@@ -58,8 +59,10 @@ TEST_P(WarmFrame, AllocatesNothing) {
   const AllocationCase& tested = GetParam();
   tbb::global_control control(tbb::global_control::max_allowed_parallelism, tested.threads);
   tbb::task_arena arena(tested.threads);
-  const auto reconstructor =
-      Reconstructor::Create({.fill = tested.fill, .spacing = 1.0, .min_component_particles = 3});
+  const auto reconstructor = Reconstructor::Create({.placement = tested.placement,
+                                                    .fill = tested.fill,
+                                                    .spacing = 1.0,
+                                                    .min_component_particles = 3});
   ASSERT_TRUE(reconstructor.ok());
   // Bodies that meet and part, spray, holes that cleaning fills, more than one stretch of
   // particles.
@@ -93,15 +96,21 @@ TEST_P(WarmFrame, AllocatesNothing) {
 
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
-  for (const Fill fill : AllFills()) {
-    for (const int threads : {1, 2}) cases.push_back({fill, threads, threads == 1});
+  for (const Placement placement : AllPlacements()) {
+    for (const Fill fill : AllFills()) {
+      for (const int threads : {1, 2}) cases.push_back({placement, fill, threads, threads == 1});
+    }
   }
   return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(Fills, WarmFrame, testing::ValuesIn(Cases()), [](const auto& tested) {
-  return std::string(Name(tested.param.fill)) + std::to_string(tested.param.threads);
-});
+INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases()),
+                         [](const auto& tested) {
+                           std::string name(Name(tested.param.placement));
+                           std::erase(name, '-');
+                           return name + "_" + std::string(Name(tested.param.fill)) +
+                                  std::to_string(tested.param.threads);
+                         });
 
 }  // namespace
 }  // namespace partiemc

@@ -95,9 +95,9 @@ void Stages::RunFromRings(std::span<const CellNormal> previous) {
   std::optional<double> area_offset;
   PlaceVertices({frame, bins, level_set, crossings, topology, field, planes, parameters, scale},
                 area_offset, placed, result.rings);
-  const absl::Status status =
-      BuildMesh({bins.tiles, crossings, topology, planes, placed, result.rings, parameters, scale},
-                mesh_scratch, result.mesh, result.statistics);
+  const absl::Status status = BuildMesh({bins.tiles, crossings, ring_scratch, topology, planes,
+                                         placed, result.rings, parameters, scale},
+                                        mesh_scratch, result.mesh, result.statistics);
   ASSERT_TRUE(status.ok()) << status;
 }
 
