@@ -1,10 +1,13 @@
 // The default placement as a whole: what its steps promise on shapes whose truth is known.
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <vector>
 
 #include "partiemc/partiemc.h"
+#include "support/instruction_sets.h"
 #include "support/random.h"
 
 namespace partiemc {
@@ -141,6 +144,33 @@ TEST(VirtualPlane, KeepsFewMoreVerticesThanMarchingSquares) {
   const auto planes = Reconstructed(positions).rings.PointCount();
   EXPECT_GE(planes, squares);
   EXPECT_LE(planes, squares + squares / 4);
+}
+
+// A ring of many stretches, and bodies of more points than one batch of the mesh.
+TEST(VirtualPlane, HasTheSameBitsForAnyNumberOfThreadsAndAnyInstructionSet) {
+  std::vector<double> positions = Disc(170, 0.2, 11);
+  for (int k = 0; k < 60; ++k) {
+    const std::vector<double> island = Disc(12, 0.2, k);
+    for (std::size_t n = 0; n < island.size(); n += 2) {
+      positions.push_back(island[n] + 200 + 30 * (k % 8));
+      positions.push_back(island[n + 1] - 200 + 30 * (k / 8));
+    }
+  }
+  std::vector<std::uint64_t> rings, meshes;
+  const auto reconstruct = [&](int threads) {
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    tbb::task_arena arena(threads);
+    const Result result = arena.execute([&] { return Reconstructed(positions); });
+    EXPECT_EQ(result.rings.RingCount(), 61u);
+    rings.push_back(DigestRings(result.rings));
+    meshes.push_back(DigestMesh(result.mesh));
+  };
+  for (const int threads : {1, 2, 7}) reconstruct(threads);
+  support::ForEachInstructionSet([&] { reconstruct(2); });
+  for (std::size_t k = 0; k < rings.size(); ++k) {
+    EXPECT_EQ(rings[k], rings[0]);
+    EXPECT_EQ(meshes[k], meshes[0]);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,205 @@
+// Window sums along rings, against walks along the ring that know of neither vectors nor margins.
+#include "ring_windows.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "crossings.h"
+#include "support/instruction_sets.h"
+#include "support/random.h"
+
+namespace partiemc {
+namespace {
+
+// A ring of `count` vertices with random steps, normals and bases.
+class RandomRing {
+ public:
+  RandomRing(support::Random& random, int count) {
+    std::vector<double> steps;
+    for (int k = 0; k < count; ++k) {
+      const double angle = 2 * 3.14159265358979323846 * k / count;
+      const double turn = angle + random.Uniform(-0.7, 0.7);
+      const double radius = count * random.Uniform(0.9, 1.1) / 20;
+      points_.push_back({100 + radius * std::cos(angle), -50 + radius * std::sin(angle)});
+      normals_.push_back({std::cos(turn), std::sin(turn)});
+      bases_.push_back(random.Uniform(-0.1, 0.1));
+      // Some vertices fall together.
+      if (k > 0 && random.Uniform(0, 1) < 0.1) points_[k] = points_[k - 1];
+    }
+    for (int k = 0; k < count; ++k) {
+      const LatticePoint& a = points_[k];
+      const LatticePoint& b = points_[(k + 1) % count];
+      steps_.push_back(std::hypot(b.x - a.x, b.y - a.y));
+    }
+  }
+
+  int count() const { return static_cast<int>(points_.size()); }
+  double Length() const {
+    double length = 0;
+    for (const double step : steps_) length += step;
+    return length;
+  }
+  const std::vector<LatticePoint>& normals() const { return normals_; }
+
+  UnrolledRing Unrolled(UnrolledRings& rings) const {
+    // More than a turn in either direction.
+    const int margin = count() + 11;
+    rings.sizes() = {{static_cast<std::uint32_t>(count()), static_cast<std::uint32_t>(margin)}};
+    rings.Allocate();
+    const UnrolledRing ring = rings[0];
+    for (int k = 0; k < count(); ++k) {
+      ring.x[k] = points_[k].x;
+      ring.y[k] = points_[k].y;
+      ring.normal_x[k] = normals_[k].x;
+      ring.normal_y[k] = normals_[k].y;
+      ring.weight[k] = WeightOf(k);
+      ring.base[k] = bases_[k];
+    }
+    for (double* values : {ring.x, ring.y, ring.normal_x, ring.normal_y, ring.weight, ring.base}) {
+      // In two parts, as two tasks would.
+      ring.Repeat(values, 0, count() / 3);
+      ring.Repeat(values, count() / 3, count());
+    }
+    ring.arc[-margin] = 0;
+    for (int k = -margin; k + 1 < count() + margin; ++k) {
+      ring.arc[k + 1] = ring.arc[k] + steps_[(k + 2 * count()) % count()];
+    }
+    return ring;
+  }
+
+  // What the three functions of ring_windows.h say, vertex by vertex.
+  LatticePoint MeanNormal(int k, double reach, bool by_angle) const {
+    LatticePoint sum;
+    ForEachNear(k, reach, [&](int j, double w) {
+      if (by_angle) w *= std::pow(std::max(0.0, Dot(normals_[k], normals_[j])), 16);
+      sum.x += w * normals_[j].x;
+      sum.y += w * normals_[j].y;
+    });
+    const double length = std::sqrt(Dot(sum, sum));
+    return {sum.x / length, sum.y / length};
+  }
+
+  double Curvature(int k, double reach) const {
+    const LatticePoint tangent{-normals_[k].y, normals_[k].x};
+    double turn = 0, square = 0;
+    ForEachNear(k, reach, [&](int j, double w) {
+      const double along = Dot(Minus(points_[j], points_[k]), tangent);
+      turn += w * along * Dot(Minus(normals_[j], normals_[k]), tangent);
+      square += w * along * along;
+    });
+    return square > 0 ? turn / square : 0;
+  }
+
+  double Shift(int k, double reach) const {
+    double sum = 0, weight = 0;
+    ForEachNear(k, reach, [&](int j, double w) {
+      w *= std::pow(std::max(0.0, Dot(normals_[k], normals_[j])), 16);
+      const LatticePoint chord = Minus(points_[j], points_[k]);
+      sum += w * ((Dot(normals_[k], chord) + Dot(normals_[j], chord)) / 2 + bases_[j]);
+      weight += w;
+    });
+    return weight > 0 ? sum / weight : bases_[k];
+  }
+
+ private:
+  static double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
+  static LatticePoint Minus(const LatticePoint& a, const LatticePoint& b) {
+    return {a.x - b.x, a.y - b.y};
+  }
+  double WeightOf(int k) const { return (steps_[(k + count() - 1) % count()] + steps_[k]) / 2; }
+
+  template <typename Visit>
+  void ForEachNear(int k, double reach, Visit visit) const {
+    const double length = Length();
+    double after = 0;
+    for (int n = 0; n < count(); ++n) {
+      const int j = (k + n) % count();
+      const double distance = std::min(after, length - after);
+      const double t = 1 - distance * distance / (reach * reach);
+      if (distance < reach) visit(j, WeightOf(j) * t * t);
+      after += steps_[j];
+    }
+  }
+
+  std::vector<LatticePoint> points_, normals_;
+  std::vector<double> bases_, steps_;
+};
+
+TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    support::Random random(seed);
+    const RandomRing expected(random, 16 + static_cast<int>(seed) * 2);
+    const double reach = expected.Length() * random.Uniform(0.02, 0.5);
+    UnrolledRings rings;
+    const UnrolledRing ring = expected.Unrolled(rings);
+    MeanCurvature(ring, 0, ring.count, reach);
+    for (int k = 0; k < ring.count; ++k) {
+      const double curvature = expected.Curvature(k, reach);
+      EXPECT_NEAR(ring.shift[k], curvature, 1e-9 * (1 + std::abs(curvature))) << "seed " << seed;
+    }
+    MeanShift(ring, 0, ring.count, reach);
+    for (int k = 0; k < ring.count; ++k) {
+      EXPECT_NEAR(ring.shift[k], expected.Shift(k, reach), 1e-9) << "seed " << seed;
+    }
+    for (const bool by_angle : {false, true}) {
+      MeanNormals(ring, 0, ring.count, reach, by_angle);
+      for (int k = 0; k < ring.count; ++k) {
+        const LatticePoint normal = expected.MeanNormal(k, reach, by_angle);
+        EXPECT_NEAR(ring.next_x[k], normal.x, 1e-6) << "seed " << seed;
+        EXPECT_NEAR(ring.next_y[k], normal.y, 1e-6) << "seed " << seed;
+      }
+    }
+  }
+}
+
+TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
+  support::Random random(3);
+  const RandomRing source(random, 40);
+  UnrolledRings rings;
+  const UnrolledRing ring = source.Unrolled(rings);
+  std::fill(ring.weight - ring.margin, ring.weight + ring.count + ring.margin, 0.0);
+  MeanNormals(ring, 0, ring.count, source.Length() / 4, true);
+  for (int k = 0; k < ring.count; ++k) {
+    EXPECT_EQ(ring.next_x[k], source.normals()[k].x);
+    EXPECT_EQ(ring.next_y[k], source.normals()[k].y);
+  }
+}
+
+TEST(RingWindows, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
+  support::Random random(5);
+  const RandomRing source(random, 103);
+  const double reach = source.Length() / 7;
+  std::vector<std::vector<double>> results;
+  support::ForEachInstructionSet([&] {
+    for (const int stretch : {1, 5, 8, 50, 103}) {
+      UnrolledRings rings;
+      const UnrolledRing ring = source.Unrolled(rings);
+      std::vector<double> result;
+      const auto in_stretches = [&](auto step) {
+        for (std::ptrdiff_t begin = 0; begin < ring.count; begin += stretch) {
+          step(begin, std::min(begin + stretch, ring.count));
+        }
+      };
+      for (const bool by_angle : {false, true}) {
+        in_stretches([&](auto begin, auto end) { MeanNormals(ring, begin, end, reach, by_angle); });
+        result.insert(result.end(), ring.next_x, ring.next_x + ring.count);
+        result.insert(result.end(), ring.next_y, ring.next_y + ring.count);
+      }
+      in_stretches([&](auto begin, auto end) { MeanCurvature(ring, begin, end, reach); });
+      result.insert(result.end(), ring.shift, ring.shift + ring.count);
+      in_stretches([&](auto begin, auto end) { MeanShift(ring, begin, end, reach); });
+      result.insert(result.end(), ring.shift, ring.shift + ring.count);
+      results.push_back(result);
+    }
+  });
+  for (const std::vector<double>& result : results) {
+    EXPECT_EQ(std::memcmp(result.data(), results[0].data(), result.size() * sizeof(double)), 0);
+  }
+}
+
+}  // namespace
+}  // namespace partiemc
