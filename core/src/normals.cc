@@ -1,5 +1,6 @@
 #include "normals.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -125,19 +126,18 @@ void Remember(const TileDirectory& directory, const Crossings& crossings, const 
 
 }  // namespace
 
-void EstimateNormals(const ParticleBins& bins, const LevelSet& level_set,
-                     const Crossings& crossings, const RingTopology& rings, const PointField& field,
+void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
+                     const RingTopology& rings, const PointField& field,
                      const ReconstructionParameters& parameters,
                      std::span<const CellNormal> previous, std::vector<CellPlane>& planes,
                      std::vector<CellNormal>& next) {
   if (!parameters.normal_memory) previous = {};
   planes.resize(rings.segments.size());
-  tbb::parallel_for(std::size_t{0}, planes.size(), [&](std::size_t k) {
+  const auto estimate = [&](std::size_t k, std::size_t after) {
     CellPlane& plane = planes[k];
-    const Segment& segment = crossings.segments[rings.segments[k]];
-    const ActiveCell& cell = crossings.cells[segment.cell];
-    plane.entry = EdgeCrossing(bins.tiles, level_set, cell, segment.entry);
-    plane.exit = EdgeCrossing(bins.tiles, level_set, cell, segment.exit);
+    const ActiveCell& cell = crossings.cells[crossings.segments[rings.segments[k]].cell];
+    plane.entry = rings.entries[k];
+    plane.exit = rings.entries[after];
     if (parameters.placement == Placement::kFarthestParticle) {
       SampleAtMean(bins.tiles, field, cell, plane);
     } else {
@@ -148,6 +148,14 @@ void EstimateNormals(const ParticleBins& bins, const LevelSet& level_set,
     if (plane.is_weak) return;
     SetNormal(plane.gradient_x, plane.gradient_y, plane);
     Orient(FindPrevious(previous, bins.tiles, cell), plane);
+  };
+  using Range = tbb::blocked_range<std::size_t>;
+  tbb::parallel_for(Range(0, planes.size()), [&](const Range& range) {
+    auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), range.begin());
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      if (k == *end) ++end;
+      estimate(k, k + 1 == *end ? *(end - 1) : k + 1);
+    }
   });
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::size_t first = rings.offsets[ring];

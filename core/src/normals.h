@@ -37,8 +37,8 @@ inline constexpr double kWeakGradientSquare = 1e-3;
 /// else by the segment. Weak gradients take the previous normal, else the mean of the ring's
 /// neighbouring reliable ones, else the segment's own.
 /// Deterministic, in parallel over segments. Cost: a field sample per segment.
-void EstimateNormals(const ParticleBins& bins, const LevelSet& level_set,
-                     const Crossings& crossings, const RingTopology& rings, const PointField& field,
+void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
+                     const RingTopology& rings, const PointField& field,
                      const ReconstructionParameters& parameters,
                      std::span<const CellNormal> previous, std::vector<CellPlane>& planes,
                      std::vector<CellNormal>& next);

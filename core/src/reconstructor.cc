@@ -141,8 +141,8 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
   {
     const StageScope scope(observer, Stage::kNormals);
     b.point_field.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale));
-    EstimateNormals(b.bins, b.level_set, b.crossings, b.topology, b.point_field, parameters,
-                    previous.normals, b.planes, b.next_normals);
+    EstimateNormals(b.bins, b.crossings, b.topology, b.point_field, parameters, previous.normals,
+                    b.planes, b.next_normals);
   }
   {
     const StageScope scope(observer, Stage::kVertices);

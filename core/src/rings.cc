@@ -1,6 +1,9 @@
 #include "rings.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <span>
 
 #include "partiemc/result.h"
 
@@ -47,15 +50,21 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
   return {node(here.entry), node((here.entry + 1) & 3)};
 }
 
-// Signed area of a ring through its edge crossings, in cells.
-double AreaOf(const ParticleBins& bins, const LevelSet& level_set, const Crossings& crossings,
-              const RingTopology& rings, std::size_t ring, std::vector<LatticePoint>& points) {
-  points.clear();
-  for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
+                 const Crossings& crossings, RingTopology& rings) {
+  rings.entries.resize(rings.segments.size());
+  tbb::parallel_for(std::size_t{0}, rings.segments.size(), [&](std::size_t k) {
     const Segment& segment = crossings.segments[rings.segments[k]];
-    points.push_back(
-        EdgeCrossing(bins.tiles, level_set, crossings.cells[segment.cell], segment.entry));
-  }
+    rings.entries[k] =
+        EdgeCrossing(directory, level_set, crossings.cells[segment.cell], segment.entry);
+  });
+}
+
+// Signed area of a ring through its edge crossings, in cells.
+double AreaOf(const RingTopology& rings, std::size_t ring) {
+  const std::span<const LatticePoint> points =
+      std::span(rings.entries)
+          .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
   double twice_area = 0;
   const LatticePoint origin = points[0];
   for (std::size_t k = 1; k + 1 < points.size(); ++k) {
@@ -113,10 +122,13 @@ void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings,
     if (IsInside(crossings, nodes.inside) == IsInside(crossings, nodes.outside)) continue;
     std::copy(rings.segments.begin() + first, rings.segments.begin() + last,
               rings.segments.begin() + end);
+    std::copy(rings.entries.begin() + first, rings.entries.begin() + last,
+              rings.entries.begin() + end);
     rings.offsets[kept++] = end;
     end += last - first;
   }
   rings.segments.resize(end);
+  rings.entries.resize(end);
   rings.offsets.resize(kept + 1);
   rings.offsets[kept] = end;
 }
@@ -129,13 +141,13 @@ void CountComponents(const ParticleBins& bins, const Crossings& crossings, RingS
                                     scratch.particle_weight);
 }
 
-void Clean(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
-           Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
+void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, RingScratch& scratch,
+           RingTopology& rings) {
   DropEmptyComponents(scratch, crossings, rings);
   if (rings.dropped_components > 0) KeepSurvivors(bins.tiles, crossings, rings);
   const double min_area = kMinHoleParticles * scale.spacing * scale.spacing;
   for (std::size_t ring = 0; ring + 1 < rings.offsets.size(); ++ring) {
-    const double area = AreaOf(bins, level_set, crossings, rings, ring, scratch.points);
+    const double area = AreaOf(rings, ring);
     if (area < 0 && -area < min_area) {
       FillRing(bins.tiles, rings, ring, crossings, scratch.edges);
       ++rings.dropped_holes;
@@ -149,8 +161,8 @@ void Clean(const ParticleBins& bins, const LevelSet& level_set, const Scale& sca
 }
 
 // Assigns holes and particles: the rings of one component are one outer ring and its holes.
-void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& crossings,
-          RingScratch& scratch, RingTopology& rings) {
+void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch,
+          RingTopology& rings) {
   const std::size_t ring_count = rings.offsets.size() - 1;
   scratch.outer_ring.assign(scratch.components.size(), kNoRing);
   scratch.component_of_ring.resize(ring_count);
@@ -159,7 +171,7 @@ void Nest(const ParticleBins& bins, const LevelSet& level_set, const Crossings& 
     const EdgeNodes nodes = EntryNodes(bins.tiles, crossings, rings.segments[rings.offsets[ring]]);
     const std::uint32_t component = scratch.components.At(crossings, nodes.inside);
     scratch.component_of_ring[ring] = component;
-    scratch.area[ring] = AreaOf(bins, level_set, crossings, rings, ring, scratch.points);
+    scratch.area[ring] = AreaOf(rings, ring);
     if (scratch.area[ring] >= 0) scratch.outer_ring[component] = static_cast<std::uint32_t>(ring);
   }
   rings.outer_of.assign(ring_count, kNoRing);
@@ -223,7 +235,7 @@ std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spaci
   return count;
 }
 
-void DropSpray(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
+void DropSpray(const ParticleBins& bins, const Scale& scale,
                const ReconstructionParameters& parameters, Crossings& crossings,
                RingScratch& scratch, RingTopology& rings) {
   FindContainers(bins.tiles, crossings, rings, scratch);
@@ -236,7 +248,7 @@ void DropSpray(const ParticleBins& bins, const LevelSet& level_set, const Scale&
   KeepSurvivors(bins.tiles, crossings, rings);
   MarkInteriorCells(bins.tiles, crossings);
   CountComponents(bins, crossings, scratch);
-  Nest(bins, level_set, crossings, scratch, rings);
+  Nest(bins, crossings, scratch, rings);
 }
 
 }  // namespace
@@ -248,11 +260,12 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
   rings.dropped_components = 0;
   rings.dropped_spray = 0;
   Trace(bins.tiles, crossings, scratch.visited, rings);
+  FindEntries(bins.tiles, level_set, crossings, rings);
   CountComponents(bins, crossings, scratch);
-  if (*parameters.clean) Clean(bins, level_set, scale, crossings, scratch, rings);
-  Nest(bins, level_set, crossings, scratch, rings);
+  if (*parameters.clean) Clean(bins, scale, crossings, scratch, rings);
+  Nest(bins, crossings, scratch, rings);
   if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {
-    DropSpray(bins, level_set, scale, parameters, crossings, scratch, rings);
+    DropSpray(bins, scale, parameters, crossings, scratch, rings);
   }
 }
 

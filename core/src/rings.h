@@ -17,6 +17,7 @@ namespace partiemc {
 /// Rings as sequences of segments, the inside on the left.
 struct RingTopology {
   std::vector<std::uint32_t> segments;        ///< Indices of segments, ring after ring.
+  std::vector<LatticePoint> entries;          ///< Where each of them enters its cell.
   std::vector<std::uint32_t> offsets;         ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;  ///< Per ring: of its component; 0 for holes.
@@ -34,7 +35,6 @@ struct RingScratch {
   std::vector<std::uint64_t> particle_count;
   std::vector<double> particle_weight;
   std::vector<std::uint8_t> visited;
-  std::vector<LatticePoint> points;
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
   std::vector<std::uint32_t> outer_ring;                     // By component.
   std::vector<std::uint32_t> component_of_ring;
