@@ -1,10 +1,13 @@
-// Hash grids, one per size of segments: a segment lies in the grid whose cells are just larger than
-// its box, in the cell of its lower left corner, and so in one cell of one grid only, however long
-// it is. It is compared with segments of its own grid and of coarser ones, of which few cells can
-// hold segments that reach it.
+// Segments are taken in short runs along their rings. A run of which all segments go to the right,
+// say, does not meet itself, nor the run after it if that goes to the right, too: on contours this
+// leaves hardly any pairs of neighbours, by comparisons of coordinates alone.
+//
+// Other runs are found in hash grids, one per size of runs: a run lies in the grid whose cells are
+// just larger than its box, in the cell of its lower left corner, and so in one cell of one grid
+// only, however long it is. It is compared with runs of its own grid and of coarser ones, of which
+// few cells can hold runs that reach it.
 #include "intersections.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -18,7 +21,13 @@
 namespace partiemc {
 namespace {
 
-using Segment = TouchingPairsBuffers::Segment;
+using Run = TouchingPairsBuffers::Run;
+
+// Segments of a run. Longer ones have larger boxes, of which more overlap.
+constexpr std::uint32_t kRunLength = 8;
+
+// Directions that all segments of a run may have.
+constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
@@ -28,29 +37,44 @@ constexpr int kLevelBits = 5;
 constexpr int kLevels = 1 << kLevelBits;
 static_assert(2 * kIndexBits + kLevelBits <= 64);
 
-// A segment is this much smaller than its cell, so that rounding of an index to the wrong side of a
-// cell's border cannot put it two cells away from one that it touches. Any value well above 2^-24,
-// the error of an index, will do.
+// A run's box is this much smaller than its cell, so that rounding of an index to the wrong side of
+// a cell's border cannot put it two cells away from one that it touches. Any value well above
+// 2^-24, the error of an index, will do.
 constexpr double kSlack = 1.0 + 0x1p-10;
 
-struct Box {
-  double left, bottom, right, top;
+struct Segment {
+  Point a, b;
 };
 
-Box BoxAround(const Segment& segment) {
-  return {std::min(segment.a.x, segment.b.x), std::min(segment.a.y, segment.b.y),
-          std::max(segment.a.x, segment.b.x), std::max(segment.a.y, segment.b.y)};
+/// A box around points.
+struct Box {
+  double left = std::numeric_limits<double>::infinity(), bottom = left, right = -left, top = -left;
+
+  void Add(const Point& point) {
+    left = std::min(left, point.x);
+    bottom = std::min(bottom, point.y);
+    right = std::max(right, point.x);
+    top = std::max(top, point.y);
+  }
+};
+
+template <typename AnyBox>
+double Extent(const AnyBox& box) {
+  return std::max(box.right - box.left, box.top - box.bottom);
 }
 
-double Extent(const Box& box) { return std::max(box.right - box.left, box.top - box.bottom); }
+template <typename BoxA, typename BoxB>
+bool BoxesTouch(const BoxA& a, const BoxB& b) {
+  return a.right >= b.left && b.right >= a.left && a.top >= b.bottom && b.top >= a.bottom;
+}
 
 /// Level k has square cells of side `finest` * 2^k.
 class Grids {
  public:
   Grids(const Box& bounds, double mean_extent)
       : origin_{bounds.left, bounds.bottom},
-        // Cells of twice the mean extent hold almost all segments of a contour in one grid and
-        // still make few candidates (half of it costs a quarter more); the second bound keeps
+        // Cells of twice the mean extent hold almost all runs of a contour in one grid and
+        // still make few candidates; the second bound keeps
         // indices below 2^27, the third keeps sizes above zero when all points coincide.
         finest_(std::max(
             {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {
@@ -106,111 +130,206 @@ bool FoldsBack(const Segment& first, const Segment& second) {
          Orientation(first.a, corner, second.b) == 0;
 }
 
-/// Whether the pair counts, see the header.
-bool TouchesMoreThanItMust(std::span<const Segment> segments, std::uint32_t i, std::uint32_t j) {
-  const Segment& a = segments[i];
-  const Segment& b = segments[j];
-  const bool a_follows = a.previous == j;
-  const bool b_follows = b.previous == i;
+/// All of the work on one input.
+class PairSearch {
+ public:
+  PairSearch(std::span<const double> points, TouchingPairsBuffers& buffers)
+      : points_(points), buffers_(buffers) {}
+
+  std::size_t Count(std::span<const std::uint32_t> ring_offsets);
+
+ private:
+  Point PointAt(std::size_t k) const { return {points_[2 * k], points_[2 * k + 1]}; }
+  Segment SegmentAt(const Run& run, std::uint32_t i) const {
+    return {PointAt(i), PointAt(i + 1 == run.ring_end ? run.ring_begin : i + 1)};
+  }
+  static std::uint32_t Previous(const Run& run, std::uint32_t i) {
+    return (i == run.ring_begin ? run.ring_end : i) - 1;
+  }
+
+  void CollectRuns(std::span<const std::uint32_t> ring_offsets);
+  void Measure(Run& run) const;
+  Grids MakeGrids() const;
+  void FillGrids(const Grids& grids);
+
+  bool Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) const;
+  template <typename Visit>
+  void ForEachPairWithin(const Run& run, Visit visit) const;
+  template <typename Visit>
+  void ForEachPairBetween(const Run& first, const Run& second, Visit visit) const;
+  template <typename Visit>
+  void ForEachPair(const Grids& grids, std::uint32_t run, Visit visit) const;
+  bool FindPairs(const Grids& grids);
+
+  std::span<const double> points_;
+  TouchingPairsBuffers& buffers_;
+  std::uint32_t used_levels_ = 0;
+};
+
+void PairSearch::CollectRuns(std::span<const std::uint32_t> ring_offsets) {
+  std::vector<Run>& runs = buffers_.runs;
+  runs.clear();
+  for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
+    const std::uint32_t begin = ring_offsets[ring];
+    const std::uint32_t end = ring_offsets[ring + 1];
+    for (std::uint32_t first = begin; first < end; first += kRunLength) {
+      runs.push_back({.first = first,
+                      .last = std::min(first + kRunLength, end),
+                      .ring_begin = begin,
+                      .ring_end = end});
+    }
+  }
+  tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t k) { Measure(runs[k]); });
+}
+
+void PairSearch::Measure(Run& run) const {
+  Box box;
+  box.Add(PointAt(run.first));
+  unsigned directions = kRightward | kLeftward | kUpward | kDownward;
+  for (std::uint32_t i = run.first; i < run.last; ++i) {
+    const auto [a, b] = SegmentAt(run, i);
+    box.Add(b);
+    directions &= (a.x < b.x ? kRightward : 0u) | (a.x > b.x ? kLeftward : 0u) |
+                  (a.y < b.y ? kUpward : 0u) | (a.y > b.y ? kDownward : 0u);
+  }
+  run.left = box.left;
+  run.bottom = box.bottom;
+  run.right = box.right;
+  run.top = box.top;
+  run.directions = static_cast<std::uint8_t>(directions);
+}
+
+Grids PairSearch::MakeGrids() const {
+  Box bounds;
+  double extents = 0;
+  for (const Run& run : buffers_.runs) {
+    bounds.Add({run.left, run.bottom});
+    bounds.Add({run.right, run.top});
+    extents += Extent(run);
+  }
+  return Grids(bounds, extents / static_cast<double>(buffers_.runs.size()));
+}
+
+/// Puts every run into its cell.
+void PairSearch::FillGrids(const Grids& grids) {
+  std::vector<Run>& runs = buffers_.runs;
+  std::vector<std::uint32_t>& slots = buffers_.slots;
+  slots.assign(std::max(std::bit_ceil(2 * runs.size()), kBlockSlots), kNone);
+  used_levels_ = 0;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    Run& run = runs[k];
+    const int level = grids.LevelFor(Extent(run));
+    used_levels_ |= 1u << level;
+    run.level = static_cast<std::uint8_t>(level);
+    run.cell = Grids::Key(level, grids.Column(run.left, level), grids.Row(run.bottom, level));
+    std::uint32_t& slot = slots[SlotOf(run.cell, slots.size())];
+    run.next_in_slot = slot;
+    slot = static_cast<std::uint32_t>(k);
+  }
+}
+
+/// Whether a pair of segments counts, see the header.
+bool PairSearch::Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) const {
+  const Segment a = SegmentAt(of_i, i);
+  const Segment b = SegmentAt(of_j, j);
+  const bool a_follows = Previous(of_i, i) == j;
+  const bool b_follows = Previous(of_j, j) == i;
   if (!a_follows && !b_follows) return SegmentsTouch(a.a, a.b, b.a, b.b);
   return (a_follows && FoldsBack(b, a)) || (b_follows && FoldsBack(a, b));
 }
 
-/// Fills `segments` with ends and neighbours; returns the box around all of them.
-Box CollectSegments(std::span<const double> points, std::span<const std::uint32_t> ring_offsets,
-                    std::vector<Segment>& segments) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Box bounds{kInfinity, kInfinity, -kInfinity, -kInfinity};
-  segments.clear();
-  for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
-    const std::uint32_t begin = ring_offsets[ring];
-    const std::uint32_t end = ring_offsets[ring + 1];
-    for (std::uint32_t i = begin; i < end; ++i) {
-      const std::size_t next = i + 1 == end ? begin : i + 1;
-      const Point a{points[2 * std::size_t{i}], points[2 * std::size_t{i} + 1]};
-      const Point b{points[2 * next], points[2 * next + 1]};
-      segments.push_back({.a = a, .b = b, .previous = i == begin ? end - 1 : i - 1});
-      bounds = {std::min(bounds.left, a.x), std::min(bounds.bottom, a.y),
-                std::max(bounds.right, a.x), std::max(bounds.top, a.y)};
+template <typename Visit>
+void PairSearch::ForEachPairWithin(const Run& run, Visit visit) const {
+  if (run.directions != 0) return;
+  for (std::uint32_t i = run.first; i < run.last; ++i) {
+    for (std::uint32_t j = i + 1; j < run.last; ++j) {
+      if (Touches(run, i, run, j)) visit(i, j);
     }
   }
-  return bounds;
 }
 
-/// Puts every segment into its cell; returns the set of levels that are used.
-std::uint32_t FillGrids(const Grids& grids, TouchingPairsBuffers& buffers) {
-  std::vector<Segment>& segments = buffers.segments;
-  std::vector<std::uint32_t>& slots = buffers.slots;
-  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t i) {
-    Segment& segment = segments[i];
-    const Box box = BoxAround(segment);
-    segment.level = grids.LevelFor(Extent(box));
-    segment.cell = Grids::Key(segment.level, grids.Column(box.left, segment.level),
-                              grids.Row(box.bottom, segment.level));
-  });
-  slots.assign(std::max(std::bit_ceil(2 * segments.size()), kBlockSlots), kNone);
-  std::uint32_t used_levels = 0;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    Segment& segment = segments[i];
-    used_levels |= 1u << segment.level;
-    std::uint32_t& slot = slots[SlotOf(segment.cell, slots.size())];
-    segment.next_in_slot = slot;
-    slot = static_cast<std::uint32_t>(i);
+template <typename Visit>
+void PairSearch::ForEachPairBetween(const Run& first, const Run& second, Visit visit) const {
+  if (!BoxesTouch(first, second)) return;
+  const bool follows = Previous(second, second.first) == first.last - 1 ||
+                       Previous(first, first.first) == second.last - 1;
+  if (follows && (first.directions & second.directions) != 0) return;
+  for (std::uint32_t i = first.first; i < first.last; ++i) {
+    const Segment segment = SegmentAt(first, i);
+    Box box;
+    box.Add(segment.a);
+    box.Add(segment.b);
+    if (!BoxesTouch(box, second)) continue;
+    for (std::uint32_t j = second.first; j < second.last; ++j) {
+      if (Touches(first, i, second, j)) visit(i, j);
+    }
   }
-  return used_levels;
 }
 
-/// Calls visit(j) for the pairs of segment i with segments j of `level` that count. What i may
-/// touch has its lower left corner no farther to the right and above than the box of i, and less
+/// Calls visit(i, j) for all pairs that count, of segments of a run and of later ones. What a run
+/// may touch has its lower left corner no farther to the right and above than its box, and less
 /// than a cell to the left and below.
 template <typename Visit>
-void ForEachPairInLevel(const Grids& grids, const TouchingPairsBuffers& buffers, std::uint32_t i,
-                        int level, Visit visit) {
-  const std::span<const Segment> segments = buffers.segments;
-  const std::span<const std::uint32_t> slots = buffers.slots;
-  const Box box = BoxAround(segments[i]);
-  const std::int64_t first_column = std::max<std::int64_t>(grids.Column(box.left, level) - 1, 0);
-  const std::int64_t last_column = grids.Column(box.right, level);
-  const std::int64_t first_row = std::max<std::int64_t>(grids.Row(box.bottom, level) - 1, 0);
-  const std::int64_t last_row = grids.Row(box.top, level);
-  // Of two segments of one level, the earlier one finds the pair.
-  const bool finds_all = segments[i].level < level;
-
-  for (std::int64_t row = first_row; row <= last_row; ++row) {
-    for (std::int64_t column = first_column; column <= last_column; ++column) {
-      const std::uint64_t cell = Grids::Key(level, column, row);
-      for (std::uint32_t j = slots[SlotOf(cell, slots.size())]; j != kNone;
-           j = segments[j].next_in_slot) {
-        if (segments[j].cell != cell || (!finds_all && j <= i)) continue;
-        if (TouchesMoreThanItMust(segments, i, j)) visit(j);
+void PairSearch::ForEachPair(const Grids& grids, std::uint32_t index, Visit visit) const {
+  const std::span<const Run> runs = buffers_.runs;
+  const std::span<const std::uint32_t> slots = buffers_.slots;
+  const Run& run = runs[index];
+  ForEachPairWithin(run, visit);
+  for (int level = run.level; used_levels_ >> level != 0; ++level) {
+    if ((used_levels_ >> level & 1u) == 0) continue;
+    const std::int64_t first_column = std::max<std::int64_t>(grids.Column(run.left, level) - 1, 0);
+    const std::int64_t last_column = grids.Column(run.right, level);
+    const std::int64_t first_row = std::max<std::int64_t>(grids.Row(run.bottom, level) - 1, 0);
+    const std::int64_t last_row = grids.Row(run.top, level);
+    // Of two runs of one level, the earlier one finds the pairs.
+    const bool finds_all = run.level < level;
+    for (std::int64_t row = first_row; row <= last_row; ++row) {
+      for (std::int64_t column = first_column; column <= last_column; ++column) {
+        const std::uint64_t cell = Grids::Key(level, column, row);
+        for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNone;
+             other = runs[other].next_in_slot) {
+          if (runs[other].cell != cell || (!finds_all && other <= index)) continue;
+          ForEachPairBetween(run, runs[other], visit);
+        }
       }
     }
   }
 }
 
-/// Calls visit(j) for all pairs that segment i finds.
-template <typename Visit>
-void ForEachPair(const Grids& grids, const TouchingPairsBuffers& buffers, std::uint32_t used_levels,
-                 std::uint32_t i, Visit visit) {
-  for (int level = buffers.segments[i].level; used_levels >> level != 0; ++level) {
-    if ((used_levels >> level & 1u) != 0) ForEachPairInLevel(grids, buffers, i, level, visit);
-  }
-}
-
-/// Finds out which segments find pairs; returns whether any does.
-bool FindPairs(const Grids& grids, TouchingPairsBuffers& buffers, std::uint32_t used_levels) {
+/// Finds out which runs find pairs; returns whether any does.
+bool PairSearch::FindPairs(const Grids& grids) {
   std::atomic<bool> has_pair = false;
   tbb::parallel_for(
-      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(buffers.segments.size())),
-      [&](const tbb::blocked_range<std::uint32_t>& range) {
-        for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
-          ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t) {
-            buffers.segments[i].finds_pair = true;
-            has_pair.store(true, std::memory_order_relaxed);
-          });
-        }
+      std::uint32_t{0}, static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t run) {
+        bool finds_pair = false;
+        ForEachPair(grids, run, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
+        buffers_.runs[run].finds_pair = finds_pair;
+        if (finds_pair) has_pair.store(true, std::memory_order_relaxed);
       });
   return has_pair;
+}
+
+std::size_t PairSearch::Count(std::span<const std::uint32_t> ring_offsets) {
+  CollectRuns(ring_offsets);
+  buffers_.pairs.clear();
+  if (buffers_.runs.empty()) return 0;
+  const Grids grids = MakeGrids();
+  FillGrids(grids);
+  // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
+  // of threads.
+  if (!FindPairs(grids)) return 0;
+  std::size_t count = 0;
+  const std::size_t max_pairs = points_.size() / 2;
+  for (std::uint32_t run = 0; run < buffers_.runs.size(); ++run) {
+    if (!buffers_.runs[run].finds_pair) continue;
+    ForEachPair(grids, run, [&](std::uint32_t i, std::uint32_t j) {
+      ++count;
+      if (buffers_.pairs.size() < max_pairs) buffers_.pairs.emplace_back(i, j);
+      buffers_.example_first = std::min(i, j);
+      buffers_.example_second = std::max(i, j);
+    });
+  }
+  return count;
 }
 
 }  // namespace
@@ -218,29 +337,7 @@ bool FindPairs(const Grids& grids, TouchingPairsBuffers& buffers, std::uint32_t 
 std::size_t CountTouchingPairs(std::span<const double> points,
                                std::span<const std::uint32_t> ring_offsets,
                                TouchingPairsBuffers& buffers) {
-  const std::vector<Segment>& segments = buffers.segments;
-  const Box bounds = CollectSegments(points, ring_offsets, buffers.segments);
-  buffers.pairs.clear();
-  if (segments.empty()) return 0;
-  double extents = 0;
-  for (const Segment& segment : segments) extents += Extent(BoxAround(segment));
-  const Grids grids(bounds, extents / static_cast<double>(segments.size()));
-
-  const std::uint32_t used_levels = FillGrids(grids, buffers);
-  // Nearly all frames have no pair. Pairs are listed in the order of the segments, whatever the
-  // number of threads.
-  if (!FindPairs(grids, buffers, used_levels)) return 0;
-  std::size_t count = 0;
-  for (std::uint32_t i = 0; i < segments.size(); ++i) {
-    if (!segments[i].finds_pair) continue;
-    ForEachPair(grids, buffers, used_levels, i, [&](std::uint32_t j) {
-      ++count;
-      if (buffers.pairs.size() < segments.size()) buffers.pairs.emplace_back(i, j);
-      buffers.example_first = std::min(i, j);
-      buffers.example_second = std::max(i, j);
-    });
-  }
-  return count;
+  return PairSearch(points, buffers).Count(ring_offsets);
 }
 
 }  // namespace partiemc

@@ -12,17 +12,20 @@
 namespace partiemc {
 
 /// Buffers of CountTouchingPairs, kept warm from call to call; they carry nothing from one to the
-/// next. Memory: about 75 bytes per segment, whatever the input.
+/// next. Memory: about 20 bytes per segment, whatever the input.
 struct TouchingPairsBuffers {
-  struct Segment {
-    Point a, b;
-    std::uint64_t cell = 0;          // Where it lies in the grid of its size (intersections.cc).
-    std::uint32_t previous = 0;      // The segment that ends at `a`.
-    std::uint32_t next_in_slot = 0;  // A list of segments whose cells share a slot.
-    int level = 0;                   // Of its grid.
-    bool finds_pair = false;         // Whether it is the earlier one of a pair that counts.
+  /// Successive segments of a ring, each named by the point that it begins at.
+  struct Run {
+    double left, bottom, right, top;     // The box around them.
+    std::uint32_t first, last;           // Segments [first, last),
+    std::uint32_t ring_begin, ring_end;  // of a ring of [ring_begin, ring_end).
+    std::uint64_t cell = 0;              // Where it lies in the grid of its size.
+    std::uint32_t next_in_slot = 0;      // A list of runs whose cells share a slot.
+    std::uint8_t level = 0;              // Of its grid (intersections.cc).
+    std::uint8_t directions = 0;         // In which all of its segments go (intersections.cc).
+    bool finds_pair = false;             // Whether it is the earlier one of a pair that counts.
   };
-  std::vector<Segment> segments;
+  std::vector<Run> runs;
   std::vector<std::uint32_t> slots;
 
   /// Pairs that were counted, each segment named by the point that it begins at. At most as many as
