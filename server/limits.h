@@ -1,13 +1,15 @@
 // What a server allows, announced to clients in StreamOpened and GetServerInfo.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 
 #include "partiemc/frame.h"
+#include "server/stream_flow.h"
 
 namespace partiemc::server {
 
-/// At the worst, requests hold max_streams * frames_in_flight * max_frame_bytes of memory, and
+/// At the worst, requests and answers hold `memory_budget` and one frame for each stream, and
 /// computing takes about 200 bytes a particle for each thread.
 struct ServerLimits {
   /// Of one frame. More suits larger simulations; memory grows with it as said above.
@@ -22,6 +24,13 @@ struct ServerLimits {
   /// Frames of a stream that are read ahead of the last answer that its client has taken. Two keep
   /// large frames flowing, four small ones; more only costs memory.
   std::uint32_t frames_in_flight = 4;
+
+  /// Bytes that requests and answers of all streams hold together. While it is used up, a stream is
+  /// read from only when nothing of it is in flight. More suits many large streams.
+  std::uint64_t memory_budget = std::uint64_t{1} << 30;
+
+  /// A stream costs next to nothing while it waits, but it keeps its name and its place.
+  IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};
 
   /// Room for the widest usual particle (three float64, id, volume, velocity: 44 bytes) and for
   /// what a message has besides. Recordings with many scalars want a larger limit by hand.

@@ -56,9 +56,9 @@ int Serve(const CommandLine& line) {
       return Fail(status);
     }
   }
-  spdlog::info("listening on {} version={} threads={} max_streams={}",
+  spdlog::info("listening on {} version={} threads={} max_streams={} memory_budget={}",
                (*server)->address().ToString(), PARTIEMC_VERSION, line.server.threads,
-               line.server.limits.max_streams);
+               line.server.limits.max_streams, line.server.limits.memory_budget);
   int signal = 0;
   sigwait(&signals, &signal);
   spdlog::info("draining after {}", strsignal(signal));

@@ -2,11 +2,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
 #include <thread>
 #include <utility>
+
+#include "server/machine_memory.h"
 
 namespace partiemc::server {
 namespace {
@@ -34,6 +37,7 @@ struct Raw {
   std::string port_file;
   std::uint64_t max_frame_bytes = 0;
   double grace_seconds = 4;
+  double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
   std::string log_format = "text";
   CommandLine line;
 };
@@ -100,11 +104,27 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
   app.add_option("--max-frame-bytes", raw.max_frame_bytes,
                  "Bytes of one serialised frame, units as in 200MB allowed (default: 48 for each "
-                 "of --max-particles). Streams hold at most max-streams x frames-in-flight x this")
+                 "of --max-particles)")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::Range(std::uint64_t{1}, kMaxFrameBytes))
       ->type_name("BYTES")
       ->envname("PARTIEMC_MAX_FRAME_BYTES")
+      ->group(kGroup);
+  app.add_option("--memory-budget", raw.line.server.limits.memory_budget,
+                 "Bytes that requests and answers of all streams hold, units as in 2GB allowed; "
+                 "beyond it a stream has one frame in flight (default: half of the memory that "
+                 "this machine or container has)")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::PositiveNumber)
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_MEMORY_BUDGET")
+      ->group(kGroup);
+  app.add_option("--idle-timeout", raw.idle_seconds,
+                 "End a stream that has had no frame for this time; 0: never")
+      ->check(CLI::Range(0.0, 1e8))
+      ->capture_default_str()
+      ->type_name("SECONDS")
+      ->envname("PARTIEMC_IDLE_TIMEOUT")
       ->group(kGroup);
 }
 
@@ -130,6 +150,11 @@ Leave Wrong(const std::string& message) {
   return {2, "partiemc-server: " + line + "; see --help\n"};
 }
 
+// Rounded up, so that a short time does not become none.
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return std::chrono::milliseconds(static_cast<std::int64_t>(std::ceil(seconds * 1000)));
+}
+
 std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
   const auto address = ParseAddress(raw.address);
   if (!address.ok()) return Wrong(std::string(address.status().message()));
@@ -141,8 +166,9 @@ std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
   }
   raw.line.log_format = raw.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
   if (!raw.port_file.empty()) raw.line.port_file = raw.port_file;
-  raw.line.grace = std::chrono::milliseconds(static_cast<std::int64_t>(raw.grace_seconds * 1000));
+  raw.line.grace = Milliseconds(raw.grace_seconds);
   ServerLimits& limits = raw.line.server.limits;
+  limits.idle.streaming = Milliseconds(raw.idle_seconds);
   limits.max_frame_bytes =
       raw.max_frame_bytes != 0
           ? raw.max_frame_bytes
@@ -157,6 +183,7 @@ std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* a
   app.footer(kFooter);
   Raw raw;
   raw.line.server.threads = std::max(1u, std::thread::hardware_concurrency());
+  raw.line.server.limits.memory_budget = AvailableMemory() / 2;
   AddServingOptions(app, raw);
   AddLimits(app, raw);
   AddLogging(app, raw);

@@ -29,11 +29,11 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
 
 ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
                                        const ServerLimits& limits, StreamRegistry& registry,
-                                       ComputePool& pool)
+                                       MemoryBudget& budget, ComputePool& pool)
     : context_(context),
       registry_(registry),
       messages_(limits, registry),
-      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool,
+      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget,
                                          limits.frames_in_flight)) {
   if (auto status = registry_.Enter(flow_); !status.ok()) {
     Finish(status);
@@ -44,7 +44,7 @@ ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
 
 void ReconstructReactor::OnReadDone(bool ok) {
   if (ok) {
-    flow_->ReadDone(messages_.Kind(read_slot_));
+    flow_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
   } else {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
     if (context_.IsCancelled()) flow_->Cancelled();
@@ -88,6 +88,8 @@ absl::Status ReconstructReactor::Open(std::size_t slot) {
 Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
   return messages_.Answer(slot, worker);
 }
+
+void ReconstructReactor::Cut() { context_.TryCancel(); }
 
 void ReconstructReactor::Finish(const absl::Status& status) {
   // Closed first: a client that sees the end may open the same name again at once.

@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "server/compute_pool.h"
 #include "server/limits.h"
+#include "server/memory_budget.h"
 #include "server/stream_flow.h"
 #include "server/stream_messages.h"
 #include "server/stream_registry.h"
@@ -23,7 +24,7 @@ class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer
  public:
   /// The arguments outlive the call.
   ReconstructReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-                     StreamRegistry& registry, ComputePool& pool);
+                     StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -35,6 +36,7 @@ class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   void StartWrite(Outgoing what, std::size_t slot) override;
   absl::Status Open(std::size_t slot) override;
   Answered Answer(std::size_t slot, Worker& worker) override;
+  void Cut() override;
   void Finish(const absl::Status& status) override;
 
   grpc::CallbackServerContext& context_;

@@ -35,8 +35,10 @@ Server::Server(const ServerOptions& options)
     : options_(options),
       address_(options.address),
       registry_(options.limits.max_streams),
+      budget_(options.limits.memory_budget),
       pool_(options.threads),
-      service_(std::make_unique<Service>(options_.limits, registry_, pool_)) {}
+      idle_timer_(registry_, options.limits.idle),
+      service_(std::make_unique<Service>(options_.limits, registry_, budget_, pool_)) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
   if (auto status = CheckSecurity(options); !status.ok()) return status;

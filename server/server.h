@@ -8,7 +8,9 @@
 #include "absl/status/statusor.h"
 #include "server/address.h"
 #include "server/compute_pool.h"
+#include "server/idle_timer.h"
 #include "server/limits.h"
+#include "server/memory_budget.h"
 #include "server/stream_registry.h"
 
 namespace grpc {
@@ -59,7 +61,9 @@ class Server {
   const ServerOptions options_;
   Address address_;
   StreamRegistry registry_;
+  MemoryBudget budget_;
   ComputePool pool_;
+  IdleTimer idle_timer_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<grpc::Server> server_;
 };

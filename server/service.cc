@@ -28,6 +28,13 @@ absl::Status AnswerCall(const v1::ReconstructFrameRequest& request, const Server
                      *session, worker, *response.mutable_frame());
 }
 
+// RESOURCE_EXHAUSTED with the Violation of what is not let in.
+absl::Status Refused(std::string_view reason, std::string field, std::string value,
+                     std::string rule) {
+  return ViolationError(absl::StatusCode::kResourceExhausted,
+                        {std::string(reason), std::move(field), std::move(value), std::move(rule)});
+}
+
 // Refuses the call as soon as it comes.
 class NoWatching final
     : public grpc::ServerBidiReactor<v1::WatchStreamRequest, v1::WatchStreamResponse> {
@@ -60,7 +67,24 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruct(
     grpc::CallbackServerContext* context) {
-  return new ReconstructReactor(*context, limits_, registry_, pool_);
+  return new ReconstructReactor(*context, limits_, registry_, budget_, pool_);
+}
+
+absl::Status Service::LetCallIn(std::uint64_t bytes) {
+  if (++calls_ > limits_.max_streams) {
+    --calls_;
+    return Refused(kReasonTooManyCalls, "calls of ReconstructFrame",
+                   absl::StrCat(limits_.max_streams, " going on"),
+                   absl::StrCat("must be at most ", limits_.max_streams, "; try again later"));
+  }
+  if (!budget_.TryTake(bytes)) {
+    --calls_;
+    return Refused(kReasonMemoryBudget, "request", absl::StrCat(bytes, " bytes"),
+                   absl::StrCat("must fit with what is being worked on into ", budget_.bytes(),
+                                " bytes; try again later, or start the server with a larger "
+                                "--memory-budget"));
+  }
+  return absl::OkStatus();
 }
 
 grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext* context,
@@ -71,13 +95,8 @@ grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext*
     reactor->Finish(ToGrpcStatus(DrainingError(), *context));
     return reactor;
   }
-  if (++calls_ > limits_.max_streams) {
-    --calls_;
-    const auto status = ViolationError(
-        absl::StatusCode::kResourceExhausted,
-        {std::string(kReasonTooManyCalls), "calls of ReconstructFrame",
-         absl::StrCat(limits_.max_streams, " going on"),
-         absl::StrCat("must be at most ", limits_.max_streams, "; try again later")});
+  const std::uint64_t bytes = request->ByteSizeLong();
+  if (auto status = LetCallIn(bytes); !status.ok()) {
     reactor->Finish(ToGrpcStatus(status, *context));
     return reactor;
   }
@@ -85,6 +104,7 @@ grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext*
     const auto status = context->IsCancelled() ? absl::CancelledError("the client went away")
                                                : AnswerCall(*request, limits_, worker, *response);
     --calls_;
+    budget_.GiveBack(bytes);
     reactor->Finish(ToGrpcStatus(status, *context));
   });
   return reactor;

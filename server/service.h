@@ -8,6 +8,7 @@
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 #include "server/compute_pool.h"
 #include "server/limits.h"
+#include "server/memory_budget.h"
 #include "server/stream_registry.h"
 
 namespace partiemc::server {
@@ -26,8 +27,9 @@ using ServiceBase = v1::ReconstructionService::WithRawCallbackMethod_Reconstruct
 class Service final : public ServiceBase {
  public:
   /// The arguments outlive the service.
-  Service(const ServerLimits& limits, StreamRegistry& registry, ComputePool& pool)
-      : limits_(limits), registry_(registry), pool_(pool) {}
+  Service(const ServerLimits& limits, StreamRegistry& registry, MemoryBudget& budget,
+          ComputePool& pool)
+      : limits_(limits), registry_(registry), budget_(budget), pool_(pool) {}
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Reconstruct(
       grpc::CallbackServerContext* context) override;
@@ -44,8 +46,12 @@ class Service final : public ServiceBase {
                                           v1::GetServerInfoResponse* response) override;
 
  private:
+  // Errors: RESOURCE_EXHAUSTED (TOO_MANY_CALLS, MEMORY_BUDGET); else it counts, with its bytes.
+  absl::Status LetCallIn(std::uint64_t bytes);
+
   const ServerLimits& limits_;
   StreamRegistry& registry_;
+  MemoryBudget& budget_;
   ComputePool& pool_;
   std::atomic<std::uint32_t> calls_ = 0;  // Of ReconstructFrame, going on.
 };

@@ -4,10 +4,13 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 
 namespace partiemc::server {
 namespace {
+
+using TimePoint = std::chrono::steady_clock::time_point;
 
 std::string Name(RequestKind kind) {
   switch (kind) {
@@ -29,6 +32,16 @@ absl::Status BrokenProtocol(std::string found, std::string rule) {
       {std::string(kReasonProtocol), "request", std::move(found), std::move(rule)});
 }
 
+absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
+
+absl::Status IdleError(std::string what, std::chrono::milliseconds limit) {
+  const std::string seconds = absl::StrCat(std::chrono::duration<double>(limit).count(), " s");
+  return ViolationError(
+      absl::StatusCode::kDeadlineExceeded,
+      {std::string(kReasonIdle), "client", absl::StrCat(what, " for ", seconds),
+       "must do so within this time (Limits.idle_timeout_seconds once open); open a new stream"});
+}
+
 }  // namespace
 
 absl::Status DrainingError() {
@@ -37,8 +50,13 @@ absl::Status DrainingError() {
                          "connect to another one, or again later"});
 }
 
-StreamFlow::StreamFlow(StreamDoor& door, ComputePool& pool, std::size_t window)
-    : door_(door), pool_(pool), window_(std::max<std::size_t>(window, 1)) {}
+StreamFlow::StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget,
+                       std::size_t window)
+    : door_(door),
+      pool_(pool),
+      budget_(budget),
+      window_(std::max<std::size_t>(window, 1)),
+      slot_bytes_(window_) {}
 
 // Lets something happen to the state and does what follows from it.
 template <typename Event>
@@ -56,18 +74,19 @@ void StreamFlow::Start() {
   On([] {});
 }
 
-void StreamFlow::ReadDone(RequestKind kind) {
+void StreamFlow::ReadDone(RequestKind kind, std::uint64_t bytes) {
   bool open = false;
   On([&] {
     reading_ = false;
     counts_.last_activity = std::chrono::steady_clock::now();
-    TakeRequest(kind);
+    TakeRequest(kind, bytes);
+    surplus_ += std::exchange(set_aside_, 0);  // Now it is known what there is.
     open = opening_;
   });
   if (open) Open();
 }
 
-void StreamFlow::TakeRequest(RequestKind kind) {
+void StreamFlow::TakeRequest(RequestKind kind, std::uint64_t bytes) {
   if (phase_ == Phase::kOpening) {
     opening_ = kind == RequestKind::kOpen;
     if (opening_) return;
@@ -75,7 +94,8 @@ void StreamFlow::TakeRequest(RequestKind kind) {
   } else if (phase_ == Phase::kStreaming) {
     switch (kind) {
       case RequestKind::kFrame:
-        ++read_;
+        last_bytes_ = std::max<std::uint64_t>(bytes, 1);
+        SetSlotBytes(read_++, bytes);
         break;
       case RequestKind::kOpen:
         End(BrokenProtocol(Name(kind), "comes once; after it every request must be `frame`"));
@@ -112,14 +132,22 @@ void StreamFlow::ReadEnded() {
 void StreamFlow::WriteDone(bool ok) {
   On([&] {
     writing_ = false;
-    if (in_flight_ == Outgoing::kAnswer) ++written_;
+    if (in_flight_ == Outgoing::kAnswer) SetSlotBytes(written_++, 0);
     counts_.last_activity = std::chrono::steady_clock::now();
-    if (!ok) Abandon();
+    if (!ok) Abandon(ClientGone());
   });
 }
 
 void StreamFlow::Cancelled() {
-  On([&] { Abandon(); });
+  On([&] { Abandon(ClientGone()); });
+}
+
+void StreamFlow::Granted(std::uint64_t bytes) {
+  On([&] {
+    // What comes after the flow has gone on without it goes back at once.
+    (waiting_ ? set_aside_ : surplus_) += bytes;
+    waiting_ = false;
+  });
 }
 
 void StreamFlow::Drain() {
@@ -127,6 +155,32 @@ void StreamFlow::Drain() {
     if (phase_ == Phase::kStreaming) owes_notice_ = true;
     End(DrainingError());
   });
+}
+
+TimePoint StreamFlow::EndIfIdle(const IdleLimits& limits, TimePoint now) {
+  TimePoint look_again = TimePoint::max();
+  On([&] {
+    if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+    const auto limit = phase_ == Phase::kOpening ? limits.opening : limits.streaming;
+    if (limit <= limit.zero()) {
+      // An opening stream may come under the other limit at any time.
+      if (phase_ == Phase::kOpening && limits.streaming > limit.zero()) {
+        look_again = now + limits.streaming;
+      }
+      return;
+    }
+    const bool ours = opening_ || computing_;
+    const TimePoint due = (ours ? now : counts_.last_activity) + limit;
+    if (now < due) {
+      look_again = due;
+    } else if (writing_) {
+      Abandon(IdleError("takes no answer", limit));
+      owes_cut_ = true;
+    } else {
+      End(IdleError(phase_ == Phase::kOpening ? "sends no `open`" : "sends no frame", limit));
+    }
+  });
+  return look_again;
 }
 
 StreamCounts StreamFlow::counts() const {
@@ -148,6 +202,7 @@ void StreamFlow::Computed() {
     ++computed_;
     const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
     if (!answered) return;
+    SetSlotBytes(computed_ - 1, answered->bytes);
     ++(answered->is_result ? counts_.frames : counts_.frame_errors);
     counts_.last_sequence = answered->last_sequence;
   });
@@ -159,17 +214,26 @@ void StreamFlow::End(absl::Status status) {
   status_ = std::move(status);
 }
 
-void StreamFlow::Abandon() {
-  if (phase_ == Phase::kFinished) return;
+void StreamFlow::Abandon(absl::Status status) {
+  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kAbandoned;
-  status_ = absl::CancelledError("the client went away");
+  status_ = std::move(status);
+}
+
+// Counts what frame number `frame`, from 0, holds now instead of what it held before.
+void StreamFlow::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
+  std::uint64_t& held = slot_bytes_[frame % window_];
+  if (bytes > held) {
+    budget_.Take(bytes - held);
+  } else {
+    surplus_ += held - bytes;
+  }
+  held = bytes;
 }
 
 StreamFlow::Actions StreamFlow::Decide() {
   Actions actions;
-  const bool wants_read =
-      phase_ == Phase::kOpening || (phase_ == Phase::kStreaming && read_ - written_ < window_);
-  if (wants_read && !opening_ && !reading_ && !starting_read_) {
+  if (!opening_ && !reading_ && !starting_read_ && MayRead(actions)) {
     reading_ = starting_read_ = true;
     actions.read = read_ % window_;
   }
@@ -181,11 +245,42 @@ StreamFlow::Actions StreamFlow::Decide() {
   if (answers && !writing_) DecideWrite(actions);
   const bool all_said = phase_ == Phase::kAbandoned ||
                         (phase_ == Phase::kEnding && written_ == read_ && !owes_notice_);
-  if (all_said && !opening_ && !computing_ && !writing_ && !starting_read_) {
+  if (std::exchange(owes_cut_, false)) actions.cut = cutting_ = true;
+  if (all_said && !opening_ && !computing_ && !writing_ && !starting_read_ && !cutting_) {
     phase_ = Phase::kFinished;
     actions.finish = status_;
   }
+  DecideMemory(actions);
   return actions;
+}
+
+// Asked only when the next read could begin at once.
+bool StreamFlow::MayRead(Actions& actions) {
+  if (phase_ == Phase::kOpening) return true;
+  if (phase_ != Phase::kStreaming || read_ - written_ >= window_) return false;
+  if (read_ == written_) {
+    actions.stop_waiting = std::exchange(waiting_, false);
+    return true;
+  }
+  if (set_aside_ > 0) return true;
+  if (waiting_) return false;
+  if (budget_.TakeOrWait(last_bytes_, shared_from_this())) {
+    set_aside_ = last_bytes_;
+    return true;
+  }
+  waiting_ = true;
+  return false;
+}
+
+// Room is set aside for a read only while the stream has something else in flight: what an idle
+// stream reads next costs nothing until it comes.
+void StreamFlow::DecideMemory(Actions& actions) {
+  if (phase_ != Phase::kStreaming && std::exchange(waiting_, false)) actions.stop_waiting = true;
+  if (phase_ != Phase::kStreaming || read_ == written_) surplus_ += std::exchange(set_aside_, 0);
+  if (phase_ == Phase::kFinished) {
+    for (std::uint64_t& bytes : slot_bytes_) surplus_ += std::exchange(bytes, 0);
+  }
+  actions.give_back = std::exchange(surplus_, 0);
 }
 
 void StreamFlow::DecideWrite(Actions& actions) {
@@ -208,16 +303,21 @@ void StreamFlow::DecideWrite(Actions& actions) {
 void StreamFlow::Perform(Actions actions) {
   const auto self = shared_from_this();
   for (;;) {
+    // Before anything that may end the stream elsewhere: it ends with nothing held.
+    if (actions.stop_waiting) budget_.StopWaiting(self);
+    if (actions.give_back > 0) budget_.GiveBack(actions.give_back);
     if (actions.compute) {
       pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
                    [self] { self->Computed(); });
     }
     if (actions.write) door_.StartWrite(*actions.write, actions.write_slot);
+    if (actions.cut) door_.Cut();
     if (actions.finish) door_.Finish(*actions.finish);
-    if (!actions.read) return;
-    door_.StartRead(*actions.read);
+    if (!actions.read && !actions.cut) return;
+    if (actions.read) door_.StartRead(*actions.read);
     const std::lock_guard lock(mutex_);
-    starting_read_ = false;
+    if (actions.read) starting_read_ = false;
+    if (actions.cut) cutting_ = false;
     actions = Decide();
   }
 }

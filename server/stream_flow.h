@@ -9,15 +9,18 @@
 #include <mutex>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "server/compute_pool.h"
+#include "server/memory_budget.h"
 
 namespace partiemc::server {
 
 /// The reasons for which the flow ends a stream (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonProtocol = "PROTOCOL";
 inline constexpr std::string_view kReasonDraining = "DRAINING";
+inline constexpr std::string_view kReasonIdle = "IDLE";
 
 /// UNAVAILABLE with the Violation that a draining server gives everybody.
 absl::Status DrainingError();
@@ -32,6 +35,7 @@ enum class Outgoing { kOpened, kAnswer, kDraining };
 struct Answered {
   bool is_result = false;           ///< Or a frame error.
   std::uint64_t last_sequence = 0;  ///< The last number that the stream has used up.
+  std::uint64_t bytes = 0;          ///< Of the answer.
 };
 
 /// Where a stream's messages come in and go out. It has `window` slots, each a request and the
@@ -51,9 +55,17 @@ class StreamDoor {
   /// Turns the frame in `slot` into its answer. Called by a worker, one frame of a stream at a time
   /// and in their order.
   virtual Answered Answer(std::size_t slot, Worker& worker) = 0;
+  /// Has the read and the write that are going on fail soon, whatever the client does.
+  virtual void Cut() = 0;
   /// The last call that the door gets; a read may still be going on, nothing else. OK, or why the
   /// stream ended.
   virtual void Finish(const absl::Status& status) = 0;
+};
+
+/// For how long a client may let a stream wait for it; 0: for ever.
+struct IdleLimits {
+  std::chrono::milliseconds opening{0};    ///< From the call to its `open`.
+  std::chrono::milliseconds streaming{0};  ///< From one frame or taken answer to the next.
 };
 
 /// Seen from outside while the stream goes on.
@@ -74,16 +86,22 @@ struct StreamCounts {
 /// While streaming, frame n lives in slot n % window from the start of its reading to the end of
 /// its answer's writing, so that a client that does not read its answers is not read from either.
 /// Ending answers what was read; abandoned answers nothing more. Safe from any thread.
-class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
+///
+/// Memory: the bytes of requests that were read and of answers that are not written count against
+/// the budget of all streams. While something of a stream is in flight, another frame is read only
+/// when the budget has room for one of the size of the last. A stream of which nothing is in flight
+/// always reads one frame, so that none stands still for the sake of another.
+class StreamFlow final : public MemoryBudget::Waiter,
+                         public std::enable_shared_from_this<StreamFlow> {
  public:
-  /// `door` lives until its Finish returns, `pool` longer. Held by shared_ptr only.
-  StreamFlow(StreamDoor& door, ComputePool& pool, std::size_t window);
+  /// `door` lives until its Finish returns, `pool` and `budget` longer. Held by shared_ptr only.
+  StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget, std::size_t window);
 
   /// Begins with the first read. Called once.
   void Start();
 
-  /// The read that was begun last has brought a request of this kind.
-  void ReadDone(RequestKind kind);
+  /// The read that was begun last has brought a request of this kind and size.
+  void ReadDone(RequestKind kind, std::uint64_t bytes);
   /// The read that was begun last has found that no request will come any more.
   void ReadEnded();
   void WriteDone(bool ok);
@@ -92,8 +110,16 @@ class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
   /// The server is going away: reads no further frame, sends Outgoing::kDraining, answers what was
   /// read and ends the stream with UNAVAILABLE.
   void Drain();
+  /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if at `now` it has waited for its client for too
+  /// long: for a request, or, by cutting it, for answers to be taken. Waiting for a worker or for
+  /// memory is not the client's doing and does not count. Gives the time before which there is no
+  /// need to look again.
+  std::chrono::steady_clock::time_point EndIfIdle(const IdleLimits& limits,
+                                                  std::chrono::steady_clock::time_point now);
 
   StreamCounts counts() const;
+
+  void Granted(std::uint64_t bytes) override;
 
  private:
   enum class Phase { kOpening, kStreaming, kEnding, kAbandoned, kFinished };
@@ -104,14 +130,19 @@ class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
     std::optional<Outgoing> write;
     std::size_t write_slot = 0;
     std::optional<absl::Status> finish;
+    bool cut = false, stop_waiting = false;
+    std::uint64_t give_back = 0;  // Bytes.
   };
 
   // With the lock held:
   Actions Decide();
+  bool MayRead(Actions& actions);
   void DecideWrite(Actions& actions);
-  void TakeRequest(RequestKind kind);
+  void DecideMemory(Actions& actions);
+  void TakeRequest(RequestKind kind, std::uint64_t bytes);
+  void SetSlotBytes(std::uint64_t frame, std::uint64_t bytes);
   void End(absl::Status status);
-  void Abandon();
+  void Abandon(absl::Status status);
   // Without:
   template <typename Event>
   void On(Event event);
@@ -122,6 +153,7 @@ class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
 
   StreamDoor& door_;
   ComputePool& pool_;
+  MemoryBudget& budget_;
   const std::size_t window_;
 
   std::optional<Answered> answered_;  // From Compute to Computed, which it precedes.
@@ -132,10 +164,17 @@ class StreamFlow : public std::enable_shared_from_this<StreamFlow> {
   // Frames so far: written_ <= computed_ <= read_ <= written_ + window_.
   std::uint64_t read_ = 0, computed_ = 0, written_ = 0;
   bool reading_ = false, computing_ = false, writing_ = false, opening_ = false;
-  // Between the decision to read and the return of the door's StartRead: the door has to stay.
-  bool starting_read_ = false;
+  // Between the decision to read or cut and the return of the door's call: the door has to stay.
+  bool starting_read_ = false, cutting_ = false;
+  bool owes_cut_ = false;
   bool owes_opened_ = false, owes_notice_ = false;
   Outgoing in_flight_ = Outgoing::kAnswer;  // What is being written.
+  // Of the budget: what each slot holds, what has been set aside for the next read, what is to be
+  // given back once the lock is released.
+  std::vector<std::uint64_t> slot_bytes_;
+  std::uint64_t set_aside_ = 0, surplus_ = 0;
+  std::uint64_t last_bytes_ = 1;  // Of the last frame, at least 1: what the next one may need.
+  bool waiting_ = false;          // For `last_bytes_` of the budget.
   StreamCounts counts_;
 };
 

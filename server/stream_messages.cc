@@ -1,5 +1,6 @@
 #include "server/stream_messages.h"
 
+#include <chrono>
 #include <memory>
 #include <new>
 #include <utility>
@@ -59,6 +60,9 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
   message.set_max_frame_bytes(limits.max_frame_bytes);
   message.set_max_tiles_per_frame(limits.frame.max_tiles);
   message.set_max_streams(limits.max_streams);
+  // Rounded up: 0 would mean none.
+  message.set_idle_timeout_seconds(static_cast<std::uint32_t>(
+      std::chrono::ceil<std::chrono::seconds>(limits.idle.streaming).count()));
 }
 
 absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame,
@@ -175,7 +179,9 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
     messages->request.Clear();  // Nothing has checked its size.
   }
   worker.door_buffers = std::move(messages);
-  return {.is_result = status.ok(), .last_sequence = session_->next_sequence() - 1};
+  return {.is_result = status.ok(),
+          .last_sequence = session_->next_sequence() - 1,
+          .bytes = answers_[slot].Length()};
 }
 
 }  // namespace partiemc::server

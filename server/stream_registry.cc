@@ -64,9 +64,19 @@ StreamRegistry::StreamRegistry(std::uint32_t max_streams)
 absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow) {
   const std::lock_guard lock(mutex_);
   if (draining_) return DrainingError();
+  if (opening_ >= max_streams_) return TooMany("opening", opening_);
   const StreamFlow* key = flow.get();
   entries_[key].flow = std::move(flow);
+  ++opening_;
   return absl::OkStatus();
+}
+
+absl::Status StreamRegistry::TooMany(absl::string_view what, std::uint32_t count) const {
+  return Refused(absl::StatusCode::kResourceExhausted, kReasonTooManyStreams, "streams",
+                 absl::StrCat(count, " ", what),
+                 absl::StrCat("must be at most ", max_streams_,
+                              "; try again when one has ended, or start the server with a larger "
+                              "--max-streams"));
 }
 
 absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
@@ -86,14 +96,9 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
                      "must not be the name of an open stream; choose another, or none");
     }
   }
-  if (open_streams >= max_streams_) {
-    return Refused(absl::StatusCode::kResourceExhausted, kReasonTooManyStreams, "streams",
-                   absl::StrCat(open_streams, " open"),
-                   absl::StrCat("must be at most ", max_streams_,
-                                "; try again when one has ended, or start the server with a larger "
-                                "--max-streams"));
-  }
+  if (open_streams >= max_streams_) return TooMany("open", open_streams);
   Entry& entry = entries_.at(&flow);
+  opening_ -= std::exchange(entry.opening, false) ? 1 : 0;
   entry.stream.emplace();
   entry.stream->number = ++opened_;
   entry.stream->id = absl::StrCat(id_prefix_, entry.stream->number);
@@ -110,7 +115,10 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
   {
     const std::lock_guard lock(mutex_);
     const auto found = entries_.find(&flow);
-    if (found != entries_.end()) summary.swap(found->second.stream);
+    if (found != entries_.end()) {
+      opening_ -= std::exchange(found->second.opening, false) ? 1 : 0;
+      summary.swap(found->second.stream);
+    }
   }
   if (summary) summary->counts = flow.counts();
   return summary;
@@ -118,7 +126,10 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
 
 void StreamRegistry::Leave(const StreamFlow& flow) {
   const std::lock_guard lock(mutex_);
-  entries_.erase(&flow);
+  const auto found = entries_.find(&flow);
+  if (found == entries_.end()) return;  // It was not let in.
+  if (found->second.opening) --opening_;
+  entries_.erase(found);
   // With the lock held: whoever waits for the last flow may take the registry away after that.
   left_.notify_all();
 }
@@ -144,15 +155,34 @@ std::size_t StreamRegistry::OpenCount() const {
                     [](const auto& item) { return item.second.stream.has_value(); }));
 }
 
+std::vector<std::shared_ptr<StreamFlow>> StreamRegistry::Flows() const {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  flows.reserve(entries_.size());
+  for (const auto& [key, entry] : entries_) flows.push_back(entry.flow);
+  return flows;
+}
+
 void StreamRegistry::Drain() {
   std::vector<std::shared_ptr<StreamFlow>> flows;
   {
     const std::lock_guard lock(mutex_);
     draining_ = true;
-    for (const auto& [key, entry] : entries_) flows.push_back(entry.flow);
+    flows = Flows();
   }
   // Without the lock: a flow that drains may leave at once.
   for (const auto& flow : flows) flow->Drain();
+}
+
+std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
+    const IdleLimits& limits, std::chrono::steady_clock::time_point now) {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  {
+    const std::lock_guard lock(mutex_);
+    flows = Flows();
+  }
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  for (const auto& flow : flows) look_again = std::min(look_again, flow->EndIfIdle(limits, now));
+  return look_again;
 }
 
 bool StreamRegistry::draining() const {

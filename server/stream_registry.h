@@ -44,7 +44,8 @@ class StreamRegistry {
  public:
   explicit StreamRegistry(std::uint32_t max_streams);
 
-  /// A flow comes in, not open yet. Errors: UNAVAILABLE (DRAINING).
+  /// A flow comes in, not open yet. Errors: UNAVAILABLE (DRAINING); RESOURCE_EXHAUSTED
+  /// (TOO_MANY_STREAMS) where as many as may be open are still opening.
   absl::Status Enter(std::shared_ptr<StreamFlow> flow);
 
   /// Opens the stream of a flow that has entered.
@@ -64,14 +65,23 @@ class StreamRegistry {
   /// Lets nobody in any more and drains every flow.
   void Drain();
   bool draining() const;
+  /// Ends the flows that have waited for their clients for too long. Gives the time before which
+  /// none of those that are here now will have.
+  std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
+                                                std::chrono::steady_clock::time_point now);
   /// Whether all flows have left before the deadline.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
 
  private:
   struct Entry {
     std::shared_ptr<StreamFlow> flow;
+    bool opening = true;                  // Until it is open or closed.
     std::optional<StreamSummary> stream;  // While open; its counts are asked of the flow.
   };
+
+  absl::Status TooMany(absl::string_view what, std::uint32_t count) const;
+  // With the lock held.
+  std::vector<std::shared_ptr<StreamFlow>> Flows() const;
 
   const std::uint32_t max_streams_;
   const std::string id_prefix_;  // Tells the ids of one run of a server from those of another.
@@ -80,6 +90,7 @@ class StreamRegistry {
   std::condition_variable left_;
   std::map<const StreamFlow*, Entry> entries_;
   std::uint64_t opened_ = 0;
+  std::uint32_t opening_ = 0;  // Entries that are.
   bool draining_ = false;
 };
 

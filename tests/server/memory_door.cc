@@ -1,19 +1,33 @@
 #include "server/memory_door.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "partiemc/status.h"
 
 namespace partiemc::server {
 
+namespace {
+
+MemoryBudget& UnlimitedBudget() {
+  static MemoryBudget budget(std::numeric_limits<std::uint64_t>::max());
+  return budget;
+}
+
+}  // namespace
+
 MemoryDoor::MemoryDoor(ComputePool& pool, std::size_t window,
+                       const ReconstructionParameters& parameters, const FrameLimits& limits)
+    : MemoryDoor(pool, UnlimitedBudget(), window, parameters, limits) {}
+
+MemoryDoor::MemoryDoor(ComputePool& pool, MemoryBudget& budget, std::size_t window,
                        const ReconstructionParameters& parameters, const FrameLimits& limits)
     : parameters_(parameters),
       limits_(limits),
       requests_(window),
       answers_(window),
-      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, window)),
+      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget, window)),
       reader_([this] { ReadLoop(); }),
       writer_([this] { WriteLoop(); }) {
   flow_->Start();
@@ -116,7 +130,14 @@ Answered MemoryDoor::Answer(std::size_t slot, Worker& worker) {
   answer.sequence = request.sequence;
   answer.reason = status.ok() ? "" : FindViolation(status)->reason;
   if (!status.ok()) answer.digests = {};
-  return {.is_result = status.ok(), .last_sequence = session_->next_sequence() - 1};
+  return {.is_result = status.ok(), .last_sequence = session_->next_sequence() - 1, .bytes = 0};
+}
+
+void MemoryDoor::Cut() {
+  const std::lock_guard lock(mutex_);
+  if (finished_) throw std::logic_error("cut after the end");
+  cancelled_ = true;
+  changed_.notify_all();
 }
 
 void MemoryDoor::Finish(const absl::Status& status) {
@@ -129,6 +150,7 @@ void MemoryDoor::Finish(const absl::Status& status) {
 void MemoryDoor::ReadLoop() {
   for (;;) {
     std::optional<RequestKind> kind;
+    std::uint64_t bytes = 0;
     {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [this] {
@@ -137,6 +159,7 @@ void MemoryDoor::ReadLoop() {
       if (finished_) return;
       if (!cancelled_ && !sent_.empty()) {
         kind = sent_.front().kind;
+        bytes = sent_.front().positions.size() * sizeof(double);
         requests_[*read_slot_] = std::move(sent_.front());
         sent_.pop_front();
         if (kind == RequestKind::kFrame) ++frames_read_;
@@ -146,7 +169,7 @@ void MemoryDoor::ReadLoop() {
       read_slot_.reset();
     }
     if (kind) {
-      flow_->ReadDone(*kind);
+      flow_->ReadDone(*kind, bytes);
     } else {
       flow_->ReadEnded();
     }

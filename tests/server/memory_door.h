@@ -38,6 +38,9 @@ class MemoryDoor final : private StreamDoor {
  public:
   MemoryDoor(ComputePool& pool, std::size_t window, const ReconstructionParameters& parameters,
              const FrameLimits& limits);
+  /// With the others of `budget`. A request counts 16 bytes a particle, an answer nothing.
+  MemoryDoor(ComputePool& pool, MemoryBudget& budget, std::size_t window,
+             const ReconstructionParameters& parameters, const FrameLimits& limits);
   /// Cancels what goes on and waits for the end.
   ~MemoryDoor() override;
 
@@ -63,6 +66,7 @@ class MemoryDoor final : private StreamDoor {
   void StartWrite(Outgoing what, std::size_t slot) override;
   absl::Status Open(std::size_t slot) override;
   Answered Answer(std::size_t slot, Worker& worker) override;
+  void Cut() override;
   void Finish(const absl::Status& status) override;
 
   void ReadLoop();

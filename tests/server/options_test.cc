@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <string>
 #include <vector>
+
+#include "server/machine_memory.h"
 
 namespace partiemc::server {
 namespace {
@@ -79,6 +82,20 @@ TEST(CommandLineOptions, FewerParticlesMakeSmallerFramesUnlessToldOtherwise) {
   EXPECT_EQ(Parsed({"--max-particles", "1000"}).server.limits.max_frame_bytes,
             ServerLimits::DefaultFrameBytes(1000));
   EXPECT_EQ(Parsed({"--max-frame-bytes", "2MB"}).server.limits.max_frame_bytes, 2u << 20);
+}
+
+TEST(CommandLineOptions, MemoryIsThatOfTheMachineUnlessToldOtherwise) {
+  EXPECT_EQ(Parsed({}).server.limits.memory_budget, AvailableMemory() / 2);
+  EXPECT_EQ(Parsed({"--memory-budget", "3MB"}).server.limits.memory_budget, 3u << 20);
+  EXPECT_THAT(Refused({"--memory-budget", "0"}), HasSubstr("--memory-budget"));
+}
+
+TEST(CommandLineOptions, AStreamMayBeIdleForAnHourUnlessToldOtherwise) {
+  using std::chrono::milliseconds;
+  EXPECT_EQ(Parsed({}).server.limits.idle.streaming, std::chrono::hours(1));
+  EXPECT_EQ(Parsed({"--idle-timeout", "0"}).server.limits.idle.streaming, milliseconds(0));
+  EXPECT_EQ(Parsed({"--idle-timeout", "0.0001"}).server.limits.idle.streaming, milliseconds(1));
+  EXPECT_THAT(Refused({"--idle-timeout", "-1"}), HasSubstr("--idle-timeout"));
 }
 
 TEST(CommandLineOptions, TheHealthCheckAsksTheAddressOfTheServerUnlessGivenAnother) {

@@ -21,6 +21,7 @@ class ClosedDoor final : public StreamDoor {
   void StartWrite(Outgoing, std::size_t) override {}
   absl::Status Open(std::size_t) override { return absl::OkStatus(); }
   Answered Answer(std::size_t, Worker&) override { return {}; }
+  void Cut() override {}
   void Finish(const absl::Status& status) override { finished = status; }
 
   std::optional<absl::Status> finished;
@@ -31,7 +32,7 @@ class Registry : public ::testing::Test {
   static constexpr std::uint32_t kMaxStreams = 3;
 
   std::shared_ptr<StreamFlow> Enter() {
-    auto flow = std::make_shared<StreamFlow>(door_, pool_, 1);
+    auto flow = std::make_shared<StreamFlow>(door_, pool_, budget_, 1);
     EXPECT_TRUE(registry_.Enter(flow).ok());
     return flow;
   }
@@ -44,6 +45,7 @@ class Registry : public ::testing::Test {
   }
 
   ComputePool pool_{1};
+  MemoryBudget budget_{1000};
   ClosedDoor door_;
   StreamRegistry registry_{kMaxStreams};
 };
@@ -62,6 +64,25 @@ TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
             "with a larger --max-streams");
   registry_.Close(*flows[0]);
   EXPECT_TRUE(Open(*late, "late").ok());
+}
+
+TEST_F(Registry, NoMoreCallsMayBeOpeningThanStreamsMayBeOpen) {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  for (std::uint32_t i = 0; i < kMaxStreams; ++i) flows.push_back(Enter());
+  const auto late = std::make_shared<StreamFlow>(door_, pool_, budget_, 1);
+  const auto refused = registry_.Enter(late);
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(ReasonOf(refused), kReasonTooManyStreams);
+  registry_.Leave(*late);  // As a call that was refused does.
+  EXPECT_FALSE(registry_.Enter(late).ok());
+  EXPECT_TRUE(Open(*flows[0], "").ok());
+  EXPECT_TRUE(registry_.Enter(late).ok()) << "one has opened";
+  registry_.Close(*flows[0]);
+  registry_.Leave(*flows[0]);
+  EXPECT_FALSE(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, budget_, 1)).ok());
+  registry_.Close(*flows[1]);
+  EXPECT_TRUE(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, budget_, 1)).ok())
+      << "one has given up";
 }
 
 TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatIsClosed) {
@@ -128,7 +149,7 @@ TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {
   EXPECT_TRUE(registry_.draining());
   ASSERT_TRUE(door_.finished.has_value());
   EXPECT_EQ(door_.finished->code(), absl::StatusCode::kUnavailable);
-  EXPECT_EQ(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, 1)).code(),
+  EXPECT_EQ(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, budget_, 1)).code(),
             absl::StatusCode::kUnavailable);
   EXPECT_EQ(ReasonOf(Open(*flow, "x").status()), kReasonDraining);
 

@@ -1,0 +1,207 @@
+// Who gets memory when, how much a machine has, and what streams do when there is none.
+#include "server/memory_budget.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/machine_memory.h"
+#include "server/memory_door.h"
+#include "server/moving_blob.h"
+
+namespace partiemc::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+class Waiter final : public MemoryBudget::Waiter {
+ public:
+  void Granted(std::uint64_t bytes) override { granted.push_back(bytes); }
+  std::vector<std::uint64_t> granted;
+};
+
+TEST(MemoryBudget, GivesWhatThereIsAndCountsWhatIsTakenAnyhow) {
+  MemoryBudget budget(100);
+  EXPECT_TRUE(budget.TryTake(60));
+  EXPECT_FALSE(budget.TryTake(41));
+  EXPECT_TRUE(budget.TryTake(40));
+  budget.Take(1000);
+  EXPECT_EQ(budget.held(), 1100u);
+  EXPECT_FALSE(budget.TryTake(1));
+  budget.GiveBack(1001);
+  EXPECT_TRUE(budget.TryTake(1));
+}
+
+TEST(MemoryBudget, IsNotFooledByNumbersThatRunOver) {
+  MemoryBudget budget(100);
+  budget.Take(1);
+  EXPECT_FALSE(budget.TryTake(std::numeric_limits<std::uint64_t>::max()));
+  EXPECT_EQ(budget.held(), 1u);
+}
+
+TEST(MemoryBudget, ServesThoseWhoWaitInTheirOrderAndLetsNobodyPast) {
+  MemoryBudget budget(100);
+  const auto large = std::make_shared<Waiter>(), small = std::make_shared<Waiter>();
+  ASSERT_TRUE(budget.TryTake(50));
+  ASSERT_FALSE(budget.TakeOrWait(80, large));
+  ASSERT_FALSE(budget.TakeOrWait(10, small)) << "there is room, but somebody came first";
+  EXPECT_FALSE(budget.TryTake(10)) << "likewise";
+  budget.GiveBack(20);
+  EXPECT_THAT(small->granted, IsEmpty());
+  budget.GiveBack(30);
+  EXPECT_THAT(large->granted, ElementsAre(80));
+  EXPECT_THAT(small->granted, ElementsAre(10));
+  EXPECT_EQ(budget.held(), 90u);
+}
+
+TEST(MemoryBudget, WhoeverWaitsNoMoreOrHasGoneStandsInNobodysWay) {
+  MemoryBudget budget(100);
+  auto first = std::make_shared<Waiter>(), gone = std::make_shared<Waiter>();
+  const auto last = std::make_shared<Waiter>();
+  ASSERT_TRUE(budget.TryTake(50));
+  ASSERT_FALSE(budget.TakeOrWait(100, first));
+  ASSERT_FALSE(budget.TakeOrWait(100, gone));
+  ASSERT_FALSE(budget.TakeOrWait(30, last));
+  gone.reset();
+  budget.StopWaiting(first);
+  EXPECT_THAT(first->granted, IsEmpty());
+  EXPECT_THAT(last->granted, IsEmpty()) << "nobody has looked who has gone";
+  budget.GiveBack(50);
+  EXPECT_THAT(last->granted, ElementsAre(30));
+  EXPECT_EQ(budget.held(), 30u);
+}
+
+constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
+constexpr std::size_t kWindow = 4;
+
+ReconstructionParameters BlobParameters() {
+  ReconstructionParameters parameters;
+  parameters.spacing = kBlobSpacing;
+  return parameters;
+}
+
+std::uint64_t FrameBytes() { return MovingBlob(1, 0).size() * sizeof(double); }
+
+void SendAll(MemoryDoor& door, std::uint64_t frames) {
+  door.Open();
+  for (std::uint64_t i = 0; i < frames; ++i) door.Send(i + 1, MovingBlob(1, i));
+  door.HalfClose();
+}
+
+std::size_t ReceiveAll(MemoryDoor& door) {
+  std::size_t frames = 0;
+  while (const auto answer = door.Receive()) frames += answer->what == Outgoing::kAnswer ? 1 : 0;
+  return frames;
+}
+
+TEST(MemoryOfStreams, WithoutAnyBudgetEveryStreamStillGoesOnFrameByFrame) {
+  ComputePool pool(2);
+  MemoryBudget budget(0);
+  MemoryDoor one(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryDoor two(pool, budget, kWindow, BlobParameters(), kLimits);
+  SendAll(one, 12);
+  SendAll(two, 12);
+  std::size_t of_two = 0;
+  std::thread other([&] { of_two = ReceiveAll(two); });
+  EXPECT_EQ(ReceiveAll(one), 12u);
+  other.join();
+  EXPECT_EQ(of_two, 12u);
+  EXPECT_TRUE(one.status().ok() && two.status().ok());
+  // One answer is in the transport, neither inside the server nor received.
+  EXPECT_LE(one.most_inside(), 2u);
+  EXPECT_EQ(budget.held(), 0u);
+}
+
+// A stream that takes no answers pins what it has; the others do not stand still for it, and when
+// it goes they have the whole budget again.
+TEST(MemoryOfStreams, AStreamThatPinsTheBudgetStopsNobody) {
+  ComputePool pool(2);
+  MemoryBudget budget(FrameBytes() * 3);
+  MemoryDoor pinned(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryDoor other(pool, budget, kWindow, BlobParameters(), kLimits);
+  SendAll(pinned, 12);
+  pinned.WaitUntilRead(3);
+  SendAll(other, 30);
+  EXPECT_EQ(ReceiveAll(other), 30u);
+  EXPECT_TRUE(other.status().ok());
+  pinned.Cancel();
+  EXPECT_EQ(pinned.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(budget.held(), 0u);
+}
+
+TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
+  constexpr unsigned kSeed = 71;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  std::mt19937 random(kSeed);
+  for (int round = 0; round < 20; ++round) {
+    MemoryBudget budget(FrameBytes() * (random() % 6));
+    auto pool = std::make_unique<ComputePool>(2);
+    std::vector<std::unique_ptr<MemoryDoor>> doors;
+    std::vector<std::thread> clients;
+    for (int i = 0; i < 6; ++i) {
+      doors.push_back(std::make_unique<MemoryDoor>(*pool, budget, 1 + random() % kWindow,
+                                                   BlobParameters(), kLimits));
+      SendAll(*doors.back(), 8);
+      clients.emplace_back([&door = *doors.back(), fate = random() % 4] {
+        if (fate == 0) return door.Cancel();
+        if (fate == 1) return door.flow().Drain();
+        EXPECT_EQ(ReceiveAll(door), 8u);
+      });
+    }
+    for (std::thread& client : clients) client.join();
+    doors.clear();
+    pool.reset();  // Its threads may be about to tell a stream of memory that it wanted once.
+    EXPECT_EQ(budget.held(), 0u) << "round " << round;
+  }
+}
+
+class MachineMemory : public ::testing::Test {
+ protected:
+  MachineMemory() { std::filesystem::remove_all(root_); }
+  void Write(const std::string& path, const std::string& text) const {
+    std::filesystem::create_directories(std::filesystem::path(root_ + path).parent_path());
+    std::ofstream(root_ + path) << text;
+  }
+  std::string root_ = ::testing::TempDir() + "/partiemc_memory_" +
+                      ::testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+TEST_F(MachineMemory, IsThatOfTheMachineWhereNoGroupLimitsIt) {
+  Write("/proc/meminfo", "MemTotal:       1000 kB\nMemFree: 5 kB\n");
+  Write("/proc/self/cgroup", "0::/a\n");
+  Write("/sys/fs/cgroup/a/memory.max", "max\n");
+  EXPECT_EQ(AvailableMemory(root_), 1'024'000u);
+}
+
+TEST_F(MachineMemory, IsTheLeastOfTheGroupsThatTheProcessIsIn) {
+  Write("/proc/meminfo", "MemTotal:       1000 kB\n");
+  Write("/proc/self/cgroup", "0::/a/b\n");
+  Write("/sys/fs/cgroup/a/b/memory.max", "900000\n");
+  Write("/sys/fs/cgroup/a/memory.max", "800000\n");
+  EXPECT_EQ(AvailableMemory(root_), 800'000u);
+}
+
+TEST_F(MachineMemory, KnowsTheGroupsOfTheFirstVersionAsAContainerSeesThem) {
+  Write("/proc/meminfo", "MemTotal:       1000 kB\n");
+  Write("/proc/self/cgroup", "4:memory:/outside/of/here\n3:cpu:/\n0::/\n");
+  Write("/sys/fs/cgroup/memory/memory.limit_in_bytes", "700000\n");
+  EXPECT_EQ(AvailableMemory(root_), 700'000u);
+}
+
+TEST_F(MachineMemory, IsUnlimitedWhereNothingIsKnown) {
+  EXPECT_EQ(AvailableMemory(root_), std::numeric_limits<std::uint64_t>::max());
+}
+
+}  // namespace
+}  // namespace partiemc::server

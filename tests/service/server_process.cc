@@ -1,0 +1,127 @@
+#include "service/server_process.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <thread>
+#include <utility>
+
+extern char** environ;
+
+namespace partiemc::server {
+namespace {
+
+std::vector<std::string> With(std::vector<std::string> arguments, const std::string& port_file) {
+  const std::vector<std::string> ours = {"--address", "127.0.0.1:0", "--port-file", port_file};
+  arguments.insert(arguments.end(), ours.begin(), ours.end());
+  return arguments;
+}
+
+}  // namespace
+
+std::string TemporaryPath(const std::string& name) {
+  static int count = 0;
+  return ::testing::TempDir() + "/partiemc_" + std::to_string(getpid()) + "_" +
+         std::to_string(count++) + "_" + name;
+}
+
+std::string FileText(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+ServerProcess::ServerProcess(std::vector<std::string> arguments)
+    : output_(TemporaryPath("output")) {
+  arguments.insert(arguments.begin(), PARTIEMC_SERVER);
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output_.c_str(),
+                                   O_CREAT | O_TRUNC | O_WRONLY, 0600);
+  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  EXPECT_EQ(posix_spawn(&process_, argv[0], &actions, nullptr, argv.data(), environ), 0);
+  posix_spawn_file_actions_destroy(&actions);
+}
+
+ServerProcess::~ServerProcess() {
+  if (process_ > 0) {
+    kill(process_, SIGKILL);
+    Wait();
+  }
+  std::error_code ignored;
+  if (!output_.empty()) std::filesystem::remove(output_, ignored);
+}
+
+ServerProcess::ServerProcess(ServerProcess&& other) noexcept
+    : output_(std::exchange(other.output_, {})), process_(std::exchange(other.process_, 0)) {}
+
+void ServerProcess::Signal(int signal) { kill(process_, signal); }
+
+std::optional<int> ServerProcess::Reap(int options) {
+  int status = 0;
+  if (waitpid(process_, &status, options) == 0) return std::nullopt;
+  process_ = 0;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+int ServerProcess::Wait() { return *Reap(0); }
+
+std::optional<int> ServerProcess::WaitFor(std::chrono::milliseconds time) {
+  const auto give_up = std::chrono::steady_clock::now() + time;
+  std::optional<int> code;
+  while (!(code = Reap(WNOHANG)) && std::chrono::steady_clock::now() < give_up) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return code;
+}
+
+double ServerProcess::ResidentMib() const { return StatusNumber("VmRSS:") / 1024; }
+
+std::size_t ServerProcess::ThreadCount() const {
+  return static_cast<std::size_t>(StatusNumber("Threads:"));
+}
+
+std::size_t ServerProcess::OpenFileCount() const {
+  const std::filesystem::directory_iterator files("/proc/" + std::to_string(process_) + "/fd");
+  return static_cast<std::size_t>(std::distance(begin(files), end(files)));
+}
+
+double ServerProcess::StatusNumber(const std::string& field) const {
+  std::ifstream status("/proc/" + std::to_string(process_) + "/status");
+  double number = -1;
+  for (std::string word; status >> word;) {
+    if (word == field && status >> number) break;
+  }
+  EXPECT_GE(number, 0) << "no " << field << " of the server: has it gone?";
+  return number;
+}
+
+int RunServer(const std::vector<std::string>& arguments, std::string* output) {
+  ServerProcess process(arguments);
+  const int code = process.Wait();
+  if (output != nullptr) *output = process.Output();
+  return code;
+}
+
+ServingProcess::ServingProcess(std::vector<std::string> arguments)
+    : port_file_(TemporaryPath("port")), process_(With(std::move(arguments), port_file_)) {
+  while (!std::filesystem::exists(port_file_)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  address_ = FileText(port_file_);
+  address_.pop_back();  // The end of the line.
+  std::filesystem::remove(port_file_);
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,65 @@
+// partiemc-server as a process, and what the system tells about it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace partiemc::server {
+
+/// A path in the tests' temporary folder that no other test has.
+std::string TemporaryPath(const std::string& name);
+
+std::string FileText(const std::string& path);
+
+/// partiemc-server with these arguments, its output in a file. Killed when it goes out of scope.
+class ServerProcess {
+ public:
+  explicit ServerProcess(std::vector<std::string> arguments);
+  ~ServerProcess();
+  ServerProcess(ServerProcess&& other) noexcept;
+  ServerProcess& operator=(ServerProcess&&) = delete;
+
+  void Signal(int signal);
+  /// The exit code, or -1 for a death by signal.
+  int Wait();
+  /// As Wait; nothing if it is still there after `time`.
+  std::optional<int> WaitFor(std::chrono::milliseconds time);
+
+  std::string Output() const { return FileText(output_); }
+  pid_t process() const { return process_; }
+
+  // While it runs:
+  double ResidentMib() const;
+  std::size_t ThreadCount() const;
+  std::size_t OpenFileCount() const;
+
+ private:
+  std::optional<int> Reap(int options);
+  double StatusNumber(const std::string& field) const;
+
+  std::string output_;
+  pid_t process_ = 0;
+};
+
+/// The exit code of a run with these arguments.
+int RunServer(const std::vector<std::string>& arguments, std::string* output = nullptr);
+
+/// One that serves on a port of loopback that it chose itself.
+class ServingProcess {
+ public:
+  explicit ServingProcess(std::vector<std::string> arguments = {});
+  const std::string& address() const { return address_; }
+  ServerProcess& process() { return process_; }
+
+ private:
+  std::string port_file_;
+  ServerProcess process_;
+  std::string address_;
+};
+
+}  // namespace partiemc::server
