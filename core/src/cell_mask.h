@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <tuple>
 
 #include "bins.h"
 #include "lattice.h"
@@ -20,6 +21,15 @@ using CellMask = std::array<std::uint64_t, kTileSize + 2 * kMaskMargin>;
 inline bool IsInMask(const CellMask& mask, const BinEntry& entry) {
   const int column = static_cast<int>(entry.x + kMaskMargin);
   const int row = static_cast<int>(entry.y + kMaskMargin);
+  return (mask[row] >> column & 1) != 0;
+}
+
+/// The same for a mask that holds cells of the tile alone, and for a particle of its list wherever
+/// it is: one beyond the mask wraps round into the margin.
+inline bool IsInTileMask(const CellMask& mask, const BinEntry& entry) {
+  static_assert(std::tuple_size_v<CellMask> == 64 && kMaskMargin * 2 == kTileSize);
+  const int column = static_cast<int>(entry.x + kMaskMargin) & 63;
+  const int row = static_cast<int>(entry.y + kMaskMargin) & 63;
   return (mask[row] >> column & 1) != 0;
 }
 

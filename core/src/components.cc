@@ -7,6 +7,9 @@
 #include <limits>
 #include <numeric>
 
+#include "bits.h"
+#include "cell_mask.h"
+
 namespace partiemc {
 namespace {
 
@@ -19,7 +22,7 @@ std::uint32_t Components::RunAt(const Crossings& crossings, const TilePlace& nod
   const std::uint32_t starts = RunStarts(crossings.tiles[node.tile].inside[node.j]);
   const std::uint32_t up_to = 0xffffffffu >> (kTileSize - 1 - node.i);
   return first_run_[node.tile * kTileSize + node.j] +
-         static_cast<std::uint32_t>(std::popcount(starts & up_to)) - 1;
+         static_cast<std::uint32_t>(CountBits(starts & up_to)) - 1;
 }
 
 std::uint32_t Components::Root(std::uint32_t run) {
@@ -76,7 +79,7 @@ void Components::Label(const TileDirectory& directory, const Crossings& crossing
     const bool full = IsFull(rows);
     for (int j = 0; j < kTileSize; ++j) {
       first_run_[tile * kTileSize + j] = runs;
-      if (!full) runs += static_cast<std::uint32_t>(std::popcount(RunStarts(rows[j])));
+      if (!full) runs += static_cast<std::uint32_t>(CountBits(RunStarts(rows[j])));
     }
     runs += full;
   }
@@ -136,21 +139,21 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
   if (component == kNoComponent || component == kSeveralComponents) return {component, 0, 0};
   if (full && bins.weight.empty()) return {component, bins.home_count[tile], 0};
 
-  // Cells with an inside corner.
-  BitRows cells;
-  NodeRow lower = InsideRow(bins.tiles, crossings.tiles, tile, 0);
+  // Cells of the tile with an inside corner: a particle is counted by one look, at home or not.
+  CellMask cells{};
+  const NodeRows rows = InsideRows(bins.tiles, crossings.tiles, tile);
   for (int j = 0; j < kTileSize; ++j) {
-    const NodeRow upper = InsideRow(bins.tiles, crossings.tiles, tile, j + 1);
-    cells[j] = lower.left | lower.right | upper.left | upper.right;
-    lower = upper;
+    cells[j + kMaskMargin] =
+        std::uint64_t{rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1]}
+        << kMaskMargin;
   }
   TileShare share{component, 0, 0};
   for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    const BinEntry& entry = bins.entries[e];
-    if (!IsAtHome(entry)) continue;
-    const bool counts = cells[static_cast<int>(entry.y)] >> static_cast<int>(entry.x) & 1;
-    share.count += counts;
-    if (counts && !bins.weight.empty()) share.weight += bins.weight[e];
+    share.count += IsInTileMask(cells, bins.entries[e]);
+  }
+  if (bins.weight.empty()) return share;
+  for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
+    if (IsInTileMask(cells, bins.entries[e])) share.weight += bins.weight[e];
   }
   return share;
 }

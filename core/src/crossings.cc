@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "bits.h"
+
 namespace partiemc {
 namespace {
 
@@ -56,60 +58,74 @@ bool AreInsideCornersJoined(const std::array<float, 4>& f, unsigned corners) {
   return corners == 5 ? numerator > 0 : numerator < 0;
 }
 
-unsigned CaseOf(const NodeRow& lower, const NodeRow& upper, int i) {
-  return (lower.left >> i & 1) | (lower.right >> i & 1) << 1 | (upper.right >> i & 1) << 2 |
-         (upper.left >> i & 1) << 3;
+unsigned CaseOf(const NodeRows& nodes, int i, int j) {
+  return (nodes.left[j] >> i & 1) | (nodes.right[j] >> i & 1) << 1 |
+         (nodes.right[j + 1] >> i & 1) << 2 | (nodes.left[j + 1] >> i & 1) << 3;
+}
+
+// The cells of a tile of which all corners are inside.
+BitRows InteriorCells(const NodeRows& nodes) {
+  BitRows interior;
+  for (int j = 0; j < kTileSize; ++j) {
+    interior[j] = nodes.left[j] & nodes.right[j] & nodes.left[j + 1] & nodes.right[j + 1];
+  }
+  return interior;
 }
 
 // Marks active and interior cells and counts cells and segments.
 CrossingCounts ClassifyCells(const TileDirectory& directory, std::vector<TileBits>& tiles,
                              std::uint32_t tile) {
-  CrossingCounts counts;
-  NodeRow lower = InsideRow(directory, tiles, tile, 0);
+  const NodeRows nodes = InsideRows(directory, tiles, tile);
+  TileBits& bits = tiles[tile];
+  bits.interior = InteriorCells(nodes);
+  BitRows saddles;
+  std::uint32_t any_active = 0;
   for (int j = 0; j < kTileSize; ++j) {
-    const NodeRow upper = InsideRow(directory, tiles, tile, j + 1);
-    const std::uint32_t any = lower.left | lower.right | upper.left | upper.right;
-    const std::uint32_t all = lower.left & lower.right & upper.left & upper.right;
-    const std::uint32_t active = any & ~all;
-    const std::uint32_t saddles =
-        (lower.left ^ lower.right) & (lower.left ^ upper.left) & (lower.right ^ upper.right);
-    tiles[tile].active[j] = active;
-    tiles[tile].interior[j] = all;
-    counts.cells += static_cast<std::uint32_t>(std::popcount(active));
-    counts.segments += static_cast<std::uint32_t>(std::popcount(active) + std::popcount(saddles));
-    lower = upper;
+    const std::uint32_t any =
+        nodes.left[j] | nodes.right[j] | nodes.left[j + 1] | nodes.right[j + 1];
+    bits.active[j] = any & ~bits.interior[j];
+    any_active |= bits.active[j];
+    saddles[j] = (nodes.left[j] ^ nodes.right[j]) & (nodes.left[j] ^ nodes.left[j + 1]) &
+                 (nodes.right[j] ^ nodes.right[j + 1]);
+  }
+  CrossingCounts counts;
+  if (any_active == 0) return counts;
+  for (int j = 0; j < kTileSize; ++j) {
+    bits.row_cells[j] = static_cast<std::uint16_t>(counts.cells);
+    const int cells = CountBits(bits.active[j]);
+    counts.cells += static_cast<std::uint32_t>(cells);
+    counts.segments += static_cast<std::uint32_t>(cells + CountBits(saddles[j]));
   }
   return counts;
 }
 
+// `next` is where the tile's cells and segments begin.
 void FillTile(const TileDirectory& directory, const LevelSet& level_set, std::uint32_t tile,
-              std::uint32_t segment, Crossings& crossings) {
-  std::uint32_t cell_index = crossings.tiles[tile].first_cell;
+              CrossingCounts next, Crossings& crossings) {
+  const NodeRows nodes = InsideRows(directory, crossings.tiles, tile);
   for (int j = 0; j < kTileSize; ++j) {
-    const NodeRow lower = InsideRow(directory, crossings.tiles, tile, j);
-    const NodeRow upper = InsideRow(directory, crossings.tiles, tile, j + 1);
     for (std::uint32_t bits = crossings.tiles[tile].active[j]; bits != 0; bits &= bits - 1) {
       const int i = std::countr_zero(bits);
-      ActiveCell& cell = crossings.cells[cell_index];
+      ActiveCell& cell = crossings.cells[next.cells];
       cell = {tile,
               static_cast<std::uint8_t>(i),
               static_cast<std::uint8_t>(j),
-              static_cast<std::uint8_t>(CaseOf(lower, upper, i)),
+              static_cast<std::uint8_t>(CaseOf(nodes, i, j)),
               0,
-              segment};
+              next.segments};
       if (cell.IsSaddle()) {
         const std::array<float, 4> f = {
             level_set.At(directory, tile, i, j), level_set.At(directory, tile, i + 1, j),
             level_set.At(directory, tile, i + 1, j + 1), level_set.At(directory, tile, i, j + 1)};
         cell.joined = AreInsideCornersJoined(f, cell.corners);
         for (const EdgePair& pair : kSaddles[cell.corners == 10][cell.joined]) {
-          crossings.segments[segment++] = {cell_index, pair.entry, pair.exit};
+          crossings.segments[next.segments++] = {next.cells, pair.entry, pair.exit};
         }
       } else {
         const EdgePair& pair = kSegments[cell.corners];
-        crossings.segments[segment++] = {cell_index, pair.entry, pair.exit};
+        crossings.segments[next.segments++] = {next.cells, pair.entry, pair.exit};
       }
-      ++cell_index;
+      ++next.cells;
     }
   }
 }
@@ -126,18 +142,21 @@ void ForEachTile(std::size_t count, Visit visit) {
 
 }  // namespace
 
-NodeRow InsideRow(const TileDirectory& directory, const std::vector<TileBits>& tiles,
-                  std::uint32_t tile, int j) {
+NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                    std::uint32_t tile) {
   const Neighbourhood& near = directory.neighbours(tile);
-  const bool above = j == kTileSize;
-  const std::uint32_t here = near[above ? 7 : 4];
-  const std::uint32_t right = near[above ? 8 : 5];
-  const int row = above ? 0 : j;
-  NodeRow result;
-  if (here != kNoTile) result.left = tiles[here].inside[row];
-  result.right = result.left >> 1;
-  if (right != kNoTile) result.right |= tiles[right].inside[row] << (kTileSize - 1);
-  return result;
+  const auto row = [&](std::uint32_t owner, int j) {
+    return owner == kNoTile ? 0 : tiles[owner].inside[j];
+  };
+  NodeRows nodes;
+  std::copy(tiles[tile].inside.begin(), tiles[tile].inside.end(), nodes.left.begin());
+  nodes.left[kTileSize] = row(near[7], 0);
+  for (int j = 0; j <= kTileSize; ++j) nodes.right[j] = nodes.left[j] >> 1;
+  if (const std::uint32_t right = near[5]; right != kNoTile) {
+    for (int j = 0; j < kTileSize; ++j) nodes.right[j] |= tiles[right].inside[j] << (kTileSize - 1);
+  }
+  nodes.right[kTileSize] |= row(near[8], 0) << (kTileSize - 1);
+  return nodes;
 }
 
 void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
@@ -148,7 +167,7 @@ void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
               [&](std::uint32_t tile) { crossings.tiles[tile].inside = level_set.inside[tile]; });
 
   std::vector<CrossingCounts>& counts = crossings.counts;
-  counts.resize(tile_count);
+  counts.resize(tile_count + 1);
   ForEachTile(tile_count, [&](std::uint32_t tile) {
     counts[tile] = ClassifyCells(directory, crossings.tiles, tile);
   });
@@ -159,33 +178,27 @@ void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
     crossings.tiles[tile].first_cell = total.cells;
     total = {total.cells + here.cells, total.segments + here.segments};
   }
+  counts[tile_count] = total;
 
   crossings.cells.resize(total.cells);
   crossings.segments.resize(total.segments);
   ForEachTile(tile_count, [&](std::uint32_t tile) {
-    FillTile(directory, level_set, tile, counts[tile].segments, crossings);
+    if (counts[tile].cells == counts[tile + 1].cells) return;
+    FillTile(directory, level_set, tile, counts[tile], crossings);
   });
 }
 
 void MarkInteriorCells(const TileDirectory& directory, Crossings& crossings) {
   ForEachTile(directory.size(), [&](std::uint32_t tile) {
-    NodeRow lower = InsideRow(directory, crossings.tiles, tile, 0);
-    for (int j = 0; j < kTileSize; ++j) {
-      const NodeRow upper = InsideRow(directory, crossings.tiles, tile, j + 1);
-      crossings.tiles[tile].interior[j] = lower.left & lower.right & upper.left & upper.right;
-      lower = upper;
-    }
+    crossings.tiles[tile].interior = InteriorCells(InsideRows(directory, crossings.tiles, tile));
   });
 }
 
 std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place) {
   const TileBits& bits = crossings.tiles[place.tile];
-  std::uint32_t index = bits.first_cell;
-  for (int j = 0; j < place.j; ++j) {
-    index += static_cast<std::uint32_t>(std::popcount(bits.active[j]));
-  }
   const std::uint32_t before = (std::uint32_t{1} << place.i) - 1;
-  return index + static_cast<std::uint32_t>(std::popcount(bits.active[place.j] & before));
+  return bits.first_cell + bits.row_cells[place.j] +
+         static_cast<std::uint32_t>(CountBits(bits.active[place.j] & before));
 }
 
 std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,

@@ -40,10 +40,11 @@ struct LatticePoint {
 
 /// Rows of bits of a tile.
 struct TileBits {
-  BitRows inside{};              ///< Node is inside.
-  BitRows active{};              ///< Cell has inside and outside corners.
-  BitRows interior{};            ///< All four corners of the cell are inside.
-  std::uint32_t first_cell = 0;  ///< Index of the tile's first active cell.
+  BitRows inside{};                                  ///< Node is inside.
+  BitRows active{};                                  ///< Cell has inside and outside corners.
+  BitRows interior{};                                ///< All four corners of the cell are inside.
+  std::uint32_t first_cell = 0;                      ///< Index of the tile's first active cell.
+  std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below it.
 };
 
 /// Cells and segments of a tile, or before it.
@@ -56,7 +57,7 @@ struct Crossings {
   std::vector<ActiveCell> cells;  ///< By tile, row, column.
   std::vector<Segment> segments;  ///< By cell.
 
-  std::vector<CrossingCounts> counts;  ///< Scratch, by tile.
+  std::vector<CrossingCounts> counts;  ///< Scratch: before each tile, then in all.
 };
 
 /// Finds the active cells of a level set and their segments.
@@ -71,13 +72,14 @@ inline bool IsInside(const Crossings& crossings, const TilePlace& node) {
   return node.tile != kNoTile && (crossings.tiles[node.tile].inside[node.j] >> node.i & 1) != 0;
 }
 
-/// The node row `j` of a tile, 0 <= j <= 32, together with its right neighbour's first bit:
-/// bit i of `right` is node i + 1.
-struct NodeRow {
-  std::uint32_t left = 0, right = 0;
+/// The inside nodes of a tile with the row above and the column right of it: bit i of row j of
+/// `left` is node (i, j), of `right` node (i + 1, j). Cell (i, j) has bit i of rows j and j + 1 of
+/// both as corners.
+struct NodeRows {
+  std::array<std::uint32_t, kTileSize + 1> left, right;
 };
-NodeRow InsideRow(const TileDirectory& directory, const std::vector<TileBits>& tiles,
-                  std::uint32_t tile, int j);
+NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                    std::uint32_t tile);
 
 /// Index of the active cell at a place that is known to be active.
 std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);

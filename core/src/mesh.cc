@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 
+#include "bits.h"
 #include "predicates.h"
 
 namespace partiemc {
@@ -218,7 +219,7 @@ void MeshBuilder::MoveVertices() {
 std::uint64_t MeshBuilder::CountInteriorCells() const {
   std::uint64_t count = 0;
   for (const TileBits& bits : input_.crossings.tiles) {
-    for (const std::uint32_t row : bits.interior) count += std::popcount(row);
+    for (const std::uint32_t row : bits.interior) count += CountBits(row);
   }
   return count;
 }

@@ -1,9 +1,11 @@
 #include "rings.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "partiemc/result.h"
 
@@ -15,19 +17,30 @@ namespace {
 constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
+// Segments that a task takes at least.
+constexpr std::size_t kSegmentGrain = 512;
+
+// What follows each segment is found in parallel; what is left to do in order is to walk.
 void Trace(const TileDirectory& directory, const Crossings& crossings,
-           std::vector<std::uint8_t>& visited, RingTopology& rings) {
-  rings.segments.clear();
-  rings.offsets.assign(1, 0);
-  visited.assign(crossings.segments.size(), 0);
-  for (std::uint32_t first = 0; first < crossings.segments.size(); ++first) {
-    if (visited[first]) continue;
-    for (std::uint32_t segment = first; !visited[segment];
-         segment = NextSegment(directory, crossings, segment)) {
-      visited[segment] = 1;
-      rings.segments.push_back(segment);
+           std::vector<std::uint32_t>& next, RingTopology& rings) {
+  constexpr std::uint32_t kTaken = 0xffffffff;
+  const std::size_t count = crossings.segments.size();
+  next.resize(count);
+  using Range = tbb::blocked_range<std::size_t>;
+  tbb::parallel_for(Range(0, count, kSegmentGrain), [&](const Range& range) {
+    for (std::size_t segment = range.begin(); segment < range.end(); ++segment) {
+      next[segment] = NextSegment(directory, crossings, static_cast<std::uint32_t>(segment));
     }
-    rings.offsets.push_back(static_cast<std::uint32_t>(rings.segments.size()));
+  });
+  rings.segments.resize(count);
+  rings.offsets.assign(1, 0);
+  std::uint32_t taken = 0;
+  for (std::uint32_t first = 0; first < count; ++first) {
+    for (std::uint32_t segment = first; next[segment] != kTaken;
+         segment = std::exchange(next[segment], kTaken)) {
+      rings.segments[taken++] = segment;
+    }
+    if (taken > rings.offsets.back()) rings.offsets.push_back(taken);
   }
 }
 
@@ -53,10 +66,13 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
 void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
                  const Crossings& crossings, RingTopology& rings) {
   rings.entries.resize(rings.segments.size());
-  tbb::parallel_for(std::size_t{0}, rings.segments.size(), [&](std::size_t k) {
-    const Segment& segment = crossings.segments[rings.segments[k]];
-    rings.entries[k] =
-        EdgeCrossing(directory, level_set, crossings.cells[segment.cell], segment.entry);
+  using Range = tbb::blocked_range<std::size_t>;
+  tbb::parallel_for(Range(0, rings.segments.size(), kSegmentGrain), [&](const Range& range) {
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      const Segment& segment = crossings.segments[rings.segments[k]];
+      rings.entries[k] =
+          EdgeCrossing(directory, level_set, crossings.cells[segment.cell], segment.entry);
+    }
   });
 }
 
@@ -259,7 +275,7 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
   rings.dropped_holes = 0;
   rings.dropped_components = 0;
   rings.dropped_spray = 0;
-  Trace(bins.tiles, crossings, scratch.visited, rings);
+  Trace(bins.tiles, crossings, scratch.next_segment, rings);
   FindEntries(bins.tiles, level_set, crossings, rings);
   CountComponents(bins, crossings, scratch);
   if (*parameters.clean) Clean(bins, scale, crossings, scratch, rings);

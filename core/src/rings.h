@@ -34,7 +34,8 @@ struct RingScratch {
   Components components;
   std::vector<std::uint64_t> particle_count;
   std::vector<double> particle_weight;
-  std::vector<std::uint8_t> visited;
+  std::vector<std::uint32_t> next_segment;                   // kTaken once it belongs to a ring.
+  std::vector<std::uint8_t> visited;                         // By ring.
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
   std::vector<std::uint32_t> outer_ring;                     // By component.
   std::vector<std::uint32_t> component_of_ring;
