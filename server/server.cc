@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "server/service.h"
@@ -20,6 +21,10 @@ int ReceiveLimit(std::uint64_t max_frame_bytes) {
   const std::uint64_t limit = max_frame_bytes + max_frame_bytes / 4;
   return static_cast<int>(std::min<std::uint64_t>(limit, std::numeric_limits<int>::max()));
 }
+
+constexpr std::chrono::milliseconds kTimeToCut(250);
+// Several times as long as a call takes to come in.
+constexpr std::chrono::milliseconds kQuiet(50);
 
 absl::Status CheckSecurity(const ServerOptions& options) {
   if (options.insecure || options.address.IsLocal()) return absl::OkStatus();
@@ -75,6 +80,16 @@ Server::~Server() {
   server_->Wait();
 }
 
+// A call that comes while gRPC shuts down is cut without a word, so clients that look for a server
+// are told to look elsewhere until no more of them come.
+void Server::WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const {
+  std::uint64_t before = 0;
+  do {
+    before = registry_.turned_away();
+    std::this_thread::sleep_until(std::min(deadline, std::chrono::steady_clock::now() + kQuiet));
+  } while (registry_.turned_away() != before && std::chrono::steady_clock::now() < deadline);
+}
+
 std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
@@ -82,13 +97,15 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
 }
 
 void Server::Drain(std::chrono::milliseconds grace) {
-  const auto deadline = std::chrono::steady_clock::now() + grace;
+  // Cutting those who do not take their answers takes a moment of the grace time too.
+  const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
   server_->GetHealthCheckService()->SetServingStatus(false);
   registry_.Drain();
   // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
   // to the last word: a connection that closes with requests unread takes back what was just
   // written.
   registry_.WaitUntilEmpty(deadline);
+  WaitUntilNobodyComes(deadline);
   const auto left = std::max(deadline - std::chrono::steady_clock::now(),
                              std::chrono::steady_clock::duration::zero());
   server_->Shutdown(std::chrono::system_clock::now() + left);

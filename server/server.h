@@ -50,13 +50,14 @@ class Server {
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
   /// Takes no new call, tells the streams, answers what they have sent, and stops. What is not done
-  /// after `grace` is cancelled. Returns when nothing goes on any more.
+  /// shortly before the end of `grace` is cancelled. Returns when nothing goes on any more.
   void Drain(std::chrono::milliseconds grace);
 
  private:
   explicit Server(const ServerOptions& options);
 
   absl::Status Listen();
+  void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
   const ServerOptions options_;
   Address address_;

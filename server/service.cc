@@ -71,6 +71,7 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruc
 }
 
 absl::Status Service::LetCallIn(std::uint64_t bytes) {
+  if (auto status = registry_.CheckServing(); !status.ok()) return status;
   if (++calls_ > limits_.max_streams) {
     --calls_;
     return Refused(kReasonTooManyCalls, "calls of ReconstructFrame",
@@ -91,10 +92,6 @@ grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext*
                                                     const v1::ReconstructFrameRequest* request,
                                                     v1::ReconstructFrameResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (registry_.draining()) {
-    reactor->Finish(ToGrpcStatus(DrainingError(), *context));
-    return reactor;
-  }
   const std::uint64_t bytes = request->ByteSizeLong();
   if (auto status = LetCallIn(bytes); !status.ok()) {
     reactor->Finish(ToGrpcStatus(status, *context));

@@ -46,7 +46,8 @@ class Service final : public ServiceBase {
                                           v1::GetServerInfoResponse* response) override;
 
  private:
-  // Errors: RESOURCE_EXHAUSTED (TOO_MANY_CALLS, MEMORY_BUDGET); else it counts, with its bytes.
+  // Errors: UNAVAILABLE (DRAINING), RESOURCE_EXHAUSTED (TOO_MANY_CALLS, MEMORY_BUDGET); else it
+  // counts, with its bytes.
   absl::Status LetCallIn(std::uint64_t bytes);
 
   const ServerLimits& limits_;

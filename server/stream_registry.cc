@@ -63,7 +63,7 @@ StreamRegistry::StreamRegistry(std::uint32_t max_streams)
 
 absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow) {
   const std::lock_guard lock(mutex_);
-  if (draining_) return DrainingError();
+  if (auto status = CheckServingLocked(); !status.ok()) return status;
   if (opening_ >= max_streams_) return TooMany("opening", opening_);
   const StreamFlow* key = flow.get();
   entries_[key].flow = std::move(flow);
@@ -85,7 +85,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
   if (auto status = CheckLabels(description.labels); !status.ok()) return status;
 
   const std::lock_guard lock(mutex_);
-  if (draining_) return DrainingError();
+  if (auto status = CheckServingLocked(); !status.ok()) return status;
   std::uint32_t open_streams = 0;
   for (const auto& [key, entry] : entries_) {
     if (!entry.stream) continue;
@@ -183,6 +183,22 @@ std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
   auto look_again = std::chrono::steady_clock::time_point::max();
   for (const auto& flow : flows) look_again = std::min(look_again, flow->EndIfIdle(limits, now));
   return look_again;
+}
+
+absl::Status StreamRegistry::CheckServing() {
+  const std::lock_guard lock(mutex_);
+  return CheckServingLocked();
+}
+
+absl::Status StreamRegistry::CheckServingLocked() {
+  if (!draining_) return absl::OkStatus();
+  ++turned_away_;
+  return DrainingError();
+}
+
+std::uint64_t StreamRegistry::turned_away() const {
+  const std::lock_guard lock(mutex_);
+  return turned_away_;
 }
 
 bool StreamRegistry::draining() const {

@@ -65,6 +65,10 @@ class StreamRegistry {
   /// Lets nobody in any more and drains every flow.
   void Drain();
   bool draining() const;
+  /// OK, or, told to whoever comes now, UNAVAILABLE (DRAINING).
+  absl::Status CheckServing();
+  /// Who has been told so: grows for as long as somebody still comes.
+  std::uint64_t turned_away() const;
   /// Ends the flows that have waited for their clients for too long. Gives the time before which
   /// none of those that are here now will have.
   std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
@@ -80,7 +84,8 @@ class StreamRegistry {
   };
 
   absl::Status TooMany(absl::string_view what, std::uint32_t count) const;
-  // With the lock held.
+  // With the lock held:
+  absl::Status CheckServingLocked();
   std::vector<std::shared_ptr<StreamFlow>> Flows() const;
 
   const std::uint32_t max_streams_;
@@ -92,6 +97,7 @@ class StreamRegistry {
   std::uint64_t opened_ = 0;
   std::uint32_t opening_ = 0;  // Entries that are.
   bool draining_ = false;
+  std::uint64_t turned_away_ = 0;
 };
 
 }  // namespace partiemc::server

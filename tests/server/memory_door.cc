@@ -118,6 +118,7 @@ absl::Status MemoryDoor::Open(std::size_t) {
 }
 
 Answered MemoryDoor::Answer(std::size_t slot, Worker& worker) {
+  when_answering();
   const MemoryRequest& request = requests_[slot];
   MemoryAnswer& answer = answers_[slot];
   Frame frame;

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -54,6 +55,9 @@ class MemoryDoor final : private StreamDoor {
   std::optional<MemoryAnswer> Receive();
   /// Once finished; waits for it.
   absl::Status status();
+
+  /// Called by the worker before it answers a frame. To be set before the first one is sent.
+  std::function<void()> when_answering = [] {};
 
   StreamFlow& flow() { return *flow_; }
   /// The most frames that were inside the server at once: read, and their answer not received.

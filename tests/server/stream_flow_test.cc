@@ -9,7 +9,9 @@
 #include <chrono>
 #include <future>
 #include <limits>
+#include <memory>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -286,6 +288,44 @@ TEST(ComputePool, RunsWhatWasSubmittedBeforeItGoes) {
     for (int i = 0; i < 100; ++i) pool.Submit([&](Worker&) { ++ran; });
   }
   EXPECT_EQ(ran, 100);
+}
+
+// A stream of large frames beside twenty of small ones, by the order of turns and not by time: each
+// waits for at most one frame of each other stream, whatever those have waiting.
+TEST(StreamFlow, OneOfLargeFramesDelaysEachSmallFrameByOneOfItsOwn) {
+  constexpr int kStreams = 21;
+  ComputePool pool(1);
+  Gate gate(pool);
+  std::vector<int> turns;  // Of the pool's only thread.
+  std::vector<std::unique_ptr<MemoryDoor>> doors;
+  std::vector<std::thread> clients;
+  for (int i = 0; i < kStreams; ++i) {
+    doors.push_back(std::make_unique<MemoryDoor>(pool, kWindow, BlobParameters(), kLimits));
+    MemoryDoor& door = *doors.back();
+    door.when_answering = [&turns, i] { turns.push_back(i); };
+    door.Open();
+    for (std::uint64_t k = 1; k <= 3 * kWindow; ++k) {
+      // The first stream's frames are thirty times as large.
+      std::vector<double> positions = MovingBlob(1, k);
+      if (i > 0) positions.resize(80);
+      door.Send(k, std::move(positions));
+    }
+    door.HalfClose();
+  }
+  // Every stream has its window full when the first turn begins.
+  for (const auto& door : doors) door->WaitUntilRead(kWindow);
+  gate.Open();
+  for (const auto& door : doors) {
+    clients.emplace_back([&door] { EXPECT_EQ(ReceiveAll(*door).size(), 3 * kWindow + 1); });
+  }
+  for (std::thread& client : clients) client.join();
+  ASSERT_EQ(turns.size(), kStreams * 3 * kWindow);
+  // As long as all have frames waiting, rounds in which each stream has one turn.
+  for (std::size_t round = 0; round < kWindow - 1; ++round) {
+    std::set<int> in_round;
+    for (int i = 0; i < kStreams; ++i) in_round.insert(turns[round * kStreams + i]);
+    EXPECT_EQ(in_round.size(), kStreams) << "round " << round;
+  }
 }
 
 TEST(ComputePool, GivesEveryStreamATurnBeforeAnyHasASecond) {
