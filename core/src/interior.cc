@@ -29,11 +29,15 @@ bool IsInterior(const TileDirectory& directory, const std::vector<TileBits>& til
   return cell.tile != kNoTile && (tiles[cell.tile].interior[cell.j] >> cell.i & 1) != 0;
 }
 
-std::uint32_t BottomEdges(const TileDirectory& directory, const std::vector<TileBits>& tiles,
-                          std::uint32_t tile, int j) {
-  const TilePlace below = Normalise(directory, tile, 0, j - 1);
-  const std::uint32_t under = below.tile == kNoTile ? 0 : tiles[below.tile].interior[below.j];
-  return tiles[tile].interior[j] & ~under;
+// The cells of a tile that are interior above a cell that is not.
+BitRows BottomEdges(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                    std::uint32_t tile) {
+  const BitRows& interior = tiles[tile].interior;
+  const std::uint32_t below = directory.neighbours(tile)[1];
+  BitRows edges;
+  edges[0] = interior[0] & ~(below == kNoTile ? 0 : tiles[below].interior[kTileSize - 1]);
+  for (int j = 1; j < kTileSize; ++j) edges[j] = interior[j] & ~interior[j - 1];
+  return edges;
 }
 
 // Walks one loop that starts eastward along the bottom edge of the cell at `start`.
@@ -77,19 +81,33 @@ std::int64_t TakeRow(const TileDirectory& directory, MergeScratch& scratch, std:
   }
 }
 
-// Takes the row above the span's if all of its cells are free. Moves the span there.
-bool TakeRowAbove(const TileDirectory& directory, MergeScratch& scratch, int row) {
-  const bool next_tiles = row % kTileSize == 0;
-  const int j = row % kTileSize;
-  for (const auto& [tile, mask] : scratch.span) {
-    const std::uint32_t above = next_tiles ? directory.neighbours(tile)[7] : tile;
-    if (above == kNoTile || (scratch.free[above][j] & mask) != mask) return false;
+// Takes the rows above the span's as long as all of their cells are free, `row` being the first of
+// them in rows from the start of the span's tiles. Returns the row that it ends before; moves the
+// span there. A tile's rows lie together in memory: they are looked at tile by tile.
+int TakeRowsAbove(const TileDirectory& directory, MergeScratch& scratch, int row) {
+  while (true) {
+    const int first = row % kTileSize;
+    if (first == 0) {
+      for (auto& [tile, mask] : scratch.span) {
+        tile = directory.neighbours(tile)[7];
+        if (tile == kNoTile) return row;
+      }
+    }
+    int last = kTileSize;
+    for (const auto& [tile, mask] : scratch.span) {
+      const BitRows& free = scratch.free[tile];
+      int j = first;
+      while (j < last && (free[j] & mask) == mask) ++j;
+      last = j;
+      if (last == first) return row;
+    }
+    for (const auto& [tile, mask] : scratch.span) {
+      BitRows& free = scratch.free[tile];
+      for (int j = first; j < last; ++j) free[j] &= ~mask;
+    }
+    row += last - first;
+    if (last < kTileSize) return row;
   }
-  for (auto& [tile, mask] : scratch.span) {
-    if (next_tiles) tile = directory.neighbours(tile)[7];
-    scratch.free[tile][j] &= ~mask;
-  }
-  return true;
 }
 
 // Cells are taken out this much beyond a box, in cells: a vertex on a lattice line touches the
@@ -179,9 +197,9 @@ void TraceStaircases(const TileDirectory& directory, const std::vector<TileBits>
   staircases.pinches = 0;
   staircases.visited.assign(tiles.size(), BitRows{});
   for (std::uint32_t tile = 0; tile < tiles.size(); ++tile) {
+    const BitRows edges = BottomEdges(directory, tiles, tile);
     for (int j = 0; j < kTileSize; ++j) {
-      const std::uint32_t edges = BottomEdges(directory, tiles, tile, j);
-      while (const std::uint32_t rest = edges & ~staircases.visited[tile][j]) {
+      while (const std::uint32_t rest = edges[j] & ~staircases.visited[tile][j]) {
         TraceLoop(directory, tiles, {tile, std::countr_zero(rest), j}, staircases);
       }
     }
@@ -208,9 +226,7 @@ void MergeCells(const TileDirectory& directory, const std::vector<TileBits>& til
           rectangle.x0 = (std::int64_t{directory[tile].x} << kTileShift) + i;
           rectangle.y0 = (std::int64_t{directory[tile].y} << kTileShift) + j;
           rectangle.x1 = rectangle.x0 + TakeRow(directory, scratch, tile, i, j);
-          int row = j + 1;
-          while (TakeRowAbove(directory, scratch, row)) ++row;
-          rectangle.y1 = rectangle.y0 + (row - j);
+          rectangle.y1 = rectangle.y0 + TakeRowsAbove(directory, scratch, j + 1) - j;
           rectangles.push_back(rectangle);
         }
       }

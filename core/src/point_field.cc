@@ -127,55 +127,65 @@ void PointField::SortTile(const ParticleBins& bins, std::uint32_t tile) {
   offsets.front() = first_entry_[tile];
 }
 
-PointSums PointField::SumAt(std::uint32_t tile, double x, double y) const {
+PointQuery PointField::QueryAt(std::uint32_t tile, double x, double y) const {
   const BucketRange columns = Buckets(x, scale_.kernel_radius);
   const BucketRange rows = Buckets(y, scale_.kernel_radius);
-  return SumAtPoint({.x = x,
-                     .y = y,
-                     .inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius),
-                     .uniform_weight = scale_.uniform_weight,
-                     .entry_x = x_.data(),
-                     .entry_y = y_.data(),
-                     .weight = weight_.empty() ? nullptr : weight_.data(),
-                     .offsets = bucket_offsets_.data() + first_bucket_[tile] +
-                                rows.first * bucket_columns_ + columns.first,
-                     .rows = rows.last - rows.first + 1,
-                     .columns = columns.last - columns.first + 1,
-                     .row_stride = bucket_columns_});
+  return {.x = x,
+          .y = y,
+          .inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius),
+          .uniform_weight = scale_.uniform_weight,
+          .entry_x = x_.data(),
+          .entry_y = y_.data(),
+          .weight = weight_.empty() ? nullptr : weight_.data(),
+          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * bucket_columns_ +
+                     columns.first,
+          .rows = rows.last - rows.first + 1,
+          .columns = columns.last - columns.first + 1,
+          .row_stride = bucket_columns_};
 }
 
 namespace {
 
-// The spread of the particles (level_set_formula.h) and its gradient.
-struct Spread {
-  double value, x, y;
-};
+// The spread of the particles (level_set_formula.h) from their moments, in units of R^2.
+class Spread {
+ public:
+  Spread(const PointSums& sums, double inverse_square)
+      : sums_(sums),
+        share_(inverse_square / sums.kernel),
+        xx_(sums.kxx * share_),
+        xy_(sums.kxy * share_),
+        yy_(sums.kyy * share_),
+        value_(LargerEigenvalue(xx_, xy_, yy_)) {}
 
-Spread SpreadOf(const PointSums& sums, double inverse_square) {
-  const double share = inverse_square / sums.kernel;
-  const double xx = sums.kxx * share;
-  const double xy = sums.kxy * share;
-  const double yy = sums.kyy * share;
-  const double value = LargerEigenvalue(xx, xy, yy);
-  // The eigenvector's square e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue; where both
-  // are the same, either direction is as good.
-  const double gap = 2 * value - (xx + yy);
-  const double exx = gap > 0 ? (value - yy) / gap : 0.5;
-  const double exy = gap > 0 ? xy / gap : 0;
-  const double eyy = 1 - exx;
-  // ds = e . dM e, where M is a ratio of sums, and d_a = x_i - x falls as x grows.
-  const auto along = [&](double dxx, double dxy, double dyy, double slope) {
-    return (exx * dxx + 2 * exy * dxy + eyy * dyy) * share - value * slope / sums.kernel;
-  };
-  return {value,
-          along(sums.xxx - 2 * sums.moment_x, sums.xxy - sums.moment_y, sums.xyy, sums.slope_x),
-          along(sums.xxy, sums.xyy - sums.moment_x, sums.yyy - 2 * sums.moment_y, sums.slope_y)};
-}
+  double value() const { return value_; }
+
+  LatticePoint Gradient(const PointThirdSums& third) const {
+    // The eigenvector's square e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue; where both
+    // are the same, either direction is as good.
+    const double gap = 2 * value_ - (xx_ + yy_);
+    const double exx = gap > 0 ? (value_ - yy_) / gap : 0.5;
+    const double exy = gap > 0 ? xy_ / gap : 0;
+    const double eyy = 1 - exx;
+    // ds = e . dM e, where M is a ratio of sums, and d_a = x_i - x falls as x grows.
+    const auto along = [&](double dxx, double dxy, double dyy, double slope) {
+      return (exx * dxx + 2 * exy * dxy + eyy * dyy) * share_ - value_ * slope / sums_.kernel;
+    };
+    return {
+        along(third.xxx - 2 * sums_.moment_x, third.xxy - sums_.moment_y, third.xyy, sums_.slope_x),
+        along(third.xxy, third.xyy - sums_.moment_x, third.yyy - 2 * sums_.moment_y,
+              sums_.slope_y)};
+  }
+
+ private:
+  const PointSums& sums_;
+  double share_, xx_, xy_, yy_, value_;
+};
 
 }  // namespace
 
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
-  const PointSums sums = SumAt(tile, x, y);
+  const PointQuery query = QueryAt(tile, x, y);
+  const PointSums sums = SumAtPoint(query);
   FieldSample sample;
   if (sums.kernel <= 0) {
     sample.phi = scale_.kernel_radius - scale_.reference_radius;
@@ -198,15 +208,16 @@ FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
     sample.phi_y = (sample.mean_x * jxy + sample.mean_y * jyy - sample.mean_y) / distance;
   }
   const LevelSetFormula<double> formula(scale_);
-  const Spread spread = SpreadOf(sums, 1 / (scale_.kernel_radius * scale_.kernel_radius));
-  sample.spread = spread.value;
-  sample.value = formula.Value(sums.density, sample.phi, spread.value);
+  const Spread spread(sums, query.inverse_square);
+  sample.spread = spread.value();
+  sample.value = formula.Value(sums.density, sample.phi, sample.spread);
   if (sample.value == sample.phi) {
     sample.gradient_x = sample.phi_x;
     sample.gradient_y = sample.phi_y;
-  } else if (sample.value == formula.Gap(spread.value)) {
-    sample.gradient_x = spread.x * scale_.gap_slope;
-    sample.gradient_y = spread.y * scale_.gap_slope;
+  } else if (sample.value == formula.Gap(sample.spread)) {
+    const LatticePoint gradient = spread.Gradient(ThirdSumsAtPoint(query));
+    sample.gradient_x = gradient.x * scale_.gap_slope;
+    sample.gradient_y = gradient.y * scale_.gap_slope;
   } else {
     // Guard and saturation fall with the density alike.
     sample.gradient_x = -sums.density_x * scale_.guard_slope;

@@ -74,7 +74,7 @@ class PointField {
   BucketRange Buckets(double centre, double radius) const;
 
   int Bucket(double coordinate) const;
-  PointSums SumAt(std::uint32_t tile, double x, double y) const;
+  PointQuery QueryAt(std::uint32_t tile, double x, double y) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   std::uint32_t ChooseEntries(const ParticleBins& bins, std::uint32_t tile);
   void SortTile(const ParticleBins& bins, std::uint32_t tile);

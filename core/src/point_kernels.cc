@@ -32,20 +32,21 @@ enum Channel {
   kXx,
   kXy,
   kYy,
-  kXxx,
-  kXxy,
-  kXyy,
-  kYyy,
   kSums
 };
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
+enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
 
 HWY_INLINE Vector LoadDouble(const float* values) {
   return hn::PromoteTo(Lanes(), hn::LoadU(FloatLanes(), values));
 }
 
-template <bool kWeighted>
-HWY_INLINE void AddEntries(const PointQuery& query, std::uint32_t entry, int left, Vector* sums) {
+// What particles contribute: d, k and dk / da, 0 beyond the row and beyond the kernel.
+struct Terms {
+  Vector dx, dy, kernel, slope_x, slope_y;
+};
+
+HWY_INLINE Terms TermsOf(const PointQuery& query, std::uint32_t entry, int left) {
   const Lanes d;
   const Vector dx = hn::Sub(LoadDouble(query.entry_x + entry), hn::Set(d, query.x));
   const Vector dy = hn::Sub(LoadDouble(query.entry_y + entry), hn::Set(d, query.y));
@@ -56,44 +57,65 @@ HWY_INLINE void AddEntries(const PointQuery& query, std::uint32_t entry, int lef
   const auto is_entry = hn::Lt(hn::Iota(d, 0.0), hn::Set(d, static_cast<double>(left)));
   t = hn::IfThenElseZero(is_entry, hn::Max(hn::Zero(d), t));
   const Vector t2 = hn::Mul(t, t);
-  const Vector k = hn::Mul(t2, t);
   const Vector slope = hn::Mul(hn::Mul(hn::Set(d, 6.0), t2), inverse_square);
-  const Vector kx = hn::Mul(slope, dx);
-  const Vector ky = hn::Mul(slope, dy);
-  const auto add = [&](int channel, Vector term) { sums[channel] = hn::Add(sums[channel], term); };
-  add(kKernel, k);
-  const Vector moment_x = hn::Mul(k, dx);
-  const Vector moment_y = hn::Mul(k, dy);
-  add(kMomentX, moment_x);
-  add(kMomentY, moment_y);
-  add(kSlopeX, kx);
-  add(kSlopeY, ky);
-  add(kKxx, hn::Mul(moment_x, dx));
-  add(kKxy, hn::Mul(moment_x, dy));
-  add(kKyy, hn::Mul(moment_y, dy));
-  const Vector xx = hn::Mul(kx, dx);
-  const Vector xy = hn::Mul(kx, dy);
-  const Vector yy = hn::Mul(ky, dy);
-  add(kXx, xx);
-  add(kXy, xy);
-  add(kYy, yy);
-  add(kXxx, hn::Mul(xx, dx));
-  add(kXxy, hn::Mul(xx, dy));
-  add(kXyy, hn::Mul(yy, dx));
-  add(kYyy, hn::Mul(yy, dy));
-  if constexpr (kWeighted) {
-    const Vector w = LoadDouble(query.weight + entry);
-    add(kDensity, hn::Mul(w, k));
-    add(kDensityX, hn::Mul(w, kx));
-    add(kDensityY, hn::Mul(w, ky));
-  }
+  return {dx, dy, hn::Mul(t2, t), hn::Mul(slope, dx), hn::Mul(slope, dy)};
 }
 
+// Each adds to the channels of one partial sum.
 template <bool kWeighted>
-PointSums Sum(const PointQuery& query) {
-  constexpr int kChannels = kWeighted ? int{kWeightedSums} : int{kSums};
+struct AddSums {
+  static constexpr int kChannels = kWeighted ? int{kWeightedSums} : int{kSums};
+
+  HWY_INLINE void operator()(const PointQuery& query, std::uint32_t entry, const Terms& terms,
+                             Vector* sums) const {
+    const auto& [dx, dy, k, kx, ky] = terms;
+    const auto add = [&](int channel, Vector term) {
+      sums[channel] = hn::Add(sums[channel], term);
+    };
+    add(kKernel, k);
+    const Vector moment_x = hn::Mul(k, dx);
+    const Vector moment_y = hn::Mul(k, dy);
+    add(kMomentX, moment_x);
+    add(kMomentY, moment_y);
+    add(kSlopeX, kx);
+    add(kSlopeY, ky);
+    add(kKxx, hn::Mul(moment_x, dx));
+    add(kKxy, hn::Mul(moment_x, dy));
+    add(kKyy, hn::Mul(moment_y, dy));
+    add(kXx, hn::Mul(kx, dx));
+    add(kXy, hn::Mul(kx, dy));
+    add(kYy, hn::Mul(ky, dy));
+    if constexpr (kWeighted) {
+      const Vector w = LoadDouble(query.weight + entry);
+      add(kDensity, hn::Mul(w, k));
+      add(kDensityX, hn::Mul(w, kx));
+      add(kDensityY, hn::Mul(w, ky));
+    }
+  }
+};
+
+struct AddThirdSums {
+  static constexpr int kChannels = kThirdSums;
+
+  HWY_INLINE void operator()(const PointQuery&, std::uint32_t, const Terms& terms,
+                             Vector* sums) const {
+    const auto& [dx, dy, k, kx, ky] = terms;
+    const auto add = [&](int channel, Vector term) {
+      sums[channel] = hn::Add(sums[channel], term);
+    };
+    const Vector xx = hn::Mul(kx, dx);
+    const Vector yy = hn::Mul(ky, dy);
+    add(kXxx, hn::Mul(xx, dx));
+    add(kXxy, hn::Mul(hn::Mul(kx, dy), dx));
+    add(kXyy, hn::Mul(yy, dx));
+    add(kYyy, hn::Mul(yy, dy));
+  }
+};
+
+template <typename Add>
+HWY_INLINE void Sum(const PointQuery& query, Add add, double* totals) {
   const Lanes d;
-  Vector sums[kParts][kChannels];
+  Vector sums[kParts][Add::kChannels];
   for (auto& part : sums) {
     for (Vector& sum : part) sum = hn::Zero(d);
   }
@@ -103,19 +125,26 @@ PointSums Sum(const PointQuery& query) {
     for (std::uint32_t entry = offsets[0]; entry < end; entry += kPointPadding) {
       for (int part = 0; part < kParts; ++part) {
         const int left = static_cast<int>(end - entry) - part * kLanes;
-        AddEntries<kWeighted>(query, entry + part * kLanes, left, sums[part]);
+        const std::uint32_t first = entry + part * kLanes;
+        add(query, first, TermsOf(query, first, left), sums[part]);
       }
     }
   }
-  double totals[kWeightedSums] = {};
-  for (int channel = 0; channel < kChannels; ++channel) {
+  for (int channel = 0; channel < Add::kChannels; ++channel) {
     HWY_ALIGN double parts[kPointPadding];
     for (int part = 0; part < kParts; ++part) {
       hn::StoreU(sums[part][channel], d, parts + part * kLanes);
     }
     totals[channel] = (parts[0] + parts[1]) + (parts[2] + parts[3]);
   }
-  if constexpr (!kWeighted) {
+}
+
+PointSums SumAtPoint(const PointQuery& query) {
+  double totals[kWeightedSums];
+  if (query.weight != nullptr) {
+    Sum(query, AddSums<true>(), totals);
+  } else {
+    Sum(query, AddSums<false>(), totals);
     totals[kDensity] = query.uniform_weight * totals[kKernel];
     totals[kDensityX] = query.uniform_weight * totals[kSlopeX];
     totals[kDensityY] = query.uniform_weight * totals[kSlopeY];
@@ -131,17 +160,15 @@ PointSums Sum(const PointQuery& query) {
           .xx = totals[kXx],
           .xy = totals[kXy],
           .yy = totals[kYy],
-          .xxx = totals[kXxx],
-          .xxy = totals[kXxy],
-          .xyy = totals[kXyy],
-          .yyy = totals[kYyy],
           .density = totals[kDensity],
           .density_x = totals[kDensityX],
           .density_y = totals[kDensityY]};
 }
 
-PointSums SumAtPoint(const PointQuery& query) {
-  return query.weight != nullptr ? Sum<true>(query) : Sum<false>(query);
+PointThirdSums ThirdSumsAtPoint(const PointQuery& query) {
+  double totals[kThirdSums];
+  Sum(query, AddThirdSums(), totals);
+  return {.xxx = totals[kXxx], .xxy = totals[kXxy], .xyy = totals[kXyy], .yyy = totals[kYyy]};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -152,8 +179,13 @@ HWY_AFTER_NAMESPACE();
 namespace partiemc {
 
 HWY_EXPORT(SumAtPoint);
+HWY_EXPORT(ThirdSumsAtPoint);
 
 PointSums SumAtPoint(const PointQuery& query) { return HWY_DYNAMIC_DISPATCH(SumAtPoint)(query); }
+
+PointThirdSums ThirdSumsAtPoint(const PointQuery& query) {
+  return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(query);
+}
 
 }  // namespace partiemc
 #endif  // HWY_ONCE

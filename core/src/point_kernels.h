@@ -25,9 +25,13 @@ struct PointSums {
   double slope_x, slope_y;      ///< sum dk / da
   double kxx, kxy, kyy;         ///< sum k d_a d_b
   double xx, xy, yy;            ///< sum (dk / da) d_b, the same for a and b exchanged
-  double xxx, xxy, xyy, yyy;    ///< sum (dk / da) d_b d_c, the same in any order
   double density;               ///< sum w k
   double density_x, density_y;  ///< sum w dk / da
+};
+
+/// More of them, which few points ask for: sum (dk / da) d_b d_c, the same in any order.
+struct PointThirdSums {
+  double xxx, xxy, xyy, yyy;
 };
 
 /// Entries are dealt to four partial sums by their place in their row, whatever the width of the
@@ -35,5 +39,6 @@ struct PointSums {
 /// Reads up to kPointPadding entries past the end of a row.
 inline constexpr int kPointPadding = 4;
 PointSums SumAtPoint(const PointQuery& query);
+PointThirdSums ThirdSumsAtPoint(const PointQuery& query);
 
 }  // namespace partiemc
