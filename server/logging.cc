@@ -1,7 +1,7 @@
 #include "server/logging.h"
 
 #include <grpc/support/log.h>
-#include <spdlog/formatter.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -55,14 +55,15 @@ void LogFromGrpc(gpr_log_func_args* message) { spdlog::debug("grpc: {}", message
 
 }  // namespace
 
+std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format) {
+  if (format == LogFormat::kJson) return std::make_unique<JsonFormatter>();
+  return std::make_unique<spdlog::pattern_formatter>("%Y-%m-%d %H:%M:%S.%e %l %v");
+}
+
 void SetUpLogging(const std::string& level, LogFormat format) {
   auto logger = std::make_shared<spdlog::logger>("partiemc-server",
                                                  std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  if (format == LogFormat::kJson) {
-    logger->set_formatter(std::make_unique<JsonFormatter>());
-  } else {
-    logger->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
-  }
+  logger->set_formatter(MakeLogFormatter(format));
   logger->set_level(spdlog::level::from_str(level));
   logger->flush_on(spdlog::level::trace);
   spdlog::set_default_logger(std::move(logger));

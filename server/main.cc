@@ -79,6 +79,8 @@ int main(int argc, char** argv) {
   }
   const auto& line = std::get<CommandLine>(parsed);
   if (!line.health_check) return Serve(line);
-  const auto status = CheckHealth(*line.health_check, kHealthCheckTimeout);
+  SetUpLogging("off", LogFormat::kText);  // gRPC would tell standard error of every attempt.
+  const auto status =
+      CheckHealth(*line.health_check, kHealthCheckTimeout, line.health_check_security);
   return status.ok() ? 0 : Fail(status);
 }

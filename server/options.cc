@@ -19,6 +19,8 @@ constexpr char kDescription[] =
     "\n"
     "  partiemc-server                                   on 127.0.0.1:50051, this machine only\n"
     "  partiemc-server --address unix:/run/partiemc.sock\n"
+    "  partiemc-server --address 0.0.0.0:50051 --tls-cert server.pem --tls-key server.key \\\n"
+    "    --token-file tokens                             for any network\n"
     "  partiemc-server --address 0.0.0.0:50051 --insecure   for a network that is trusted\n"
     "  partiemc-server --health-check                    is one running? Exit code 0 or 1\n"
     "\n"
@@ -38,6 +40,8 @@ struct Raw {
   std::uint64_t max_frame_bytes = 0;
   double grace_seconds = 4;
   double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
+  std::string token_file;
+  TlsFiles tls;
   std::string log_format = "text";
   CommandLine line;
 };
@@ -51,9 +55,6 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
       ->capture_default_str()
       ->type_name("ADDRESS")
       ->envname("PARTIEMC_ADDRESS");
-  app.add_flag("--insecure", raw.line.server.insecure,
-               "Listen on an address that other machines reach, although all travels in the clear")
-      ->envname("PARTIEMC_INSECURE");
   app.add_option("--port-file", raw.port_file,
                  "Write the address that was bound to this file once the server serves")
       ->type_name("FILE")
@@ -70,6 +71,38 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
       ->capture_default_str()
       ->type_name("SECONDS")
       ->envname("PARTIEMC_GRACE_SECONDS");
+}
+
+void AddSecurity(CLI::App& app, Raw& raw) {
+  const char* const kGroup = "Security (files are read again when they change)";
+  CLI::Option* certificate =
+      app.add_option("--tls-cert", raw.tls.certificate,
+                     "Speak TLS with this certificate: PEM, those between it and its root after it")
+          ->type_name("FILE")
+          ->envname("PARTIEMC_TLS_CERT")
+          ->group(kGroup);
+  CLI::Option* key = app.add_option("--tls-key", raw.tls.key, "Its private key: PEM, no passphrase")
+                         ->type_name("FILE")
+                         ->envname("PARTIEMC_TLS_KEY")
+                         ->group(kGroup);
+  certificate->needs(key);
+  key->needs(certificate);
+  app.add_option("--tls-client-ca", raw.tls.client_ca,
+                 "Take only clients with a certificate signed by an authority of this file (mTLS)")
+      ->needs(certificate)
+      ->type_name("FILE")
+      ->envname("PARTIEMC_TLS_CLIENT_CA")
+      ->group(kGroup);
+  app.add_option("--token-file", raw.token_file,
+                 "Take only calls with a bearer token of this file; a line is TOKEN, or TOKEN and "
+                 "the NAME that the log has for its client. Health checks need none")
+      ->type_name("FILE")
+      ->envname("PARTIEMC_TOKEN_FILE")
+      ->group(kGroup);
+  app.add_flag("--insecure", raw.line.server.insecure,
+               "Listen on an address that other machines reach, although all travels in the clear")
+      ->envname("PARTIEMC_INSECURE")
+      ->group(kGroup);
 }
 
 void AddLimits(CLI::App& app, Raw& raw) {
@@ -164,6 +197,13 @@ std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
     if (!asked.ok()) return Wrong(std::string(asked.status().message()));
     raw.line.health_check = *asked;
   }
+  if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
+  if (!raw.token_file.empty()) raw.line.server.token_file = raw.token_file;
+  raw.line.health_check_security.tls = raw.line.server.tls.has_value();
+  if (!raw.tls.client_ca.empty()) {
+    raw.line.health_check_security.certificate_file = raw.tls.certificate;
+    raw.line.health_check_security.key_file = raw.tls.key;
+  }
   raw.line.log_format = raw.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
   if (!raw.port_file.empty()) raw.line.port_file = raw.port_file;
   raw.line.grace = Milliseconds(raw.grace_seconds);
@@ -185,10 +225,13 @@ std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* a
   raw.line.server.threads = std::max(1u, std::thread::hardware_concurrency());
   raw.line.server.limits.memory_budget = AvailableMemory() / 2;
   AddServingOptions(app, raw);
+  AddSecurity(app, raw);
   AddLimits(app, raw);
   AddLogging(app, raw);
-  app.add_option("--health-check", raw.health_check,
-                 "Ask the server at this address (default: --address) whether it serves, and leave")
+  app.add_option(
+         "--health-check", raw.health_check,
+         "Ask the server at this address (default: --address) whether it serves, and leave; "
+         "with --tls-cert over TLS, with --tls-client-ca showing --tls-cert to it")
       ->expected(0, 1)
       ->type_name("[ADDRESS]")
       ->configurable(false);

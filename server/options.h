@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "server/health_check.h"
 #include "server/logging.h"
 #include "server/server.h"
 
@@ -19,6 +20,7 @@ struct CommandLine {
   std::optional<std::string> port_file;
   /// Only ask the server at this address whether it serves.
   std::optional<Address> health_check;
+  HealthCheckSecurity health_check_security;
   std::string log_level = "info";
   LogFormat log_format = LogFormat::kText;
 };

@@ -3,14 +3,19 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <limits>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/call_guard.h"
 #include "server/service.h"
+#include "server/tls_credentials.h"
 
 namespace partiemc::server {
 namespace {
@@ -27,11 +32,23 @@ constexpr std::chrono::milliseconds kTimeToCut(250);
 constexpr std::chrono::milliseconds kQuiet(50);
 
 absl::Status CheckSecurity(const ServerOptions& options) {
-  if (options.insecure || options.address.IsLocal()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("address ", options.address.ToString(),
-                   " can be reached from other machines, and everything would travel in the clear; "
-                   "listen on 127.0.0.1, or add --insecure if the network is trusted"));
+  if (options.tls || options.insecure || options.address.IsLocal()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "address ", options.address.ToString(), " can be reached from other machines, and ",
+      options.token_file ? "tokens" : "everything",
+      " would travel in the clear; give --tls-cert and --tls-key, listen on 127.0.0.1, or add "
+      "--insecure if the network is trusted"));
+}
+
+absl::StatusOr<BearerTokens> ReadTokens(const std::string& path) {
+  const auto text = ReadSmallFile("--token-file", path);
+  if (!text.ok()) return text.status();
+  auto tokens = BearerTokens::Parse(*text);
+  if (!tokens.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--token-file ", path, ": ", tokens.status().message()));
+  }
+  return tokens;
 }
 
 }  // namespace
@@ -39,18 +56,48 @@ absl::Status CheckSecurity(const ServerOptions& options) {
 Server::Server(const ServerOptions& options)
     : options_(options),
       address_(options.address),
+      tls_identity_(std::make_unique<CurrentTlsIdentity>()),
       registry_(options.limits.max_streams),
       budget_(options.limits.memory_budget),
       pool_(options.threads),
       idle_timer_(registry_, options.limits.idle),
-      service_(std::make_unique<Service>(options_.limits, registry_, budget_, pool_)) {}
+      service_(
+          std::make_unique<Service>(options_.limits, authentication_, registry_, budget_, pool_)) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
   if (auto status = CheckSecurity(options); !status.ok()) return status;
   if (auto status = CheckCanListen(options.address); !status.ok()) return status;
   std::unique_ptr<Server> server(new Server(options));
+  if (auto status = server->LoadFiles(); !status.ok()) return status;
   if (auto status = server->Listen(); !status.ok()) return status;
+  server->reloader_.Start(options.reload_interval);
   return server;
+}
+
+absl::Status Server::LoadFiles() {
+  if (options_.tls) {
+    auto status = reloader_.Add("TLS certificate", options_.tls->All(), [this] {
+      auto identity = ReadTlsIdentity(*options_.tls);
+      if (!identity.ok()) return identity.status();
+      if (identity->not_after < std::chrono::system_clock::now()) {
+        spdlog::warn("--tls-cert {} has expired: clients will refuse it",
+                     options_.tls->certificate);
+      }
+      tls_identity_->Set(*std::move(identity));
+      return absl::OkStatus();
+    });
+    if (!status.ok()) return status;
+  }
+  if (options_.token_file) {
+    auto status = reloader_.Add("tokens", {*options_.token_file}, [this] {
+      auto tokens = ReadTokens(*options_.token_file);
+      if (!tokens.ok()) return tokens.status();
+      authentication_.Set(*std::move(tokens));
+      return absl::OkStatus();
+    });
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Server::Listen() {
@@ -58,7 +105,14 @@ absl::Status Server::Listen() {
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(address_.ToString(), grpc::InsecureServerCredentials(), &port);
+  credentials_ =
+      options_.tls ? MakeTlsCredentials(*tls_identity_) : grpc::InsecureServerCredentials();
+  builder.AddListeningPort(address_.ToString(), credentials_, &port);
+  if (authentication_.required()) {
+    std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> guards;
+    guards.push_back(MakeGuardOfForeignServices(authentication_));
+    builder.experimental().SetInterceptorCreators(std::move(guards));
+  }
   builder.RegisterService(service_.get());
   builder.SetMaxReceiveMessageSize(ReceiveLimit(options_.limits.max_frame_bytes));
   // Otherwise two servers share a port without noticing, and clients reach one of them.

@@ -3,29 +3,41 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
 #include "server/address.h"
+#include "server/authentication.h"
 #include "server/compute_pool.h"
+#include "server/file_reloader.h"
 #include "server/idle_timer.h"
 #include "server/limits.h"
 #include "server/memory_budget.h"
 #include "server/stream_registry.h"
+#include "server/tls_identity.h"
 
 namespace grpc {
 class Channel;
 class Server;
+class ServerCredentials;
 }  // namespace grpc
 
 namespace partiemc::server {
 
+class CurrentTlsIdentity;
 class Service;
 
 struct ServerOptions {
   Address address{.host = "127.0.0.1", .port = 50051, .unix_path = {}};
   /// Allows an address beyond this machine, although everything travels in the clear.
   bool insecure = false;
+  /// Speaks TLS, and nothing else, with this identity.
+  std::optional<TlsFiles> tls;
+  /// Lets in only callers with a token of this file (BearerTokens::Parse), health checks apart.
+  std::optional<std::string> token_file;
+  /// How soon a change of those files counts: for connections and calls that begin after it.
+  std::chrono::milliseconds reload_interval{1000};
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
@@ -34,7 +46,8 @@ struct ServerOptions {
 class Server {
  public:
   /// Listens and serves when it returns.
-  /// Errors: INVALID_ARGUMENT for an address beyond this machine without `insecure`, UNAVAILABLE
+  /// Errors: INVALID_ARGUMENT for an address beyond this machine with neither `tls` nor
+  /// `insecure`, and for files of `tls` or tokens that do not hold what they should; UNAVAILABLE
   /// where it cannot listen; a line that says what, where and what to do.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
 
@@ -56,17 +69,22 @@ class Server {
  private:
   explicit Server(const ServerOptions& options);
 
+  absl::Status LoadFiles();
   absl::Status Listen();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
   const ServerOptions options_;
   Address address_;
+  Authentication authentication_;
+  std::unique_ptr<CurrentTlsIdentity> tls_identity_;
+  std::shared_ptr<grpc::ServerCredentials> credentials_;
   StreamRegistry registry_;
   MemoryBudget budget_;
   ComputePool pool_;
   IdleTimer idle_timer_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<grpc::Server> server_;
+  FileReloader reloader_;  // The last: it stops before what it loads into goes.
 };
 
 }  // namespace partiemc::server

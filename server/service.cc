@@ -6,6 +6,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "server/call_guard.h"
 #include "server/grpc_status.h"
 #include "server/reconstruct_reactor.h"
 #include "server/stream_messages.h"
@@ -35,16 +36,19 @@ absl::Status Refused(std::string_view reason, std::string field, std::string val
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-// Refuses the call as soon as it comes.
-class NoWatching final
-    : public grpc::ServerBidiReactor<v1::WatchStreamRequest, v1::WatchStreamResponse> {
+// Ends a call as soon as it comes.
+template <typename Request, typename Response>
+class RefusedStream final : public grpc::ServerBidiReactor<Request, Response> {
  public:
-  NoWatching() {
-    Finish({grpc::StatusCode::UNIMPLEMENTED,
-            "this server lacks the capability \"watch\"; GetServerInfo lists what it has"});
-  }
+  explicit RefusedStream(const grpc::Status& status) { this->Finish(status); }
   void OnDone() override { delete this; }
 };
+
+grpc::ServerUnaryReactor* Refuse(const absl::Status& status, grpc::CallbackServerContext& context) {
+  grpc::ServerUnaryReactor* reactor = context.DefaultReactor();
+  reactor->Finish(ToGrpcStatus(status, context));
+  return reactor;
+}
 
 void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_point now,
                    v1::StreamSummary& message) {
@@ -67,6 +71,10 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruct(
     grpc::CallbackServerContext* context) {
+  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
+    return new RefusedStream<grpc::ByteBuffer, grpc::ByteBuffer>(
+        ToGrpcStatus(client.status(), *context));
+  }
   return new ReconstructReactor(*context, limits_, registry_, budget_, pool_);
 }
 
@@ -91,12 +99,12 @@ absl::Status Service::LetCallIn(std::uint64_t bytes) {
 grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext* context,
                                                     const v1::ReconstructFrameRequest* request,
                                                     v1::ReconstructFrameResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const std::uint64_t bytes = request->ByteSizeLong();
-  if (auto status = LetCallIn(bytes); !status.ok()) {
-    reactor->Finish(ToGrpcStatus(status, *context));
-    return reactor;
+  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
+    return Refuse(client.status(), *context);
   }
+  const std::uint64_t bytes = request->ByteSizeLong();
+  if (auto status = LetCallIn(bytes); !status.ok()) return Refuse(status, *context);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   pool_.Submit([=, this](Worker& worker) {
     const auto status = context->IsCancelled() ? absl::CancelledError("the client went away")
                                                : AnswerCall(*request, limits_, worker, *response);
@@ -108,13 +116,22 @@ grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext*
 }
 
 grpc::ServerBidiReactor<v1::WatchStreamRequest, v1::WatchStreamResponse>* Service::WatchStream(
-    grpc::CallbackServerContext*) {
-  return new NoWatching;
+    grpc::CallbackServerContext* context) {
+  using Refused = RefusedStream<v1::WatchStreamRequest, v1::WatchStreamResponse>;
+  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
+    return new Refused(ToGrpcStatus(client.status(), *context));
+  }
+  return new Refused({grpc::StatusCode::UNIMPLEMENTED,
+                      "this server lacks the capability \"watch\"; GetServerInfo lists what it "
+                      "has"});
 }
 
 grpc::ServerUnaryReactor* Service::ListStreams(grpc::CallbackServerContext* context,
                                                const v1::ListStreamsRequest* request,
                                                v1::ListStreamsResponse* response) {
+  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
+    return Refuse(client.status(), *context);
+  }
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   // A token is the number of the last stream that was listed.
   const std::string& token = request->page_token();
@@ -142,6 +159,9 @@ grpc::ServerUnaryReactor* Service::ListStreams(grpc::CallbackServerContext* cont
 grpc::ServerUnaryReactor* Service::GetServerInfo(grpc::CallbackServerContext* context,
                                                  const v1::GetServerInfoRequest*,
                                                  v1::GetServerInfoResponse* response) {
+  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
+    return Refuse(client.status(), *context);
+  }
   response->set_version(PARTIEMC_VERSION);
   response->set_method_version(kMethodVersion);
   EncodeLimits(limits_, *response->mutable_limits());

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "partiemc/v1/reconstruction.grpc.pb.h"
+#include "server/authentication.h"
 #include "server/compute_pool.h"
 #include "server/limits.h"
 #include "server/memory_budget.h"
@@ -24,12 +25,17 @@ using ServiceBase = v1::ReconstructionService::WithRawCallbackMethod_Reconstruct
                 v1::ReconstructionService::WithCallbackMethod_GetServerInfo<
                     v1::ReconstructionService::Service>>>>>;
 
+/// Every method authenticates its caller first (server/call_guard.h).
 class Service final : public ServiceBase {
  public:
   /// The arguments outlive the service.
-  Service(const ServerLimits& limits, StreamRegistry& registry, MemoryBudget& budget,
-          ComputePool& pool)
-      : limits_(limits), registry_(registry), budget_(budget), pool_(pool) {}
+  Service(const ServerLimits& limits, const Authentication& authentication,
+          StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool)
+      : limits_(limits),
+        authentication_(authentication),
+        registry_(registry),
+        budget_(budget),
+        pool_(pool) {}
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Reconstruct(
       grpc::CallbackServerContext* context) override;
@@ -51,6 +57,7 @@ class Service final : public ServiceBase {
   absl::Status LetCallIn(std::uint64_t bytes);
 
   const ServerLimits& limits_;
+  const Authentication& authentication_;
   StreamRegistry& registry_;
   MemoryBudget& budget_;
   ComputePool& pool_;

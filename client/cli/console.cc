@@ -3,6 +3,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <utility>
 
 namespace partiemc::client {
 namespace {
@@ -42,6 +43,12 @@ std::string AsFlag(const absl::Status& status) {
   std::string line = OneLine(status);
   constexpr std::string_view kAddress = "address:";
   if (line.starts_with(kAddress)) return "--server:" + line.substr(kAddress.size());
+  for (const auto& [field, flag] :
+       {std::pair("ca_file:", "--tls-ca:"), std::pair("cert_file:", "--tls-cert:"),
+        std::pair("key_file:", "--tls-key:"), std::pair("token_file:", "--token-file:"),
+        std::pair("token:", "PARTIEMC_TOKEN:")}) {
+    if (line.starts_with(field)) return flag + line.substr(std::string_view(field).size());
+  }
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
   line.replace(0, kPrefix.size(), "--");

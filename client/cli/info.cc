@@ -80,9 +80,7 @@ std::string InfoJson(const ServerInfo& info, const std::string& address) {
 
 CLI::App* AddInfo(CLI::App& app, InfoFlags& flags) {
   CLI::App* verb = app.add_subcommand("info", "Ask a server for its version and limits");
-  verb->add_option("--server", flags.server, "Server: HOST:PORT or unix:PATH")
-      ->type_name("ADDRESS")
-      ->capture_default_str();
+  AddServerFlags(*verb, flags.server, "Server");
   verb->add_option("--deadline", flags.deadline_seconds, "Seconds that the answer may take")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
@@ -95,15 +93,16 @@ CLI::App* AddInfo(CLI::App& app, InfoFlags& flags) {
 }
 
 int Info(const InfoFlags& flags) {
-  const auto info =
-      GetServerInfo(flags.server, std::chrono::duration_cast<std::chrono::milliseconds>(
-                                      std::chrono::duration<double>(flags.deadline_seconds)));
+  const auto info = GetServerInfo(flags.server.address,
+                                  std::chrono::duration_cast<std::chrono::milliseconds>(
+                                      std::chrono::duration<double>(flags.deadline_seconds)),
+                                  flags.server.credentials);
   if (!info.ok()) {
     const bool wrong_flag = info.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kServer, AsFlag(info.status()));
   }
   const std::string text =
-      flags.json ? InfoJson(*info, flags.server) : InfoText(*info, flags.server);
+      flags.json ? InfoJson(*info, flags.server.address) : InfoText(*info, flags.server.address);
   std::fputs(text.c_str(), stdout);
   return kGood;
 }

@@ -4,12 +4,13 @@
 #include <string>
 
 #include "CLI/CLI.hpp"
+#include "cli/server_flags.h"
 #include "partiemc/client/server_info.h"
 
 namespace partiemc::client {
 
 struct InfoFlags {
-  std::string server = "127.0.0.1:50051";
+  ServerFlags server;
   double deadline_seconds = 5;
   bool json = false;
 };

@@ -1,4 +1,6 @@
 // `partiemc`: the command line. Only wires flags to verbs.
+#include <cstdlib>
+
 #include "CLI/CLI.hpp"
 #include "cli/console.h"
 #include "cli/convert.h"
@@ -21,6 +23,8 @@ int ComplainUsage(const CLI::App& app, const CLI::ParseError& error) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // gRPC's own words about a connection are for its developers; what went wrong is told in ours.
+  setenv("GRPC_VERBOSITY", "NONE", /*replace=*/0);
   CLI::App app("Outlines and meshes of streamed particle frames (SPH, granular), stable over time.",
                "partiemc");
   app.set_version_flag("--version", "partiemc " PARTIEMC_VERSION);

@@ -38,11 +38,13 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
   }
   const auto deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double>(flags.deadline_seconds));
-  auto stream = Stream::Open(
-      flags.server, {.parameters = parameters,
-                     .outputs = {.mesh = parameters.fill != Fill::kNone, .normals = normals},
-                     .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
-                     .deadline = deadline});
+  auto stream =
+      Stream::Open(flags.server.address,
+                   {.parameters = parameters,
+                    .outputs = {.mesh = parameters.fill != Fill::kNone, .normals = normals},
+                    .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
+                    .credentials = flags.server.credentials,
+                    .deadline = deadline});
   if (!stream.ok()) return stream.status();
   return *std::move(stream);
 }
@@ -183,10 +185,7 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
 
 void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
   constexpr const char* kGroup = "Where";
-  CLI::Option* server = app.add_option("--server", flags.server, "Server: HOST:PORT or unix:PATH")
-                            ->type_name("ADDRESS")
-                            ->capture_default_str()
-                            ->group(kGroup);
+  CLI::Option* server = AddServerFlags(app, flags.server, kGroup);
   app.add_flag("--local", flags.local, "Reconstruct in this process, without a server")
       ->excludes(server)
       ->group(kGroup);

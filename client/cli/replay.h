@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "CLI/CLI.hpp"
+#include "cli/server_flags.h"
 #include "client/input/sequence.h"
 #include "partiemc/parameters.h"
 
@@ -17,7 +18,7 @@ struct ReplayFlags {
   std::string input;
   SequenceOptions sequence;
 
-  std::string server = "127.0.0.1:50051";
+  ServerFlags server;
   bool local = false;
   int threads = 0;  ///< 0: one for each processor.
   double deadline_seconds = 30;

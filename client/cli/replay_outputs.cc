@@ -27,10 +27,11 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
   }
   if (!flags.report.empty()) {
     auto report = ReportWriter::Create(
-        flags.report, {.title = BaseName(flags.input),
-                       .subtitle = flags.local ? "reconstructed in process"
-                                               : "reconstructed by the server at " + flags.server,
-                       .parameters = DescribeParameters(Resolve(parameters))});
+        flags.report,
+        {.title = BaseName(flags.input),
+         .subtitle = flags.local ? "reconstructed in process"
+                                 : "reconstructed by the server at " + flags.server.address,
+         .parameters = DescribeParameters(Resolve(parameters))});
     if (!report.ok()) return report.status();
     outputs.report_.emplace(*std::move(report));
   }

@@ -3,8 +3,11 @@
 #include <charconv>
 #include <cstdint>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "library/credentials.h"
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 
@@ -45,7 +48,8 @@ std::string Reason(const grpc::Status& status) {
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address) {
+absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
+                                                           const Credentials& credentials) {
   if (!IsAddress(address)) {
     return ViolationError(absl::StatusCode::kInvalidArgument,
                           {.reason = std::string(kReasonOutOfRange),
@@ -53,6 +57,11 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
                            .value = absl::StrCat("'", address, "'"),
                            .rule = "must be HOST:PORT, [IPV6]:PORT or unix:PATH"});
   }
+  auto channel_credentials = MakeChannelCredentials(credentials);
+  if (!channel_credentials.ok()) return channel_credentials.status();
+  auto token_sender = MakeTokenSender(credentials, address);
+  if (!token_sender.ok()) return token_sender.status();
+
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);
@@ -61,7 +70,10 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
   // The address is where the frames go; an http_proxy meant for browsers must not reroute them.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> senders;
+  if (*token_sender != nullptr) senders.push_back(*std::move(token_sender));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, *channel_credentials,
+                                                                 arguments, std::move(senders));
 }
 
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
@@ -75,7 +87,19 @@ absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::s
   const auto stub = v1::ReconstructionService::NewStub(channel);
   const grpc::Status status = stub->GetServerInfo(&context, {}, &response);
   if (status.ok()) return absl::OkStatus();  // It came up in the meantime.
-  return absl::UnavailableError(absl::StrCat("no server at ", address, " (", Reason(status),
+  const std::string reason = Reason(status);
+  if (reason.find("certificate") != std::string::npos) {
+    return absl::UnavailableError(
+        absl::StrCat("the server at ", address, " has a certificate that does not hold (", reason,
+                     "): it must be valid, for that host, and signed by an authority of --tls-ca"));
+  }
+  if (reason.find("refused") == std::string::npos && reason.find("closed") != std::string::npos) {
+    return absl::UnavailableError(
+        absl::StrCat("what listens at ", address, " ends the connection (", reason,
+                     "): a server may speak TLS (--tls) or not, and ask clients for a certificate "
+                     "(--tls-cert, --tls-key)"));
+  }
+  return absl::UnavailableError(absl::StrCat("no server at ", address, " (", reason,
                                              "): start one with `partiemc-server --address ",
                                              address, "`, or use --local"));
 }

@@ -10,12 +10,15 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "partiemc/client/credentials.h"
 
 namespace partiemc::client {
 
 /// A channel with this library's settings; connects when it is first used.
-/// Errors: INVALID_ARGUMENT unless `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
-absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address);
+/// Errors: INVALID_ARGUMENT unless `address` is HOST:PORT, [IPV6]:PORT or unix:PATH, and for
+/// credentials that do not hold, or do not suit the address.
+absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
+                                                           const Credentials& credentials);
 
 /// Waits until `channel` is connected. A refused connection is tried again until the time is over.
 /// Errors: UNAVAILABLE, "no server at ADDRESS (WHY): ...".

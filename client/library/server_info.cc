@@ -48,10 +48,11 @@ ServerInfo Decode(const v1::GetServerInfoResponse& message) {
 }  // namespace
 
 absl::StatusOr<ServerInfo> GetServerInfo(std::string_view address_text,
-                                         std::chrono::milliseconds deadline) {
+                                         std::chrono::milliseconds deadline,
+                                         const Credentials& credentials) {
   const std::string address(address_text);
   const auto until = std::chrono::system_clock::now() + deadline;
-  const auto channel = MakeChannel(address);
+  const auto channel = MakeChannel(address, credentials);
   if (!channel.ok()) return channel.status();
   const absl::Status connected = Connect(*channel, address, std::min(deadline, kConnectTimeout));
   if (!connected.ok()) return connected;

@@ -12,7 +12,7 @@ absl::StatusOr<std::unique_ptr<Stream>> Stream::Open(std::string_view address_te
   const absl::Status valid = Validate(options.parameters);
   if (!valid.ok()) return valid;
   const std::string address(address_text);
-  auto channel = MakeChannel(address);
+  auto channel = MakeChannel(address, options.credentials);
   if (!channel.ok()) return channel.status();
   absl::Status status = Connect(*channel, address, options.connect_timeout);
   if (!status.ok()) return status;

@@ -67,6 +67,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"nlohmann_json", {"nlohmann-json3-dev"}},
       {"partiemc", {}},
       {"PkgConfig", {"pkg-config"}},
+      {"OpenSSL", {"libssl-dev"}},
       {"Protobuf", {"libprotobuf-dev", "protobuf-compiler"}},
       {"spdlog", {"libspdlog-dev"}},
       {"TBB", {"libtbb-dev"}},

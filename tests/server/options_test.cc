@@ -105,6 +105,26 @@ TEST(CommandLineOptions, TheHealthCheckAsksTheAddressOfTheServerUnlessGivenAnoth
   EXPECT_EQ(Parsed({"--health-check", "unix:/tmp/a"}).health_check->ToString(), "unix:/tmp/a");
 }
 
+TEST(CommandLineOptions, TlsIsACertificateAndItsKeyAndWhatClientsAreAskedFor) {
+  EXPECT_FALSE(Parsed({}).server.tls.has_value());
+  EXPECT_FALSE(Parsed({}).health_check_security.tls);
+  const Environment tokens("PARTIEMC_TOKEN_FILE", "tokens");
+  CommandLine line = Parsed({"--tls-cert", "a.pem", "--tls-key", "a.key"});
+  EXPECT_EQ(line.server.tls->certificate, "a.pem");
+  EXPECT_EQ(line.server.tls->key, "a.key");
+  EXPECT_EQ(line.server.tls->client_ca, "");
+  EXPECT_EQ(line.server.token_file, "tokens");
+  EXPECT_TRUE(line.health_check_security.tls);
+  EXPECT_EQ(line.health_check_security.certificate_file, "");
+  line = Parsed({"--tls-cert", "a.pem", "--tls-key", "a.key", "--tls-client-ca", "ca.pem"});
+  EXPECT_EQ(line.server.tls->client_ca, "ca.pem");
+  EXPECT_EQ(line.health_check_security.certificate_file, "a.pem");
+  EXPECT_EQ(line.health_check_security.key_file, "a.key");
+  EXPECT_THAT(Refused({"--tls-cert", "a.pem"}), HasSubstr("--tls-key"));
+  EXPECT_THAT(Refused({"--tls-key", "a.key"}), HasSubstr("--tls-cert"));
+  EXPECT_THAT(Refused({"--tls-client-ca", "ca.pem"}), HasSubstr("--tls-cert"));
+}
+
 TEST(CommandLineOptions, WhatIsWrongIsToldInOneLine) {
   EXPECT_THAT(Refused({"--bogus"}), HasSubstr("--bogus"));
   EXPECT_THAT(Refused({"--max-streams", "0"}), HasSubstr("--max-streams"));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "partiemc/client/credentials.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/parameters.h"
 
@@ -30,8 +31,10 @@ struct ServerInfo {
 };
 
 /// Asks the server at `address` (HOST:PORT, [IPV6]:PORT or unix:PATH).
-/// Errors: INVALID_ARGUMENT (address), UNAVAILABLE (no server there), DEADLINE_EXCEEDED.
+/// Errors: INVALID_ARGUMENT (address, credentials), UNAVAILABLE (no server there, or one of the two
+/// does not trust the other), UNAUTHENTICATED (token), DEADLINE_EXCEEDED.
 absl::StatusOr<ServerInfo> GetServerInfo(
-    std::string_view address, std::chrono::milliseconds deadline = std::chrono::seconds(5));
+    std::string_view address, std::chrono::milliseconds deadline = std::chrono::seconds(5),
+    const Credentials& credentials = {});
 
 }  // namespace partiemc::client

@@ -20,6 +20,7 @@
 #include <string>
 #include <string_view>
 
+#include "partiemc/client/credentials.h"
 #include "partiemc/client/frame_stream.h"
 
 namespace partiemc::client {
@@ -40,6 +41,9 @@ struct StreamOptions {
   Outputs outputs = {};
   /// Shown where streams are listed. At most 16, keys and values of at most 128 bytes each.
   std::map<std::string, std::string> labels = {};
+  /// TLS, certificates and token. Loopback and Unix sockets need none, unless the server wants
+  /// them.
+  Credentials credentials = {};
   /// For reaching the server; a server that starts meanwhile is found.
   std::chrono::milliseconds connect_timeout{2000};
   /// For the server to accept the stream, and then for each answer, counted from the frame or the
@@ -53,8 +57,9 @@ struct StreamOptions {
 class Stream final : public FrameStream {
  public:
   /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
-  /// Errors: INVALID_ARGUMENT (address, parameters, name or labels), UNAVAILABLE (no server
-  /// there), RESOURCE_EXHAUSTED (no room for another stream), DEADLINE_EXCEEDED, each in one line.
+  /// Errors: INVALID_ARGUMENT (address, credentials, parameters, name or labels), UNAVAILABLE (no
+  /// server there, or one of the two does not trust the other), UNAUTHENTICATED (token),
+  /// RESOURCE_EXHAUSTED (no room for another stream), DEADLINE_EXCEEDED, each in one line.
   static absl::StatusOr<std::unique_ptr<Stream>> Open(std::string_view address,
                                                       const StreamOptions& options);
 

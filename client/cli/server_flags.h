@@ -1,0 +1,21 @@
+// The flags of every verb that speaks to a server: where it is and how to be sure of each other.
+#pragma once
+
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "partiemc/client/credentials.h"
+
+namespace partiemc::client {
+
+struct ServerFlags {
+  std::string address = "127.0.0.1:50051";
+  Credentials credentials;
+};
+
+/// Adds --server, --tls, --tls-ca, --tls-cert, --tls-key and --token-file; gives --server. `flags`
+/// outlives the parsing. The token itself is read from PARTIEMC_TOKEN alone: a command line is no
+/// place for a secret.
+CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group);
+
+}  // namespace partiemc::client

@@ -1,0 +1,141 @@
+#include "library/credentials.h"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string_view>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+
+namespace partiemc::client {
+namespace {
+
+namespace experimental = grpc::experimental;
+
+constexpr std::size_t kMaxTokenBytes = 512;  // As servers take it.
+
+absl::Status Wrong(std::string field, std::string value, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
+}
+
+absl::StatusOr<std::string> ReadPem(const std::string& field, const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  std::string pem = std::move(text).str();
+  if (pem.find("-----BEGIN ") == std::string::npos) {
+    return Wrong(field, path, "must be a PEM file that can be read");
+  }
+  return pem;
+}
+
+// Reached without a network: what goes there stays on this machine.
+bool IsLocal(std::string_view address) {
+  if (address.starts_with("unix:")) return true;
+  const std::string_view host = address.substr(0, address.rfind(':'));
+  const bool number = std::ranges::all_of(
+      host, [](char c) { return absl::ascii_isdigit(static_cast<unsigned char>(c)) || c == '.'; });
+  return host == "localhost" || host == "[::1]" || (number && host.starts_with("127."));
+}
+
+bool IsToken(const std::string& text) {
+  return !text.empty() && text.size() <= kMaxTokenBytes && std::ranges::all_of(text, [](char c) {
+    return absl::ascii_isgraph(static_cast<unsigned char>(c));
+  });
+}
+
+absl::StatusOr<std::string> TokenOf(const Credentials& credentials) {
+  if (!credentials.token.empty()) {
+    if (IsToken(credentials.token)) return credentials.token;
+    return Wrong("token", "(not shown)", "must be at most 512 visible ASCII characters");
+  }
+  std::ifstream file(credentials.token_file);
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string word;
+    if (words >> word && word.front() != '#' && IsToken(word)) return word;
+  }
+  return Wrong("token_file", credentials.token_file,
+               "must be a file that can be read and holds a token");
+}
+
+class TokenSender final : public experimental::Interceptor {
+ public:
+  explicit TokenSender(std::string header) : header_(std::move(header)) {}
+
+  void Intercept(experimental::InterceptorBatchMethods* methods) override {
+    if (methods->QueryInterceptionHookPoint(
+            experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->emplace("authorization", std::move(header_));
+    }
+    methods->Proceed();
+  }
+
+ private:
+  std::string header_;
+};
+
+// An interceptor rather than call credentials, which gRPC has for TLS alone.
+class TokenSenderFactory final : public experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenSenderFactory(Credentials credentials) : credentials_(std::move(credentials)) {}
+
+  experimental::Interceptor* CreateClientInterceptor(experimental::ClientRpcInfo*) override {
+    const auto token = TokenOf(credentials_);
+    // A file that has gone meanwhile: the server says that there is no token.
+    return token.ok() ? new TokenSender(absl::StrCat("Bearer ", *token)) : nullptr;
+  }
+
+ private:
+  const Credentials credentials_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials(
+    const Credentials& credentials) {
+  if (!credentials.tls) {
+    for (const auto& [field, path] : {std::pair("ca_file", &credentials.ca_file),
+                                      std::pair("cert_file", &credentials.cert_file),
+                                      std::pair("key_file", &credentials.key_file)}) {
+      if (!path->empty()) return Wrong(field, *path, "goes with `tls`");
+    }
+    return grpc::InsecureChannelCredentials();
+  }
+  if (credentials.cert_file.empty() != credentials.key_file.empty()) {
+    return credentials.cert_file.empty()
+               ? Wrong("key_file", credentials.key_file, "goes with cert_file")
+               : Wrong("cert_file", credentials.cert_file, "goes with key_file");
+  }
+  grpc::SslCredentialsOptions options;
+  for (const auto& [field, path, pem] :
+       {std::tuple("ca_file", &credentials.ca_file, &options.pem_root_certs),
+        std::tuple("cert_file", &credentials.cert_file, &options.pem_cert_chain),
+        std::tuple("key_file", &credentials.key_file, &options.pem_private_key)}) {
+    if (path->empty()) continue;
+    auto read = ReadPem(field, *path);
+    if (!read.ok()) return read.status();
+    *pem = *std::move(read);
+  }
+  return grpc::SslCredentials(options);
+}
+
+absl::StatusOr<std::unique_ptr<experimental::ClientInterceptorFactoryInterface>> MakeTokenSender(
+    const Credentials& credentials, const std::string& address) {
+  std::unique_ptr<experimental::ClientInterceptorFactoryInterface> sender;
+  if (credentials.token.empty() && credentials.token_file.empty()) return sender;
+  if (const auto token = TokenOf(credentials); !token.ok()) return token.status();
+  if (!credentials.tls && !IsLocal(address)) {
+    return Wrong(credentials.token.empty() ? "token_file" : "token", "(not shown)",
+                 absl::StrCat("would travel to ", address,
+                              " in the clear; must go over TLS, or within this machine"));
+  }
+  sender = std::make_unique<TokenSenderFactory>(credentials);
+  return sender;
+}
+
+}  // namespace partiemc::client
