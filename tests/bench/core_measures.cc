@@ -127,6 +127,9 @@ void CoreMeasures::AddTo(Report& report) const {
     const Cost frame = harness_.Median("frame/" + name);
     report.AddMetric("compute_ms_" + name, frame.wall_ms, "ms");
     report.AddMetric("compute_cpu_ms_" + name, frame.cpu_ms, "ms");
+    report.AddMetric("particle_cpu_ns_" + name,
+                     1e6 * frame.cpu_ms / static_cast<double>(measured->scene->ParticleCount()),
+                     "ns");
     for (std::size_t k = 0; k < kStageCount; ++k) {
       const std::string stage(kStageNames[k]);
       const Cost cost = StageCost(*measured, static_cast<Stage>(k));
@@ -155,6 +158,16 @@ void CoreMeasures::AddTo(Report& report) const {
   report.AddMetric("sparse_over_compact_1m",
                    report.Metric("compute_cpu_ms_islands_1m") / report.Metric("compute_cpu_ms_1m"),
                    "ratio");
+  const auto field_cpu_ms = [&](const std::string& name) {
+    return report.Metric("bins_cpu_ms_" + name) + report.Metric("field_cpu_ms_" + name);
+  };
+  report.AddMetric("sparse_field_over_compact_1m", field_cpu_ms("islands_1m") / field_cpu_ms("1m"),
+                   "ratio");
+  if (report.HasMetric("particle_cpu_ns_4m")) {
+    report.AddMetric("particle_cpu_4m_over_100k",
+                     report.Metric("particle_cpu_ns_4m") / report.Metric("particle_cpu_ns_100k"),
+                     "ratio");
+  }
   AddStageTable(report);
   AddFloorTable(report);
   AddThreadTable(report);
@@ -180,7 +193,7 @@ void CoreMeasures::AddStageTable(Report& report) const {
     }
     row.push_back(WallAndCpu(frame));
     row.push_back(Figure(report.Metric("frame_over_field_" + measured->name)));
-    row.push_back(Figure(1e6 * frame.cpu_ms / static_cast<double>(particles)));
+    row.push_back(Figure(report.Metric("particle_cpu_ns_" + measured->name)));
     rows.push_back(row);
   }
   report.AddTable(rows);

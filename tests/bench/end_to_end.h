@@ -44,7 +44,7 @@ class FrameExchange {
 /// How long to measure: `runs` series of about `run_ms`, of at least `min_frames` each.
 struct EndToEndPlan {
   int runs = 5;
-  double run_ms = 1000;
+  double run_ms = 500;
   int min_frames = 12;
 };
 

@@ -115,8 +115,9 @@ void PeerMeasures::AddTo(Report& report) const {
       "faster. vtkSPHInterpolator sums its quintic kernel, of the same reach, at every node of the "
       "scene's box. The isolines are those of one blob: VTK's of the density at half of its inner "
       "value on 1024 x 1024 nodes, ours of the level set on the tiles that particles reach. VTK's "
-      "polylines have coordinates, are not nested and not cleaned; crossings and rings have no "
-      "coordinates yet, are nested and cleaned.");
+      "polylines are neither nested nor cleaned; what crossings and rings leave is, with the same "
+      "coordinates in cells, and with the particles of every body counted. The line below it goes "
+      "on to all that a result holds: normals from particles, measures, identities.");
   std::vector<Report::Row> rows = {
       {"work", "ours, wall / processor ms", "peer", "peer, wall / processor ms", "ratio"}};
   for (const Comparison& c : comparisons) {

@@ -7,7 +7,7 @@ usage() {
   cat <<'USAGE'
 usage: tests/bench/run.sh --output DIR [--quick] [--check] [--refresh]
   --output DIR  where bench.md and bench.csv go (default with --check or --refresh: build/bench)
-  --quick       fewer repetitions and cases: a minute or two instead of ten
+  --quick       fewer repetitions and cases: a minute or two instead of several
   --check       fail where a ratio is clearly worse than tests/bench/expected.csv has it; what is
                 found is measured a second time before it is believed
   --refresh     write the ratios of this run into tests/bench/expected.csv
@@ -54,7 +54,19 @@ if ! { cmake --preset release -DPARTIEMC_VTK=ON &&
 fi
 rm -f "$log"
 
-measure() { build/release/bin/partiemc-bench --output "$output" "${quick[@]}" "$@"; }
+# In the background, so that whatever ends this script ends it too; its servers end with it.
+bench=
+trap '[[ -z $bench ]] || kill "$bench" 2>/dev/null || true' EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM HUP
+measure() {
+  build/release/bin/partiemc-bench --output "$output" "${quick[@]}" "$@" &
+  bench=$!
+  local code=0
+  wait "$bench" || code=$?
+  bench=
+  return "$code"
+}
 
 readonly worse=3  # What the program returns where a ratio is worse than recorded.
 if ! $check; then

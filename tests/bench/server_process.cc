@@ -2,8 +2,8 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdlib.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -16,8 +16,6 @@
 #include "bench/clocks.h"
 #include "bench/progress.h"
 
-extern char** environ;
-
 namespace partiemc::bench {
 namespace {
 
@@ -29,19 +27,23 @@ std::filesystem::path NewFolder() {
   return folder;
 }
 
+// Starts a process that ends with this one, however that ends.
 pid_t Spawn(std::vector<std::string> arguments, const std::filesystem::path& log) {
+  constexpr int kCannotStart = 127;
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(),
-                                   O_CREAT | O_TRUNC | O_WRONLY, 0600);
-  pid_t process = 0;
-  const int error = posix_spawn(&process, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) Fail("cannot start " + arguments[0]);
-  return process;
+  const pid_t bench = getpid();
+  const pid_t process = fork();
+  if (process < 0) Fail("cannot start " + arguments[0]);
+  if (process > 0) return process;
+  // The new process: nothing but calls that are safe after a fork beside other threads.
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != bench) _exit(kCannotStart);  // It ended before it could be watched.
+  const int file = open(log.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
+  if (file < 0 || dup2(file, STDERR_FILENO) < 0) _exit(kCannotStart);
+  execv(argv[0], argv.data());
+  _exit(kCannotStart);
 }
 
 }  // namespace
