@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout release recordings sanitized core-alone consumer bench)
+readonly all_steps=(layout release recordings sanitized fuzz core-alone consumer bench)
 
 usage() {
   cat <<'USAGE'
@@ -14,6 +14,7 @@ Steps, all of them by default:
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
   sanitized   core and sessions under AddressSanitizer and UndefinedBehaviorSanitizer
+  fuzz        a minute of hostile bytes for every parser (tests/fuzz)
   core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
@@ -113,6 +114,12 @@ step_sanitized() {
     check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
       run_ctest "sanitized $room" "build/asan/tests/$room"
   done
+}
+
+step_fuzz() {
+  check "fuzz: configure" cmake --preset fuzz &&
+    check "fuzz: build" cmake --build --preset fuzz -j "$jobs" &&
+    check "fuzz" tests/fuzz/run.sh --seconds 60
 }
 
 step_core-alone() {

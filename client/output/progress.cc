@@ -43,7 +43,9 @@ double Rate(std::uint64_t done, double seconds) {
 }
 
 /// Rates below ten need a decimal.
-std::string RateText(double rate) { return absl::StrFormat(rate < 10 ? "%.1f" : "%.0f", rate); }
+std::string RateText(double rate) {
+  return rate < 10 ? absl::StrFormat("%.1f", rate) : absl::StrFormat("%.0f", rate);
+}
 
 std::optional<double> SecondsLeft(std::uint64_t done, std::uint64_t total, double seconds) {
   if (done == 0 || done >= total) return std::nullopt;

@@ -21,9 +21,11 @@ struct WorldPosition {
 template <typename Real>
 class PositionReader {
  public:
-  /// Requires: `first`, `second` < `components`.
+  /// Requires: `first`, `second` < `components`. `values` may be null where there are no particles.
   PositionReader(const Real* values, int components, int first, int second)
-      : first_(values + first), second_(values + second), components_(components) {}
+      : first_(values == nullptr ? nullptr : values + first),
+        second_(values == nullptr ? nullptr : values + second),
+        components_(components) {}
 
   WorldPosition operator[](std::size_t particle) const {
     const std::size_t at = particle * components_;

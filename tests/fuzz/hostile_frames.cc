@@ -1,0 +1,183 @@
+#include "fuzz/hostile_frames.h"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "fuzz/require.h"
+#include "fuzz/single_thread.h"
+#include "partiemc/partiemc.h"
+
+namespace partiemc::fuzz {
+namespace {
+
+constexpr std::size_t kMostParticles = 96;
+
+// A coordinate near `origin`, in one of the ways in which coordinates hurt: on nodes and half way
+// between them (ties), a hair beside them, anywhere, of any bits.
+double HostileCoordinate(Choices& choices, double origin, double spacing) {
+  const auto kind = choices.Take<std::uint8_t>();
+  const auto step = choices.Take<std::int8_t>();
+  const double place = origin + spacing * step;
+  switch (kind % 16) {
+    case 0:
+      return origin + spacing * 0.5 * step;
+    case 1:
+      return std::nextafter(place, std::numeric_limits<double>::infinity());
+    case 2:
+      return origin + spacing * 0x1p-17 * choices.Take<std::int16_t>();
+    case 3:
+      return place + spacing * choices.Take<std::int16_t>() * 0x1p-15;
+    case 4:
+      return kind == 4 ? choices.Take<double>() : place;
+    case 5:
+      return kind == 5 ? origin + spacing * choices.Take<float>() : place;
+    default:
+      return place;
+  }
+}
+
+double HostileOrigin(Choices& choices) {
+  constexpr double kOrigins[] = {0, 0, 0, 0, 0.5, -3.25, 1e6, -1e9, 16777216.5, 2e9, 1e15, -1e300};
+  return kOrigins[choices.Below(std::size(kOrigins))];
+}
+
+double HostileRatio(Choices& choices, double low, double usual, double high) {
+  switch (choices.Below(6)) {
+    case 0:
+      return low;
+    case 1:
+      return high;
+    case 2:
+      return low + (high - low) * choices.Take<std::uint16_t>() / 65535.0;
+    case 3:
+      return choices.Below(32) == 7 ? choices.Take<double>() : usual;
+    default:
+      return usual;
+  }
+}
+
+void RequireGuarantees(const ReconstructionParameters& parameters, const Result& result) {
+  if (parameters.placement == Placement::kFarthestParticle) return;
+  RequireOk(Validate(result, parameters.fill),
+            absl::StrCat("every guarantee holds (", std::string(Name(parameters.placement)), ", ",
+                         std::string(Name(parameters.fill)), ")"));
+  Require(result.statistics.self_intersections == 0, "no crossings are told");
+  Require(result.statistics.folded_triangles == 0, "no folds are told");
+}
+
+void RequireNoTrace(const absl::Status& status, const Result& result, const State& before,
+                    const State& after) {
+  Require(status.code() == absl::StatusCode::kInvalidArgument ||
+              status.code() == absl::StatusCode::kResourceExhausted,
+          absl::StrCat("a frame is refused for what it is: ", status.ToString()));
+  RequireViolation(status);
+  Require(result == Result{}, "the result of a refused frame is empty");
+  Require(Serialize(before) == Serialize(after), "a refused frame leaves no trace");
+}
+
+}  // namespace
+
+HostileFrame::HostileFrame(Choices& choices, double spacing) {
+  const auto shape = choices.Take<std::uint8_t>();
+  is_float_ = shape & 1;
+  components_ = (shape & 6) == 2 ? 3 : 2;
+  const std::size_t count = choices.Below(kMostParticles + 1);
+  const double x = HostileOrigin(choices), y = HostileOrigin(choices);
+  for (std::size_t k = 0; k < count && !choices.empty(); ++k) {
+    doubles_.push_back(HostileCoordinate(choices, x * spacing, spacing));
+    doubles_.push_back(HostileCoordinate(choices, y * spacing, spacing));
+    if (components_ == 3) doubles_.push_back(shape & 128 ? HostileCoordinate(choices, 0, 1) : 0);
+    if (shape & 8) volumes_.push_back(static_cast<float>(spacing * spacing));
+    if (shape & 16) ids_.push_back(choices.Take<std::uint8_t>());
+    if (shape & 32) {
+      for (int axis = 0; axis < components_; ++axis) velocities_.push_back(choices.Take<float>());
+    }
+  }
+  if (!volumes_.empty() && choices.Flip())
+    volumes_[choices.Below(volumes_.size())] = choices.Take<float>();
+  if ((shape & 64) && !doubles_.empty()) doubles_.pop_back();  // Half a particle.
+  if (choices.Below(16) == 5 && !ids_.empty()) ids_.pop_back();
+  time_ = choices.Flip() ? choices.Take<std::int8_t>() : choices.Take<double>();
+  if (!is_float_) return;
+  for (const double value : doubles_) {
+    // Beyond its range a conversion to float is undefined.
+    const bool fits = std::abs(value) <= std::numeric_limits<float>::max();
+    floats_.push_back(fits ? static_cast<float>(value) : std::numeric_limits<float>::infinity());
+  }
+}
+
+Frame HostileFrame::AsFrame() const {
+  Frame frame{.positions = std::span<const double>(doubles_),
+              .components = components_,
+              .volumes = volumes_,
+              .ids = ids_,
+              .velocities = velocities_,
+              .time = time_};
+  if (is_float_) frame.positions = std::span<const float>(floats_);
+  return frame;
+}
+
+ReconstructionParameters HostileParameters(Choices& choices) {
+  ReconstructionParameters parameters;
+  parameters.placement = AllPlacements()[choices.Below(AllPlacements().size())];
+  parameters.fill = AllFills()[choices.Below(AllFills().size())];
+  const auto flags = choices.Take<std::uint8_t>();
+  constexpr double kSpacings[] = {1, 0.01, 1e-9, 1e7, 1e-60, 1e60, 0.0303, 3};
+  if (!(flags & 1)) parameters.spacing = kSpacings[choices.Below(8)];
+  parameters.spacing_rule = flags & 2 ? SpacingRule::kEveryFrame : SpacingRule::kFirstFrame;
+  parameters.normal_memory = !(flags & 4);
+  if (flags & 8) parameters.clean = (flags & 16) != 0;
+  parameters.plane = flags & 32 ? Plane::kYz : Plane::kXy;
+  if (flags & 64) parameters.min_component_area = choices.Take<std::uint8_t>();
+  if (flags & 128) parameters.min_component_particles = choices.Take<std::uint8_t>();
+  parameters.kernel_radius = HostileRatio(choices, 1.5, 3, 8);
+  parameters.cell_size = HostileRatio(choices, 0.25, 1, 4);
+  if (choices.Below(4) == 1) {
+    parameters.reference_radius = HostileRatio(choices, 0.01, 1, 7.9);
+  }
+  if (choices.Below(4) == 1) parameters.surface_offset = HostileRatio(choices, -1, 0, 1);
+  return parameters;
+}
+
+void AttackStream(Choices& choices, const ReconstructionParameters& parameters, State state,
+                  int frames) {
+  const SingleThread single_thread;
+  const auto reconstructor = Reconstructor::Create(parameters, kHostileLimits);
+  if (!reconstructor.ok()) {
+    RequireViolation(reconstructor.status());
+    return;
+  }
+  static auto* const workspace = new Workspace;  // Its history never changes a result.
+  Result result, again;
+  for (int k = 0; k < frames; ++k) {
+    const HostileFrame frame(choices, parameters.spacing.value_or(1));
+    const State before = state;
+    const absl::Status status =
+        reconstructor->Reconstruct(frame.AsFrame(), state, *workspace, result);
+    if (!status.ok()) {
+      RequireNoTrace(status, result, before, state);
+      continue;
+    }
+    RequireGuarantees(parameters, result);
+    if (choices.Below(4) != 0) continue;
+    const std::string bytes = Serialize(before);
+    auto restored = ParseState(bytes);
+    RequireOk(restored.status(), "a state reads back");
+    Require(Serialize(*restored) == bytes, "a state reads back the same");
+    Workspace fresh;
+    RequireOk(reconstructor->Reconstruct(frame.AsFrame(), *restored, fresh, again),
+              "a restored stream takes the same frame");
+    Require(result == again && Serialize(*restored) == Serialize(state),
+            "a stream goes on from a restored state bit for bit");
+  }
+}
+
+void AttackFrames(Bytes bytes) {
+  Choices choices(bytes);
+  const ReconstructionParameters parameters = HostileParameters(choices);
+  AttackStream(choices, parameters, State{}, 1 + static_cast<int>(choices.Below(3)));
+}
+
+}  // namespace partiemc::fuzz

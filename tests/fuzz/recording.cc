@@ -1,0 +1,69 @@
+// Recordings: as they are, or fuzzed blocks packed as the writer packs them, so that zstd's
+// checksums keep nothing away from the reader.
+#include "recording/recording.h"
+
+#include "fuzz/choices.h"
+#include "fuzz/memory_file.h"
+#include "fuzz/require.h"
+#include "recording/block.h"
+
+namespace partiemc::fuzz {
+namespace {
+
+// Blocks, each behind its length in two bytes, between marks that are right but for the frame
+// count, which is fuzzed.
+std::string Recording(Choices& choices) {
+  static auto* const packer = new client::recording::BlockPacker(1);
+  std::string file =
+      client::recording::MakeMark(client::recording::kFileTag, client::recording::kVersion);
+  const std::uint8_t frame_count = choices.Take<std::uint8_t>();
+  while (!choices.empty()) {
+    const auto block = packer->Pack(choices.TakeText(choices.Take<std::uint16_t>()));
+    RequireOk(block.status(), "a block can be packed");
+    file += *block;
+  }
+  if (frame_count < 128) {
+    file += client::recording::MakeMark(client::recording::kTailTag, frame_count);
+  }
+  return file;
+}
+
+void RequireWhole(const client::RecordedFrame& frame) {
+  const std::size_t count = frame.ParticleCount();
+  Require(frame.positions.size() == 2 * count, "two coordinates a particle");
+  Require(frame.ids.empty() || frame.ids.size() == count, "ids of all particles, or none");
+  Require(frame.volumes.empty() || frame.volumes.size() == count, "volumes of all, or none");
+  Require(frame.velocities.empty() || frame.velocities.size() == 2 * count,
+          "velocities of all particles, or none");
+}
+
+void ReadAll(const std::string& path, const std::string& range) {
+  const auto reader = client::RecordingReader::Open(path, range);
+  if (!reader.ok()) return;
+  client::RecordedFrame frame;
+  std::optional<std::size_t> before;
+  while (true) {
+    const auto more = (*reader)->Next(frame);
+    if (!more.ok()) {
+      Require((*reader)->Next(frame).status() == more.status(), "an error stays");
+      return;
+    }
+    if (!*more) return;
+    RequireWhole(frame);
+    Require(!before || frame.index > *before, "frames come in order");
+    before = frame.index;
+  }
+}
+
+}  // namespace
+
+void AttackRecording(Bytes bytes) {
+  Choices choices(bytes);
+  const auto choice = choices.Take<std::uint8_t>();
+  const bool as_it_is = choice & 1;
+  const MemoryFile file(as_it_is ? std::string(choices.TakeRest()) : Recording(choices));
+  if (choice & 2) client::IsRecording(file.path());
+  ReadAll(file.path(), choice & 4 ? "1::2" : "");
+}
+
+}  // namespace partiemc::fuzz

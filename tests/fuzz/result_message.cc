@@ -1,0 +1,69 @@
+// A server's answer as the client gets it: whatever it says, what is accepted is whole.
+#include <cmath>
+
+#include "fuzz/require.h"
+#include "fuzz/targets.h"
+#include "partiemc/partiemc.h"
+#include "wire/codec.h"
+
+namespace partiemc::fuzz {
+namespace {
+
+// What writers and callers index with what.
+void RequireWhole(const Result& result) {
+  const Rings& rings = result.rings;
+  Require(rings.offsets.size() == rings.RingCount() + 1 || rings.RingCount() == 0,
+          "a ring has a beginning and an end");
+  Require(rings.measures.size() == rings.RingCount(), "a ring has measures");
+  for (std::size_t k = 0; k < rings.RingCount(); ++k) {
+    Require(rings.offsets[k] < rings.offsets[k + 1] && rings.offsets[k + 1] <= rings.PointCount(),
+            "a ring's points are there");
+    const std::uint32_t outer = rings.outer_of[k];
+    Require(outer == kNoRing || (outer < rings.RingCount() && rings.outer_of[outer] == kNoRing),
+            "a hole's outer ring is one");
+    rings.ParentsOf(k);
+  }
+  Require(rings.normals.empty() || rings.normals.size() == rings.points.size(),
+          "normals are there for every point, or none");
+  Require(result.mesh.triangles.size() == 3 * result.mesh.TriangleCount(),
+          "a triangle has three points and a class");
+  for (const std::uint32_t point : result.mesh.triangles) {
+    Require(point < result.mesh.PointCount(), "a triangle's points are there");
+  }
+  for (const TriangleClass of_triangle : result.mesh.classes) {
+    Require(of_triangle == TriangleClass::kBoundary || of_triangle == TriangleClass::kInterior,
+            "a triangle's class is known");
+  }
+  for (const double coordinate : rings.points) Require(std::isfinite(coordinate), "finite points");
+  for (const double coordinate : result.mesh.points) {
+    Require(std::isfinite(coordinate), "finite points");
+  }
+}
+
+}  // namespace
+
+void AttackResultMessage(Bytes bytes) {
+  v1::ReconstructedFrame message;
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
+  wire::ReconstructedFrame frame;
+  const absl::Status status = wire::DecodeResult(message, frame);
+  if (!status.ok()) {
+    Require(absl::IsDataLoss(status), "a broken answer is DATA_LOSS");
+    Require(frame.result.rings.points.empty() && frame.result.mesh.points.empty(),
+            "a broken answer leaves nothing");
+    return;
+  }
+  RequireWhole(frame.result);
+  // What --check and the writers do with it must not depend on a server that means well.
+  if (Validate(frame.result).ok()) CountTJunctions(frame.result);
+  v1::ReconstructedFrame again;
+  RequireOk(wire::EncodeResult(frame.result, frame.times, {.normals = true}, again),
+            "what was decoded can be encoded");
+  wire::ReconstructedFrame twice;
+  RequireOk(wire::DecodeResult(again, twice), "and decoded again");
+  Require(DigestRings(frame.result.rings) == DigestRings(twice.result.rings) &&
+              DigestMesh(frame.result.mesh) == DigestMesh(twice.result.mesh),
+          "to the same bits");
+}
+
+}  // namespace partiemc::fuzz

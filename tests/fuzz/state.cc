@@ -1,0 +1,66 @@
+// A serialised state: as it comes, and with the magic number, version and checksum put right, so
+// that they keep nothing away from what follows them. A state that is accepted is gone on from.
+#include "partiemc/state.h"
+
+#include <string>
+
+#include "fuzz/choices.h"
+#include "fuzz/hostile_frames.h"
+#include "fuzz/require.h"
+#include "partiemc/status.h"
+
+namespace partiemc::fuzz {
+namespace {
+
+constexpr std::size_t kMarkBytes = 8;  // Magic number and version.
+constexpr std::size_t kChecksumBytes = 8;
+
+// FNV-1a, as state.cc has it.
+std::uint64_t ChecksumOf(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char byte : bytes) {
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x00000100000001b3u;
+  }
+  return hash;
+}
+
+std::string PutRight(std::string_view bytes) {
+  static const auto* const kMark = new std::string(Serialize(State{}).substr(0, kMarkBytes));
+  std::string state = *kMark;
+  if (bytes.size() > kMarkBytes + kChecksumBytes) {
+    state += bytes.substr(kMarkBytes, bytes.size() - kMarkBytes - kChecksumBytes);
+  }
+  const std::uint64_t checksum = ChecksumOf(state);
+  for (std::size_t k = 0; k < kChecksumBytes; ++k) {
+    state.push_back(static_cast<char>(checksum >> (8 * k)));
+  }
+  return state;
+}
+
+std::optional<State> Parse(std::string_view bytes) {
+  const auto state = ParseState(bytes);
+  if (state.ok()) return *state;
+  RequireViolation(state.status());
+  Require(FindViolation(state.status())->reason == kReasonCorruptState,
+          "bytes that are no state are CORRUPT_STATE");
+  return std::nullopt;
+}
+
+}  // namespace
+
+void AttackState(Bytes bytes) {
+  Choices choices(bytes);
+  const ReconstructionParameters parameters = HostileParameters(choices);
+  // The frames come first, so that the state is all of the rest.
+  const std::string_view frames = choices.TakeText(choices.Take<std::uint8_t>());
+  const std::string_view rest = choices.TakeRest();
+  Parse(rest);
+  const std::string right = PutRight(rest);
+  if (const auto state = Parse(right)) {
+    Require(Parse(Serialize(*state)).has_value(), "a state that was accepted is accepted again");
+    Choices of_frames(Bytes(reinterpret_cast<const std::uint8_t*>(frames.data()), frames.size()));
+    AttackStream(of_frames, parameters, *state, 2);
+  }
+}
+
+}  // namespace partiemc::fuzz
