@@ -6,10 +6,17 @@
 #include "partiemc/status.h"
 
 namespace partiemc::client {
+namespace {
+
+double TimeOf(const RecordedFrame& recorded) {
+  return recorded.time.value_or(static_cast<double>(recorded.index));
+}
+
+}  // namespace
 
 FrameFeeder::FrameFeeder(Sequence& input, FrameStream& stream,
-                         std::optional<double> frames_per_second)
-    : input_(input), stream_(stream), frames_per_second_(frames_per_second) {
+                         std::optional<double> frames_per_second, SendPolicy policy)
+    : input_(input), stream_(stream), frames_per_second_(frames_per_second), policy_(policy) {
   reader_ = std::thread([this] { Read(); });
   sender_ = std::thread([this] { SendAll(); });
 }
@@ -35,6 +42,11 @@ void FrameFeeder::Recycle(FramePointer frame) {
 std::vector<FrameFeeder::Refused> FrameFeeder::TakeRefused() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(refused_, {});
+}
+
+std::uint64_t FrameFeeder::skipped_count() const {
+  const std::scoped_lock lock(mutex_);
+  return skipped_;
 }
 
 void FrameFeeder::Stop() {
@@ -74,15 +86,18 @@ void FrameFeeder::Read() {
 }
 
 void FrameFeeder::SendAll() {
+  std::optional<LatestSender> latest;
+  if (policy_ == SendPolicy::kLatest) latest.emplace(stream_, Hooks());
   std::size_t sent = 0;
   while (auto frame = read_ahead_.Pop()) {
-    if (!Pace(sent++) || !SendOne(*std::move(frame))) {
+    if (!Pace(sent++) ||
+        !(latest ? Offer(*latest, *std::move(frame)) : SendOne(*std::move(frame)))) {
       read_ahead_.Close();
       return;
     }
   }
   // An error ends the stream, and is told by Receive.
-  stream_.FinishSending().IgnoreError();
+  (latest ? latest->Finish() : stream_.FinishSending()).IgnoreError();
 }
 
 bool FrameFeeder::Pace(std::size_t sent) {
@@ -94,8 +109,7 @@ bool FrameFeeder::Pace(std::size_t sent) {
   return !stopped_.wait_until(lock, due, [this] { return stop_; });
 }
 
-bool FrameFeeder::SendOne(FramePointer owned) {
-  const RecordedFrame& recorded = *owned;
+Frame FrameFeeder::View(const RecordedFrame& recorded) {
   Frame frame{.positions = std::span<const double>(recorded.positions),
               .volumes = recorded.volumes,
               .ids = recorded.ids};
@@ -108,20 +122,59 @@ bool FrameFeeder::SendOne(FramePointer owned) {
     }
     frame.positions = std::span<const float>(as_float32_);
   }
-  const double time = recorded.time.value_or(static_cast<double>(recorded.index));
+  return frame;
+}
+
+bool FrameFeeder::SendOne(FramePointer owned) {
+  const RecordedFrame& recorded = *owned;
+  const Frame frame = View(recorded);
   {
     // Before it is sent: its answer may be there before Send returns.
     const std::scoped_lock lock(mutex_);
     unanswered_.push_back(std::move(owned));
   }
-  const auto sequence = stream_.Send(frame, time);
+  const auto sequence = stream_.Send(frame, TimeOf(recorded));
   if (sequence.ok()) return true;
   if (!FindViolation(sequence.status())) return false;
+  RefuseLast(sequence.status());
+  return true;
+}
+
+bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
+  const RecordedFrame& recorded = *owned;
+  const Frame frame = View(recorded);
+  const double time = TimeOf(recorded);
+  {
+    // Before it is offered: it may be sent, and answered, before Offer returns.
+    const std::scoped_lock lock(mutex_);
+    offered_.push_back(std::move(owned));
+  }
+  return sender.Offer(frame, time).ok();
+}
+
+// Frames are sent and skipped in the order in which they were offered.
+OfferHooks FrameFeeder::Hooks() {
+  return {.sending =
+              [this](std::uint64_t) {
+                const std::scoped_lock lock(mutex_);
+                unanswered_.push_back(std::move(offered_.front()));
+                offered_.pop_front();
+              },
+          .skipped =
+              [this](std::uint64_t) {
+                const std::scoped_lock lock(mutex_);
+                ++skipped_;
+                free_.push_back(std::move(offered_.front()));
+                offered_.pop_front();
+              },
+          .refused = [this](std::uint64_t, const absl::Status& status) { RefuseLast(status); }};
+}
+
+void FrameFeeder::RefuseLast(const absl::Status& status) {
   const std::scoped_lock lock(mutex_);
-  refused_.push_back({recorded.source, OneLine(sequence.status())});
+  refused_.push_back({unanswered_.back()->source, OneLine(status)});
   free_.push_back(std::move(unanswered_.back()));
   unanswered_.pop_back();
-  return true;
 }
 
 }  // namespace partiemc::client

@@ -181,6 +181,13 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("FPS")
       ->capture_default_str()
       ->group(kGroup);
+  app.add_option("--policy", flags.policy,
+                 "Where frames come faster than they are taken: block (they wait, none is lost) or "
+                 "latest (the newest is sent, others are skipped and counted)")
+      ->check(CLI::IsMember({"block", "latest"}))
+      ->type_name("WHICH")
+      ->capture_default_str()
+      ->group(kGroup);
 }
 
 void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
@@ -332,7 +339,8 @@ int Replay(const ReplayFlags& flags) {
   progress_options.total = input->frames->FrameCount();
   Progress progress(std::move(progress_options));
   const Clock::time_point start = Clock::now();
-  FrameFeeder feeder(*input->frames, **stream, *rate);
+  FrameFeeder feeder(*input->frames, **stream, *rate,
+                     flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock);
   Receiver receiver(flags, **stream, feeder, *outputs, progress);
   const ExitCode ended = receiver.Run();
   if (ended != kGood) feeder.Stop();
@@ -342,6 +350,10 @@ int Replay(const ReplayFlags& flags) {
 
   if (!flags.quiet) {
     for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
+    if (feeder.skipped_count() > 0) {
+      Complain(kGood, Concat(Plural(feeder.skipped_count(), "frame"),
+                             " skipped, because newer ones came (--policy latest)"));
+    }
   }
   if (ended == kInterrupted) {
     return Complain(kInterrupted, Concat("interrupted after ",

@@ -36,6 +36,7 @@ struct ReplayFlags {
   std::uint64_t min_particles = 0;
 
   std::string rate = "max";
+  std::string policy = "block";
   bool check = false;
   bool keep_going = false;
   bool quiet = false;

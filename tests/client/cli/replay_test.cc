@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <sstream>
 #include <thread>
@@ -69,6 +70,32 @@ TEST(Replay, InProcessWritesEveryOutputAndATable) {
   expected.insert(expected.end(), {"report.html", "stats.csv"});
   EXPECT_EQ(FilesIn(directory.path()), expected);
   EXPECT_THAT(Column(Content(directory.Path("stats.csv")), "frame"), ElementsAre("10", "11", "12"));
+}
+
+// Each frame is either replayed under its own index or counted as skipped; the last one is always
+// replayed.
+TEST(Replay, ByTheLatestPolicyEveryFrameIsReplayedOrSkippedAndCounted) {
+  for (const char* rate : {"max", "150"}) {
+    const TemporaryDirectory directory;
+    const Ran ran =
+        RunPartiemc({"replay", kDamBreak, "--local", "--threads", "1", "--policy", "latest",
+                     "--rate", rate, "--check", "--stats", directory.Path("stats.csv")});
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    std::vector<int> frames;
+    for (const std::string& frame : Column(Content(directory.Path("stats.csv")), "frame")) {
+      frames.push_back(std::stoi(frame));
+    }
+    EXPECT_TRUE(std::ranges::is_sorted(frames, std::ranges::less_equal()));
+    ASSERT_FALSE(frames.empty());
+    EXPECT_EQ(frames.back(), 74);
+    const auto skipped = 75 - frames.size();
+    if (skipped > 0) {
+      EXPECT_THAT(ran.error, HasSubstr(std::to_string(skipped) + " frame"));
+      EXPECT_THAT(ran.error, HasSubstr("skipped, because newer ones came"));
+    } else {
+      EXPECT_EQ(ran.error.find("skipped"), std::string::npos);
+    }
+  }
 }
 
 // A block that stays and one that leaps over it, with the columns that `header` names.

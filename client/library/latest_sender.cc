@@ -1,0 +1,152 @@
+#include "partiemc/client/latest_sender.h"
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "partiemc/status.h"
+
+namespace partiemc::client {
+namespace {
+
+// A frame that owns its arrays. Assigning to it uses its memory again.
+class FrameCopy {
+ public:
+  void Assign(const Frame& frame, double time, std::uint64_t offer) {
+    frame_ = frame;
+    time_ = time;
+    offer_ = offer;
+    if (const auto* singles = std::get_if<std::span<const float>>(&frame.positions)) {
+      frame_.positions = Copy(*singles, singles_);
+    } else {
+      frame_.positions = Copy(std::get<std::span<const double>>(frame.positions), doubles_);
+    }
+    frame_.volumes = Copy(frame.volumes, volumes_);
+    frame_.ids = Copy(frame.ids, ids_);
+    frame_.velocities = Copy(frame.velocities, velocities_);
+  }
+
+  const Frame& frame() const { return frame_; }
+  double time() const { return time_; }
+  std::uint64_t offer() const { return offer_; }
+
+ private:
+  template <typename T>
+  static std::span<const T> Copy(std::span<const T> from, std::vector<T>& to) {
+    to.assign(from.begin(), from.end());
+    return to;
+  }
+
+  std::vector<float> singles_;
+  std::vector<double> doubles_;
+  std::vector<float> volumes_, velocities_;
+  std::vector<std::uint64_t> ids_;
+  Frame frame_;  // Of views into the vectors.
+  double time_ = 0;
+  std::uint64_t offer_ = 0;
+};
+
+}  // namespace
+
+class LatestSender::Sending {
+ public:
+  Sending(FrameStream& stream, OfferHooks hooks) : stream_(stream), hooks_(std::move(hooks)) {
+    thread_ = std::thread([this] { Run(); });
+  }
+  ~Sending() {
+    if (!thread_.joinable()) return;
+    {
+      const std::scoped_lock lock(mutex_);
+      Stop(absl::CancelledError("the sender went away"));
+    }
+    stream_.Cancel();
+    thread_.join();
+  }
+
+  absl::Status Offer(const Frame& frame, double time) {
+    const std::scoped_lock lock(mutex_);
+    if (finishing_) return absl::FailedPreconditionError("frame: offered after Finish");
+    if (!status_.ok()) return status_;
+    if (std::exchange(is_waiting_, true)) {
+      ++counts_.skipped;
+      hooks_.skipped(waiting_.offer());
+    }
+    waiting_.Assign(frame, time, ++offers_);
+    changed_.notify_all();
+    return absl::OkStatus();
+  }
+
+  absl::Status Finish() {
+    {
+      const std::scoped_lock lock(mutex_);
+      if (finishing_) return absl::FailedPreconditionError("Finish: called twice");
+      finishing_ = true;
+      changed_.notify_all();
+    }
+    thread_.join();
+    return status_.ok() ? stream_.FinishSending() : status_;
+  }
+
+  OfferCounts counts() const {
+    const std::scoped_lock lock(mutex_);
+    return counts_;
+  }
+
+ private:
+  void Run() {
+    FrameCopy in_hand;
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] { return is_waiting_ || finishing_ || !status_.ok(); });
+      if (!status_.ok() || !is_waiting_) return;
+      std::swap(in_hand, waiting_);
+      is_waiting_ = false;
+      ++counts_.sent;
+      // Before it is sent: its answer may be there before Send returns.
+      hooks_.sending(in_hand.offer());
+      lock.unlock();
+      const absl::Status sent = stream_.Send(in_hand.frame(), in_hand.time()).status();
+      lock.lock();
+      if (sent.ok()) continue;
+      --counts_.sent;
+      if (FindViolation(sent)) {
+        ++counts_.refused;
+        hooks_.refused(in_hand.offer(), sent);
+      } else {
+        Stop(sent);
+      }
+    }
+  }
+
+  void Stop(absl::Status status) {
+    if (status_.ok()) status_ = std::move(status);
+    changed_.notify_all();
+  }
+
+  FrameStream& stream_;
+  const OfferHooks hooks_;
+
+  mutable std::mutex mutex_;  // Guards everything below.
+  std::condition_variable changed_;
+  FrameCopy waiting_;
+  bool is_waiting_ = false, finishing_ = false;
+  std::uint64_t offers_ = 0;
+  OfferCounts counts_;
+  absl::Status status_;  // Of the stream; what ended it.
+  std::thread thread_;
+};
+
+LatestSender::LatestSender(FrameStream& stream, OfferHooks hooks)
+    : sending_(std::make_unique<Sending>(stream, std::move(hooks))) {}
+LatestSender::~LatestSender() = default;
+
+absl::Status LatestSender::Offer(const Frame& frame, double time) {
+  return sending_->Offer(frame, time);
+}
+absl::Status LatestSender::Finish() { return sending_->Finish(); }
+OfferCounts LatestSender::counts() const { return sending_->counts(); }
+
+}  // namespace partiemc::client
