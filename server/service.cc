@@ -178,6 +178,7 @@ grpc::ServerUnaryReactor* Service::GetServerInfo(grpc::CallbackServerContext* co
     parameters.fill = fill;
     if (Reconstructor::Create(parameters).ok()) response->add_fills(wire::ToWire(fill));
   }
+  response->add_capabilities("resume");
   response->set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
   response->set_draining(registry_.draining());
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();

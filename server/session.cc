@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "server/checkpoint.h"
 
 namespace partiemc::server {
 
@@ -21,6 +22,21 @@ absl::StatusOr<Session> Session::Open(const ReconstructionParameters& parameters
   auto reconstructor = Reconstructor::Create(parameters, limits);
   if (!reconstructor.ok()) return reconstructor.status();
   return Session(*std::move(reconstructor));
+}
+
+absl::StatusOr<Session> Session::Resume(const ReconstructionParameters& parameters,
+                                        const FrameLimits& limits, std::string_view checkpoint) {
+  auto session = Open(parameters, limits);
+  if (!session.ok()) return session;
+  auto restored = ParseCheckpoint(checkpoint, session->parameters());
+  if (!restored.ok()) return restored.status();
+  session->next_sequence_ = restored->next_sequence;
+  session->state_ = std::move(restored->state);
+  return session;
+}
+
+std::string Session::Checkpoint() const {
+  return Serialize(server::Checkpoint{next_sequence_, state_}, parameters());
 }
 
 absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,

@@ -63,6 +63,14 @@ class Session {
   static absl::StatusOr<Session> Open(const ReconstructionParameters& parameters,
                                       const FrameLimits& limits);
 
+  /// Goes on after the frame that `checkpoint` was made after, bit for bit as if the stream had
+  /// never stopped. Errors: also those of ParseCheckpoint.
+  static absl::StatusOr<Session> Resume(const ReconstructionParameters& parameters,
+                                        const FrameLimits& limits, std::string_view checkpoint);
+
+  /// What Resume takes, after the last frame. Costs and takes as much as the state.
+  std::string Checkpoint() const;
+
   /// Reconstructs the frame and hands the result to `deliver`. `frame` is an error where the frame
   /// could not be decoded.
   /// Errors, each with a Violation, after which the state is as if the frame had never come:

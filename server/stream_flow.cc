@@ -150,6 +150,15 @@ void StreamFlow::Granted(std::uint64_t bytes) {
   });
 }
 
+void StreamFlow::TakenOver() {
+  On([&] {
+    Abandon(ViolationError(absl::StatusCode::kAborted, {std::string(kReasonTakenOver), "stream",
+                                                        "resumed by its producer in another call",
+                                                        "must be read where it was resumed"}));
+    owes_cut_ = true;
+  });
+}
+
 void StreamFlow::Drain() {
   On([&] {
     if (phase_ == Phase::kStreaming) owes_notice_ = true;

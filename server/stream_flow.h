@@ -20,6 +20,7 @@ namespace partiemc::server {
 /// The reasons for which the flow ends a stream (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonProtocol = "PROTOCOL";
 inline constexpr std::string_view kReasonDraining = "DRAINING";
+inline constexpr std::string_view kReasonTakenOver = "TAKEN_OVER";
 inline constexpr std::string_view kReasonIdle = "IDLE";
 
 /// UNAVAILABLE with the Violation that a draining server gives everybody.
@@ -107,6 +108,9 @@ class StreamFlow final : public MemoryBudget::Waiter,
   void WriteDone(bool ok);
   /// Nobody waits for answers any more.
   void Cancelled();
+  /// The client goes on with this stream in another call, and its connection may be dead: answers
+  /// nothing more and ends with ABORTED.
+  void TakenOver();
   /// The server is going away: reads no further frame, sends Outgoing::kDraining, answers what was
   /// read and ends the stream with UNAVAILABLE.
   void Drain();

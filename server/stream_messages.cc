@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "server/stream_token.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {
@@ -36,21 +37,6 @@ absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request
   return ViolationError(absl::StatusCode::kInvalidArgument,
                         {std::string(kReasonMalformed), "frame",
                          absl::StrCat(bytes.Length(), " bytes"), "must be a ParticleFrame"});
-}
-
-// Parts of the protocol that this server does not speak are refused, not ignored.
-absl::Status CheckCapabilities(const v1::OpenStream& open) {
-  const auto unsupported = [](std::string field, std::string value) {
-    return ViolationError(
-        absl::StatusCode::kInvalidArgument,
-        {std::string(wire::kReasonUnsupported), std::move(field), std::move(value),
-         "must be absent: this server lacks the capability \"resume\""});
-  };
-  if (open.checkpoint_interval() != 0) {
-    return unsupported("open.checkpoint_interval", absl::StrCat(open.checkpoint_interval()));
-  }
-  if (open.has_resume()) return unsupported("open.resume", "present");
-  return absl::OkStatus();
 }
 
 }  // namespace
@@ -134,23 +120,29 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
         {std::string(kReasonProtocol), "request", "malformed", "must be a ReconstructRequest"});
   }
   const v1::OpenStream& open = request.open();
-  if (auto status = CheckCapabilities(open); !status.ok()) return status;
   const auto parameters = wire::DecodeParameters(open.parameters());
   if (!parameters.ok()) return parameters.status();
   const auto outputs = wire::DecodeOutputs(open.outputs(), open.has_outputs());
   if (!outputs.ok()) return outputs.status();
-  auto session = Session::Open(*parameters, limits_.frame);
+  auto session = open.has_resume()
+                     ? Session::Resume(*parameters, limits_.frame, open.resume().checkpoint())
+                     : Session::Open(*parameters, limits_.frame);
   if (!session.ok()) return session.status();
-  auto stream = registry_.Open(flow, {.name = open.stream_name(),
-                                      .labels = {open.labels().begin(), open.labels().end()},
-                                      .parameters = session->parameters()});
+  const std::string token = open.has_resume() ? open.resume().stream_token() : NewStreamToken();
+  auto stream = registry_.Open(flow,
+                               {.name = open.stream_name(),
+                                .labels = {open.labels().begin(), open.labels().end()},
+                                .parameters = session->parameters()},
+                               token);
   if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
   outputs_ = *outputs;
+  checkpoint_interval_ = open.checkpoint_interval();
 
   v1::ReconstructResponse response;
   v1::StreamOpened& opened = *response.mutable_opened();
   opened.set_stream_id(stream->id);
+  opened.set_stream_token(token);
   wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
   opened.set_frames_in_flight(limits_.frames_in_flight);
   EncodeLimits(limits_, *opened.mutable_limits());
@@ -165,16 +157,26 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
   requests_[slot].Clear();
   const v1::ParticleFrame& request = messages->request.frame();
   v1::ReconstructedFrame& result = *messages->result.mutable_frame();
+  const std::uint64_t next_sequence = session_->next_sequence();
   const absl::Status status =
       AnswerFrame(parsed.ok() ? DecodeFrameWithin(request, limits_) : parsed, request.sequence(),
                   outputs_, *session_, worker, result);
+  const bool used_number = session_->next_sequence() > next_sequence;
+  const bool has_checkpoint =
+      checkpoint_interval_ > 0 && used_number && next_sequence % checkpoint_interval_ == 0;
   if (status.ok()) {
     result.set_sequence(request.sequence());
+    if (has_checkpoint) {
+      result.set_checkpoint(session_->Checkpoint());
+    } else {
+      result.clear_checkpoint();
+    }
     answers_[slot] = wire::ToBytes(messages->result);
   } else {
     v1::ReconstructResponse error;
     wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
                            *error.mutable_error());
+    if (has_checkpoint) error.mutable_error()->set_checkpoint(session_->Checkpoint());
     answers_[slot] = wire::ToBytes(error);
     messages->request.Clear();  // Nothing has checked its size.
   }

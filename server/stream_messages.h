@@ -64,6 +64,7 @@ class StreamMessages {
   grpc::ByteBuffer opened_;
   grpc::ByteBuffer draining_;
   std::optional<Session> session_;  // Once open.
+  std::uint32_t checkpoint_interval_ = 0;
   wire::Outputs outputs_;
 };
 

@@ -8,6 +8,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "server/stream_token.h"
 
 namespace partiemc::server {
 namespace {
@@ -55,6 +56,14 @@ absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
   return absl::OkStatus();
 }
 
+absl::Status CheckToken(std::string_view token) {
+  if (IsStreamToken(token)) return absl::OkStatus();
+  // What was given is nobody's business, and may be a secret of something else.
+  return Refused(absl::StatusCode::kInvalidArgument, kReasonStreamToken, "open.resume.stream_token",
+                 absl::StrCat(token.size(), " characters"),
+                 "must be the stream_token of StreamOpened");
+}
+
 }  // namespace
 
 StreamRegistry::StreamRegistry(std::uint32_t max_streams)
@@ -80,15 +89,21 @@ absl::Status StreamRegistry::TooMany(absl::string_view what, std::uint32_t count
 }
 
 absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
-                                                   StreamDescription description) {
+                                                   StreamDescription description,
+                                                   std::string token) {
   if (auto status = CheckName(description.name); !status.ok()) return status;
   if (auto status = CheckLabels(description.labels); !status.ok()) return status;
+  if (auto status = CheckToken(token); !status.ok()) return status;
 
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
+  Entry* const former = FindOpen(token);
+  if (former != nullptr && description.name.empty()) {
+    description.name = former->stream->description.name;
+  }
   std::uint32_t open_streams = 0;
   for (const auto& [key, entry] : entries_) {
-    if (!entry.stream) continue;
+    if (!entry.IsOpen() || &entry == former) continue;
     ++open_streams;
     if (!description.name.empty() && entry.stream->description.name == description.name) {
       return Refused(absl::StatusCode::kAlreadyExists, kReasonNameInUse, "open.stream_name",
@@ -107,7 +122,21 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
   if (entry.stream->description.name.empty()) {
     entry.stream->description.name = absl::StrCat("stream-", entry.stream->id);
   }
-  return *entry.stream;
+  entry.token = std::move(token);
+  StreamSummary opened = *entry.stream;
+  if (former == nullptr) return opened;
+  former->taken_over = true;
+  const std::shared_ptr<StreamFlow> former_flow = former->flow;
+  lock.unlock();  // A flow may leave at once.
+  former_flow->TakenOver();
+  return opened;
+}
+
+StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {
+  for (auto& [key, entry] : entries_) {
+    if (entry.IsOpen() && SameToken(entry.token, token)) return &entry;
+  }
+  return nullptr;
 }
 
 std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
@@ -138,7 +167,7 @@ std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t
   std::vector<StreamSummary> summaries;
   const std::lock_guard lock(mutex_);
   for (const auto& [flow, entry] : entries_) {
-    if (!entry.stream || entry.stream->number <= after) continue;
+    if (!entry.IsOpen() || entry.stream->number <= after) continue;
     summaries.push_back(*entry.stream);
     summaries.back().counts = flow->counts();
   }
@@ -150,9 +179,8 @@ std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t
 
 std::size_t StreamRegistry::OpenCount() const {
   const std::lock_guard lock(mutex_);
-  return static_cast<std::size_t>(
-      std::count_if(entries_.begin(), entries_.end(),
-                    [](const auto& item) { return item.second.stream.has_value(); }));
+  return static_cast<std::size_t>(std::count_if(
+      entries_.begin(), entries_.end(), [](const auto& item) { return item.second.IsOpen(); }));
 }
 
 std::vector<std::shared_ptr<StreamFlow>> StreamRegistry::Flows() const {

@@ -48,10 +48,12 @@ class StreamRegistry {
   /// (TOO_MANY_STREAMS) where as many as may be open are still opening.
   absl::Status Enter(std::shared_ptr<StreamFlow> flow);
 
-  /// Opens the stream of a flow that has entered.
-  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS), ALREADY_EXISTS (NAME_IN_USE),
-  /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS), UNAVAILABLE (DRAINING).
-  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description);
+  /// Opens the stream of a flow that has entered. Where an open stream has the same `token`, the
+  /// new one takes over from it: its place, its name if none is given, and its flow ends.
+  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN), ALREADY_EXISTS
+  /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS), UNAVAILABLE (DRAINING).
+  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description,
+                                     std::string token);
 
   /// The flow's stream ends: its name and its place are free. What it was, if it had been opened.
   std::optional<StreamSummary> Close(const StreamFlow& flow);
@@ -81,12 +83,17 @@ class StreamRegistry {
     std::shared_ptr<StreamFlow> flow;
     bool opening = true;                  // Until it is open or closed.
     std::optional<StreamSummary> stream;  // While open; its counts are asked of the flow.
+    std::string token;                    // Of the stream.
+    bool taken_over = false;  // By another entry: the stream is not this one's any more.
+
+    bool IsOpen() const { return stream && !taken_over; }
   };
 
   absl::Status TooMany(absl::string_view what, std::uint32_t count) const;
   // With the lock held:
   absl::Status CheckServingLocked();
   std::vector<std::shared_ptr<StreamFlow>> Flows() const;
+  Entry* FindOpen(std::string_view token);
 
   const std::uint32_t max_streams_;
   const std::string id_prefix_;  // Tells the ids of one run of a server from those of another.

@@ -2,11 +2,11 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <string>
 #include <tuple>
 
 #include "absl/strings/str_cat.h"
+#include "partiemc/byte_string.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -24,35 +24,6 @@ constexpr std::size_t kRingBytes = 8 + 4 + 4 + 8 + 8;
 constexpr std::size_t kRunBytes = 4 + 4 + 4 + 4;
 constexpr std::size_t kSampleBytes = 8 + 4 + 4 + 4;
 constexpr std::size_t kChecksumBytes = 8;
-
-template <typename T>
-void Put(T value, std::string& bytes) {
-  auto bits =
-      std::bit_cast<std::conditional_t<sizeof(T) == 8, std::uint64_t, std::uint32_t>>(value);
-  for (std::size_t k = 0; k < sizeof(T); ++k) {
-    bytes.push_back(static_cast<char>(bits & 0xff));
-    bits >>= 8;
-  }
-}
-
-template <typename T>
-T Take(std::string_view& bytes) {
-  using Bits = std::conditional_t<sizeof(T) == 8, std::uint64_t, std::uint32_t>;
-  Bits bits = 0;
-  for (std::size_t k = 0; k < sizeof(T); ++k) {
-    bits |= static_cast<Bits>(static_cast<unsigned char>(bytes[k])) << (8 * k);
-  }
-  bytes.remove_prefix(sizeof(T));
-  return std::bit_cast<T>(bits);
-}
-
-std::uint64_t ChecksumOf(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char byte : bytes) {
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x00000100000001b3u;
-  }
-  return hash;
-}
 
 absl::Status Corrupt(std::string value, std::string rule) {
   return ViolationError(
@@ -78,13 +49,13 @@ absl::Status CheckNormals(const std::vector<CellNormal>& normals) {
 }
 
 std::optional<double> TakeOptional(std::string_view& rest) {
-  const auto bits = Take<std::uint64_t>(rest);
+  const auto bits = TakeNumber<std::uint64_t>(rest);
   if (bits == kAbsent) return std::nullopt;
   return std::bit_cast<double>(bits);
 }
 
 void PutOptional(std::optional<double> value, std::string& bytes) {
-  Put(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
+  PutNumber(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
 }
 
 absl::Status CheckAreaOffset(std::optional<double> offset) {
@@ -168,50 +139,50 @@ bool Fill(const Counts& counts, std::size_t bytes) {
 
 void PutHistory(const RingHistory& history, std::string& bytes) {
   for (const KnownRing& ring : history.rings) {
-    Put(ring.identity, bytes);
-    Put(std::uint32_t{ring.is_hole}, bytes);
-    Put(ring.outer, bytes);
-    Put(ring.velocity_x, bytes);
-    Put(ring.velocity_y, bytes);
+    PutNumber(ring.identity, bytes);
+    PutNumber(std::uint32_t{ring.is_hole}, bytes);
+    PutNumber(ring.outer, bytes);
+    PutNumber(ring.velocity_x, bytes);
+    PutNumber(ring.velocity_y, bytes);
   }
   for (const NodeRun& run : history.runs) {
-    Put(run.row, bytes);
-    Put(run.first, bytes);
-    Put(run.last, bytes);
-    Put(run.ring, bytes);
+    PutNumber(run.row, bytes);
+    PutNumber(run.first, bytes);
+    PutNumber(run.last, bytes);
+    PutNumber(run.ring, bytes);
   }
   for (const ParticleSample& sample : history.samples) {
-    Put(sample.hash, bytes);
-    Put(sample.column, bytes);
-    Put(sample.row, bytes);
-    Put(sample.ring, bytes);
+    PutNumber(sample.hash, bytes);
+    PutNumber(sample.column, bytes);
+    PutNumber(sample.row, bytes);
+    PutNumber(sample.ring, bytes);
   }
 }
 
 absl::Status TakeHistory(const Counts& counts, std::string_view& rest, RingHistory& history) {
   history.rings.resize(counts.rings);
   for (KnownRing& ring : history.rings) {
-    ring.identity = Take<std::uint64_t>(rest);
-    const auto kind = Take<std::uint32_t>(rest);
+    ring.identity = TakeNumber<std::uint64_t>(rest);
+    const auto kind = TakeNumber<std::uint32_t>(rest);
     if (kind > 1) return Corrupt(absl::StrCat("ring of kind ", kind), "must be of kind 0 or 1");
     ring.is_hole = kind == 1;
-    ring.outer = Take<std::uint32_t>(rest);
-    ring.velocity_x = Take<double>(rest);
-    ring.velocity_y = Take<double>(rest);
+    ring.outer = TakeNumber<std::uint32_t>(rest);
+    ring.velocity_x = TakeNumber<double>(rest);
+    ring.velocity_y = TakeNumber<double>(rest);
   }
   history.runs.resize(counts.runs);
   for (NodeRun& run : history.runs) {
-    run.row = Take<std::int32_t>(rest);
-    run.first = Take<std::int32_t>(rest);
-    run.last = Take<std::int32_t>(rest);
-    run.ring = Take<std::uint32_t>(rest);
+    run.row = TakeNumber<std::int32_t>(rest);
+    run.first = TakeNumber<std::int32_t>(rest);
+    run.last = TakeNumber<std::int32_t>(rest);
+    run.ring = TakeNumber<std::uint32_t>(rest);
   }
   history.samples.resize(counts.samples);
   for (ParticleSample& sample : history.samples) {
-    sample.hash = Take<std::uint64_t>(rest);
-    sample.column = Take<std::int32_t>(rest);
-    sample.row = Take<std::int32_t>(rest);
-    sample.ring = Take<std::uint32_t>(rest);
+    sample.hash = TakeNumber<std::uint64_t>(rest);
+    sample.column = TakeNumber<std::int32_t>(rest);
+    sample.row = TakeNumber<std::int32_t>(rest);
+    sample.ring = TakeNumber<std::uint32_t>(rest);
   }
   return CheckHistory(history);
 }
@@ -224,25 +195,25 @@ std::string Serialize(const State& state) {
   bytes.reserve(kHeaderBytes + kNormalBytes * state.normals.size() +
                 kRingBytes * history.rings.size() + kRunBytes * history.runs.size() +
                 kSampleBytes * history.samples.size() + kChecksumBytes);
-  Put(kMagic, bytes);
-  Put(kVersion, bytes);
-  Put(state.cell_size.value_or(0), bytes);
-  Put(state.spacing.value_or(0), bytes);
+  PutNumber(kMagic, bytes);
+  PutNumber(kVersion, bytes);
+  PutNumber(state.cell_size.value_or(0), bytes);
+  PutNumber(state.spacing.value_or(0), bytes);
   PutOptional(state.area_offset, bytes);
   PutOptional(history.time, bytes);
-  Put(history.identities_given, bytes);
-  Put(static_cast<std::uint64_t>(state.normals.size()), bytes);
-  Put(static_cast<std::uint64_t>(history.rings.size()), bytes);
-  Put(static_cast<std::uint64_t>(history.runs.size()), bytes);
-  Put(static_cast<std::uint64_t>(history.samples.size()), bytes);
+  PutNumber(history.identities_given, bytes);
+  PutNumber(static_cast<std::uint64_t>(state.normals.size()), bytes);
+  PutNumber(static_cast<std::uint64_t>(history.rings.size()), bytes);
+  PutNumber(static_cast<std::uint64_t>(history.runs.size()), bytes);
+  PutNumber(static_cast<std::uint64_t>(history.samples.size()), bytes);
   for (const CellNormal& normal : state.normals) {
-    Put(normal.column, bytes);
-    Put(normal.row, bytes);
-    Put(normal.x, bytes);
-    Put(normal.y, bytes);
+    PutNumber(normal.column, bytes);
+    PutNumber(normal.row, bytes);
+    PutNumber(normal.x, bytes);
+    PutNumber(normal.y, bytes);
   }
   PutHistory(history, bytes);
-  Put(ChecksumOf(bytes), bytes);
+  PutNumber(ChecksumOf(bytes), bytes);
   return bytes;
 }
 
@@ -255,17 +226,18 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
   std::string_view tail = bytes.substr(size - kChecksumBytes);
   const std::string_view body = bytes.substr(0, size - kChecksumBytes);
   std::string_view rest = body;
-  if (Take<std::uint32_t>(rest) != kMagic)
+  if (TakeNumber<std::uint32_t>(rest) != kMagic) {
     return Corrupt("another kind of data", "must be a state");
-  if (const auto version = Take<std::uint32_t>(rest); version != kVersion) {
+  }
+  if (const auto version = TakeNumber<std::uint32_t>(rest); version != kVersion) {
     return Corrupt(absl::StrCat("version ", version), absl::StrCat("must be version ", kVersion));
   }
-  if (Take<std::uint64_t>(tail) != ChecksumOf(body)) {
+  if (TakeNumber<std::uint64_t>(tail) != ChecksumOf(body)) {
     return Corrupt("a wrong checksum", "must be what Serialize wrote");
   }
   State state;
-  if (const auto cell_size = Take<double>(rest); cell_size != 0) state.cell_size = cell_size;
-  if (const auto spacing = Take<double>(rest); spacing != 0) state.spacing = spacing;
+  if (const auto cell_size = TakeNumber<double>(rest); cell_size != 0) state.cell_size = cell_size;
+  if (const auto spacing = TakeNumber<double>(rest); spacing != 0) state.spacing = spacing;
   if (state.cell_size.has_value() != state.spacing.has_value() ||
       !IsLength(state.cell_size.value_or(1)) || !IsLength(state.spacing.value_or(1))) {
     return Corrupt(absl::StrCat("cell size ", ShortestNumber(state.cell_size.value_or(0)),
@@ -275,12 +247,12 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
   state.area_offset = TakeOptional(rest);
   if (absl::Status status = CheckAreaOffset(state.area_offset); !status.ok()) return status;
   state.history.time = TakeOptional(rest);
-  state.history.identities_given = Take<std::uint64_t>(rest);
+  state.history.identities_given = TakeNumber<std::uint64_t>(rest);
   Counts counts{};
-  counts.normals = Take<std::uint64_t>(rest);
-  counts.rings = Take<std::uint64_t>(rest);
-  counts.runs = Take<std::uint64_t>(rest);
-  counts.samples = Take<std::uint64_t>(rest);
+  counts.normals = TakeNumber<std::uint64_t>(rest);
+  counts.rings = TakeNumber<std::uint64_t>(rest);
+  counts.runs = TakeNumber<std::uint64_t>(rest);
+  counts.samples = TakeNumber<std::uint64_t>(rest);
   if (!Fill(counts, rest.size())) {
     return Corrupt(
         absl::StrCat(counts.normals, " normals, ", counts.rings, " rings, ", counts.runs,
@@ -290,10 +262,10 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
   }
   state.normals.resize(counts.normals);
   for (CellNormal& normal : state.normals) {
-    normal.column = Take<std::int32_t>(rest);
-    normal.row = Take<std::int32_t>(rest);
-    normal.x = Take<float>(rest);
-    normal.y = Take<float>(rest);
+    normal.column = TakeNumber<std::int32_t>(rest);
+    normal.row = TakeNumber<std::int32_t>(rest);
+    normal.x = TakeNumber<float>(rest);
+    normal.y = TakeNumber<float>(rest);
   }
   if (absl::Status status = CheckNormals(state.normals); !status.ok()) return status;
   if (absl::Status status = TakeHistory(counts, rest, state.history); !status.ok()) return status;

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "partiemc/status.h"
+#include "server/stream_token.h"
 
 namespace partiemc::server {
 namespace {
@@ -37,7 +38,7 @@ class Registry : public ::testing::Test {
     return flow;
   }
   absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, const std::string& name) {
-    return registry_.Open(flow, {.name = name, .labels = {}, .parameters = {}});
+    return registry_.Open(flow, {.name = name, .labels = {}, .parameters = {}}, NewStreamToken());
   }
   static std::string ReasonOf(const absl::Status& status) {
     const auto violation = FindViolation(status);
@@ -97,6 +98,50 @@ TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatIsClosed) {
   EXPECT_TRUE(Open(*second, "tank").ok());
 }
 
+TEST_F(Registry, WhoHasTheTokenTakesOverAndNobodyElse) {
+  const std::string token = NewStreamToken();
+  const auto first = Enter(), second = Enter(), stranger = Enter();
+  ASSERT_TRUE(registry_.Open(*first, {.name = "tank", .labels = {}, .parameters = {}}, token).ok());
+  EXPECT_EQ(ReasonOf(Open(*stranger, "tank").status()), kReasonNameInUse);
+  EXPECT_FALSE(door_.finished.has_value());
+
+  const auto resumed = registry_.Open(*second, {.name = "", .labels = {}, .parameters = {}}, token);
+  ASSERT_TRUE(resumed.ok());
+  EXPECT_EQ(resumed->description.name, "tank") << "inherited";
+  ASSERT_TRUE(door_.finished.has_value()) << "the call before has ended";
+  EXPECT_EQ(door_.finished->code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(ReasonOf(*door_.finished), kReasonTakenOver);
+  EXPECT_EQ(registry_.OpenCount(), 1u);
+  ASSERT_EQ(registry_.List(0, 10).size(), 1u);
+  EXPECT_EQ(registry_.List(0, 10)[0].id, resumed->id);
+  EXPECT_TRUE(registry_.Close(*first).has_value()) << "for its line in the log";
+  EXPECT_EQ(registry_.OpenCount(), 1u);
+  EXPECT_EQ(ReasonOf(Open(*stranger, "tank").status()), kReasonNameInUse);
+  EXPECT_TRUE(registry_.Close(*second).has_value());
+  EXPECT_TRUE(Open(*stranger, "tank").ok());
+}
+
+TEST_F(Registry, TakingOverNeedsNoFreePlace) {
+  const std::string token = NewStreamToken();
+  const auto first = Enter();
+  ASSERT_TRUE(registry_.Open(*first, {.name = "", .labels = {}, .parameters = {}}, token).ok());
+  for (std::uint32_t k = 1; k < kMaxStreams; ++k) ASSERT_TRUE(Open(*Enter(), "").ok());
+  EXPECT_EQ(ReasonOf(Open(*Enter(), "").status()), kReasonTooManyStreams);
+  EXPECT_TRUE(registry_.Open(*Enter(), {.name = "", .labels = {}, .parameters = {}}, token).ok());
+}
+
+TEST_F(Registry, TokensOfAnotherFormAreRefusedAndNotRepeated) {
+  const auto flow = Enter();
+  for (const std::string& token : {std::string(), std::string("secret"), std::string(33, 'a'),
+                                   std::string(31, 'a') + "G", std::string(31, 'a') + "A"}) {
+    const auto refused = registry_.Open(*flow, {.name = "", .labels = {}, .parameters = {}}, token);
+    EXPECT_EQ(ReasonOf(refused.status()), kReasonStreamToken);
+    EXPECT_EQ(refused.status().message().find("secret"), std::string::npos);
+  }
+  EXPECT_TRUE(IsStreamToken(NewStreamToken()));
+  EXPECT_NE(NewStreamToken(), NewStreamToken());
+}
+
 TEST_F(Registry, NamesAreShortAndPlain) {
   const auto flow = Enter();
   for (const std::string& name :
@@ -113,11 +158,11 @@ TEST_F(Registry, LabelsAreFewAndShort) {
   const auto flow = Enter();
   StreamDescription many{.name = "", .labels = {}, .parameters = {}};
   for (int i = 0; i < 17; ++i) many.labels[std::to_string(i)] = "";
-  EXPECT_EQ(ReasonOf(registry_.Open(*flow, many).status()), kReasonLabels);
+  EXPECT_EQ(ReasonOf(registry_.Open(*flow, many, NewStreamToken()).status()), kReasonLabels);
   StreamDescription wide{.name = "", .labels = {{"k", std::string(129, 'v')}}, .parameters = {}};
-  EXPECT_EQ(ReasonOf(registry_.Open(*flow, wide).status()), kReasonLabels);
+  EXPECT_EQ(ReasonOf(registry_.Open(*flow, wide, NewStreamToken()).status()), kReasonLabels);
   many.labels.erase("0");
-  EXPECT_TRUE(registry_.Open(*flow, many).ok());
+  EXPECT_TRUE(registry_.Open(*flow, many, NewStreamToken()).ok());
 }
 
 TEST_F(Registry, StreamsWithoutANameGetDifferentOnes) {

@@ -148,17 +148,12 @@ TEST_P(Protocol, ParametersOutOfRangeAreRefusedWithFieldValueAndRule) {
 }
 
 TEST_P(Protocol, PartsOfTheProtocolThatThisServerDoesNotSpeakAreRefused) {
-  auto checkpoints = OpenRequest();
-  checkpoints.mutable_open()->set_checkpoint_interval(5);
-  auto resume = OpenRequest();
-  resume.mutable_open()->mutable_resume();
   auto attributes = OpenRequest();
   attributes.mutable_open()->mutable_outputs()->add_attributes("pressure");
   auto echo = OpenRequest();
   echo.mutable_open()->mutable_outputs()->set_echo_particles(true);
   for (const auto& [open, capability] :
-       {std::pair(checkpoints, "resume"), std::pair(resume, "resume"),
-        std::pair(attributes, "attributes"), std::pair(echo, "watch")}) {
+       {std::pair(attributes, "attributes"), std::pair(echo, "watch")}) {
     ExpectRefused(open, grpc::StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
                   std::string("lacks the capability \"") + capability + '"');
   }

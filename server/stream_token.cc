@@ -1,0 +1,38 @@
+#include "server/stream_token.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <random>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::size_t kDigits = 32;
+
+}  // namespace
+
+std::string NewStreamToken() {
+  std::random_device random;  // The system's own generator.
+  std::string token;
+  while (token.size() < kDigits) absl::StrAppend(&token, absl::Hex(random(), absl::kZeroPad8));
+  return token;
+}
+
+bool IsStreamToken(std::string_view text) {
+  return text.size() == kDigits && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+           return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
+         });
+}
+
+bool SameToken(std::string_view a, std::string_view b) {
+  unsigned char difference = 0;
+  for (std::size_t k = 0; k < kDigits; ++k) {
+    difference = static_cast<unsigned char>(difference | (a[k] ^ b[k]));
+  }
+  return difference == 0;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,21 @@
+// The secret by which a producer shows that a stream is his.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace partiemc::server {
+
+/// The reason of INVALID_ARGUMENT for a token of another form (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonStreamToken = "STREAM_TOKEN";
+
+/// 128 random bits as 32 hexadecimal digits.
+std::string NewStreamToken();
+
+/// Whether `text` could be one. A server takes what another one has given.
+bool IsStreamToken(std::string_view text);
+
+/// In a time that does not tell how much of them is alike. Requires: both are tokens.
+bool SameToken(std::string_view a, std::string_view b);
+
+}  // namespace partiemc::server
