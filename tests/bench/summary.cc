@@ -32,7 +32,8 @@ constexpr Line kLines[] = {
     {"sparse_over_compact_1m", "at most 5", "the same, whole frame"},
     {"allocations_per_warm_frame", "0", "calls of malloc by the core"},
     {"server_peak_mb_1m", "at most 200", "peak memory of the server"},
-    {"server_growth_mb_1m", "0", "what it grows by after a tenth of the frames"},
+    {"server_growth_mb_1m", "0",
+     "what it grows by from the first tenth of a thousand frames to the last"},
 };
 
 std::string InstructionSet() {
