@@ -254,7 +254,10 @@ StreamFlow::Actions StreamFlow::Decide() {
   if (answers && !writing_) DecideWrite(actions);
   const bool all_said = phase_ == Phase::kAbandoned ||
                         (phase_ == Phase::kEnding && written_ == read_ && !owes_notice_);
-  if (std::exchange(owes_cut_, false)) actions.cut = cutting_ = true;
+  // Once finished there may be no door any more.
+  if (std::exchange(owes_cut_, false) && phase_ != Phase::kFinished) {
+    actions.cut = cutting_ = true;
+  }
   if (all_said && !opening_ && !computing_ && !writing_ && !starting_read_ && !cutting_) {
     phase_ = Phase::kFinished;
     actions.finish = status_;

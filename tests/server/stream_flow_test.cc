@@ -234,6 +234,24 @@ TEST(StreamFlow, ADrainEndsAStreamThatHasNotOpened) {
   EXPECT_EQ(door.status().code(), absl::StatusCode::kUnavailable);
 }
 
+// The door throws where it is used after the end, when it may be gone.
+TEST(StreamFlow, WhatComesAfterTheEndReachesNoDoor) {
+  ComputePool pool(1);
+  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
+  door.Open();
+  door.HalfClose();
+  EXPECT_EQ(ReceiveAll(door).size(), 1u);
+  EXPECT_TRUE(door.status().ok());
+  EXPECT_NO_THROW({
+    door.flow().TakenOver();
+    door.flow().Drain();
+    door.flow().Cancelled();
+    door.flow().EndIfIdle({.streaming = std::chrono::milliseconds(1)},
+                          std::chrono::steady_clock::now() + std::chrono::hours(1));
+    door.flow().Granted(0);
+  });
+}
+
 TEST(StreamFlow, ACancelledStreamComputesNothingThatWasOnlyQueued) {
   ComputePool pool(1);
   Gate gate(pool);
