@@ -32,6 +32,17 @@ struct ServerLimits {
   /// A stream costs next to nothing while it waits, but it keeps its name and its place.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};
 
+  /// Watchers of all streams together.
+  std::uint32_t max_watchers = 64;
+
+  /// What one watcher may keep from being freed: the frames that it has not taken yet, of which
+  /// most are shared with other watchers. A larger frame cannot be watched.
+  std::uint64_t max_watcher_bytes = std::uint64_t{16} << 20;
+
+  /// The newest result of a stream is kept for watchers to come if it is no larger: 64 MiB for all
+  /// streams together.
+  std::uint64_t KeptResultBytes() const { return (std::uint64_t{64} << 20) / max_streams; }
+
   /// Room for the widest usual particle (three float64, id, volume, velocity: 44 bytes) and for
   /// what a message has besides. Recordings with many scalars want a larger limit by hand.
   static constexpr std::uint64_t DefaultFrameBytes(std::uint64_t max_particles) {

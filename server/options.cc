@@ -122,6 +122,22 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->type_name("N")
       ->envname("PARTIEMC_FRAMES_IN_FLIGHT")
       ->group(kGroup);
+  app.add_option("--max-watchers", limits.max_watchers,
+                 "Watchers of all streams together; one too many is refused at once")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_WATCHERS")
+      ->group(kGroup);
+  app.add_option("--max-watcher-bytes", limits.max_watcher_bytes,
+                 "Memory that one watcher may hold, units as in 16MB allowed; larger results "
+                 "cannot be watched")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{4096}, kMaxFrameBytes))
+      ->capture_default_str()
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_MAX_WATCHER_BYTES")
+      ->group(kGroup);
   app.add_option("--max-particles", limits.frame.max_particles, "Particles of one frame")
       ->check(CLI::Range(1, 1'000'000'000))
       ->capture_default_str()

@@ -20,19 +20,21 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
     return;
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - stream->opened;
-  spdlog::info("stream closed id={} name={} frames={} frame_errors={} seconds={:.3f} status={}",
-               stream->id, stream->description.name, stream->counts.frames,
-               stream->counts.frame_errors, open.count(), code);
+  spdlog::info(
+      "stream closed id={} name={} frames={} frame_errors={} watch_waits={} "
+      "seconds={:.3f} status={}",
+      stream->id, stream->description.name, stream->counts.frames, stream->counts.frame_errors,
+      stream->description.hub->producer_waits(), open.count(), code);
 }
 
 }  // namespace
 
 ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
                                        const ServerLimits& limits, StreamRegistry& registry,
-                                       MemoryBudget& budget, ComputePool& pool)
+                                       MemoryBudget& budget, ComputePool& pool, WatchPump& pump)
     : context_(context),
       registry_(registry),
-      messages_(limits, registry),
+      messages_(limits, registry, pump),
       flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget,
                                          limits.frames_in_flight)) {
   if (auto status = registry_.Enter(flow_); !status.ok()) {
@@ -93,7 +95,9 @@ void ReconstructReactor::Cut() { context_.TryCancel(); }
 
 void ReconstructReactor::Finish(const absl::Status& status) {
   // Closed first: a client that sees the end may open the same name again at once.
-  LogEnd(registry_.Close(*flow_), context_.peer(), status);
+  const auto stream = registry_.Close(*flow_);
+  LogEnd(stream, context_.peer(), status);
+  if (stream) stream->description.hub->End(WatchEnd::OfStream(status));
   ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
 }
 

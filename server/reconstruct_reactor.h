@@ -24,7 +24,8 @@ class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer
  public:
   /// The arguments outlive the call.
   ReconstructReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-                     StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool);
+                     StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool,
+                     WatchPump& pump);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;

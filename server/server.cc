@@ -51,18 +51,22 @@ absl::StatusOr<BearerTokens> ReadTokens(const std::string& path) {
   return tokens;
 }
 
+// For watchers to be told that the server drains; one that does not read is cut then.
+constexpr std::chrono::milliseconds kWatchPatience(500);
+
 }  // namespace
 
 Server::Server(const ServerOptions& options)
     : options_(options),
       address_(options.address),
       tls_identity_(std::make_unique<CurrentTlsIdentity>()),
+      watchers_(options.limits.max_watchers),
       registry_(options.limits.max_streams),
       budget_(options.limits.memory_budget),
       pool_(options.threads),
       idle_timer_(registry_, options.limits.idle),
-      service_(
-          std::make_unique<Service>(options_.limits, authentication_, registry_, budget_, pool_)) {}
+      service_(std::make_unique<Service>(options_.limits, authentication_, registry_, budget_,
+                                         pool_, watchers_, pump_)) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
   if (auto status = CheckSecurity(options); !status.ok()) return status;
@@ -159,6 +163,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
   // to the last word: a connection that closes with requests unread takes back what was just
   // written.
   registry_.WaitUntilEmpty(deadline);
+  watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
   const auto left = std::max(deadline - std::chrono::steady_clock::now(),
                              std::chrono::steady_clock::duration::zero());

@@ -16,6 +16,8 @@
 #include "server/memory_budget.h"
 #include "server/stream_registry.h"
 #include "server/tls_identity.h"
+#include "server/watch_pump.h"
+#include "server/watch_registry.h"
 
 namespace grpc {
 class Channel;
@@ -62,8 +64,9 @@ class Server {
   /// To this server without a socket, for tests and embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
-  /// Takes no new call, tells the streams, answers what they have sent, and stops. What is not done
-  /// shortly before the end of `grace` is cancelled. Returns when nothing goes on any more.
+  /// Takes no new call, tells the streams, answers what they have sent, ends watches, and stops.
+  /// What is not done shortly before the end of `grace` is cancelled. Returns when nothing goes on
+  /// any more.
   void Drain(std::chrono::milliseconds grace);
 
  private:
@@ -78,6 +81,8 @@ class Server {
   Authentication authentication_;
   std::unique_ptr<CurrentTlsIdentity> tls_identity_;
   std::shared_ptr<grpc::ServerCredentials> credentials_;
+  WatchPump pump_;
+  WatchRegistry watchers_;
   StreamRegistry registry_;
   MemoryBudget budget_;
   ComputePool pool_;

@@ -10,6 +10,7 @@
 #include "server/grpc_status.h"
 #include "server/reconstruct_reactor.h"
 #include "server/stream_messages.h"
+#include "server/watch_reactor.h"
 
 namespace partiemc::server {
 namespace {
@@ -37,10 +38,9 @@ absl::Status Refused(std::string_view reason, std::string field, std::string val
 }
 
 // Ends a call as soon as it comes.
-template <typename Request, typename Response>
-class RefusedStream final : public grpc::ServerBidiReactor<Request, Response> {
+class RefusedStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
-  explicit RefusedStream(const grpc::Status& status) { this->Finish(status); }
+  explicit RefusedStream(const grpc::Status& status) { Finish(status); }
   void OnDone() override { delete this; }
 };
 
@@ -63,6 +63,7 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
   message.set_last_sequence(stream.counts.last_sequence);
   message.set_frames(stream.counts.frames);
   message.set_frame_errors(stream.counts.frame_errors);
+  message.set_watchers(stream.description.hub->watcher_count());
   message.set_open_seconds(seconds_since(stream.opened));
   message.set_idle_seconds(std::max(0.0, seconds_since(stream.counts.last_activity)));
 }
@@ -72,10 +73,9 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruct(
     grpc::CallbackServerContext* context) {
   if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return new RefusedStream<grpc::ByteBuffer, grpc::ByteBuffer>(
-        ToGrpcStatus(client.status(), *context));
+    return new RefusedStream(ToGrpcStatus(client.status(), *context));
   }
-  return new ReconstructReactor(*context, limits_, registry_, budget_, pool_);
+  return new ReconstructReactor(*context, limits_, registry_, budget_, pool_, pump_);
 }
 
 absl::Status Service::LetCallIn(std::uint64_t bytes) {
@@ -115,15 +115,12 @@ grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext*
   return reactor;
 }
 
-grpc::ServerBidiReactor<v1::WatchStreamRequest, v1::WatchStreamResponse>* Service::WatchStream(
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::WatchStream(
     grpc::CallbackServerContext* context) {
-  using Refused = RefusedStream<v1::WatchStreamRequest, v1::WatchStreamResponse>;
   if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return new Refused(ToGrpcStatus(client.status(), *context));
+    return new RefusedStream(ToGrpcStatus(client.status(), *context));
   }
-  return new Refused({grpc::StatusCode::UNIMPLEMENTED,
-                      "this server lacks the capability \"watch\"; GetServerInfo lists what it "
-                      "has"});
+  return new WatchReactor(*context, limits_, registry_, watchers_);
 }
 
 grpc::ServerUnaryReactor* Service::ListStreams(grpc::CallbackServerContext* context,
@@ -179,6 +176,7 @@ grpc::ServerUnaryReactor* Service::GetServerInfo(grpc::CallbackServerContext* co
     if (Reconstructor::Create(parameters).ok()) response->add_fills(wire::ToWire(fill));
   }
   response->add_capabilities("resume");
+  response->add_capabilities("watch");
   response->set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
   response->set_draining(registry_.draining());
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();

@@ -11,16 +11,18 @@
 #include "server/limits.h"
 #include "server/memory_budget.h"
 #include "server/stream_registry.h"
+#include "server/watch_pump.h"
+#include "server/watch_registry.h"
 
 namespace partiemc::server {
 
 /// The reason of RESOURCE_EXHAUSTED for a ReconstructFrame too many (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 
-/// The generated service, in which Reconstruct passes messages as bytes.
+/// The generated service, in which Reconstruct and WatchStream pass messages as bytes.
 using ServiceBase = v1::ReconstructionService::WithRawCallbackMethod_Reconstruct<
     v1::ReconstructionService::WithCallbackMethod_ReconstructFrame<
-        v1::ReconstructionService::WithCallbackMethod_WatchStream<
+        v1::ReconstructionService::WithRawCallbackMethod_WatchStream<
             v1::ReconstructionService::WithCallbackMethod_ListStreams<
                 v1::ReconstructionService::WithCallbackMethod_GetServerInfo<
                     v1::ReconstructionService::Service>>>>>;
@@ -30,19 +32,22 @@ class Service final : public ServiceBase {
  public:
   /// The arguments outlive the service.
   Service(const ServerLimits& limits, const Authentication& authentication,
-          StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool)
+          StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool,
+          WatchRegistry& watchers, WatchPump& pump)
       : limits_(limits),
         authentication_(authentication),
         registry_(registry),
         budget_(budget),
-        pool_(pool) {}
+        pool_(pool),
+        watchers_(watchers),
+        pump_(pump) {}
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Reconstruct(
       grpc::CallbackServerContext* context) override;
   grpc::ServerUnaryReactor* ReconstructFrame(grpc::CallbackServerContext* context,
                                              const v1::ReconstructFrameRequest* request,
                                              v1::ReconstructFrameResponse* response) override;
-  grpc::ServerBidiReactor<v1::WatchStreamRequest, v1::WatchStreamResponse>* WatchStream(
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* WatchStream(
       grpc::CallbackServerContext* context) override;
   grpc::ServerUnaryReactor* ListStreams(grpc::CallbackServerContext* context,
                                         const v1::ListStreamsRequest* request,
@@ -61,6 +66,8 @@ class Service final : public ServiceBase {
   StreamRegistry& registry_;
   MemoryBudget& budget_;
   ComputePool& pool_;
+  WatchRegistry& watchers_;
+  WatchPump& pump_;
   std::atomic<std::uint32_t> calls_ = 0;  // Of ReconstructFrame, going on.
 };
 

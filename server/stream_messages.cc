@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/stream_token.h"
+#include "server/watch_reactor.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {
@@ -49,6 +50,7 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
   // Rounded up: 0 would mean none.
   message.set_idle_timeout_seconds(static_cast<std::uint32_t>(
       std::chrono::ceil<std::chrono::seconds>(limits.idle.streaming).count()));
+  message.set_max_watchers(limits.max_watchers);
 }
 
 absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame,
@@ -72,9 +74,13 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
   return status;
 }
 
-StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry)
+StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,
+                               WatchPump& pump)
     : limits_(limits),
       registry_(registry),
+      hub_(std::make_shared<WatchHub>(pump,
+                                      WatchHub::Limits{.tap_bytes = limits.max_watcher_bytes,
+                                                       .kept_bytes = limits.KeptResultBytes()})),
       requests_(limits.frames_in_flight),
       answers_(limits.frames_in_flight) {
   v1::ReconstructResponse draining;
@@ -132,7 +138,8 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
   auto stream = registry_.Open(flow,
                                {.name = open.stream_name(),
                                 .labels = {open.labels().begin(), open.labels().end()},
-                                .parameters = session->parameters()},
+                                .parameters = session->parameters(),
+                                .hub = hub_},
                                token);
   if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
@@ -154,7 +161,7 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
 Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
   std::unique_ptr<FrameMessages> messages = TakeMessages(worker);
   const absl::Status parsed = ParseFrame(requests_[slot], messages->request);
-  requests_[slot].Clear();
+  if (!outputs_.echo_particles) requests_[slot].Clear();
   const v1::ParticleFrame& request = messages->request.frame();
   v1::ReconstructedFrame& result = *messages->result.mutable_frame();
   const std::uint64_t next_sequence = session_->next_sequence();
@@ -172,6 +179,7 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
       result.clear_checkpoint();
     }
     answers_[slot] = wire::ToBytes(messages->result);
+    ShowWatchers(slot, result, request);
   } else {
     v1::ReconstructResponse error;
     wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
@@ -180,10 +188,19 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
     answers_[slot] = wire::ToBytes(error);
     messages->request.Clear();  // Nothing has checked its size.
   }
+  requests_[slot].Clear();
   worker.door_buffers = std::move(messages);
   return {.is_result = status.ok(),
           .last_sequence = session_->next_sequence() - 1,
           .bytes = answers_[slot].Length()};
+}
+
+// They share the bytes of the answer, and of the request where particles are echoed.
+void StreamMessages::ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
+                                  const v1::ParticleFrame& request) {
+  wire::WatchedBytes bytes(answers_[slot], result);
+  if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
+  hub_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
 }
 
 }  // namespace partiemc::server

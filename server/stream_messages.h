@@ -4,6 +4,7 @@
 #include <grpcpp/support/byte_buffer.h>
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "server/session.h"
 #include "server/stream_flow.h"
 #include "server/stream_registry.h"
+#include "server/watch_hub.h"
 #include "wire/codec.h"
 
 namespace partiemc::server {
@@ -42,7 +44,7 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 class StreamMessages {
  public:
   /// One slot for each of limits.frames_in_flight.
-  StreamMessages(const ServerLimits& limits, StreamRegistry& registry);
+  StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchPump& pump);
 
   grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
   RequestKind Kind(std::size_t slot);
@@ -56,9 +58,12 @@ class StreamMessages {
 
  private:
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
+  void ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
+                    const v1::ParticleFrame& request);
 
   const ServerLimits& limits_;
   StreamRegistry& registry_;
+  const std::shared_ptr<WatchHub> hub_;
   std::vector<grpc::ByteBuffer> requests_;
   std::vector<grpc::ByteBuffer> answers_;
   grpc::ByteBuffer opened_;

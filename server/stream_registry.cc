@@ -163,6 +163,18 @@ void StreamRegistry::Leave(const StreamFlow& flow) {
   left_.notify_all();
 }
 
+absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [flow, entry] : entries_) {
+    if (!entry.IsOpen() || entry.stream->description.name != name) continue;
+    StreamSummary summary = *entry.stream;
+    summary.counts = flow->counts();
+    return summary;
+  }
+  return Refused(absl::StatusCode::kNotFound, kReasonNoSuchStream, "open.stream_name", Quoted(name),
+                 "must be the name of an open stream; ListStreams tells them");
+}
+
 std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count) const {
   std::vector<StreamSummary> summaries;
   const std::lock_guard lock(mutex_);

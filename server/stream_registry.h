@@ -16,6 +16,7 @@
 #include "absl/status/statusor.h"
 #include "partiemc/parameters.h"
 #include "server/stream_flow.h"
+#include "server/watch_hub.h"
 
 namespace partiemc::server {
 
@@ -24,11 +25,13 @@ inline constexpr std::string_view kReasonName = "NAME";
 inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
 inline constexpr std::string_view kReasonLabels = "LABELS";
 inline constexpr std::string_view kReasonTooManyStreams = "TOO_MANY_STREAMS";
+inline constexpr std::string_view kReasonNoSuchStream = "NO_SUCH_STREAM";
 
 struct StreamDescription {
   std::string name;  ///< Empty: the registry makes one up.
   std::map<std::string, std::string> labels;
   ReconstructionParameters parameters;  ///< As resolved.
+  std::shared_ptr<WatchHub> hub;        ///< Shows its results to watchers.
 };
 
 struct StreamSummary {
@@ -60,6 +63,8 @@ class StreamRegistry {
   /// The flow has gone: its last word has been sent.
   void Leave(const StreamFlow& flow);
 
+  /// The open stream of that name. Errors: NOT_FOUND (NO_SUCH_STREAM).
+  absl::StatusOr<StreamSummary> Find(const std::string& name) const;
   /// The open streams in the order of their numbers: at most `count`, with numbers above `after`.
   std::vector<StreamSummary> List(std::uint64_t after, std::size_t count) const;
   std::size_t OpenCount() const;

@@ -7,6 +7,8 @@
 #include "cli/evaluate.h"
 #include "cli/info.h"
 #include "cli/replay.h"
+#include "cli/streams.h"
+#include "cli/watch.h"
 
 namespace {
 
@@ -32,10 +34,14 @@ int main(int argc, char** argv) {
   app.get_formatter()->column_width(32);
   app.footer("`partiemc VERB --help` tells more and has examples.");
   partiemc::client::ReplayFlags replay;
+  partiemc::client::WatchFlags watch;
+  partiemc::client::StreamsFlags streams;
   partiemc::client::InfoFlags info;
   partiemc::client::ConvertFlags convert;
   partiemc::client::EvaluateFlags evaluate;
   const CLI::App* replay_verb = AddReplay(app, replay);
+  const CLI::App* watch_verb = AddWatch(app, watch);
+  const CLI::App* streams_verb = AddStreams(app, streams);
   const CLI::App* info_verb = AddInfo(app, info);
   const CLI::App* evaluate_verb = AddEvaluate(app, evaluate);
   AddConvert(app, convert);
@@ -47,6 +53,8 @@ int main(int argc, char** argv) {
     return ComplainUsage(app, error);
   }
   if (replay_verb->parsed()) return Replay(replay);
+  if (watch_verb->parsed()) return Watch(watch);
+  if (streams_verb->parsed()) return Streams(streams);
   if (info_verb->parsed()) return Info(info);
   if (evaluate_verb->parsed()) return Evaluate(evaluate);
   return Convert(convert);

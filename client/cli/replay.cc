@@ -38,13 +38,15 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
   }
   const auto deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double>(flags.deadline_seconds));
-  auto stream =
-      Stream::Open(flags.server.address,
-                   {.parameters = parameters,
-                    .outputs = {.mesh = parameters.fill != Fill::kNone, .normals = normals},
-                    .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
-                    .credentials = flags.server.credentials,
-                    .deadline = deadline});
+  auto stream = Stream::Open(flags.server.address,
+                             {.name = flags.name,
+                              .parameters = parameters,
+                              .outputs = {.mesh = parameters.fill != Fill::kNone,
+                                          .normals = normals,
+                                          .echo_particles = flags.echo_particles},
+                              .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
+                              .credentials = flags.server.credentials,
+                              .deadline = deadline});
   if (!stream.ok()) return stream.status();
   return *std::move(stream);
 }
@@ -192,9 +194,18 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
 
 void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
   constexpr const char* kGroup = "Where";
-  CLI::Option* server = AddServerFlags(app, flags.server, kGroup);
+  CLI::Option* const server = AddServerFlags(app, flags.server, kGroup);
+  CLI::Option* const name =
+      app.add_option("--name", flags.name, "Of the stream, for `partiemc watch NAME`")
+          ->type_name("NAME")
+          ->group(kGroup);
+  CLI::Option* const echo =
+      app.add_flag("--echo-particles", flags.echo_particles, "Who watches gets the particles too")
+          ->group(kGroup);
   app.add_flag("--local", flags.local, "Reconstruct in this process, without a server")
       ->excludes(server)
+      ->excludes(name)
+      ->excludes(echo)
       ->group(kGroup);
   app.add_option("--threads", flags.threads, "Threads with --local; all processors by default")
       ->check(CLI::Range(1, 1024))
@@ -301,6 +312,7 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
       "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
       "--rate 25\n"
+      "  partiemc replay dam_break.pemc --name dam --rate 25   and elsewhere: partiemc watch dam\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 3 input, 4 server, 130 interrupted.");
   verb->parse_complete_callback([verb] {
     const absl::Status status = CheckCombinations(*verb);

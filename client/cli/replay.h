@@ -22,6 +22,8 @@ struct ReplayFlags {
   bool local = false;
   int threads = 0;  ///< 0: one for each processor.
   double deadline_seconds = 30;
+  std::string name;  ///< Of the stream; empty: the server makes one up.
+  bool echo_particles = false;
 
   std::string placement = "virtual-plane";
   std::string fill = "greedy";

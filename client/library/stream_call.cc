@@ -52,7 +52,8 @@ absl::Status Stream::Call::Open(const StreamOptions& options) {
   wire::EncodeParameters(options.parameters, *open.mutable_parameters());
   wire::EncodeOutputs({.mesh = options.outputs.mesh,
                        .normals = options.outputs.normals,
-                       .relative_float32 = options.outputs.relative_float32},
+                       .relative_float32 = options.outputs.relative_float32,
+                       .echo_particles = options.outputs.echo_particles},
                       *open.mutable_outputs());
   open.mutable_labels()->insert(options.labels.begin(), options.labels.end());
 

@@ -69,8 +69,9 @@ Progress::Options Progress::ForStandardError() {
 
 Progress::Progress(Options options) : options_(std::move(options)), start_(options_.now()) {}
 
-void Progress::Update(std::uint64_t done) {
+void Progress::Update(std::uint64_t done, std::string detail) {
   done_ = done;
+  detail_ = std::move(detail);
   if (options_.quiet || finished_) return;
   const auto now = options_.now();
   if (options_.terminal) {
@@ -97,7 +98,8 @@ void Progress::Show() {
 std::string Progress::Bar(double seconds) const {
   const std::string rate = Concat(RateText(Rate(done_, seconds)), " fps");
   if (!options_.total) {
-    return Concat(done_, " frames  ", rate, "  ", Duration(seconds));
+    return Concat(done_, " frames  ", rate, "  ", Duration(seconds), detail_.empty() ? "" : "  ",
+                  detail_);
   }
   const std::uint64_t total = *options_.total;
   const std::string total_text = Concat(total);
@@ -119,7 +121,9 @@ std::string Progress::Bar(double seconds) const {
 
 std::string Progress::Line(double seconds) const {
   const std::string rate = Concat(RateText(Rate(done_, seconds)), " frames/s");
-  if (!options_.total) return Concat(done_, " frames, ", rate);
+  if (!options_.total) {
+    return Concat(done_, " frames, ", rate, detail_.empty() ? "" : ", ", detail_);
+  }
   const auto left = SecondsLeft(done_, *options_.total, seconds);
   return Concat(done_, " of ", *options_.total, " frames, ", rate,
                 left ? Concat(", ", Duration(*left), " left") : "");

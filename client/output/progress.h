@@ -34,8 +34,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done` frames are through, counted from the start.
-  void Update(std::uint64_t done);
+  /// `done` frames are through, counted from the start; `detail` is a word about the last of them,
+  /// shown where there is room for it.
+  void Update(std::uint64_t done, std::string detail = {});
 
   /// Shows a line of its own without tearing the bar (a warning, a refused frame), also when
   /// quiet, because it is no progress.
@@ -53,6 +54,7 @@ class Progress {
   Clock::time_point start_;
   std::optional<Clock::time_point> shown_at_;
   std::uint64_t done_ = 0;
+  std::string detail_;
   std::optional<std::uint64_t> shown_done_;
   bool finished_ = false;
 };

@@ -256,10 +256,6 @@ absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) 
                    absl::StrCat(message.attributes_size(), " names"),
                    "must be empty: this server lacks the capability \"attributes\"");
   }
-  if (message.echo_particles()) {
-    return Invalid(kReasonUnsupported, "outputs.echo_particles", "true",
-                   "must be false: this server lacks the capability \"watch\"");
-  }
   if (!v1::CoordinateFormat_IsValid(message.coordinate_format())) {
     return UnknownEnum("outputs.coordinate_format", message.coordinate_format());
   }
@@ -267,7 +263,8 @@ absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) 
       .rings = message.rings(),
       .mesh = message.mesh(),
       .normals = message.normals(),
-      .relative_float32 = message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE};
+      .relative_float32 = message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE,
+      .echo_particles = message.echo_particles()};
 }
 
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
@@ -277,6 +274,7 @@ void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
   message.set_normals(outputs.normals);
   message.set_coordinate_format(outputs.relative_float32 ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
                                                          : v1::COORDINATE_FORMAT_FLOAT64);
+  message.set_echo_particles(outputs.echo_particles);
 }
 
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message) {

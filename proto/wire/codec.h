@@ -28,6 +28,7 @@ struct Outputs {
   bool mesh = true;
   bool normals = false;
   bool relative_float32 = false;  ///< COORDINATE_FORMAT_FLOAT32_RELATIVE.
+  bool echo_particles = false;    ///< To watchers.
 
   friend bool operator==(const Outputs&, const Outputs&) = default;
 };
@@ -58,8 +59,8 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
-/// Errors: INVALID_ARGUMENT with a Violation (attributes and echo_particles are refused with
-/// reason UNSUPPORTED until the server offers the capability).
+/// Errors: INVALID_ARGUMENT with a Violation (attributes are refused with reason
+/// UNSUPPORTED until the server offers the capability).
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 

@@ -20,7 +20,6 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::Not;
 namespace health = grpc::health::v1;
 
@@ -79,7 +78,7 @@ TEST_F(Operation, TheServerTellsWhatItIsAndWhatItAllows) {
   EXPECT_THAT(info.placements(), Contains(v1::PLACEMENT_VIRTUAL_PLANE));
   EXPECT_THAT(info.placements(), Not(Contains(v1::PLACEMENT_UNSPECIFIED)));
   EXPECT_THAT(info.fills(), Contains(v1::FILL_GREEDY));
-  EXPECT_THAT(info.capabilities(), IsEmpty());
+  EXPECT_THAT(info.capabilities(), Contains("watch"));
   EXPECT_FALSE(info.draining());
 }
 
@@ -118,14 +117,6 @@ TEST_F(Operation, OpenStreamsAreListedPageByPageWithTheirCounts) {
   v1::ListStreamsResponse page;
   EXPECT_EQ(stub_->ListStreams(&context, request, &page).error_code(),
             grpc::StatusCode::INVALID_ARGUMENT);
-}
-
-TEST_F(Operation, WatchingIsRefusedNamingTheCapabilityThatLacks) {
-  grpc::ClientContext context;
-  SetDeadline(context);
-  const auto status = stub_->WatchStream(&context)->Finish();
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("\"watch\""));
 }
 
 TEST_F(Operation, HealthIsToldForTheServerAndForTheServiceByName) {

@@ -116,6 +116,46 @@ grpc::Status StreamClient::Finish() {
   return stream_->Finish();
 }
 
+WatchClient::WatchClient(const std::shared_ptr<grpc::Channel>& channel)
+    : stub_(v1::ReconstructionService::NewStub(channel)) {
+  SetDeadline(context_);
+  rpc_ = stub_->WatchStream(&context_);
+}
+
+WatchClient::~WatchClient() {
+  if (finished_) return;
+  Cancel();
+  Finish();
+}
+
+bool WatchClient::Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits) {
+  v1::WatchStreamRequest request;
+  request.mutable_open()->set_stream_name(stream_name);
+  request.mutable_open()->set_mode(mode);
+  request.mutable_open()->set_credits(credits);
+  return rpc_->Write(request);
+}
+
+bool WatchClient::Credit(std::uint32_t frames) {
+  v1::WatchStreamRequest request;
+  request.mutable_credit()->set_frames(frames);
+  return rpc_->Write(request);
+}
+
+v1::WatchStreamResponse WatchClient::Receive() {
+  v1::WatchStreamResponse response;
+  if (!rpc_->Read(&response)) response.Clear();
+  return response;
+}
+
+grpc::Status WatchClient::Finish() {
+  v1::WatchStreamResponse response;
+  while (rpc_->Read(&response)) {
+  }
+  finished_ = true;
+  return rpc_->Finish();
+}
+
 std::vector<Digests> LocalDigests(unsigned seed, std::uint64_t frames) {
   const auto reconstructor = Reconstructor::Create(BlobParameters());
   State state;

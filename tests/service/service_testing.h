@@ -66,6 +66,32 @@ class StreamClient {
   bool finished_ = false;
 };
 
+/// One WatchStream call, driven step by step.
+class WatchClient {
+ public:
+  explicit WatchClient(const std::shared_ptr<grpc::Channel>& channel);
+  /// Cancels a watch that was not finished.
+  ~WatchClient();
+
+  bool Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits);
+  bool Send(const v1::WatchStreamRequest& request) { return rpc_->Write(request); }
+  bool Credit(std::uint32_t frames);
+  /// A message without a case once the watch has ended.
+  v1::WatchStreamResponse Receive();
+  void HalfClose() { rpc_->WritesDone(); }
+  void Cancel() { context_.TryCancel(); }
+  /// Receives and drops what is left; gives the status.
+  grpc::Status Finish();
+  /// Of the status.
+  std::string reason() const { return ReasonOf(context_); }
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<v1::ReconstructionService::Stub> stub_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::WatchStreamRequest, v1::WatchStreamResponse>> rpc_;
+  bool finished_ = false;
+};
+
 struct Digests {
   std::uint64_t rings = 0, mesh = 0;
 

@@ -23,7 +23,7 @@ void ExpectOneLine(const Ran& ran) {
 TEST(Usage, HelpTeachesEveryVerbByExamples) {
   const Ran help = RunPartiemc({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"replay", "info", "evaluate", "convert"}) {
+  for (const char* verb : {"replay", "watch", "streams", "info", "evaluate", "convert"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     const Ran verb_help = RunPartiemc({verb, "--help"});
     EXPECT_EQ(verb_help.exit_code, 0);
@@ -62,6 +62,15 @@ TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
       {"replay", kDamBreak, "--local", "--select", "type=1"},
       {"replay", kDamBreak, "--local", "--stats", "stats.xls"},
       {"replay", kDamBreak, "--server", "nowhere"},
+      {"replay", kDamBreak, "--local", "--name", "dam"},
+      {"watch"},
+      {"watch", "dam", "--server", "nowhere"},
+      {"watch", "dam", "--mode", "some"},
+      {"watch", "dam", "--frames", "0"},
+      {"watch", "dam", "--format", "svg"},
+      {"watch", "dam", "--output-dir", "out", "--format", "png"},
+      {"watch", "dam", "--stats", "stats.xls"},
+      {"streams", "--server", "nowhere"},
       {"info", "--server", "nowhere"},
       {"convert", kDamBreak},
       {"convert", kDamBreak, "out.csv"},

@@ -32,6 +32,7 @@ struct Outputs {
   /// Coordinates as float32 relative to an origin: half the bytes. A frame so wide that a point
   /// would move by more than 1e-4 spacings is refused.
   bool relative_float32 = false;
+  bool echo_particles = false;  ///< Watchers of the stream get the particles too.
 };
 
 struct StreamOptions {

@@ -1,0 +1,30 @@
+// `partiemc streams`: what is being streamed through a server now.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "cli/server_flags.h"
+#include "partiemc/client/stream_list.h"
+
+namespace partiemc::client {
+
+struct StreamsFlags {
+  ServerFlags server;
+  double deadline_seconds = 5;
+  bool json = false;
+};
+
+CLI::App* AddStreams(CLI::App& app, StreamsFlags& flags);
+
+/// Returns the exit code.
+int Streams(const StreamsFlags& flags);
+
+/// An aligned table for a person; every line ends in '\n'.
+std::string StreamsText(std::span<const StreamSummary> streams);
+
+/// One JSON object on one line.
+std::string StreamsJson(std::span<const StreamSummary> streams, const std::string& address);
+
+}  // namespace partiemc::client

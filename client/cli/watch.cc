@@ -1,0 +1,199 @@
+#include "cli/watch.h"
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "cli/console.h"
+#include "output/frame_writer.h"
+#include "output/progress.h"
+#include "output/statistics_writer.h"
+#include "output/summary.h"
+#include "output/text.h"
+#include "partiemc/client/watcher.h"
+
+namespace partiemc::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// How soon Ctrl-C is seen while no frame comes.
+constexpr std::chrono::milliseconds kPollInterval(100);
+
+// What a watch leaves behind.
+class WatchOutputs {
+ public:
+  static absl::StatusOr<WatchOutputs> Create(const WatchFlags& flags) {
+    WatchOutputs outputs;
+    if (!flags.output_dir.empty()) {
+      auto formats = ParseFrameFormats(flags.format);
+      if (!formats.ok()) return formats.status();
+      auto frames =
+          FrameWriter::Create({.directory = flags.output_dir, .formats = *std::move(formats)});
+      if (!frames.ok()) return frames.status();
+      outputs.frames_ = *std::move(frames);
+    }
+    if (!flags.stats.empty()) {
+      auto statistics = StatisticsWriter::Create(flags.stats);
+      if (!statistics.ok()) return statistics.status();
+      outputs.statistics_.emplace(*std::move(statistics));
+    }
+    return outputs;
+  }
+
+  absl::Status Write(const WatchedFrame& frame) {
+    const FrameRecord record{.index = frame.sequence - 1,  // As a replay numbers its files.
+                             .time = frame.time,
+                             .result = frame.frame.result,
+                             .particles = frame.particles,
+                             .stages_ms = frame.frame.times.stages_ms,
+                             .total_ms = frame.frame.times.total_ms,
+                             .rings_digest = frame.frame.rings_digest,
+                             .mesh_digest = frame.frame.mesh_digest};
+    summary_.Add(record);
+    absl::Status status;
+    if (frames_) status = frames_->Write(record);
+    if (status.ok() && statistics_) status = statistics_->Add(record);
+    return status;
+  }
+
+  absl::Status Finish() { return statistics_ ? statistics_->Finish() : absl::OkStatus(); }
+
+  const Summary& summary() const { return summary_; }
+
+ private:
+  std::optional<FrameWriter> frames_;
+  std::optional<StatisticsWriter> statistics_;
+  Summary summary_;
+};
+
+// How a watch ended.
+struct Ended {
+  ExitCode code = kGood;
+  std::uint64_t dropped = 0;
+  std::string word;  // Of the end, unless it is what was asked for.
+};
+
+// "t = 1.25, 2278 particles, 5 polylines, 3 dropped".
+std::string Detail(const WatchedFrame& frame, std::uint64_t dropped) {
+  std::string detail = Concat("t = ", frame.time, ", ", frame.frame.result.statistics.particles,
+                              " particles, ", frame.frame.result.rings.RingCount(), " polylines");
+  if (dropped > 0) AppendAll(detail, ", ", dropped, " dropped");
+  return detail;
+}
+
+Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, WatchOutputs& outputs,
+                 Progress& progress) {
+  Ended ended;
+  WatchedFrame frame;
+  for (std::uint64_t count = 0; flags.frames == 0 || count < flags.frames;) {
+    if (Interrupted()) return {kInterrupted, ended.dropped, "interrupted"};
+    const auto received = watcher.Receive(frame, kPollInterval);
+    if (!received.ok()) {
+      return {kServer, ended.dropped + watcher.end().dropped, OneLine(received.status())};
+    }
+    if (*received == Received::kNothingYet) continue;
+    if (*received == Received::kEnd) {
+      const bool finished = watcher.end().reason == "FINISHED";
+      ended.dropped += watcher.end().dropped;
+      if (finished) return ended;
+      return {kServer, ended.dropped, "the stream ended: " + OneLine(watcher.end().message)};
+    }
+    ended.dropped += frame.dropped;
+    const absl::Status status = outputs.Write(frame);
+    if (!status.ok()) return {kFailed, ended.dropped, OneLine(status)};
+    progress.Update(++count, Detail(frame, ended.dropped));
+  }
+  return ended;
+}
+
+}  // namespace
+
+CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
+  CLI::App* verb =
+      app.add_subcommand("watch", "Show what a stream of somebody else gives, while it is running");
+  verb->add_option("STREAM", flags.stream, "Its name, as `partiemc streams` tells it")->required();
+  AddServerFlags(*verb, flags.server, "Server");
+  verb->add_option("--mode", flags.mode,
+                   "latest: the newest frame whenever there is room, others are dropped and "
+                   "counted; every: all of them, or be disconnected for falling behind")
+      ->check(CLI::IsMember({"latest", "every"}))
+      ->type_name("MODE")
+      ->capture_default_str();
+  verb->add_option("--frames", flags.frames, "Leave after as many; by default when the stream ends")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62))
+      ->type_name("N");
+  verb->add_option("--credits", flags.credits, "Frames on their way at once")
+      ->check(CLI::Range(1, 64))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--deadline", flags.deadline_seconds,
+                   "Seconds that the server may take to accept")
+      ->check(CLI::Range(0.001, 86400.0))
+      ->capture_default_str();
+  std::string formats;
+  for (const FrameFormat format : AllFrameFormats()) {
+    AppendAll(formats, formats.empty() ? "" : ",", Name(format));
+  }
+  auto* const output_dir =
+      verb->add_option("--output-dir", flags.output_dir,
+                       "Write DIR/frame_000000.EXT for every frame, numbered as its producer does")
+          ->type_name("DIR");
+  verb->add_option("--format", flags.format, "Of these files, a list of " + formats)
+      ->needs(output_dir)
+      ->type_name("LIST")
+      ->capture_default_str();
+  verb->add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
+      ->type_name("FILE");
+  verb->add_flag("--quiet", flags.quiet, "No progress and no table");
+  verb->footer(
+      "A watcher never slows the stream. One that joins late gets the newest frame at once.\n"
+      "Examples:\n"
+      "  partiemc streams --server simulator:50051\n"
+      "  partiemc watch dam-break --server simulator:50051\n"
+      "  partiemc watch dam-break --mode every --output-dir out --format geojson,svg\n"
+      "  partiemc watch dam-break --frames 1 --quiet --output-dir now\n"
+      "Exit codes: 0 good, 1 failed, 2 wrong usage, 4 server or its stream, 130 interrupted.");
+  return verb;
+}
+
+int Watch(const WatchFlags& flags) {
+  CatchInterrupts();  // Before there are temporary files to take away.
+  auto outputs = WatchOutputs::Create(flags);
+  if (!outputs.ok()) {
+    const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
+  }
+  const auto watcher =
+      Watcher::Open(flags.server.address, flags.stream,
+                    {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
+                     .credits = flags.credits,
+                     .credentials = flags.server.credentials,
+                     .deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
+                         std::chrono::duration<double>(flags.deadline_seconds))});
+  if (!watcher.ok()) {
+    const bool wrong_flag = watcher.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kServer, AsFlag(watcher.status()));
+  }
+
+  Progress::Options progress_options = Progress::ForStandardError();
+  progress_options.quiet = flags.quiet;
+  if (flags.frames > 0) progress_options.total = flags.frames;
+  Progress progress(std::move(progress_options));
+  const Clock::time_point start = Clock::now();
+  const Ended ended = ReceiveAll(flags, **watcher, *outputs, progress);
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  progress.Finish();
+
+  const absl::Status finished = outputs->Finish();
+  if (!finished.ok()) return Complain(kFailed, finished);
+  if (!flags.quiet && outputs->summary().frame_count() > 0) {
+    std::fputs(outputs->summary().Table(seconds).c_str(), stdout);
+    std::fputs(Concat("dropped frames: ", ended.dropped, "\n").c_str(), stdout);
+  }
+  return ended.word.empty() ? ended.code : Complain(ended.code, ended.word);
+}
+
+}  // namespace partiemc::client

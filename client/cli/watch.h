@@ -1,0 +1,30 @@
+// `partiemc watch`: the results of somebody else's stream, while they are made.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "cli/server_flags.h"
+
+namespace partiemc::client {
+
+struct WatchFlags {
+  std::string stream;
+  ServerFlags server;
+  std::string mode = "latest";
+  std::uint32_t credits = 2;
+  std::uint64_t frames = 0;  ///< 0: until the stream ends.
+  double deadline_seconds = 30;
+  std::string output_dir;
+  std::string format = "geojson";
+  std::string stats;
+  bool quiet = false;
+};
+
+CLI::App* AddWatch(CLI::App& app, WatchFlags& flags);
+
+/// Returns the exit code.
+int Watch(const WatchFlags& flags);
+
+}  // namespace partiemc::client

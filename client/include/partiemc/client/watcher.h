@@ -1,0 +1,107 @@
+// A watcher of somebody else's stream: gets its results while they are made, and can never hold up
+// whoever makes them.
+//
+//   auto watcher = partiemc::client::Watcher::Open("127.0.0.1:50051", "dam-break", {});
+//   if (!watcher.ok()) ...
+//   partiemc::client::WatchedFrame frame;
+//   for (auto got = (*watcher)->Receive(frame); got.ok() && *got == Received::kEvent;
+//        got = (*watcher)->Receive(frame)) Draw(frame.frame.result.rings);
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "partiemc/client/credentials.h"
+#include "partiemc/client/frame_stream.h"
+
+namespace partiemc::client {
+
+enum class WatchMode : std::uint8_t {
+  kLatest,  ///< The newest frame whenever there is room for one; others are dropped and counted.
+  kEvery,   ///< Every frame from now on; who falls behind for long is disconnected.
+};
+
+struct WatcherOptions {
+  WatchMode mode = WatchMode::kLatest;
+  /// Frames on their way or waiting to be received, at least 1. More hides a slow link; fewer show
+  /// newer frames.
+  std::uint32_t credits = 2;
+  Credentials credentials = {};
+  /// For reaching the server; a server that starts meanwhile is found.
+  std::chrono::milliseconds connect_timeout{2000};
+  /// For the server to answer. Frames may take any time: they come when the producer sends them.
+  std::chrono::milliseconds deadline{30000};
+};
+
+/// The stream that is watched.
+struct WatchedStream {
+  std::string stream_id;                ///< As in the server's log.
+  ReconstructionParameters parameters;  ///< As resolved.
+  std::map<std::string, std::string> labels;
+};
+
+/// Kept by the caller and handed in again, so that its buffers are reused.
+struct WatchedFrame {
+  std::uint64_t sequence = 0;  ///< Of the producer's frame.
+  double time = 0;
+  FrameResult frame;
+  /// x0, y0, x1, y1, ... in the stream's plane, where its producer echoes them; else empty.
+  std::vector<double> particles;
+  std::uint64_t dropped = 0;  ///< Frames that did not come since the one before.
+};
+
+/// Why a watch ended.
+struct WatchEnd {
+  std::string reason;   ///< "FINISHED", "PRODUCER_LOST", ...: proto/PROTOCOL.md has the table.
+  std::string message;  ///< For a person.
+  std::uint64_t dropped = 0;  ///< Frames that did not come since the last one.
+};
+
+/// One thread receives; Cancel may come from any thread. Reading runs in the background, credit is
+/// given as frames are received.
+class Watcher {
+ public:
+  /// `stream_name` is as ListStreams tells it; `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
+  /// Errors: INVALID_ARGUMENT (address, credentials), UNAVAILABLE (no server there, or one of the
+  /// two does not trust the other), UNAUTHENTICATED (token), NOT_FOUND (no such stream),
+  /// RESOURCE_EXHAUSTED (too many watchers), DEADLINE_EXCEEDED, each in one line.
+  static absl::StatusOr<std::unique_ptr<Watcher>> Open(std::string_view address,
+                                                       std::string_view stream_name,
+                                                       const WatcherOptions& options);
+
+  /// Leaves unless the end has been received. No call may be under way.
+  ~Watcher();
+  Watcher(const Watcher&) = delete;
+  Watcher& operator=(const Watcher&) = delete;
+
+  const WatchedStream& stream() const;
+
+  /// Waits for the next frame, at most `wait` where it is given. kEnd: the watch has ended, as
+  /// end() tells.
+  /// Errors: RESOURCE_EXHAUSTED (fell behind in mode kEvery; a frame too large to be watched),
+  /// UNAVAILABLE (the server drains, or the connection was lost), DATA_LOSS when a message makes no
+  /// sense, CANCELLED after Cancel; each has ended the watch.
+  absl::StatusOr<Received> Receive(WatchedFrame& frame,
+                                   std::optional<std::chrono::milliseconds> wait = std::nullopt);
+
+  /// Once the watch has ended; what the server said of it, if it did.
+  const WatchEnd& end() const;
+
+  /// Leaves at once: calls under way and later ones return CANCELLED.
+  void Cancel();
+
+ private:
+  class Call;
+  explicit Watcher(std::unique_ptr<Call> call);
+
+  std::unique_ptr<Call> call_;
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,41 @@
+// A result as watchers get it: the bytes that were serialised for its producer, shared by all
+// messages that carry them.
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "partiemc/v1/reconstruction.pb.h"
+
+namespace partiemc::wire {
+
+/// Immutable but for EchoParticles, and cheap to copy: slices are counted references.
+class WatchedBytes {
+ public:
+  /// Shares the memory of `response`, which ToBytes made of a ReconstructResponse that holds
+  /// `frame`. Its checkpoint is left out: that is between the producer and the server.
+  /// Requires: `frame` has no particles and has not been changed since.
+  WatchedBytes(const grpc::ByteBuffer& response, const v1::ReconstructedFrame& frame);
+
+  /// Adds the positions of the frame in `request`, the bytes of a ReconstructRequest that was
+  /// parsed into `frame`, by sharing their memory.
+  void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
+
+  /// Of the serialised ReconstructedFrame.
+  std::size_t size() const { return size_; }
+
+  /// A serialised WatchStreamResponse with the frame and this WatchedFrame.dropped. Copies nothing
+  /// but a few bytes of its own.
+  grpc::ByteBuffer ToResponse(std::uint64_t dropped) const;
+
+ private:
+  void Append(const grpc::ByteBuffer& whole, std::size_t offset, std::size_t length);
+
+  std::vector<grpc::Slice> slices_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace partiemc::wire

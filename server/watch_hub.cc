@@ -1,0 +1,99 @@
+#include "server/watch_hub.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace partiemc::server {
+namespace {
+
+// How often this thread has given up its processor to wait for something.
+long Sleeps() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_nvcsw;
+}
+
+}  // namespace
+
+WatchHub::WatchHub(WatchPump& pump, const Limits& limits)
+    : pump_(pump), limits_(limits), tap_(limits.tap_bytes) {}
+
+void WatchHub::Publish(std::shared_ptr<const WatchFrame> frame) {
+  ++published_;
+  if (watcher_count_ == 0) {
+    if (frame->bytes() <= limits_.kept_bytes) {
+      tap_.Put({std::move(frame), published_}, /*keep_older=*/false);
+    } else {
+      tap_.Clear();
+    }
+    // Who has joined meanwhile may have found the tap empty.
+    if (watcher_count_ != 0) pump_.Wake(*this);
+    return;
+  }
+  const long sleeps = Sleeps();
+  tap_.Put({std::move(frame), published_}, /*keep_older=*/true);
+  pump_.Wake(*this);
+  if (Sleeps() != sleeps) ++producer_waits_;
+}
+
+void WatchHub::End(WatchEnd end) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!end_) end_ = std::move(end);
+  }
+  pump_.Wake(*this);
+}
+
+void WatchHub::Join(std::shared_ptr<WatchFlow> watcher) {
+  {
+    const std::lock_guard lock(mutex_);
+    watchers_.push_back({.flow = std::move(watcher)});
+    ++watcher_count_;
+  }
+  pump_.Wake(*this);
+}
+
+void WatchHub::Leave(const WatchFlow& watcher) {
+  std::shared_ptr<WatchFlow> left;  // Given up without the lock, and so is the frame.
+  Published newest;
+  const std::lock_guard lock(mutex_);
+  const auto found = std::ranges::find_if(
+      watchers_, [&](const Entry& entry) { return entry.flow.get() == &watcher; });
+  if (found == watchers_.end()) return;
+  left = std::move(found->flow);
+  watchers_.erase(found);
+  if (--watcher_count_ != 0) return;
+  newest = std::exchange(newest_, {});
+  if (newest.frame != nullptr && newest.frame->bytes() <= limits_.kept_bytes) {
+    tap_.PutBack(std::move(newest));
+  }
+}
+
+void WatchHub::Serve() {
+  std::vector<Published> news;
+  std::vector<Entry> watchers;
+  Published newest;
+  std::optional<WatchEnd> end;
+  {
+    const std::lock_guard lock(mutex_);
+    if (watchers_.empty()) return;
+    news = tap_.Take();
+    if (!news.empty()) newest_ = news.back();
+    newest = newest_;
+    watchers = watchers_;
+    for (Entry& entry : watchers_) entry.is_new = false;
+    end = end_;
+  }
+  for (const Entry& entry : watchers) {
+    if (!entry.is_new) {
+      entry.flow->Offer(news);
+    } else if (newest.frame != nullptr) {
+      entry.flow->Offer({&newest, 1});
+    }
+    if (end) entry.flow->StreamEnded(*end);
+  }
+}
+
+}  // namespace partiemc::server

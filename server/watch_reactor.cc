@@ -1,0 +1,149 @@
+#include "server/watch_reactor.h"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/grpc_status.h"
+#include "server/watch_hub.h"
+#include "wire/codec.h"
+#include "wire/message_bytes.h"
+
+namespace partiemc::server {
+namespace {
+
+// Far above what an `open` or a `credit` takes, so small that nobody fills memory with them.
+constexpr std::size_t kMaxRequestBytes = 4096;
+
+absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
+  switch (mode) {
+    case v1::WATCH_MODE_UNSPECIFIED:
+    case v1::WATCH_MODE_LATEST:
+      return WatchMode::kLatest;
+    case v1::WATCH_MODE_EVERY:
+      return WatchMode::kEvery;
+    default:
+      return ViolationError(absl::StatusCode::kInvalidArgument,
+                            {std::string(wire::kReasonUnsupported), "open.mode", absl::StrCat(mode),
+                             "must be WATCH_MODE_LATEST or WATCH_MODE_EVERY"});
+  }
+}
+
+}  // namespace
+
+WatchReactor::WatchReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
+                           StreamRegistry& streams, WatchRegistry& watchers)
+    : context_(context),
+      streams_(streams),
+      watchers_(watchers),
+      flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), limits.max_watcher_bytes)) {
+  auto status = streams_.CheckServing();
+  if (status.ok()) status = watchers_.Enter(flow_);
+  if (!status.ok()) {
+    Finish(status);
+  } else {
+    flow_->Start();
+  }
+}
+
+void WatchReactor::OnReadDone(bool ok) {
+  if (!ok) {
+    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
+    if (context_.IsCancelled()) flow_->Cancelled();
+    return flow_->ReadEnded();
+  }
+  WatchRequest request;
+  parsed_.Clear();
+  if (request_.Length() <= kMaxRequestBytes && wire::MergeBytes(request_, parsed_)) {
+    using Kind = WatchRequest::Kind;
+    request.kind = parsed_.has_open()     ? Kind::kOpen
+                   : parsed_.has_credit() ? Kind::kCredit
+                                          : Kind::kEmpty;
+    request.credit = parsed_.credit().frames();
+  }
+  request_.Clear();
+  flow_->ReadDone(request);
+}
+
+void WatchReactor::OnWriteDone(bool ok) {
+  response_.Clear();
+  flow_->WriteDone(ok);
+}
+
+void WatchReactor::OnCancel() { flow_->Cancelled(); }
+
+void WatchReactor::OnDone() {
+  watchers_.Leave(*flow_);
+  delete this;
+}
+
+void WatchReactor::StartRead() { ServerBidiReactor::StartRead(&request_); }
+
+absl::StatusOr<WatchTerms> WatchReactor::Open() {
+  const v1::OpenWatch& open = parsed_.open();
+  const auto mode = DecodeMode(open.mode());
+  if (!mode.ok()) return mode.status();
+  if (open.credits() == 0) {
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonOutOfRange), "open.credits", "0", "must be at least 1"});
+  }
+  const auto stream = streams_.Find(open.stream_name());
+  if (!stream.ok()) return stream.status();
+  const StreamDescription& description = stream->description;
+  stream_name_ = description.name;
+  v1::WatchOpened& opened = *opened_.mutable_opened();
+  opened.set_stream_id(stream->id);
+  wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
+  opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
+  spdlog::info("watch opened stream={} name={} mode={} peer={}", stream->id, stream_name_,
+               *mode == WatchMode::kEvery ? "every" : "latest", context_.peer());
+  return WatchTerms{.hub = description.hub, .mode = *mode, .credit = open.credits()};
+}
+
+void WatchReactor::WriteOpened() { Write(wire::ToBytes(opened_)); }
+
+void WatchReactor::WriteFrame(const WatchFrame& frame, std::uint64_t dropped) {
+  Write(static_cast<const WatchedResult&>(frame).bytes.ToResponse(dropped));
+}
+
+void WatchReactor::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
+  end_reason_ = end.reason;
+  v1::WatchStreamResponse response;
+  response.mutable_ended()->set_reason(end.reason);
+  response.mutable_ended()->set_message(end.message);
+  response.mutable_ended()->set_dropped(dropped);
+  Write(wire::ToBytes(response));
+}
+
+void WatchReactor::Write(grpc::ByteBuffer response) {
+  response_.Swap(&response);
+  StartWrite(&response_);
+}
+
+void WatchReactor::Cut() { context_.TryCancel(); }
+
+void WatchReactor::Finish(const absl::Status& status) {
+  LogEnd(status);
+  ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
+}
+
+void WatchReactor::LogEnd(const absl::Status& status) const {
+  const std::string code = absl::StatusCodeToString(status.code());
+  if (stream_name_.empty()) {
+    spdlog::warn("watch refused peer={} status={} message={}", context_.peer(), code,
+                 std::string(status.message()));
+    return;
+  }
+  const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;
+  const WatchCounts counts = flow_->counts();
+  spdlog::info(
+      "watch closed stream={} name={} frames={} dropped={} seconds={:.3f} reason={} "
+      "status={}",
+      opened_.opened().stream_id(), stream_name_, counts.frames, counts.dropped, open.count(),
+      end_reason_.empty() ? "LEFT" : end_reason_, code);
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,63 @@
+#include "server/watch_registry.h"
+
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/stream_flow.h"
+
+namespace partiemc::server {
+
+absl::Status WatchRegistry::Enter(std::shared_ptr<WatchFlow> watcher) {
+  const std::lock_guard lock(mutex_);
+  if (draining_) return DrainingError();
+  if (watchers_.size() >= max_watchers_) {
+    return ViolationError(
+        absl::StatusCode::kResourceExhausted,
+        {std::string(kReasonTooManyWatchers), "watchers", absl::StrCat(watchers_.size(), " watch"),
+         absl::StrCat("must be at most ", max_watchers_,
+                      "; try again when one has left, or start the server with a larger "
+                      "--max-watchers")});
+  }
+  const WatchFlow* key = watcher.get();
+  watchers_[key] = std::move(watcher);
+  return absl::OkStatus();
+}
+
+void WatchRegistry::Leave(const WatchFlow& watcher) {
+  const std::lock_guard lock(mutex_);
+  watchers_.erase(&watcher);
+  // With the lock held: whoever waits for the last one may take the registry away after that.
+  left_.notify_all();
+}
+
+std::size_t WatchRegistry::count() const {
+  const std::lock_guard lock(mutex_);
+  return watchers_.size();
+}
+
+std::vector<std::shared_ptr<WatchFlow>> WatchRegistry::All() const {
+  std::vector<std::shared_ptr<WatchFlow>> all;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
+  return all;
+}
+
+// Flows are told without the lock: one that drains may leave at once.
+void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  for (const auto& watcher : All()) watcher->Drain();
+  if (WaitUntilEmpty(patience)) return;
+  for (const auto& watcher : All()) watcher->Cut();
+}
+
+bool WatchRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return left_.wait_until(lock, deadline, [this] { return watchers_.empty(); });
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,303 @@
+// Watching over gRPC: what watchers get, what they are told, how watches end.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "service/service_testing.h"
+
+namespace partiemc::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::chrono::milliseconds kGrace{60'000};
+
+class Watch : public ::testing::TestWithParam<Transport> {
+ protected:
+  void SetUp() override {
+    ServerOptions options = TestOptions();
+    options.limits.max_watchers = 4;
+    server_ = StartServer(options);
+    channel_ = Connect(*server_, GetParam());
+    producer_ = std::make_unique<StreamClient>(channel_);
+  }
+
+  void OpenProducer(bool echo_particles = false) {
+    auto open = OpenRequest("tank");
+    if (echo_particles) {
+      open.mutable_open()->mutable_outputs()->set_rings(true);
+      open.mutable_open()->mutable_outputs()->set_mesh(true);
+      open.mutable_open()->mutable_outputs()->set_echo_particles(true);
+    }
+    (*open.mutable_open()->mutable_labels())["run"] = "7";
+    ASSERT_TRUE(producer_->SendAndReceive(open).has_opened());
+  }
+  // Frame `index` through the producer's stream; what came back to it.
+  v1::ReconstructedFrame Produce(std::uint64_t index) {
+    return producer_->SendAndReceive(BlobRequest(index + 1, 1, index)).frame();
+  }
+  std::uint32_t ListedWatchers() {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::ListStreamsResponse streams;
+    EXPECT_TRUE(
+        v1::ReconstructionService::NewStub(channel_)->ListStreams(&context, {}, &streams).ok());
+    return streams.streams_size() == 1 ? streams.streams(0).watchers() : 99;
+  }
+  void ExpectRefused(WatchClient& watcher, grpc::StatusCode code, const std::string& reason,
+                     const std::string& words) {
+    const auto status = watcher.Finish();
+    EXPECT_EQ(status.error_code(), code) << status.error_message();
+    EXPECT_EQ(watcher.reason(), reason);
+    EXPECT_THAT(status.error_message(), HasSubstr(words));
+  }
+
+  std::unique_ptr<Server> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<StreamClient> producer_;
+};
+
+std::string WithoutTimes(v1::ReconstructedFrame frame) {
+  frame.mutable_statistics()->clear_stages();
+  frame.mutable_statistics()->clear_milliseconds();
+  return frame.SerializeAsString();
+}
+
+TEST_P(Watch, EveryGetsEachResultBitForBitAsItsProducerDoesAndThenHearsTheEnd) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_EVERY, 3);
+  const auto opened = watcher.Receive();
+  ASSERT_TRUE(opened.has_opened());
+  EXPECT_EQ(opened.opened().labels().at("run"), "7");
+  EXPECT_TRUE(opened.opened().parameters().has_reference_radius());
+  EXPECT_EQ(ListedWatchers(), 1u);
+  for (std::uint64_t i = 0; i < 12; ++i) {
+    const v1::ReconstructedFrame made = Produce(i);
+    const auto seen = watcher.Receive();
+    ASSERT_TRUE(seen.has_frame());
+    EXPECT_EQ(seen.frame().frame().SerializeAsString(), made.SerializeAsString());
+    EXPECT_EQ(seen.frame().dropped(), 0u);
+    watcher.Credit(1);
+  }
+  producer_->HalfClose();
+  EXPECT_TRUE(producer_->Finish().ok());
+  const auto ended = watcher.Receive();
+  EXPECT_EQ(ended.ended().reason(), "FINISHED");
+  EXPECT_EQ(ended.ended().dropped(), 0u);
+  EXPECT_TRUE(watcher.Finish().ok());
+}
+
+TEST_P(Watch, WhoComesLateGetsTheNewestFrameAtOnceAlthoughNobodyWatchedIt) {
+  OpenProducer();
+  v1::ReconstructedFrame made;
+  for (std::uint64_t i = 0; i < 5; ++i) made = Produce(i);
+  for (int k = 0; k < 3; ++k) {  // And again when the one before has left.
+    WatchClient watcher(channel_);
+    watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+    ASSERT_TRUE(watcher.Receive().has_opened());
+    const auto seen = watcher.Receive();
+    EXPECT_EQ(WithoutTimes(seen.frame().frame()), WithoutTimes(made));
+    EXPECT_EQ(seen.frame().dropped(), 0u);
+  }
+}
+
+TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  Produce(0);
+  EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
+  for (std::uint64_t i = 1; i < 6; ++i) Produce(i);
+  watcher.Credit(1);
+  // The pump may still be on its way with the last ones when the credit comes.
+  std::uint64_t dropped = 0;
+  std::uint64_t sequence = 0;
+  while (sequence < 6) {
+    const auto seen = watcher.Receive();
+    ASSERT_TRUE(seen.has_frame());
+    EXPECT_EQ(seen.frame().frame().sequence(),
+              sequence + seen.frame().dropped() + 1 + (sequence == 0 ? 1 : 0));
+    sequence = seen.frame().frame().sequence();
+    dropped += seen.frame().dropped();
+    if (sequence < 6) watcher.Credit(1);
+  }
+  for (std::uint64_t i = 6; i < 10; ++i) Produce(i);
+  producer_->HalfClose();
+  EXPECT_TRUE(producer_->Finish().ok());
+  watcher.HalfClose();  // No credit will come for what is there.
+  const auto ended = watcher.Receive();
+  EXPECT_EQ(ended.ended().dropped(), 4u);
+  EXPECT_TRUE(watcher.Finish().ok());
+}
+
+TEST_P(Watch, TheLastFrameIsStillShownWhenItsCreditComesAfterTheEndOfTheStream) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  Produce(0);
+  EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
+  for (std::uint64_t i = 1; i < 4; ++i) Produce(i);
+  producer_->HalfClose();
+  EXPECT_TRUE(producer_->Finish().ok());
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  watcher.Credit(1);
+  const auto last = watcher.Receive();
+  EXPECT_EQ(last.frame().frame().sequence(), 4u);
+  EXPECT_EQ(last.frame().dropped(), 2u);
+  EXPECT_EQ(watcher.Receive().ended().reason(), "FINISHED");
+  EXPECT_TRUE(watcher.Finish().ok());
+}
+
+TEST_P(Watch, ParticlesAreEchoedToWatchersAsTheyWereSentAndNotToTheProducer) {
+  OpenProducer(/*echo_particles=*/true);
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_EVERY, 9);
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    const v1::ReconstructRequest request = BlobRequest(i + 1, 1, i);
+    const auto made = producer_->SendAndReceive(request);
+    EXPECT_TRUE(made.frame().particles().empty());
+    v1::ReconstructedFrame seen = watcher.Receive().frame().frame();
+    EXPECT_EQ(seen.particle_format(), request.frame().position_format());
+    EXPECT_TRUE(seen.particles() == request.frame().positions());
+    seen.clear_particles();
+    seen.clear_particle_format();
+    EXPECT_EQ(seen.SerializeAsString(), made.frame().SerializeAsString());
+  }
+}
+
+TEST_P(Watch, AFrameErrorIsNotShownAndNoDrop) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_EVERY, 9);
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  Produce(0);
+  auto bad = BlobRequest(2, 1, 1);
+  bad.mutable_frame()->mutable_positions()->pop_back();
+  EXPECT_TRUE(producer_->SendAndReceive(bad).has_error());
+  Produce(2);
+  EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
+  const auto next = watcher.Receive();
+  EXPECT_EQ(next.frame().frame().sequence(), 3u);
+  EXPECT_EQ(next.frame().dropped(), 0u);
+}
+
+TEST_P(Watch, AHalfClosedWatchGoesOnForAsLongAsItHasCredit) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_LATEST, 2);
+  watcher.HalfClose();
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  Produce(0);
+  EXPECT_TRUE(watcher.Receive().has_frame());
+  Produce(1);
+  EXPECT_TRUE(watcher.Receive().has_frame());
+  EXPECT_EQ(watcher.Receive().ended().reason(), "CREDIT_USED");
+  EXPECT_TRUE(watcher.Finish().ok());
+}
+
+TEST_P(Watch, AProducerThatIsGoneIsTold) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Open("tank", v1::WATCH_MODE_LATEST, 2);
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  producer_->Cancel();
+  EXPECT_EQ(watcher.Receive().ended().reason(), "PRODUCER_LOST");
+  EXPECT_TRUE(watcher.Finish().ok());
+}
+
+TEST_P(Watch, WhatCannotBeWatchedIsRefusedWithItsReason) {
+  OpenProducer();
+  WatchClient unknown(channel_), mode(channel_), credits(channel_), early(channel_);
+  unknown.Open("tonk", v1::WATCH_MODE_LATEST, 1);
+  ExpectRefused(unknown, grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM",
+                "open.stream_name: \"tonk\"; must be the name of an open stream");
+  mode.Open("tank", static_cast<v1::WatchMode>(9), 1);
+  ExpectRefused(mode, grpc::StatusCode::INVALID_ARGUMENT, "UNSUPPORTED", "open.mode: 9; must be");
+  credits.Open("tank", v1::WATCH_MODE_LATEST, 0);
+  ExpectRefused(credits, grpc::StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+                "open.credits: 0; must be at least 1");
+  early.Credit(1);
+  ExpectRefused(early, grpc::StatusCode::INVALID_ARGUMENT, "PROTOCOL",
+                "request: no `open`; the first must be `open`");
+  WatchClient silent(channel_);
+  silent.HalfClose();
+  ExpectRefused(silent, grpc::StatusCode::INVALID_ARGUMENT, "PROTOCOL", "request: none;");
+}
+
+TEST_P(Watch, BrokenRulesEndAWatchAndAreTold) {
+  OpenProducer();
+  v1::WatchStreamRequest second_open, no_frames, empty;
+  second_open.mutable_open()->set_stream_name("tank");
+  no_frames.mutable_credit();
+  for (const auto& [request, reason] :
+       {std::pair(second_open, "PROTOCOL"), std::pair(empty, "PROTOCOL"),
+        std::pair(no_frames, "OUT_OF_RANGE")}) {
+    WatchClient watcher(channel_);
+    watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+    ASSERT_TRUE(watcher.Receive().has_opened());
+    watcher.Send(request);
+    EXPECT_EQ(watcher.Receive().ended().reason(), reason);
+    ExpectRefused(watcher, grpc::StatusCode::INVALID_ARGUMENT, reason, "must be");
+  }
+}
+
+TEST_P(Watch, OneWatcherTooManyIsRefusedAtOnceAndThePlaceIsFreeWhenOneLeaves) {
+  OpenProducer();
+  std::vector<std::unique_ptr<WatchClient>> watchers;
+  for (int k = 0; k < 4; ++k) {
+    watchers.push_back(std::make_unique<WatchClient>(channel_));
+    watchers.back()->Open("tank", v1::WATCH_MODE_LATEST, 1);
+    ASSERT_TRUE(watchers.back()->Receive().has_opened());
+  }
+  EXPECT_EQ(ListedWatchers(), 4u);
+  WatchClient fifth(channel_);  // Refused before it says anything.
+  ExpectRefused(fifth, grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS",
+                "watchers: 4 watch; must be at most 4");
+  watchers.pop_back();
+  for (bool in = false; !in;) {  // The server hears of it a little later.
+    WatchClient again(channel_);
+    again.Open("tank", v1::WATCH_MODE_LATEST, 1);
+    in = again.Receive().has_opened();
+  }
+}
+
+TEST_P(Watch, ADrainDeliversWhatIsDoneAndSaysGoodbye) {
+  OpenProducer();
+  WatchClient idle(channel_), without_credit(channel_);
+  idle.Open("tank", v1::WATCH_MODE_EVERY, 9);
+  without_credit.Open("tank", v1::WATCH_MODE_EVERY, 1);
+  ASSERT_TRUE(idle.Receive().has_opened());
+  ASSERT_TRUE(without_credit.Receive().has_opened());
+  Produce(0);
+  Produce(1);
+  std::thread drain([&] { server_->Drain(kGrace); });
+  std::thread producer([&] { producer_->Finish(); });
+  for (WatchClient* watcher : {&idle, &without_credit}) {
+    EXPECT_TRUE(watcher->Receive().has_frame());
+    if (watcher == &idle) {
+      EXPECT_TRUE(watcher->Receive().has_frame());
+    }
+    const auto ended = watcher->Receive();
+    EXPECT_EQ(ended.ended().reason(), "DRAINING");
+    EXPECT_EQ(ended.ended().dropped(), watcher == &idle ? 0u : 1u);
+    ExpectRefused(*watcher, grpc::StatusCode::UNAVAILABLE, "DRAINING", "server: draining");
+  }
+  producer.join();
+  drain.join();
+}
+
+INSTANTIATE_TEST_SUITE_P(Over, Watch, ::testing::Values(Transport::kInProcess, Transport::kTcp),
+                         [](const auto& over) { return TransportName(over.param); });
+
+}  // namespace
+}  // namespace partiemc::server
