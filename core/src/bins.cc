@@ -1,5 +1,6 @@
 #include "bins.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -19,38 +20,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Sides of a tile that a kernel crosses, as in BinStretch.
-enum Side : std::uint32_t { kLeft = 1, kRight = 2, kLower = 4, kUpper = 8 };
-constexpr int kSideBits = 4;
-
-// A tile's place in its own Neighbourhood.
-constexpr int kHere = 4;
-
-// The neighbours, by their place in Neighbourhood, that a kernel reaches which crosses the sides of
-// its index; the tile itself in any case.
-constexpr std::array<std::uint16_t, 16> ReachedBySides() {
-  std::array<std::uint16_t, 16> reached{};
-  for (unsigned sides = 0; sides < 16; ++sides) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const bool column = dx == 0 || (sides & (dx < 0 ? kLeft : kRight)) != 0;
-        const bool row = dy == 0 || (sides & (dy < 0 ? kLower : kUpper)) != 0;
-        if (column && row) reached[sides] |= 1 << ((dy + 1) * 3 + dx + 1);
-      }
-    }
-  }
-  return reached;
-}
-constexpr std::array<std::uint16_t, 16> kReachedBySides = ReachedBySides();
-
-// Calls visit(place in Neighbourhood) for each tile that a kernel reaches.
-template <typename Visit>
-void ForEachReached(std::uint32_t sides, Visit visit) {
-  for (std::uint32_t bits = kReachedBySides[sides]; bits != 0; bits &= bits - 1) {
-    visit(std::countr_zero(bits));
-  }
-}
-
 // How far beyond its kernel a particle needs tiles, in cells: an inside node is within reach of a
 // particle, the rest of an active cell within one cell of it, and any node of a small hole within
 // the radius of a disc of the hole's area of its ring.
@@ -58,171 +27,238 @@ double TileMargin(const Scale& scale) {
   return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
 }
 
-// Five bits, moved five places apart: times the bits of a row, the bits of a box.
-constexpr std::array<std::uint32_t, 32> SpreadBits() {
-  std::array<std::uint32_t, 32> spread{};
-  for (unsigned bits = 0; bits < 32; ++bits) {
-    for (int k = 0; k < 5; ++k) spread[bits] |= (bits >> k & 1) << 5 * k;
-  }
-  return spread;
-}
-constexpr std::array<std::uint32_t, 32> kSpreadBits = SpreadBits();
+// Particles whose coordinates are looked at together: what is known of them stays in the nearest
+// cache.
+constexpr std::size_t kBlockParticles = 256;
 
 // The homes met last, by the low bits of their coordinates: a body of up to 64 x 64 tiles finds all
 // of its homes here, without a probe of the directory that would have to be guessed.
 class RecentHomes {
  public:
-  RecentHomes() { index_.fill(kNoTile); }
+  explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNoTile); }
 
-  std::uint32_t Insert(TileCoordinate tile, TileDirectory& homes) {
+  std::uint32_t Find(TileCoordinate tile) {
     constexpr int kMask = (1 << kBits) - 1;
     std::uint32_t& index = index_[(tile.y & kMask) << kBits | (tile.x & kMask)];
-    if (index == kNoTile || homes[index] != tile) index = homes.Insert(tile);
+    if (index == kNoTile || stretch_.homes[index] != tile) {
+      index = stretch_.homes.Insert(tile);
+      if (index == stretch_.entries.size()) stretch_.entries.push_back(0);
+    }
     return index;
   }
 
  private:
   static constexpr int kBits = 6;
+  BinStretch& stretch_;
   std::array<std::uint32_t, 1 << 2 * kBits> index_;
 };
 
 // First pass over a stretch: finds home tiles and counts. Returns false if a particle is too far
 // from the origin, or if there are more than `max_tiles`.
 template <typename Reader>
-bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, const Reach& reach,
+bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double units_per_world,
                std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {
   stretch.homes.Clear();
-  stretch.crossing.clear();
-  stretch.reached.clear();
-  RecentHomes recent;
-  CoordinateBlock block;
+  stretch.entries.clear();
+  RecentHomes recent(stretch);
+  std::array<typename Reader::Number, 2 * kBlockParticles> copy;
+  std::array<std::int32_t, 2 * kBlockParticles> tiles;
   for (std::size_t start = first; start < last; start += kBlockParticles) {
-    const int count = static_cast<int>(std::min<std::size_t>(kBlockParticles, last - start));
-    for (int k = 0; k < count; ++k) {
-      const WorldPosition position = reader[start + k];
-      block.units[2 * k] = position.x * reach.units_per_world;
-      block.units[2 * k + 1] = position.y * reach.units_per_world;
+    const std::size_t count = std::min(kBlockParticles, last - start);
+    if (!FindTiles(reader.Pairs(start, count, copy.data()), units_per_world, tiles.data(),
+                   scratch.positions.data() + 2 * start)) {
+      return false;
     }
-    if (!FindTiles(2 * count, reach, block, scratch.positions.data() + 2 * start)) return false;
-    for (int k = 0; k < count; ++k) {
-      const std::uint32_t index =
-          recent.Insert({block.tile[2 * k + 1], block.tile[2 * k]}, stretch.homes);
-      if (index == stretch.reached.size()) {
-        if (index == max_tiles) return false;
-        stretch.crossing.emplace_back();
-        stretch.reached.push_back(0);
-      }
-      const std::uint32_t sides = block.sides[2 * k] | block.sides[2 * k + 1] << 2;
-      ++stretch.crossing[index][sides];
-      stretch.reached[index] |= block.reached[2 * k] * kSpreadBits[block.reached[2 * k + 1]];
-      scratch.home[start + k] = index << kSideBits | sides;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t home = recent.Find({tiles[2 * k + 1], tiles[2 * k]});
+      ++stretch.entries[home];
+      scratch.home[start + k] = home;
     }
+    if (stretch.homes.size() > max_tiles) return false;
   }
   return true;
 }
 
-// Joins the tiles of all stretches in `tiles`. Returns false if they are more than `max_tiles`.
-bool CollectTiles(BinScratch& scratch, std::size_t max_tiles, TileDirectory& tiles) {
-  scratch.reached.clear();
+// Joins the homes of all stretches in `tiles`, sorted. Returns false if they are more than
+// `max_tiles`.
+bool JoinHomes(const BinScratch& scratch, std::size_t max_tiles, TileDirectory& tiles) {
   for (const BinStretch& stretch : scratch.stretches) {
-    for (std::size_t k = 0; k < stretch.homes.size(); ++k) {
-      const std::uint32_t index = tiles.Insert(stretch.homes[k]);
-      if (index == scratch.reached.size()) scratch.reached.push_back(0);
-      scratch.reached[index] |= stretch.reached[k];
-    }
+    for (const TileCoordinate& home : stretch.homes.tiles()) tiles.Insert(home);
     if (tiles.size() > max_tiles) return false;
   }
-  const std::size_t homes = tiles.size();
-  for (std::size_t k = 0; k < homes; ++k) {
-    const TileCoordinate home = tiles[k];
-    for (std::uint32_t bits = scratch.reached[k]; bits != 0; bits &= bits - 1) {
-      const int place = std::countr_zero(bits);
-      tiles.Insert({home.y + place / 5 - 2, home.x + place % 5 - 2});
-    }
-    if (tiles.size() > max_tiles) return false;
-  }
+  tiles.Sort();
   return true;
-}
-
-// Counts how many entries a stretch has in each tile.
-void CountEntries(const TileDirectory& tiles, BinStretch& stretch) {
-  stretch.entries.assign(tiles.size(), 0);
-  stretch.tile.resize(stretch.homes.size());
-  for (std::size_t k = 0; k < stretch.homes.size(); ++k) {
-    stretch.tile[k] = tiles.Find(stretch.homes[k]);
-    const Neighbourhood& near = tiles.neighbours(stretch.tile[k]);
-    for (std::uint32_t sides = 0; sides < stretch.crossing[k].size(); ++sides) {
-      const std::uint32_t count = stretch.crossing[k][sides];
-      if (count == 0) continue;
-      ForEachReached(sides, [&](int place) { stretch.entries[near[place]] += count; });
-    }
-  }
 }
 
 // Turns the counts of all stretches into the places of their first entries: a tile's list has the
-// entries of the first stretch, then those of the second.
-void PlaceEntries(ParticleBins& bins) {
-  const std::size_t tiles = bins.tiles.size();
-  bins.offsets.resize(tiles + 1);
-  std::uint32_t next = 0;
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    bins.offsets[tile] = next;
-    for (BinStretch& stretch : bins.scratch.stretches) {
-      const std::uint32_t count = stretch.entries[tile];
-      stretch.entries[tile] = next;
+// entries of the first stretch, then those of the second. Returns how many entries there are.
+std::uint32_t PlaceEntries(const TileDirectory& homes, BinScratch& scratch) {
+  scratch.homes.assign(homes.tiles().begin(), homes.tiles().end());
+  scratch.next.assign(homes.size(), 0);
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
+      scratch.next[homes.Find(stretch.homes[k])] += stretch.entries[k];
+    }
+  }
+  std::uint32_t total = 0;
+  for (std::uint32_t& next : scratch.next) {
+    const std::uint32_t count = next;
+    next = total;
+    total += count;
+  }
+  scratch.offsets = scratch.next;
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
+      std::uint32_t& next = scratch.next[homes.Find(stretch.homes[k])];
+      const std::uint32_t count = stretch.entries[k];
+      stretch.entries[k] = next;
       next += count;
     }
   }
-  bins.offsets[tiles] = next;
-  bins.home_count.assign(tiles, 0);
-  for (const BinStretch& stretch : bins.scratch.stretches) {
-    for (std::size_t k = 0; k < stretch.tile.size(); ++k) {
-      for (const std::uint32_t count : stretch.crossing[k]) {
-        bins.home_count[stretch.tile[k]] += count;
-      }
-    }
-  }
+  return total;
 }
 
 // Second pass over a stretch: writes its entries.
 void FillEntries(std::size_t first, std::size_t last, std::span<const float> volumes,
                  double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
-  constexpr auto kSize = static_cast<float>(kTileSize);
-  const float* positions = bins.scratch.positions.data();
-  BinEntry* entries = bins.entries.data();
+  const float* const positions = bins.scratch.positions.data();
+  const std::uint32_t* const home = bins.scratch.home.data();
+  std::uint32_t* const next = stretch.entries.data();
+  BinEntry* const entries = bins.entries.data();
+  if (volumes.empty()) {
+    for (std::size_t k = first; k < last; ++k) {
+      entries[next[home[k]]++] = {positions[2 * k], positions[2 * k + 1],
+                                  static_cast<std::uint32_t>(k)};
+    }
+    return;
+  }
   for (std::size_t k = first; k < last; ++k) {
-    const std::uint32_t home = bins.scratch.home[k];
-    const std::uint32_t tile = stretch.tile[home >> kSideBits];
-    const float x = positions[2 * k];
-    const float y = positions[2 * k + 1];
-    const auto add = [&](std::uint32_t to, float at_x, float at_y) {
-      const std::uint32_t entry = stretch.entries[to]++;
-      entries[entry] = {at_x, at_y, static_cast<std::uint32_t>(k)};
-      if (!volumes.empty()) {
-        bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
-      }
-    };
-    add(tile, x, y);
-    const std::uint32_t sides = home & ((1u << kSideBits) - 1);
-    if (sides == 0) continue;
-    const Neighbourhood& near = bins.tiles.neighbours(tile);
-    ForEachReached(sides, [&](int place) {
-      if (place == kHere) return;
-      add(near[place], x - static_cast<float>(place % 3 - 1) * kSize,
-          y - static_cast<float>(place / 3 - 1) * kSize);
-    });
+    const std::uint32_t entry = next[home[k]]++;
+    entries[entry] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
+    bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
   }
 }
 
-// Why FindHomes or CollectTiles gave up: the first particle too far away, else too many tiles.
-absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, const Reach& reach,
-                     std::size_t max_tiles) {
+// Which tiles must exist because of particles in one tile: bit 5 (dy + 2) + dx + 2 stands for the
+// one at (dx, dy) from it.
+class ReachedTiles {
+ public:
+  // `reach`: how far from a particle tiles exist, in cells, less than two tiles.
+  explicit ReachedTiles(float reach)
+      : reach_(reach),
+        near_(reach <= kSize),
+        all_(Box(near_ ? 0b01110 : 0b11111, near_ ? 0b01110 : 0b11111)) {}
+
+  std::uint32_t Of(std::span<const BinEntry> entries) const {
+    std::uint32_t reached = 0;
+    for (const BinEntry& entry : entries) {
+      reached |= Box(Along(entry.x), Along(entry.y));
+      if (reached == all_) break;
+    }
+    return reached;
+  }
+
+  // Whether they are the eight neighbours at most.
+  bool AreNeighbours() const { return near_; }
+
+  // Calls visit(tile) for each.
+  template <typename Visit>
+  static void ForEach(TileCoordinate home, std::uint32_t reached, Visit visit) {
+    for (; reached != 0; reached &= reached - 1) {
+      const int place = std::countr_zero(reached);
+      visit(TileCoordinate{home.y + place / 5 - 2, home.x + place % 5 - 2});
+    }
+  }
+
+ private:
+  static constexpr auto kSize = static_cast<float>(kTileSize);
+
+  // Five bits, moved five places apart: times the bits of a row, the bits of a box.
+  static constexpr std::array<std::uint32_t, 32> SpreadBits() {
+    std::array<std::uint32_t, 32> spread{};
+    for (unsigned bits = 0; bits < 32; ++bits) {
+      for (int k = 0; k < 5; ++k) spread[bits] |= (bits >> k & 1) << 5 * k;
+    }
+    return spread;
+  }
+
+  static std::uint32_t Box(std::uint32_t columns, std::uint32_t rows) {
+    static constexpr std::array<std::uint32_t, 32> kSpreadBits = SpreadBits();
+    return columns * kSpreadBits[rows];
+  }
+
+  // Bit d + 2: the tile d from this one along an axis.
+  std::uint32_t Along(float at) const {
+    return static_cast<std::uint32_t>(at < reach_ - kSize) |
+           static_cast<std::uint32_t>(at < reach_) << 1 | 1u << 2 |
+           static_cast<std::uint32_t>(at >= kSize - reach_) << 3 |
+           static_cast<std::uint32_t>(at >= 2 * kSize - reach_) << 4;
+  }
+
+  float reach_;
+  bool near_;
+  std::uint32_t all_;
+};
+
+// Whether the eight neighbours of a tile are in the directory.
+bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (tiles.Find({tile.y + dy, tile.x + dx}) == kNoTile) return false;
+    }
+  }
+  return true;
+}
+
+// Adds the tiles around those that hold particles, and seals the directory. Returns false if they
+// are more than `max_tiles`.
+bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
+  BinScratch& scratch = bins.scratch;
+  const auto homes = static_cast<std::uint32_t>(scratch.homes.size());
+  const ReachedTiles reached(reach);
+  scratch.reached.resize(homes);
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, homes), [&](const auto& range) {
+    for (std::uint32_t k = range.begin(); k < range.end(); ++k) {
+      // In the middle of a body nothing is to be added, whatever its particles reach.
+      scratch.reached[k] = 0;
+      if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) continue;
+      const std::uint32_t end =
+          k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.entries.size());
+      scratch.reached[k] =
+          reached.Of(std::span(bins.entries).subspan(scratch.offsets[k], end - scratch.offsets[k]));
+    }
+  });
+  for (std::uint32_t k = 0; k < homes; ++k) {
+    ReachedTiles::ForEach(scratch.homes[k], scratch.reached[k],
+                          [&](TileCoordinate tile) { bins.tiles.Insert(tile); });
+    if (bins.tiles.size() > max_tiles) return false;
+  }
+  bins.tiles.Seal();
+  return true;
+}
+
+// The first entry of each tile of the sealed directory, those without particles included.
+void SetOffsets(ParticleBins& bins) {
+  const BinScratch& scratch = bins.scratch;
+  const auto entries = static_cast<std::uint32_t>(bins.entries.size());
+  bins.offsets.resize(bins.tiles.size() + 1);
+  std::size_t home = 0;
+  for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    bins.offsets[tile] = home < scratch.homes.size() ? scratch.offsets[home] : entries;
+    home += home < scratch.homes.size() && scratch.homes[home] == bins.tiles[tile];
+  }
+  bins.offsets.back() = entries;
+}
+
+// Why tiles were not found: the first particle too far away, else too many tiles.
+absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::size_t max_tiles) {
+  const double units_per_world = UnitsPerWorld(scale);
   const Axes axes = AxesOf(frame, plane);
   for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
     const WorldPosition position = PositionOf(frame, plane, k);
     for (const auto& [axis, value] :
          {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
-      if (IsNearOrigin(value * reach.units_per_world)) continue;
+      if (IsNearOrigin(value * units_per_world)) continue;
       return InvalidFrame(kReasonOutOfRange, CoordinateField("positions", k, axis),
                           ShortestNumber(value),
                           absl::StrCat("must be within 2^30 cells of ",
@@ -247,7 +283,6 @@ constexpr std::size_t kMaxStretches = 16;
 void ParticleBins::Clear() {
   tiles.Clear();
   offsets.clear();
-  home_count.clear();
   entries.clear();
   weight.clear();
 }
@@ -257,7 +292,6 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   bins.tiles.Clear();
   BinScratch& scratch = bins.scratch;
   const std::size_t count = frame.ParticleCount();
-  const Reach reach = ReachOf(scale, TileMargin(scale));
   scratch.home.resize(count);
   scratch.positions.resize(2 * count);
   const std::size_t length = std::max(kMinStretch, (count + kMaxStretches - 1) / kMaxStretches);
@@ -269,20 +303,18 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   };
 
   std::atomic<bool> found = true;
+  const double units_per_world = UnitsPerWorld(scale);
   VisitPositions(frame, plane, [&](const auto& reader) {
     for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
-      if (!FindHomes(reader, first, last, reach, limits.max_tiles, stretch, scratch)) found = false;
+      if (!FindHomes(reader, first, last, units_per_world, limits.max_tiles, stretch, scratch)) {
+        found = false;
+      }
     });
   });
-  if (!found || !CollectTiles(scratch, limits.max_tiles, bins.tiles)) {
-    return Refusal(frame, plane, scale, reach, limits.max_tiles);
+  if (!found || !JoinHomes(scratch, limits.max_tiles, bins.tiles)) {
+    return Refusal(frame, plane, scale, limits.max_tiles);
   }
-  bins.tiles.Seal();
-  for_each_stretch(
-      [&](BinStretch& stretch, std::size_t, std::size_t) { CountEntries(bins.tiles, stretch); });
-  PlaceEntries(bins);
-
-  const std::size_t entries = bins.offsets.back();
+  const std::uint32_t entries = PlaceEntries(bins.tiles, scratch);
   bins.entries.resize(entries);
   bins.weight.resize(frame.volumes.empty() ? 0 : entries);
   const double weight_per_world_volume =
@@ -290,6 +322,11 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
     FillEntries(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
   });
+  if (!AddReachedTiles(RoundedUp(scale.kernel_radius + TileMargin(scale)), limits.max_tiles,
+                       bins)) {
+    return Refusal(frame, plane, scale, limits.max_tiles);
+  }
+  SetOffsets(bins);
   return absl::OkStatus();
 }
 

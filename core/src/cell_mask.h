@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <tuple>
 
-#include "bins.h"
 #include "lattice.h"
 
 namespace partiemc {
@@ -16,21 +14,27 @@ namespace partiemc {
 inline constexpr int kMaskMargin = kTileSize / 2;
 using CellMask = std::array<std::uint64_t, kTileSize + 2 * kMaskMargin>;
 
-/// Whether the particle of an entry lies in a cell of the mask.
-/// Requires: it is less than kMaskMargin cells away from the tile.
-inline bool IsInMask(const CellMask& mask, const BinEntry& entry) {
-  const int column = static_cast<int>(entry.x + kMaskMargin);
-  const int row = static_cast<int>(entry.y + kMaskMargin);
-  return (mask[row] >> column & 1) != 0;
+inline bool IsEmpty(const BitRows& rows) {
+  std::uint32_t any = 0;
+  for (const std::uint32_t row : rows) any |= row;
+  return any == 0;
 }
 
-/// The same for a mask that holds cells of the tile alone, and for a particle of its list wherever
-/// it is: one beyond the mask wraps round into the margin.
-inline bool IsInTileMask(const CellMask& mask, const BinEntry& entry) {
-  static_assert(std::tuple_size_v<CellMask> == 64 && kMaskMargin * 2 == kTileSize);
-  const int column = static_cast<int>(entry.x + kMaskMargin) & 63;
-  const int row = static_cast<int>(entry.y + kMaskMargin) & 63;
-  return (mask[row] >> column & 1) != 0;
+/// The cells of a mask that lie in the tile's neighbour at `place` (Neighbourhood), or in the tile
+/// itself.
+inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
+  const int dx = place % 3 - 1;
+  const int dy = place / 3 - 1;
+  BitRows cells{};
+  for (int j = 0; j < kTileSize; ++j) {
+    const int row = j + dy * kTileSize + kMaskMargin;
+    if (row < 0 || row >= static_cast<int>(mask.size())) continue;
+    const std::uint64_t bits = mask[row];
+    cells[j] = static_cast<std::uint32_t>(dx < 0   ? bits << (kTileSize - kMaskMargin)
+                                          : dx > 0 ? bits >> (kTileSize + kMaskMargin)
+                                                   : bits >> kMaskMargin);
+  }
+  return cells;
 }
 
 /// The cells (i + di, j + dj), -before <= di, dj <= after, of every bit (i, j) of `rows`.

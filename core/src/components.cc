@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "bits.h"
-#include "cell_mask.h"
 
 namespace partiemc {
 namespace {
@@ -132,28 +131,25 @@ std::uint32_t Components::ComponentSeenFrom(const TileDirectory& directory,
 
 Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossings& crossings,
                                           std::uint32_t tile) const {
-  if (bins.home_count[tile] == 0) return {kNoComponent, 0, 0};
+  if (bins.CountOf(tile) == 0) return {kNoComponent, 0, 0};
   const bool full = IsFull(crossings.tiles[tile].inside);
   const std::uint32_t component =
       full ? label_[first_run_[tile * kTileSize]] : ComponentSeenFrom(bins.tiles, crossings, tile);
   if (component == kNoComponent || component == kSeveralComponents) return {component, 0, 0};
-  if (full && bins.weight.empty()) return {component, bins.home_count[tile], 0};
+  if (full && bins.weight.empty()) return {component, bins.CountOf(tile), 0};
 
-  // Cells of the tile with an inside corner: a particle is counted by one look, at home or not.
-  CellMask cells{};
+  BitRows cells;  // With an inside corner.
   const NodeRows rows = InsideRows(bins.tiles, crossings.tiles, tile);
   for (int j = 0; j < kTileSize; ++j) {
-    cells[j + kMaskMargin] =
-        std::uint64_t{rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1]}
-        << kMaskMargin;
+    cells[j] = rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1];
   }
   TileShare share{component, 0, 0};
   for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    share.count += IsInTileMask(cells, bins.entries[e]);
+    share.count += LiesIn(bins.entries[e], cells);
   }
   if (bins.weight.empty()) return share;
   for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    if (IsInTileMask(cells, bins.entries[e])) share.weight += bins.weight[e];
+    if (LiesIn(bins.entries[e], cells)) share.weight += bins.weight[e];
   }
   return share;
 }

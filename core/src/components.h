@@ -99,7 +99,6 @@ template <typename Visit>
 void Components::ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings,
                                    std::uint32_t tile, Visit visit) const {
   for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
-    if (!IsAtHome(bins.entries[entry])) continue;
     const TilePlace node = NearestInside(bins, crossings, tile, entry);
     if (node.tile != kNoTile) visit(tile, entry, At(crossings, node));
   }

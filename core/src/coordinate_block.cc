@@ -1,58 +1,130 @@
 #include "coordinate_block.h"
 
+#include <bit>
 #include <cmath>
+#include <cstddef>
 
 #include "lattice.h"
 
+// Highway compiles the rest of this file once for each target.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "coordinate_block.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#ifndef PARTIEMC_COORDINATE_BLOCK_ONCE
+#define PARTIEMC_COORDINATE_BLOCK_ONCE
 namespace partiemc {
 namespace {
 
 constexpr double kUnitsPerCell = 1 << kFractionBits;
 constexpr float kCellsPerUnit = 1.0f / (1 << kFractionBits);
-constexpr double kUnitsPerTile = 1 << (kFractionBits + kTileShift);
-constexpr double kMaxCellsFromOrigin = 1 << 30;
+constexpr int kUnitShift = kFractionBits + kTileShift;  // 2^kUnitShift units are a tile.
+constexpr double kMaxUnits = (1 << 30) * kUnitsPerCell;
 
-// The nearest whole number, for magnitudes below 2^51: beyond 2^52 doubles have no fraction.
-double Round(double value) {
-  constexpr double kShift = 0x1.8p52;
-  return (value + kShift) - kShift;
-}
+// Added to a number below 2^51 it rounds to a whole one, which the lower bits of the sum are: a
+// double between 2^52 and 2^53 has no fraction. Shifted by a tile's units, the bits are the tile's
+// number and what the shift leaves behind here.
+constexpr double kRound = 0x1.8p52;
+constexpr auto kRoundTile =
+    static_cast<std::uint32_t>(std::bit_cast<std::uint64_t>(kRound) >> kUnitShift);
 
 }  // namespace
+}  // namespace partiemc
+#endif
 
-Reach ReachOf(const Scale& scale, double tile_margin) {
-  const auto rounded_up = [](double cells) {
-    return static_cast<float>(std::ceil(cells * kUnitsPerCell) / kUnitsPerCell);
-  };
-  return {kUnitsPerCell / scale.cell_size, rounded_up(scale.kernel_radius),
-          rounded_up(scale.kernel_radius + tile_margin)};
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class D>
+HWY_INLINE hn::Vec<D> LoadDoubles(D d, const double* values) {
+  return hn::LoadU(d, values);
 }
 
-bool IsNearOrigin(double units) { return std::abs(units) <= kMaxCellsFromOrigin * kUnitsPerCell; }
+template <class D>
+HWY_INLINE hn::Vec<D> LoadDoubles(D d, const float* values) {
+  return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, D>(), values));
+}
 
-// Loops without a branch, of which the compiler makes vectors.
-bool FindTiles(int count, const Reach& reach, CoordinateBlock& block, float* positions) {
-  constexpr auto kSize = static_cast<float>(kTileSize);
+// Does as many of the coordinates as fill vectors of `d`, from `first` on. Returns where it ended.
+template <class D, typename Real>
+HWY_INLINE std::size_t FindTilesIn(D d, std::span<const Real> coordinates, std::size_t first,
+                                   double units_per_world, std::int32_t* HWY_RESTRICT tiles,
+                                   float* HWY_RESTRICT positions, bool& near) {
+  const hn::Rebind<std::uint64_t, D> d_bits;
+  const hn::Rebind<std::uint32_t, D> d_half;
+  const hn::Rebind<std::int32_t, D> d_int;
+  const hn::Rebind<float, D> d_float;
+  auto all_near = hn::Eq(hn::Zero(d), hn::Zero(d));
+  const std::size_t step = hn::Lanes(d);
+  std::size_t k = first;
+  for (; k + step <= coordinates.size(); k += step) {
+    const auto units = hn::Mul(LoadDoubles(d, coordinates.data() + k), hn::Set(d, units_per_world));
+    all_near = hn::And(all_near, hn::Le(hn::Abs(units), hn::Set(d, kMaxUnits)));
+    const auto bits = hn::BitCast(d_bits, hn::Add(units, hn::Set(d, kRound)));
+    const auto tile = hn::TruncateTo(d_half, hn::ShiftRight<kUnitShift>(bits));
+    hn::StoreU(hn::BitCast(d_int, hn::Sub(tile, hn::Set(d_half, kRoundTile))), d_int, tiles + k);
+    const auto in_tile =
+        hn::And(hn::TruncateTo(d_half, bits), hn::Set(d_half, (1u << kUnitShift) - 1));
+    hn::StoreU(hn::Mul(hn::ConvertTo(d_float, hn::BitCast(d_int, in_tile)),
+                       hn::Set(d_float, kCellsPerUnit)),
+               d_float, positions + k);
+  }
+  near = near && hn::AllTrue(d, all_near);
+  return k;
+}
+
+template <typename Real>
+bool FindAllTiles(std::span<const Real> coordinates, double units_per_world, std::int32_t* tiles,
+                  float* positions) {
   bool near = true;
-  for (int k = 0; k < count; ++k) near &= IsNearOrigin(block.units[k]);
-  if (!near) return false;
-  for (int k = 0; k < count; ++k) {
-    const double units = Round(block.units[k]);
-    // Of positions k + 1/2 units none is half way between two tiles, which Round would not decide.
-    const double tile = Round((units + 0.5) / kUnitsPerTile - 0.5);
-    block.tile[k] = static_cast<std::int32_t>(tile);
-    positions[k] = static_cast<float>(units - tile * kUnitsPerTile) * kCellsPerUnit;
-  }
-  for (int k = 0; k < count; ++k) {
-    const float at = positions[k];
-    block.sides[k] = static_cast<std::uint32_t>(at < reach.kernel) |
-                     static_cast<std::uint32_t>(at >= kSize - reach.kernel) << 1;
-    block.reached[k] = static_cast<std::uint32_t>(at < reach.tiles - kSize) |
-                       static_cast<std::uint32_t>(at < reach.tiles) << 1 | 1u << 2 |
-                       static_cast<std::uint32_t>(at >= kSize - reach.tiles) << 3 |
-                       static_cast<std::uint32_t>(at >= 2 * kSize - reach.tiles) << 4;
-  }
-  return true;
+  const std::size_t rest = FindTilesIn(hn::CappedTag<double, 8>(), coordinates, 0, units_per_world,
+                                       tiles, positions, near);
+  FindTilesIn(hn::CappedTag<double, 1>(), coordinates, rest, units_per_world, tiles, positions,
+              near);
+  return near;
+}
+
+bool FindTilesOfFloats(std::span<const float> coordinates, double units_per_world,
+                       std::int32_t* tiles, float* positions) {
+  return FindAllTiles(coordinates, units_per_world, tiles, positions);
+}
+
+bool FindTilesOfDoubles(std::span<const double> coordinates, double units_per_world,
+                        std::int32_t* tiles, float* positions) {
+  return FindAllTiles(coordinates, units_per_world, tiles, positions);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace partiemc {
+
+HWY_EXPORT(FindTilesOfFloats);
+HWY_EXPORT(FindTilesOfDoubles);
+
+double UnitsPerWorld(const Scale& scale) { return kUnitsPerCell / scale.cell_size; }
+
+float RoundedUp(double cells) {
+  return static_cast<float>(std::ceil(cells * kUnitsPerCell) / kUnitsPerCell);
+}
+
+bool IsNearOrigin(double units) { return std::abs(units) <= kMaxUnits; }
+
+bool FindTiles(std::span<const float> coordinates, double units_per_world, std::int32_t* tiles,
+               float* positions) {
+  return HWY_DYNAMIC_DISPATCH(FindTilesOfFloats)(coordinates, units_per_world, tiles, positions);
+}
+
+bool FindTiles(std::span<const double> coordinates, double units_per_world, std::int32_t* tiles,
+               float* positions) {
+  return HWY_DYNAMIC_DISPATCH(FindTilesOfDoubles)(coordinates, units_per_world, tiles, positions);
 }
 
 }  // namespace partiemc
+#endif  // HWY_ONCE

@@ -8,15 +8,22 @@
 #include <cmath>
 
 #include "level_set_formula.h"
+#include "near_entries.h"
 #include "tile_kernels.h"
 
 namespace partiemc {
 namespace {
 
-TileEntries EntriesOf(const ParticleBins& bins, std::size_t tile) {
+// Null where they are uniform.
+const float* WeightsOf(const ParticleBins& bins) {
+  return bins.weight.empty() ? nullptr : bins.weight.data();
+}
+
+TileEntries EntriesOf(const ParticleBins& bins, std::uint32_t tile) {
   const std::uint32_t first = bins.offsets[tile];
-  return {bins.entries.data() + first, bins.weight.empty() ? nullptr : bins.weight.data() + first,
-          bins.offsets[tile + 1] - first};
+  const float* const weights = WeightsOf(bins);
+  return {bins.entries.data() + first, weights == nullptr ? nullptr : weights + first,
+          bins.CountOf(tile)};
 }
 
 // What a sum of kernels is worth: with weights of their own, particles bring them along.
@@ -24,13 +31,38 @@ float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
 
-// First pass: the density at every node, and what follows from it alone.
-void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::size_t tile,
-                  LevelSet& level_set) {
+// First pass: the kernels of a tile's own particles, or of all around it where they reach too far
+// for the margin of the sums.
+void SumTile(const ParticleBins& bins, float radius, std::uint32_t tile, LevelSet& level_set) {
+  std::array<float, kTileNodes>& values = level_set.tiles[tile];
+  const bool fits = radius <= kSumMargin;
+  if (fits && bins.CountOf(tile) == 0) {
+    values.fill(0);
+    return;
+  }
   alignas(64) NodeSums sums;
-  ScatterKernel(EntriesOf(bins, tile), static_cast<float>(scale.kernel_radius), sums);
-  ClassifyNodes(sums, WeightOf(bins, scale), scale, level_set.tiles[tile].data(),
-                level_set.sure_inside[tile], level_set.sure_outside[tile]);
+  sums.fill(0);
+  if (fits) {
+    ScatterKernels(EntriesOf(bins, tile), radius, sums);
+    level_set.rims.Keep(tile, sums);
+  } else {
+    NearWalk(bins, tile, nullptr).InAnyOrder([&](const NearEntries& near) {
+      ScatterNearKernels(near, WeightsOf(bins), radius, sums);
+    });
+  }
+  for (int j = 0; j < kTileSize; ++j) {
+    std::copy_n(sums.data() + SumIndex(0, j), kTileSize, values.data() + j * kTileSize);
+  }
+}
+
+// Second pass: the density at every node, and what follows from it alone.
+void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                  LevelSet& level_set) {
+  float* const values = level_set.tiles[tile].data();
+  if (static_cast<float>(scale.kernel_radius) <= kSumMargin)
+    level_set.rims.AddTo(bins.tiles, tile, values);
+  ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.sure_inside[tile],
+                level_set.sure_outside[tile]);
   level_set.inside[tile] = level_set.sure_inside[tile];
 }
 
@@ -64,17 +96,27 @@ BitRows BandOf(const TileDirectory& directory, const LevelSet& level_set, std::u
   return band;
 }
 
-// Second pass: F at the nodes of `band`.
-void SampleBand(const ParticleBins& bins, const Scale& scale, std::size_t tile, const BitRows& band,
-                LevelSet& level_set) {
+void Clear(MomentSums& sums, bool weighted) {
+  for (NodeSums* const channel :
+       {&sums.kernel, &sums.moment_x, &sums.moment_y, &sums.xx, &sums.xy, &sums.yy}) {
+    channel->fill(0);
+  }
+  if (weighted) sums.weighted.fill(0);
+}
+
+// Third pass: F at the nodes of `band`.
+void SampleBand(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                const BitRows& band, LevelSet& level_set) {
   MomentSums sums;
+  Clear(sums, !bins.weight.empty());
   CellMask mask;
   const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
   const bool masked = reach < kMaskMargin;
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) mask = Widened(band, reach, reach - 1);
-  ScatterMoments(EntriesOf(bins, tile), static_cast<float>(scale.kernel_radius),
-                 masked ? &mask : nullptr, sums);
+  NearWalk(bins, tile, masked ? &mask : nullptr).InOrder([&](const NearEntries& near) {
+    ScatterNearMoments(near, WeightsOf(bins), static_cast<float>(scale.kernel_radius), sums);
+  });
   const LevelSetFormula<float> formula(scale);
   const NodeSums& weighted = bins.weight.empty() ? sums.kernel : sums.weighted;
   const float weight = WeightOf(bins, scale);
@@ -121,11 +163,13 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   level_set.inside.resize(tiles);
   level_set.sure_inside.resize(tiles);
   level_set.sure_outside.resize(tiles);
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  if (radius <= kSumMargin) level_set.rims.Prepare(bins, radius);
+  ForEachTile(bins, [&](std::uint32_t tile) { SumTile(bins, radius, tile, level_set); });
   ForEachTile(bins, [&](std::uint32_t tile) { ClassifyTile(bins, scale, tile, level_set); });
   ForEachTile(bins, [&](std::uint32_t tile) {
     const BitRows band = BandOf(bins.tiles, level_set, tile);
-    const bool any = std::any_of(band.begin(), band.end(), [](auto row) { return row != 0; });
-    if (any) SampleBand(bins, scale, tile, band, level_set);
+    if (!IsEmpty(band)) SampleBand(bins, scale, tile, band, level_set);
   });
 }
 

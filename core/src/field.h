@@ -7,6 +7,7 @@
 #include "bins.h"
 #include "lattice.h"
 #include "scale.h"
+#include "sum_rims.h"
 
 namespace partiemc {
 
@@ -21,7 +22,9 @@ struct LevelSet {
   std::vector<BitRows> inside;  ///< By tile: the nodes at which F < 0.
   float void_value = 0;         ///< F where no particle reaches, hence in tiles that do not exist.
 
-  std::vector<BitRows> sure_inside, sure_outside;  ///< By tile, scratch: the density decides.
+  // Scratch.
+  std::vector<BitRows> sure_inside, sure_outside;  ///< By tile: the density decides.
+  SumRims rims;
 
   /// F at the node (i, j) of `tile`, 0 <= i, j <= 32: the last row and column are the neighbours'.
   float At(const TileDirectory& directory, std::uint32_t tile, int i, int j) const {
@@ -34,9 +37,10 @@ struct LevelSet {
 /// Samples F at the nodes of every tile of `bins`: the density everywhere, the weighted mean only
 /// where the density leaves the side of a node or of one of its neighbours open.
 /// Accuracy: 1e-5 relative to f = 1 for f, for nodes and particles as rounded by the bins.
-/// Deterministic: each node's sums run over its tile's list in order, whatever the threads and
-/// whatever the instruction set. Parallel over tiles.
-/// Cost: linear in the entries of the bins, times the square of the kernel radius in cells.
+/// Deterministic: sums run in the order of the frame where values count, whatever the tiles, the
+/// threads and the instruction set; elsewhere over the lists of a node's tile and its neighbours in
+/// one order. Parallel over tiles.
+/// Cost: linear in the particles, times the square of the kernel radius in cells.
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 
 }  // namespace partiemc

@@ -33,8 +33,10 @@ constexpr char kAxisNames[] = "xyz";
 // done in vectors.
 template <typename Real>
 bool AreCoordinates(std::span<const Real> values) {
+  constexpr double kLargest = std::numeric_limits<Real>::max();
+  constexpr auto kLimit = static_cast<Real>(std::min(kMaxCoordinate, kLargest));
   bool good = true;
-  for (const Real value : values) good &= std::abs(static_cast<double>(value)) <= kMaxCoordinate;
+  for (const Real value : values) good &= std::abs(value) <= kLimit;
   return good;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -31,6 +32,19 @@ class PositionReader {
     const std::size_t at = particle * components_;
     return {static_cast<double>(first_[at]), static_cast<double>(second_[at])};
   }
+
+  /// The pairs of `count` particles from `first` on, one after the other: in the frame itself where
+  /// it has two components, else copied. Requires: room for them in `copy`.
+  std::span<const Real> Pairs(std::size_t first, std::size_t count, Real* copy) const {
+    if (components_ == 2) return {first_ + 2 * first, 2 * count};
+    for (std::size_t k = 0; k < count; ++k) {
+      copy[2 * k] = first_[(first + k) * components_];
+      copy[2 * k + 1] = second_[(first + k) * components_];
+    }
+    return {copy, 2 * count};
+  }
+
+  using Number = Real;
 
  private:
   const Real* first_;

@@ -15,10 +15,14 @@ void TileDirectory::Grow() {
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) slots_[Slot(tiles_[tile])] = tile;
 }
 
-void TileDirectory::Seal() {
+void TileDirectory::Sort() {
   std::sort(tiles_.begin(), tiles_.end());
   std::fill(slots_.begin(), slots_.end(), kNoTile);
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) slots_[Slot(tiles_[tile])] = tile;
+}
+
+void TileDirectory::Seal() {
+  Sort();
   neighbours_.resize(tiles_.size());
   for (std::size_t tile = 0; tile < tiles_.size(); ++tile) {
     for (int dy = -1; dy <= 1; ++dy) {

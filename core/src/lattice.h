@@ -42,7 +42,11 @@ class TileDirectory {
   /// Cost: constant on average.
   std::uint32_t Insert(TileCoordinate tile);
 
-  /// Sorts the tiles and links neighbours. Afterwards indices are positions in the sorted order.
+  /// Sorts the tiles: from now on indices are positions in the sorted order. Later tiles are
+  /// appended, as ever.
+  void Sort();
+
+  /// Sorts the tiles and links neighbours.
   void Seal();
 
   std::size_t size() const { return tiles_.size(); }
@@ -50,7 +54,7 @@ class TileDirectory {
   const TileCoordinate& operator[](std::size_t tile) const { return tiles_[tile]; }
   const Neighbourhood& neighbours(std::size_t tile) const { return neighbours_[tile]; }
 
-  /// Index of a tile after Seal, or kNoTile.
+  /// Index of a tile, or kNoTile.
   std::uint32_t Find(TileCoordinate tile) const;
 
  private:

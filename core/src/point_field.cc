@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 #include "cell_mask.h"
 #include "level_set_formula.h"
+#include "near_entries.h"
 
 namespace partiemc {
 namespace {
@@ -37,9 +38,7 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
       return crossings.tiles[of].active;
     });
     if (all) asked_[tile].fill(~std::uint32_t{0});
-    const bool any = std::any_of(asked_[tile].begin(), asked_[tile].end(),
-                                 [](std::uint32_t row) { return row != 0; });
-    if (any) first_bucket_[tile] = 0;
+    if (!IsEmpty(asked_[tile])) first_bucket_[tile] = 0;
   });
 }
 
@@ -51,77 +50,76 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
   bucket_columns_ = static_cast<int>((kTileSize + 2 * margin_) * buckets_per_cell_) + 1;
   MarkTiles(bins, crossings, wander);
 
+  const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
   const auto buckets = static_cast<std::uint32_t>(bucket_columns_ * bucket_columns_ + 1);
-  first_entry_.resize(bins.tiles.size());
   std::uint32_t bucket_count = 0;
-  std::uint32_t entry_count = 0;
-  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    if (first_bucket_[tile] == kNoTile) continue;
+  for (std::uint32_t tile = 0; tile < tiles; ++tile) {
+    if (!IsIndexed(tile)) continue;
     first_bucket_[tile] = bucket_count;
-    first_entry_[tile] = entry_count;
     bucket_count += buckets;
-    entry_count += bins.offsets[tile + 1] - bins.offsets[tile];
   }
   bucket_offsets_.resize(bucket_count);
+  const auto for_each_indexed = [&](auto visit) {
+    tbb::parallel_for(std::uint32_t{0}, tiles, [&](std::uint32_t tile) {
+      if (IsIndexed(tile)) visit(tile);
+    });
+  };
+  first_entry_.resize(tiles);
+  for_each_indexed([&](std::uint32_t tile) { first_entry_[tile] = CountEntries(bins, tile); });
+  std::uint32_t entry_count = 0;
+  for (std::uint32_t tile = 0; tile < tiles; ++tile) {
+    if (IsIndexed(tile)) entry_count += std::exchange(first_entry_[tile], entry_count);
+  }
   x_.resize(entry_count + kPointPadding);
   y_.resize(entry_count + kPointPadding);
   source_.resize(entry_count);
-  chosen_.resize(entry_count);
-  bucket_.resize(entry_count);
   weight_.resize(bins.weight.empty() ? 0 : entry_count + kPointPadding);
-  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(bins.tiles.size()),
-                    [&](std::uint32_t tile) {
-                      if (IsIndexed(tile)) SortTile(bins, tile);
-                    });
+  for_each_indexed([&](std::uint32_t tile) { FillEntries(bins, tile); });
 }
 
-// Lists the entries of a tile that are within reach of a point that may be asked for. Returns how
-// many they are.
-std::uint32_t PointField::ChooseEntries(const ParticleBins& bins, std::uint32_t tile) {
-  std::uint32_t* chosen = chosen_.data() + first_entry_[tile];
+std::span<std::uint32_t> PointField::OffsetsOf(std::uint32_t tile) {
+  return {bucket_offsets_.data() + first_bucket_[tile],
+          static_cast<std::size_t>(bucket_columns_) * bucket_columns_ + 1};
+}
+
+// The particles within reach of a point that may be asked for.
+NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile) const {
   const int reach = static_cast<int>(std::ceil(scale_.kernel_radius));
-  if (reach >= kMaskMargin) {
-    const std::uint32_t count = bins.offsets[tile + 1] - bins.offsets[tile];
-    std::iota(chosen, chosen + count, bins.offsets[tile]);
-    return count;
-  }
+  if (reach >= kMaskMargin) return NearWalk(bins, tile, nullptr);
   const CellMask mask = Widened(asked_[tile], reach, reach);
+  return NearWalk(bins, tile, &mask);
+}
+
+// Counts the particles in each bucket of a tile. Returns how many they are.
+std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t tile) {
+  const std::span<std::uint32_t> offsets = OffsetsOf(tile);
+  std::fill(offsets.begin(), offsets.end(), 0);
   std::uint32_t count = 0;
-  for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    chosen[count] = e;
-    count += IsInMask(mask, bins.entries[e]);
-  }
+  Near(bins, tile).InAnyOrder([&](const NearEntries& near) {
+    for (int k = 0; k < near.count; ++k) ++offsets[BucketOf(near, k)];
+    count += static_cast<std::uint32_t>(near.count);
+  });
   return count;
 }
 
-void PointField::SortTile(const ParticleBins& bins, std::uint32_t tile) {
-  const std::uint32_t count = ChooseEntries(bins, tile);
-  const std::uint32_t* chosen = chosen_.data() + first_entry_[tile];
-  std::uint32_t* bucket_of = bucket_.data() + first_entry_[tile];
-  const std::span<std::uint32_t> offsets(
-      bucket_offsets_.data() + first_bucket_[tile],
-      static_cast<std::size_t>(bucket_columns_) * bucket_columns_ + 1);
-  std::fill(offsets.begin(), offsets.end(), 0);
-  for (std::uint32_t k = 0; k < count; ++k) {
-    const BinEntry& entry = bins.entries[chosen[k]];
-    const int bucket = Bucket(entry.y) * bucket_columns_ + Bucket(entry.x);
-    bucket_of[k] = static_cast<std::uint32_t>(bucket);
-    ++offsets[bucket];
-  }
+// Turns the counts of a tile's buckets into offsets, and fills the buckets.
+void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
+  const std::span<std::uint32_t> offsets = OffsetsOf(tile);
   std::uint32_t next = first_entry_[tile];
   for (std::uint32_t& offset : offsets) {
     const std::uint32_t in_bucket = offset;
     offset = next;
     next += in_bucket;
   }
-  for (std::uint32_t k = 0; k < count; ++k) {
-    const std::uint32_t to = offsets[bucket_of[k]]++;
-    const BinEntry& entry = bins.entries[chosen[k]];
-    x_[to] = entry.x;
-    y_[to] = entry.y;
-    source_[to] = entry.source;
-    if (!bins.weight.empty()) weight_[to] = bins.weight[chosen[k]];
-  }
+  Near(bins, tile).InOrder([&](const NearEntries& near) {
+    for (int k = 0; k < near.count; ++k) {
+      const std::uint32_t to = offsets[BucketOf(near, k)]++;
+      x_[to] = near.x[k];
+      y_[to] = near.y[k];
+      source_[to] = near.source[k];
+      if (!bins.weight.empty()) weight_[to] = bins.weight[near.entry[k]];
+    }
+  });
   // Filling moved every offset to the start of the next bucket.
   std::copy_backward(offsets.begin(), offsets.end() - 1, offsets.end());
   offsets.front() = first_entry_[tile];

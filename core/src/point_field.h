@@ -8,6 +8,7 @@
 
 #include "bins.h"
 #include "crossings.h"
+#include "near_entries.h"
 #include "point_kernels.h"
 #include "scale.h"
 
@@ -76,8 +77,13 @@ class PointField {
   int Bucket(double coordinate) const;
   PointQuery QueryAt(std::uint32_t tile, double x, double y) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
-  std::uint32_t ChooseEntries(const ParticleBins& bins, std::uint32_t tile);
-  void SortTile(const ParticleBins& bins, std::uint32_t tile);
+  std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
+  NearWalk Near(const ParticleBins& bins, std::uint32_t tile) const;
+  int BucketOf(const NearEntries& near, int k) const {
+    return Bucket(near.y[k]) * bucket_columns_ + Bucket(near.x[k]);
+  }
+  std::uint32_t CountEntries(const ParticleBins& bins, std::uint32_t tile);
+  void FillEntries(const ParticleBins& bins, std::uint32_t tile);
 
   Scale scale_;
   double buckets_per_cell_ = 1;
@@ -85,11 +91,10 @@ class PointField {
   int bucket_columns_ = 0;
   std::vector<BitRows> asked_;               // Per tile: the cells in which points may lie.
   std::vector<std::uint32_t> first_bucket_;  // Per tile: into bucket_offsets_, or kNoTile.
-  std::vector<std::uint32_t> first_entry_;   // Per tile: into the arrays below.
+  std::vector<std::uint32_t> first_entry_;   // Per tile: into the arrays of entries.
   std::vector<std::uint32_t> bucket_offsets_;
   std::vector<float> x_, y_, weight_;
   std::vector<std::uint32_t> source_;
-  std::vector<std::uint32_t> chosen_, bucket_;  // Scratch: entries of the bins, and their buckets.
 };
 
 inline int PointField::Bucket(double coordinate) const {

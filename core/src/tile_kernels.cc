@@ -21,7 +21,7 @@ using Lanes = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// The first node after `coordinate`. Truncation rounds down: no particle of a tile's list is
+// The first node after `coordinate`. Truncation rounds down: no particle in or next to a tile is
 // farther from it than a tile's width, and no kernel reaches farther than that from a particle.
 HWY_INLINE int NodeAfter(float coordinate) {
   constexpr int kOffset = 2 * kTileSize;
@@ -46,7 +46,8 @@ HWY_INLINE void SetRowTerms(float y, NodeRange rows, float inverse_square, RowTe
   const Lanes d;
   const Vector from_first = hn::Set(d, y - static_cast<float>(rows.first));
   for (int row = 0; row <= rows.last - rows.first; row += kLanes) {
-    const Vector dy = hn::Sub(from_first, hn::Iota(d, static_cast<float>(row)));
+    const Vector dy =
+        hn::Sub(from_first, hn::Add(hn::Set(d, static_cast<float>(row)), hn::Iota(d, 0.0f)));
     hn::StoreU(hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dy, dy), hn::Set(d, inverse_square))), d,
                terms.data() + row);
   }
@@ -85,82 +86,109 @@ HWY_INLINE void AddRow(float row_term, Vector column_term, float weight, float* 
   AddTo(sums, k);
 }
 
+// Adds the rows of a kernel from `at` on: with vectors of sixteen two at a time, which takes the
+// same steps for each node.
+template <bool kWeighted>
+HWY_INLINE void AddRows(const RowTerms& row_terms, int count, Vector column_term, float weight,
+                        float* HWY_RESTRICT at) {
+  int row = 0;
+#if HWY_TARGET <= HWY_AVX3
+  const hn::CappedTag<float, 2 * kLanes> d;
+  const Lanes d_row;
+  const auto column_terms = hn::Combine(d, column_term, column_term);
+  for (; row + 2 <= count; row += 2) {
+    const auto terms =
+        hn::Combine(d, hn::Set(d_row, row_terms[row + 1]), hn::Set(d_row, row_terms[row]));
+    const auto t = hn::Max(hn::Zero(d), hn::Sub(terms, column_terms));
+    auto k = hn::Mul(hn::Mul(t, t), t);
+    if constexpr (kWeighted) k = hn::Mul(k, hn::Set(d, weight));
+    AddTo(at + row * kSumColumns, hn::LowerHalf(k));
+    AddTo(at + (row + 1) * kSumColumns, hn::UpperHalf(d_row, k));
+  }
+#endif
+  for (; row < count; ++row) {
+    AddRow<kWeighted>(row_terms[row], column_term, weight, at + row * kSumColumns);
+  }
+}
+
 // Kernels that the margin has room for: every one covers the same number of rows and columns, so
 // that no branch depends on where a particle lies.
 template <bool kWeighted>
-void ScatterSmallKernels(const TileEntries& entries, float radius, NodeSums& sums) {
+void ScatterKernelsOf(const TileEntries& entries, float radius, NodeSums& sums) {
   const float inverse_square = 1 / (radius * radius);
   const int span = static_cast<int>(std::ceil(2 * radius));
   alignas(64) RowTerms row_terms;
-  for (std::size_t e = 0; e < entries.count; ++e) {
-    const float x = entries.entries[e].x;
-    const float y = entries.entries[e].y;
-    const float weight = kWeighted ? entries.weight[e] : 1.0f;
+  const BinEntry* const end = entries.entries + entries.count;
+  const float* next_weight = entries.weight;
+  for (const BinEntry* entry = entries.entries; entry != end; ++entry) {
+    const float x = entry->x;
+    const float y = entry->y;
+    const float weight = kWeighted ? *next_weight++ : 1.0f;
     const int column = NodeAfter(x - radius);
     const int row = NodeAfter(y - radius);
     SetRowTerms(y, {row, row + span - 1}, inverse_square, row_terms);
     for (int v = 0; v < span; v += kLanes) {
       const Vector column_term =
           ColumnTermsAt(x, column + v, column + span - 1, inverse_square).term;
-      float* HWY_RESTRICT at = sums.data() + SumIndex(column + v, row);
-      for (int k = 0; k < span; ++k) {
-        AddRow<kWeighted>(row_terms[k], column_term, weight, at + k * kSumColumns);
-      }
+      AddRows<kWeighted>(row_terms, span, column_term, weight,
+                         sums.data() + SumIndex(column + v, row));
     }
   }
 }
 
-template <bool kWeighted>
 void ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
-  const float inverse_square = 1 / (radius * radius);
-  alignas(64) RowTerms row_terms;
-  for (std::size_t e = 0; e < entries.count; ++e) {
-    const float x = entries.entries[e].x;
-    const float y = entries.entries[e].y;
-    const float weight = kWeighted ? entries.weight[e] : 1.0f;
-    const NodeRange columns = NodesReached(x, radius);
-    const NodeRange rows = NodesReached(y, radius);
-    SetRowTerms(y, rows, inverse_square, row_terms);
-    for (int column = columns.first; column <= columns.last; column += kLanes) {
-      const Vector column_term = ColumnTermsAt(x, column, columns.last, inverse_square).term;
-      for (int row = rows.first; row <= rows.last; ++row) {
-        AddRow<kWeighted>(row_terms[row - rows.first], column_term, weight,
-                          sums.data() + SumIndex(column, row));
-      }
-    }
-  }
+  entries.weight != nullptr ? ScatterKernelsOf<true>(entries, radius, sums)
+                            : ScatterKernelsOf<false>(entries, radius, sums);
 }
 
-void ScatterKernel(const TileEntries& entries, float radius, NodeSums& sums) {
-  sums.fill(0);
-  const bool weighted = entries.weight != nullptr;
-  if (2 * radius <= kSumMargin) {
-    weighted ? ScatterSmallKernels<true>(entries, radius, sums)
-             : ScatterSmallKernels<false>(entries, radius, sums);
-  } else {
-    weighted ? ScatterKernels<true>(entries, radius, sums)
-             : ScatterKernels<false>(entries, radius, sums);
-  }
-}
-
-template <bool kWeighted>
-void ScatterMomentsLoop(const TileEntries& entries, float radius, const CellMask* mask,
-                        MomentSums& sums) {
-  const Lanes d;
+// Calls visit(index among the near ones, column, row, terms of the columns from there, term of the
+// row) for each vector of the tile's nodes that a kernel reaches.
+template <typename Visit>
+HWY_INLINE void ForEachReached(const NearEntries& near, float radius, Visit visit) {
   const float inverse_square = 1 / (radius * radius);
   alignas(64) RowTerms row_terms;
-  for (std::size_t e = 0; e < entries.count; ++e) {
-    const float x = entries.entries[e].x;
-    const float y = entries.entries[e].y;
-    if (mask != nullptr && !IsInMask(*mask, entries.entries[e])) continue;
+  for (int e = 0; e < near.count; ++e) {
+    const float x = near.x[e];
+    const float y = near.y[e];
     const NodeRange columns = NodesReached(x, radius);
     const NodeRange rows = NodesReached(y, radius);
+    if (rows.last < rows.first) continue;
     SetRowTerms(y, rows, inverse_square, row_terms);
     for (int column = columns.first; column <= columns.last; column += kLanes) {
       const ColumnTerms terms = ColumnTermsAt(x, column, columns.last, inverse_square);
       for (int row = rows.first; row <= rows.last; ++row) {
-        const Vector k = KernelAt(row_terms[row - rows.first], terms.term);
-        const Vector dy = hn::Set(d, y - static_cast<float>(row));
+        visit(e, column, row, terms, row_terms[row - rows.first]);
+      }
+    }
+  }
+}
+
+template <bool kWeighted>
+void ScatterNearKernelsOf(const NearEntries& near, const float* weight, float radius,
+                          NodeSums& sums) {
+  ForEachReached(
+      near, radius,
+      [&](int e, int column, int row, const ColumnTerms& terms, float row_term) HWY_ATTR {
+        AddRow<kWeighted>(row_term, terms.term, kWeighted ? weight[near.entry[e]] : 1.0f,
+                          sums.data() + SumIndex(column, row));
+      });
+}
+
+void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
+                        NodeSums& sums) {
+  weight != nullptr ? ScatterNearKernelsOf<true>(near, weight, radius, sums)
+                    : ScatterNearKernelsOf<false>(near, weight, radius, sums);
+}
+
+template <bool kWeighted>
+void ScatterNearMomentsOf(const NearEntries& near, const float* weight, float radius,
+                          MomentSums& sums) {
+  const Lanes d;
+  ForEachReached(
+      near, radius,
+      [&](int e, int column, int row, const ColumnTerms& terms, float row_term) HWY_ATTR {
+        const Vector k = KernelAt(row_term, terms.term);
+        const Vector dy = hn::Set(d, near.y[e] - static_cast<float>(row));
         const int at = SumIndex(column, row);
         AddTo(sums.kernel.data() + at, k);
         const Vector kx = hn::Mul(k, terms.dx);
@@ -171,42 +199,32 @@ void ScatterMomentsLoop(const TileEntries& entries, float radius, const CellMask
         AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
         AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
         if constexpr (kWeighted) {
-          AddTo(sums.weighted.data() + at, hn::Mul(k, hn::Set(d, entries.weight[e])));
+          AddTo(sums.weighted.data() + at, hn::Mul(k, hn::Set(d, weight[near.entry[e]])));
         }
-      }
-    }
-  }
+      });
 }
 
-void ScatterMoments(const TileEntries& entries, float radius, const CellMask* mask,
-                    MomentSums& sums) {
-  sums.kernel.fill(0);
-  sums.moment_x.fill(0);
-  sums.moment_y.fill(0);
-  sums.xx.fill(0);
-  sums.xy.fill(0);
-  sums.yy.fill(0);
-  if (entries.weight != nullptr) {
-    sums.weighted.fill(0);
-    ScatterMomentsLoop<true>(entries, radius, mask, sums);
-  } else {
-    ScatterMomentsLoop<false>(entries, radius, mask, sums);
-  }
+void ScatterNearMoments(const NearEntries& near, const float* weight, float radius,
+                        MomentSums& sums) {
+  weight != nullptr ? ScatterNearMomentsOf<true>(near, weight, radius, sums)
+                    : ScatterNearMomentsOf<false>(near, weight, radius, sums);
 }
 
-void ClassifyNodes(const NodeSums& sums, float weight, const Scale& scale, float* values,
-                   BitRows& sure_inside, BitRows& sure_outside) {
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& sure_inside,
+                   BitRows& sure_outside) {
   const Lanes d;
   const Vector guard = hn::Set(d, static_cast<float>(scale.guard));
   const Vector saturation = hn::Set(d, static_cast<float>(scale.saturation));
+  const Vector surely = hn::Set(d, static_cast<float>((1 + kSumTolerance) * scale.saturation));
+  const Vector surely_not = hn::Set(d, static_cast<float>((1 - kSumTolerance) * scale.guard));
   const Vector slope = hn::Set(d, static_cast<float>(scale.guard_slope));
   const Vector void_value = hn::Set(d, static_cast<float>(scale.VoidValue()));
   for (int j = 0; j < kTileSize; ++j) {
     std::uint32_t inside_row = 0, outside_row = 0;
     for (int i = 0; i < kTileSize; i += kLanes) {
-      const Vector f = hn::Mul(hn::Set(d, weight), hn::LoadU(d, sums.data() + SumIndex(i, j)));
-      const auto inside = hn::Gt(f, saturation);
-      const auto outside = hn::Le(f, guard);
+      const Vector f = hn::Mul(hn::Set(d, weight), hn::LoadU(d, values + j * kTileSize + i));
+      const auto inside = hn::Gt(f, surely);
+      const auto outside = hn::Le(f, surely_not);
       const auto bits = [&](auto mask) {
         std::uint8_t bytes[8] = {};
         hn::StoreMaskBits(d, mask, bytes);
@@ -231,22 +249,28 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(ScatterKernel);
-HWY_EXPORT(ScatterMoments);
+HWY_EXPORT(ScatterKernels);
+HWY_EXPORT(ScatterNearKernels);
+HWY_EXPORT(ScatterNearMoments);
 HWY_EXPORT(ClassifyNodes);
 
-void ScatterKernel(const TileEntries& entries, float radius, NodeSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterKernel)(entries, radius, sums);
+void ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterKernels)(entries, radius, sums);
 }
 
-void ScatterMoments(const TileEntries& entries, float radius, const CellMask* mask,
-                    MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterMoments)(entries, radius, mask, sums);
+void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
+                        NodeSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
 }
 
-void ClassifyNodes(const NodeSums& sums, float weight, const Scale& scale, float* values,
-                   BitRows& sure_inside, BitRows& sure_outside) {
-  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(sums, weight, scale, values, sure_inside, sure_outside);
+void ScatterNearMoments(const NearEntries& near, const float* weight, float radius,
+                        MomentSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, weight, radius, sums);
+}
+
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& sure_inside,
+                   BitRows& sure_outside) {
+  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, values, sure_inside, sure_outside);
 }
 
 }  // namespace partiemc

@@ -10,28 +10,21 @@
 #include <cstdint>
 
 #include "bins.h"
-#include "cell_mask.h"
 #include "lattice.h"
+#include "near_entries.h"
 #include "scale.h"
 
 namespace partiemc {
 
-/// The list of one tile. `weight` is null where weights are uniform.
-struct TileEntries {
-  const BinEntry* entries;
-  const float* weight;
-  std::size_t count;
-};
-
-/// Sums at the nodes of a tile, with a margin that takes what kernels add beyond its sides: those
-/// of a radius of up to half the margin are added without a look at where they end.
+/// Sums at the nodes of a tile, with a margin that takes what kernels of its particles add beyond
+/// its sides. Wider kernels than that are cut off at the tile's sides.
 inline constexpr int kSumMargin = 8;
 inline constexpr int kSumColumns = kTileSize + 2 * kSumMargin;
 inline constexpr int SumIndex(int i, int j) {
   return (j + kSumMargin) * kSumColumns + i + kSumMargin;
 }
-/// Two rows more: particles that reach a tile's last cells only begin beyond its last node, and the
-/// lanes of a vector may go on in the next row.
+/// Two rows more: the lanes of a vector may go on in the next row, and what is beyond the reach of
+/// the last particle in the one after it.
 using NodeSums = std::array<float, (kTileSize + 2 * kSumMargin + 2) * kSumColumns>;
 
 /// Kernel sums at the nodes of one tile. The moments are relative to the node, so that the mean
@@ -46,16 +39,32 @@ struct alignas(64) MomentSums {
   NodeSums weighted;  ///< sum w k; only where weights differ from particle to particle.
 };
 
-/// sum k at every node, or sum w k where there are weights.
-void ScatterKernel(const TileEntries& entries, float radius, NodeSums& sums);
+/// The list of one tile. `weight` is null where weights are uniform.
+struct TileEntries {
+  const BinEntry* entries;
+  const float* weight;
+  std::size_t count;
+};
 
-/// All sums, of the entries in cells of `mask`, or of all where it is null.
-void ScatterMoments(const TileEntries& entries, float radius, const CellMask* mask,
-                    MomentSums& sums);
+/// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any:
+/// also beyond the tile's sides. Requires: radius <= kSumMargin.
+void ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums);
 
-/// What the density f = weight * sum says of a tile's nodes: their sides, and the branch of F that
-/// decides them; where f = 0, F itself.
-void ClassifyNodes(const NodeSums& sums, float weight, const Scale& scale, float* values,
-                   BitRows& sure_inside, BitRows& sure_outside);
+/// The same of particles in and around a tile, to the tile's nodes only, for any radius. `weight`,
+/// by entry of the bins, is null where weights are uniform.
+void ScatterNearKernels(const NearEntries& near, const float* weight, float radius, NodeSums& sums);
+
+/// Adds to all sums of the tile's nodes.
+void ScatterNearMoments(const NearEntries& near, const float* weight, float radius,
+                        MomentSums& sums);
+
+/// The sums of two orders of the same particles are closer than this share of either: nodes whose
+/// density is so close to a bound are left open, and decided by sums in the order of the frame.
+inline constexpr double kSumTolerance = 1e-4;
+
+/// What the density f = weight * sum says of a tile's nodes: their sides, and in place of the sums
+/// the branch of F that decides them; where f = 0, F itself.
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& sure_inside,
+                   BitRows& sure_outside);
 
 }  // namespace partiemc

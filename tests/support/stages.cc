@@ -67,15 +67,14 @@ void Stages::TraceOn(const std::function<double(int, int)>& function, TileCoordi
   for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
     const int column = bins.tiles[tile].x * kTileSize;
     const int row = bins.tiles[tile].y * kTileSize;
-    bins.home_count.push_back(0);
     for (std::size_t k = 0; k < particles.size(); ++k) {
       const double px = particles.x(k) / scale.cell_size - column;
       const double py = particles.y(k) / scale.cell_size - row;
-      const double reach = scale.kernel_radius;
-      if (std::min(px, py) < -reach || std::max(px, py) > kTileSize + reach) continue;
-      bins.entries.push_back(
-          {static_cast<float>(px), static_cast<float>(py), static_cast<std::uint32_t>(k)});
-      bins.home_count.back() += IsAtHome(bins.entries.back());
+      if (std::min(px, py) < 0 || std::max(px, py) >= kTileSize) continue;
+      const float last = std::nextafter(static_cast<float>(kTileSize), 0.0f);
+      bins.entries.push_back({std::min(static_cast<float>(px), last),
+                              std::min(static_cast<float>(py), last),
+                              static_cast<std::uint32_t>(k)});
     }
     bins.offsets.push_back(static_cast<std::uint32_t>(bins.entries.size()));
   }

@@ -1,0 +1,140 @@
+#include "near_entries.h"
+
+#include <algorithm>
+#include <limits>
+
+// Highway compiles the rest of this file once for each target.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "near_entries.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Sets `near` to those of the entries [first, last) that lie in `cells` of their tile.
+// Reads whole vectors, if need be of the entries behind them.
+void ChooseEntries(std::span<const BinEntry> entries, std::uint32_t first, std::uint32_t last,
+                   const BitRows& cells, float shift_x, float shift_y, NearEntries& near) {
+  const hn::CappedTag<float, NearEntries::kPadding> d;
+  using D = decltype(d);
+  const hn::RebindToSigned<D> d_int;
+  const hn::RebindToUnsigned<D> d_index;
+  const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
+  const auto* rows = reinterpret_cast<const std::int32_t*>(cells.data());
+  const auto lane = hn::Iota(d_index, 0);
+  int chosen = 0;
+  for (; first < last && first + lanes <= entries.size(); first += lanes) {
+    hn::Vec<D> x, y, source;
+    hn::LoadInterleaved3(d, &entries[first].x, x, y, source);
+    // Truncation rounds down: nothing is before its tile.
+    const auto row = hn::GatherIndex(d_int, rows, hn::ConvertTo(d_int, y));
+    const auto bit = hn::Shl(hn::Set(d_int, 1), hn::ConvertTo(d_int, x));
+    const auto is_in = hn::And(hn::TestBit(row, bit), hn::FirstN(d_int, last - first));
+    // Compressed in a register: some processors are slow at compressing into memory.
+    const auto keep = [&](auto values, auto* to) HWY_ATTR {
+      const hn::DFromV<decltype(values)> d_values;
+      hn::StoreU(hn::Compress(values, hn::RebindMask(d_values, is_in)), d_values, to + chosen);
+    };
+    keep(hn::Add(x, hn::Set(d, shift_x)), near.x.data());
+    keep(hn::Add(y, hn::Set(d, shift_y)), near.y.data());
+    keep(hn::BitCast(d_index, source), near.source.data());
+    keep(hn::Add(hn::Set(d_index, first), lane), near.entry.data());
+    chosen += static_cast<int>(hn::CountTrue(d_int, is_in));
+  }
+  for (; first < last; ++first) {
+    const BinEntry& entry = entries[first];
+    near.x[chosen] = entry.x + shift_x;
+    near.y[chosen] = entry.y + shift_y;
+    near.source[chosen] = entry.source;
+    near.entry[chosen] = first;
+    chosen += LiesIn(entry, cells);
+  }
+  near.count = chosen;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace partiemc {
+
+HWY_EXPORT(ChooseEntries);
+
+NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask)
+    : entries_(bins.entries) {
+  const Neighbourhood& neighbours = bins.tiles.neighbours(tile);
+  for (int place = 0; place < kMaxLists; ++place) {
+    const std::uint32_t from = neighbours[place];
+    if (from == kNoTile || bins.CountOf(from) == 0) continue;
+    List& list = lists_[list_count_];
+    list.cells.fill(~std::uint32_t{0});
+    if (mask != nullptr) list.cells = CellsOfNeighbour(*mask, place);
+    if (IsEmpty(list.cells)) continue;
+    list.next = bins.offsets[from];
+    list.end = bins.offsets[from + 1];
+    list.shift_x = static_cast<float>((place % 3 - 1) * kTileSize);
+    list.shift_y = static_cast<float>((place / 3 - 1) * kTileSize);
+    ++list_count_;
+  }
+}
+
+// Chooses the next of a list's entries. Returns false if there are no more.
+bool NearWalk::ChooseMore(List& list) const {
+  list.chosen.count = 0;
+  while (list.chosen.count == 0 && list.next < list.end) {
+    const std::uint32_t last =
+        list.next + std::min<std::uint32_t>(NearEntries::kCapacity, list.end - list.next);
+    HWY_DYNAMIC_DISPATCH(ChooseEntries)
+    (entries_, list.next, last, list.cells, list.shift_x, list.shift_y, list.chosen);
+    list.next = last;
+  }
+  return list.chosen.count > 0;
+}
+
+// Heads compare as their particles' indices in the frame; nothing comes after the end.
+void NearWalk::SetHead(int list) {
+  List& of = lists_[list];
+  if (of.merged == of.chosen.count) {
+    of.merged = 0;
+    if (!ChooseMore(of)) {
+      heads_[list] = std::numeric_limits<std::uint64_t>::max();
+      return;
+    }
+  }
+  heads_[list] = std::uint64_t{of.chosen.source[of.merged]} << 32 | static_cast<unsigned>(list);
+}
+
+void NearWalk::StartMerging() {
+  for (int k = 0; k < list_count_; ++k) {
+    lists_[k].merged = lists_[k].chosen.count = 0;
+    SetHead(k);
+  }
+}
+
+bool NearWalk::MergeNext(NearEntries& near) {
+  near.count = 0;
+  while (near.count < NearEntries::kCapacity) {
+    // Without a branch on what comes first, which nobody could guess.
+    std::uint64_t first = std::numeric_limits<std::uint64_t>::max();
+    for (int k = 0; k < list_count_; ++k) first = std::min(first, heads_[k]);
+    if (first == std::numeric_limits<std::uint64_t>::max()) break;
+    const auto list = static_cast<int>(first & 0xff);
+    List& of = lists_[list];
+    near.x[near.count] = of.chosen.x[of.merged];
+    near.y[near.count] = of.chosen.y[of.merged];
+    near.entry[near.count] = of.chosen.entry[of.merged];
+    near.source[near.count] = of.chosen.source[of.merged];
+    ++near.count;
+    ++of.merged;
+    SetHead(list);
+  }
+  return near.count > 0;
+}
+
+}  // namespace partiemc
+#endif  // HWY_ONCE

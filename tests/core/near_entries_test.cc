@@ -1,0 +1,133 @@
+#include "near_entries.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include "support/instruction_sets.h"
+#include "support/particles.h"
+
+namespace partiemc {
+namespace {
+
+// An entry as a walk hands it out.
+struct Seen {
+  std::uint32_t source, entry;
+  float x, y;
+
+  friend auto operator<=>(const Seen&, const Seen&) = default;
+};
+
+std::vector<Seen> InOrder(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
+  std::vector<Seen> seen;
+  NearWalk(bins, tile, mask).InOrder([&](const NearEntries& near) {
+    EXPECT_GT(near.count, 0);
+    for (int k = 0; k < near.count; ++k) {
+      seen.push_back({near.source[k], near.entry[k], near.x[k], near.y[k]});
+    }
+  });
+  return seen;
+}
+
+std::vector<Seen> InAnyOrder(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
+  std::vector<Seen> seen;
+  NearWalk(bins, tile, mask).InAnyOrder([&](const NearEntries& near) {
+    for (int k = 0; k < near.count; ++k) {
+      seen.push_back({near.source[k], near.entry[k], near.x[k], near.y[k]});
+    }
+  });
+  std::sort(seen.begin(), seen.end());
+  return seen;
+}
+
+// All entries of the bins in cells of the mask around a tile, in the order of the frame.
+std::vector<Seen> Expected(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
+  std::vector<Seen> expected;
+  for (std::uint32_t other = 0; other < bins.tiles.size(); ++other) {
+    const int dx = bins.tiles[other].x - bins.tiles[tile].x;
+    const int dy = bins.tiles[other].y - bins.tiles[tile].y;
+    if (std::abs(dx) > 1 || std::abs(dy) > 1) continue;
+    for (std::uint32_t e = bins.offsets[other]; e < bins.offsets[other + 1]; ++e) {
+      const float x = bins.entries[e].x + static_cast<float>(dx * kTileSize);
+      const float y = bins.entries[e].y + static_cast<float>(dy * kTileSize);
+      if (mask != nullptr) {
+        const int column = static_cast<int>(std::floor(x)) + kMaskMargin;
+        const int row = static_cast<int>(std::floor(y)) + kMaskMargin;
+        if (std::min(column, row) < 0 || std::max(column, row) >= 64) continue;
+        if (((*mask)[row] >> column & 1) == 0) continue;
+      }
+      expected.push_back({bins.entries[e].source, e, x, y});
+    }
+  }
+  std::sort(expected.begin(), expected.end());
+  return expected;
+}
+
+ParticleBins Bin(const support::Particles& particles) {
+  const ReconstructionParameters parameters = Resolve({.spacing = 1.0});
+  ParticleBins bins;
+  EXPECT_TRUE(
+      BinParticles(particles.AsFrame(), Plane::kXy, MakeScale(parameters, 1, 1, 1), {}, bins).ok());
+  return bins;
+}
+
+void ExpectAllSeen(const ParticleBins& bins, const CellMask* mask) {
+  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    const std::vector<Seen> expected = Expected(bins, tile, mask);
+    EXPECT_EQ(InOrder(bins, tile, mask), expected);
+    EXPECT_EQ(InAnyOrder(bins, tile, mask), expected);
+  }
+}
+
+// A body over several tiles, and crowds at the corner of four of them that fill several blocks.
+support::Particles CrowdedScene(support::Random& random) {
+  support::Particles particles = support::Blob(random, 30);
+  for (int k = 0; k < 3000; ++k) {
+    particles.Add(random.Uniform(-1, 1), random.Uniform(-1, 1));
+    particles.Add(random.Uniform(30, 34), random.Uniform(-40, 40));
+  }
+  return particles;
+}
+
+TEST(NearEntries, AreThoseInTheMaskInTheOrderOfTheFrameOnEveryInstructionSet) {
+  support::Random random(1);
+  const ParticleBins bins = Bin(CrowdedScene(random));
+  ASSERT_GE(bins.tiles.size(), 9u);
+  CellMask sparse, dense, one_side{};
+  for (std::uint64_t& row : sparse) row = random.Bits() & random.Bits() & random.Bits();
+  for (std::uint64_t& row : dense) row = random.Bits() | random.Bits();
+  for (std::uint64_t& row : one_side) row = 0xff;
+  const int sets = support::ForEachInstructionSet([&] {
+    for (const CellMask* mask : {&sparse, &dense, &one_side}) ExpectAllSeen(bins, mask);
+  });
+  EXPECT_GE(sets, 1);
+}
+
+TEST(NearEntries, WithoutAMaskAreAllOfATileAndItsNeighbours) {
+  support::Random random(2);
+  ExpectAllSeen(Bin(CrowdedScene(random)), nullptr);
+}
+
+TEST(NearEntries, OfAnEmptyMaskAreNone) {
+  support::Random random(3);
+  const CellMask empty{};
+  ExpectAllSeen(Bin(CrowdedScene(random)), &empty);
+}
+
+TEST(NearEntries, OfAnySmallNumberOfParticlesAreRight) {
+  // Fewer than a vector, at the end of the bins too.
+  for (int count = 1; count <= 40; ++count) {
+    support::Random random(static_cast<std::uint64_t>(count));
+    support::Particles particles;
+    for (int k = 0; k < count; ++k) particles.Add(random.Uniform(-20, 20), random.Uniform(-20, 20));
+    CellMask mask;
+    for (std::uint64_t& row : mask) row = random.Bits();
+    ExpectAllSeen(Bin(particles), &mask);
+  }
+}
+
+}  // namespace
+}  // namespace partiemc
