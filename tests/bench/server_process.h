@@ -13,7 +13,8 @@ enum class Transport { kTcp, kUnix };
 class ServerProcess {
  public:
   /// Starts one on a free port of loopback or on a socket in a new temporary folder, and waits
-  /// until it serves. Ends the program where it does not.
+  /// until it serves. Ends the program where it does not. The system kills it when the thread that
+  /// starts it ends, however it ends.
   explicit ServerProcess(Transport transport);
   /// Asks it to leave, and waits until it has.
   ~ServerProcess();
@@ -21,6 +22,7 @@ class ServerProcess {
   ServerProcess& operator=(const ServerProcess&) = delete;
 
   const std::string& address() const { return address_; }
+  pid_t process() const { return process_; }
   double CpuMs() const;
   double ResidentMb() const { return StatusMb("VmRSS:"); }
   double PeakMb() const { return StatusMb("VmHWM:"); }
