@@ -11,6 +11,7 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -69,6 +70,7 @@ ServerProcess::ServerProcess(ServerProcess&& other) noexcept
 void ServerProcess::Signal(int signal) { kill(process_, signal); }
 
 std::optional<int> ServerProcess::Reap(int options) {
+  if (process_ <= 0) throw std::runtime_error("the server could not be started");
   int status = 0;
   if (waitpid(process_, &status, options) == 0) return std::nullopt;
   process_ = 0;
@@ -117,7 +119,10 @@ int RunServer(const std::vector<std::string>& arguments, std::string* output) {
 ServingProcess::ServingProcess(std::vector<std::string> arguments)
     : port_file_(TemporaryPath("port")), process_(With(std::move(arguments), port_file_)) {
   while (!std::filesystem::exists(port_file_)) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (const auto code = process_.WaitFor(std::chrono::milliseconds(5))) {
+      throw std::runtime_error("the server left with " + std::to_string(*code) + ": " +
+                               process_.Output());
+    }
   }
   address_ = FileText(port_file_);
   address_.pop_back();  // The end of the line.

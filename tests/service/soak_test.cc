@@ -38,6 +38,8 @@ constexpr std::size_t kFrames = 8;          // Different ones, over and over.
 constexpr Seconds kWarmUp(15);
 // Below this the slope is noise; then memory may vary by this much.
 constexpr double kMinutesForSlope = 10;
+// gRPC takes another thread for its callbacks when all are busy, up to a few in all.
+constexpr std::size_t kPoolThreads = 2;
 constexpr double kMaxSlopeMibPerHour = 1, kMaxGrowthMib = 8;
 
 std::shared_ptr<grpc::Channel> NewChannel(const std::string& address) {
@@ -252,7 +254,7 @@ TEST_F(Soak, NothingGrows) {
     EXPECT_LE(SlopePerHour(samples), kMaxSlopeMibPerHour);
   }
   EXPECT_LE(after.files, before.files);
-  EXPECT_LE(after.threads, before.threads);
+  EXPECT_LE(after.threads, before.threads + kPoolThreads);
 }
 
 }  // namespace
