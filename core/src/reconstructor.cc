@@ -51,11 +51,12 @@ struct Lengths {
 };
 
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
-                                                     const Frame& frame, const State& state) {
+                                                     const Frame& frame, const State& state,
+                                                     SpacingScratch& scratch) {
   std::optional<double> spacing = parameters.spacing;
   if (!spacing && parameters.spacing_rule == SpacingRule::kFirstFrame) spacing = state.spacing;
   if (!spacing) {
-    spacing = EstimateSpacing(frame, parameters.plane);
+    spacing = EstimateSpacing(frame, parameters.plane, scratch);
     if (spacing && !(*spacing >= kMinSpacing && *spacing <= kMaxSpacing)) {
       return ViolationError(absl::StatusCode::kInvalidArgument,
                             {std::string(kReasonOutOfRange), "positions",
@@ -188,7 +189,7 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
     if (absl::Status status = CheckFrame(frame, parameters_.plane, limits_); !status.ok()) {
       return status;
     }
-    auto decided = DecideLengths(parameters_, frame, state);
+    auto decided = DecideLengths(parameters_, frame, state, buffers.spacing);
     if (!decided.ok()) return decided.status();
     lengths = *decided;
     if (!lengths) {

@@ -40,8 +40,6 @@ constexpr std::size_t kMinFilledPoints = 32;
 constexpr double kSumTolerance = 0.05;
 constexpr double kQuarterPi = 0.78539816339744830962;
 
-using Positions = std::vector<WorldPosition>;
-
 // Where points lie from their particles, in kernel radii: as far as the kernel reaches, so that the
 // particle itself adds nothing and the sums are those of the plane, whatever the arrangement.
 constexpr WorldPosition kDirections[] = {{1, 0},       {0.8, 0.6},  {0.6, 0.8},  {0, 1},
@@ -130,9 +128,10 @@ double FilledWeight(std::span<const WorldPosition> tree, const WorldPosition& po
 
 // The spacing whose square, one for each particle, makes up for the density inside of bodies.
 // Nothing where no point is surrounded by them.
-std::optional<double> SpacingOfDensity(std::span<const WorldPosition> tree, const Positions& asked,
-                                       double radius) {
-  std::vector<double> weights(asked.size());
+std::optional<double> SpacingOfDensity(std::span<const WorldPosition> tree,
+                                       std::span<const WorldPosition> asked, double radius,
+                                       std::vector<double>& weights) {
+  weights.resize(asked.size());
   tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t k) {
     const WorldPosition& direction = kDirections[k % std::size(kDirections)];
     const WorldPosition point{asked[k].x + radius * direction.x, asked[k].y + radius * direction.y};
@@ -162,11 +161,12 @@ double MedianOf(std::vector<double>& values) {
 
 }  // namespace
 
-std::optional<double> EstimateSpacing(const Frame& frame, Plane plane) {
+std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingScratch& scratch) {
   const std::size_t count = frame.ParticleCount();
-  Positions positions(count);
+  auto& [positions, asked, distances, weights] = scratch;
+  positions.resize(count);
   VisitPositions(frame, plane, [&](const auto& reader) {
-    for (std::size_t k = 0; k < count; ++k) positions[k] = reader[k];
+    for (std::size_t k = 0; k < count; ++k) scratch.positions[k] = reader[k];
   });
   // Sorted and without duplicates: the tree is the same for any order of the particles, and no
   // query wades through a million copies of itself.
@@ -179,13 +179,14 @@ std::optional<double> EstimateSpacing(const Frame& frame, Plane plane) {
 
   const std::uint64_t stride = std::max<std::size_t>(1, positions.size() / kSampleSize);
   const double infinity = std::numeric_limits<double>::infinity();
-  Positions asked;
+  asked.clear();
   for (const WorldPosition& position : positions) {
     if (HashOf(position) % stride == 0) asked.push_back(position);
   }
-  std::vector<double> distances(asked.size());
+  distances.resize(asked.size());
   tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t k) {
-    distances[k] = std::sqrt(NearestSquare(positions, asked[k], 0, infinity));
+    scratch.distances[k] =
+        std::sqrt(NearestSquare(scratch.positions, scratch.asked[k], 0, infinity));
   });
   std::erase(distances, infinity);
   if (distances.empty()) return std::nullopt;
@@ -196,7 +197,7 @@ std::optional<double> EstimateSpacing(const Frame& frame, Plane plane) {
   double spacing = distance;
   for (int round = 0; round < kDensityRounds; ++round) {
     const std::optional<double> dense =
-        SpacingOfDensity(positions, asked, kDensityRadius * spacing);
+        SpacingOfDensity(positions, asked, kDensityRadius * spacing, weights);
     if (!dense) break;
     spacing = *dense;
   }

@@ -2,12 +2,20 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
-#include "bins.h"
+#include "frame_view.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc {
+
+/// Warm buffers of EstimateSpacing.
+struct SpacingScratch {
+  std::vector<WorldPosition> positions;  ///< Distinct, as a k-d tree.
+  std::vector<WorldPosition> asked;      ///< Those asked for their neighbours.
+  std::vector<double> distances, weights;
+};
 
 /// The side of the square that each particle stands for where bodies are filled: 1 / sqrt(density),
 /// in world units; nothing without two distinct positions. The density is the mean of kernel sums
@@ -18,7 +26,7 @@ namespace partiemc {
 /// with none within four times that median (spray, lone ones) are left out and it is taken once
 /// more. Of large frames a sample is asked, chosen by the bits of the positions: the answer does
 /// not depend on the order of the particles. Requires: a checked frame. Cost: n log n for the tree,
-/// a few queries for at most 2^14 particles or so.
-std::optional<double> EstimateSpacing(const Frame& frame, Plane plane);
+/// a few queries for at most 2^14 particles or so. Allocates nothing once `scratch` is warm.
+std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingScratch& scratch);
 
 }  // namespace partiemc

@@ -14,11 +14,13 @@
 #include "partiemc/reconstructor.h"
 #include "point_field.h"
 #include "rings.h"
+#include "spacing.h"
 #include "vertices.h"
 
 namespace partiemc {
 
 struct Workspace::Buffers {
+  SpacingScratch spacing;
   ParticleBins bins;
   LevelSet level_set;
   Crossings crossings;

@@ -46,11 +46,13 @@ struct AllocationCase {
   Fill fill;
   int threads;
   bool volumes;
+  bool estimates_spacing = false;  // In each frame.
 };
 
 void PrintTo(const AllocationCase& tested, std::ostream* out) {
   *out << Name(tested.placement) << ", " << Name(tested.fill) << ", " << tested.threads
-       << " threads" << (tested.volumes ? ", volumes" : "");
+       << " threads" << (tested.volumes ? ", volumes" : "")
+       << (tested.estimates_spacing ? ", spacing estimated" : "");
 }
 
 class WarmFrame : public testing::TestWithParam<AllocationCase> {};
@@ -59,10 +61,14 @@ TEST_P(WarmFrame, AllocatesNothing) {
   const AllocationCase& tested = GetParam();
   tbb::global_control control(tbb::global_control::max_allowed_parallelism, tested.threads);
   tbb::task_arena arena(tested.threads);
-  const auto reconstructor = Reconstructor::Create({.placement = tested.placement,
-                                                    .fill = tested.fill,
-                                                    .spacing = 1.0,
-                                                    .min_component_particles = 3});
+  ReconstructionParameters parameters{
+      .placement = tested.placement, .fill = tested.fill, .min_component_particles = 3};
+  if (tested.estimates_spacing) {
+    parameters.spacing_rule = SpacingRule::kEveryFrame;
+  } else {
+    parameters.spacing = 1.0;
+  }
+  const auto reconstructor = Reconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   // Bodies that meet and part, spray, holes that cleaning fills, more than one stretch of
   // particles.
@@ -101,6 +107,9 @@ std::vector<AllocationCase> Cases() {
       for (const int threads : {1, 2}) cases.push_back({placement, fill, threads, threads == 1});
     }
   }
+  for (const int threads : {1, 2}) {
+    cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, false, true});
+  }
   return cases;
 }
 
@@ -109,7 +118,8 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                            std::string name(Name(tested.param.placement));
                            std::erase(name, '-');
                            return name + "_" + std::string(Name(tested.param.fill)) +
-                                  std::to_string(tested.param.threads);
+                                  std::to_string(tested.param.threads) +
+                                  (tested.param.estimates_spacing ? "_spacing" : "");
                          });
 
 }  // namespace

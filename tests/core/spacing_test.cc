@@ -13,7 +13,8 @@ namespace {
 using support::Particles;
 
 std::optional<double> Estimate(const Particles& particles) {
-  return EstimateSpacing(particles.AsFrame(), Plane::kXy);
+  SpacingScratch scratch;
+  return EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch);
 }
 
 TEST(Spacing, OfALatticeIsItsConstant) {
@@ -99,6 +100,16 @@ TEST(Spacing, DoesNotDependOnTheOrderOfTheParticles) {
   }
 }
 
+TEST(Spacing, DoesNotDependOnWhatWasEstimatedBefore) {
+  support::Random random(14);
+  SpacingScratch scratch;
+  for (const auto& particles :
+       {support::Lattice(300, 200), support::Lattice(2, 1), support::Noise(random, 5000, 40),
+        Particles{}, support::Lattice(20, 30)}) {
+    EXPECT_EQ(EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch), Estimate(particles));
+  }
+}
+
 TEST(Spacing, OfTwoParticlesIsTheirDistance) {
   Particles particles;
   particles.Add(1, 2);
@@ -128,7 +139,8 @@ TEST(Spacing, IsMeasuredInThePlaneOfTheParticles) {
   std::vector<double> xyz;
   for (int k = 0; k < 30; ++k) xyz.insert(xyz.end(), {2.0 * (k % 6), 7.0, 2.0 * (k / 6)});
   const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
-  EXPECT_EQ(EstimateSpacing(frame, Plane::kXz), 2.0);
+  SpacingScratch scratch;
+  EXPECT_EQ(EstimateSpacing(frame, Plane::kXz, scratch), 2.0);
 }
 
 }  // namespace
