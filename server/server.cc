@@ -20,6 +20,9 @@
 namespace partiemc::server {
 namespace {
 
+// What clients may do to find out that a connection is dead; gRPC's own 5 minutes are too long.
+constexpr int kShortestPingIntervalMs = 500;
+
 // gRPC ends a stream whose message is larger than it may receive, so it may receive somewhat more
 // than was announced: a frame that is slightly too large is answered by a FrameError instead.
 int ReceiveLimit(std::uint64_t max_frame_bytes) {
@@ -119,6 +122,10 @@ absl::Status Server::Listen() {
   }
   builder.RegisterService(service_.get());
   builder.SetMaxReceiveMessageSize(ReceiveLimit(options_.limits.max_frame_bytes));
+  // Clients ask a connection for a sign of life this often at most, whether it carries data or not.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                             kShortestPingIntervalMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   // Otherwise two servers share a port without noticing, and clients reach one of them.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   server_ = builder.BuildAndStart();

@@ -10,6 +10,7 @@
 #include "cli/input_source.h"
 #include "cli/replay_flags.h"
 #include "cli/replay_outputs.h"
+#include "client/input/text.h"
 #include "output/progress.h"
 #include "output/text.h"
 #include "partiemc/client/local_stream.h"
@@ -38,15 +39,19 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
   }
   const auto deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double>(flags.deadline_seconds));
-  auto stream = Stream::Open(flags.server.address,
-                             {.name = flags.name,
-                              .parameters = parameters,
-                              .outputs = {.mesh = parameters.fill != Fill::kNone,
-                                          .normals = normals,
-                                          .echo_particles = flags.echo_particles},
-                              .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
-                              .credentials = flags.server.credentials,
-                              .deadline = deadline});
+  const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
+  auto stream =
+      Stream::Open(servers.front(), {.name = flags.name,
+                                     .parameters = parameters,
+                                     .outputs = {.mesh = parameters.fill != Fill::kNone,
+                                                 .normals = normals,
+                                                 .echo_particles = flags.echo_particles},
+                                     .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
+                                     .credentials = flags.server.credentials,
+                                     .deadline = deadline,
+                                     .fallback_addresses = {servers.begin() + 1, servers.end()},
+                                     .checkpoint_interval = flags.checkpoint_interval,
+                                     .reconnect = {.announce = true}});
   if (!stream.ok()) return stream.status();
   return *std::move(stream);
 }
@@ -84,6 +89,10 @@ class Receiver {
   absl::Status Take() {
     if (event_.kind == Event::Kind::kNotice) {
       progress_.Note("partiemc: the server says: " + OneLine(event_.message));
+      return absl::OkStatus();
+    }
+    if (event_.kind == Event::Kind::kReconnected) {
+      progress_.Note("partiemc: " + OneLine(event_.message));
       return absl::OkStatus();
     }
     std::unique_ptr<RecordedFrame> frame = feeder_.TakeAnswered();
@@ -195,6 +204,16 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
 void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
   constexpr const char* kGroup = "Where";
   CLI::Option* const server = AddServerFlags(app, flags.server, kGroup);
+  server->description("Server: HOST:PORT or unix:PATH; several, to go on with when one is lost")
+      ->multi_option_policy(CLI::MultiOptionPolicy::Join)
+      ->delimiter(',');
+  app.add_option("--checkpoint-interval", flags.checkpoint_interval,
+                 "A server sends what another one needs to go on with every such frame; 0: never, "
+                 "and a lost server ends the replay")
+      ->type_name("K")
+      ->check(CLI::Range(0u, 1'000'000u))
+      ->capture_default_str()
+      ->group(kGroup);
   CLI::Option* const name =
       app.add_option("--name", flags.name, "Of the stream, for `partiemc watch NAME`")
           ->type_name("NAME")

@@ -20,6 +20,7 @@ struct ReplayFlags {
 
   ServerFlags server;
   bool local = false;
+  std::uint32_t checkpoint_interval = 4;
   int threads = 0;  ///< 0: one for each processor.
   double deadline_seconds = 30;
   std::string name;  ///< Of the stream; empty: the server makes one up.

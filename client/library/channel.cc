@@ -19,6 +19,12 @@ namespace {
 constexpr int kFirstBackoffMs = 100;
 constexpr int kLongestBackoffMs = 500;
 
+// A connection whose other end has silently gone is noticed after both: how long nothing comes
+// before that end is asked for a sign, and how long it may take to give one, over a slow line with
+// megabytes under way, too.
+constexpr int kKeepaliveMs = 4000;
+constexpr int kKeepaliveTimeoutMs = 6000;
+
 // For asking gRPC why there is no connection; it knows the answer already.
 constexpr std::chrono::seconds kReasonTimeout(1);
 
@@ -38,15 +44,14 @@ bool IsAddress(std::string_view address) {
   return (bracketed || plain) && IsPort(address.substr(colon + 1));
 }
 
-// gRPC's words end in the system's: "...: Failed to connect to remote host: Connection refused".
-std::string Reason(const grpc::Status& status) {
-  std::string_view text = status.error_message();
-  const std::size_t colon = text.rfind(": ");
-  if (colon != std::string_view::npos) text.remove_prefix(colon + 2);
-  return text.empty() ? "no answer" : std::string(text);
-}
-
 }  // namespace
+
+std::string Reason(const grpc::Status& status) {
+  std::string text = status.error_message();
+  const std::size_t colon = text.rfind(": ");
+  if (colon != std::string::npos) text.erase(0, colon + 2);
+  return text.empty() ? "no answer" : text;
+}
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials) {
@@ -68,6 +73,11 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  // A connection of its own: after a loss none that may be dead, too.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // The address is where the frames go; an http_proxy meant for browsers must not reroute them.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> senders;

@@ -25,6 +25,10 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout);
 
+/// Why a call has failed, in the system's words, which gRPC's end in:
+/// "...: Failed to connect to remote host: Connection refused".
+std::string Reason(const grpc::Status& status);
+
 /// The end of a call as one line that names the server. OK stays OK.
 absl::Status FromGrpc(const grpc::Status& status, const std::string& address);
 

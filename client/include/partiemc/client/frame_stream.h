@@ -40,16 +40,17 @@ struct FrameResult {
 /// One answer. Kept by the caller and handed in again, so that its buffers are reused.
 struct Event {
   enum class Kind : std::uint8_t {
-    kResult,   ///< `frame` holds what frame `sequence` became.
-    kRefusal,  ///< Frame `sequence` broke `violation`; it left no trace and the stream goes on.
-    kNotice,   ///< `message` is a word from the server (it is about to go away).
+    kResult,       ///< `frame` holds what frame `sequence` became.
+    kRefusal,      ///< Frame `sequence` broke `violation`; it left no trace, the stream goes on.
+    kNotice,       ///< `message` is a word from the server (it is about to go away).
+    kReconnected,  ///< The stream goes on after a loss that `message` tells; nothing is missing.
   };
   Kind kind = Kind::kResult;
-  std::uint64_t sequence = 0;  ///< 0 for a notice.
+  std::uint64_t sequence = 0;  ///< 0 for what is of no frame.
   double time = 0;             ///< Of a result: simulation time as it was sent.
   FrameResult frame;
   Violation violation;
-  std::string message;  ///< Of a refusal or notice: one line for a person.
+  std::string message;  ///< Of all but a result: one line for a person.
 };
 
 /// What a frame may cost; a larger one is refused.

@@ -15,10 +15,12 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "partiemc/client/credentials.h"
 #include "partiemc/client/frame_stream.h"
@@ -35,6 +37,19 @@ struct Outputs {
   bool echo_particles = false;  ///< Watchers of the stream get the particles too.
 };
 
+/// How a stream goes on after its connection or its server was lost.
+struct ReconnectPolicy {
+  /// For how long to try, from the loss to the next new answer, before the stream ends with the
+  /// error. 0: not at all.
+  std::chrono::milliseconds give_up_after{30000};
+  /// Each address is tried once at once. Then pauses follow, each twice as long as the one before,
+  /// of which a random part is left out, so that many clients do not come back as one.
+  std::chrono::milliseconds first_pause{50};
+  std::chrono::milliseconds longest_pause{1000};
+  /// Whether Receive tells of each reconnection (Event::Kind::kReconnected).
+  bool announce = false;
+};
+
 struct StreamOptions {
   /// 1 to 128 characters of [A-Za-z0-9._-], unique on the server. Empty: the server makes one up.
   std::string name = {};
@@ -47,19 +62,36 @@ struct StreamOptions {
   Credentials credentials = {};
   /// For reaching the server; a server that starts meanwhile is found.
   std::chrono::milliseconds connect_timeout{2000};
-  /// For the server to accept the stream, and then for each answer, counted from the frame or the
-  /// answer before it, whichever came later.
+  /// For the server to accept the stream, and then for each answer, counted from the frame, the
+  /// answer or the reconnection before it, whichever came last.
   std::chrono::milliseconds deadline{30000};
+  /// Servers to go on with, beside the one that Open is given: of the same version and with no
+  /// smaller limits. Behind a proxy one address is enough.
+  std::vector<std::string> fallback_addresses = {};
+  /// The server sends what is needed to go on elsewhere with every such frame. Less repeats fewer
+  /// frames after a loss and holds fewer; it costs the bytes of the outline. 0: the stream ends
+  /// with its connection.
+  std::uint32_t checkpoint_interval = 4;
+  ReconnectPolicy reconnect = {};
+  /// What frames may take that are held for being sent again: `checkpoint_interval` and a window of
+  /// them. A frame that does not fit is refused.
+  std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
+
+class ResumingStream;
 
 /// Frames are never dropped: Send waits while the server's window is full. A frame larger than the
 /// server's limits is refused before anything is sent. Reading runs in the background, so that a
 /// sender and a receiver never wait for each other beyond the window.
+///
+/// A stream survives its connection and its server: Receive connects again, to the next address
+/// first, and goes on from the last checkpoint. Every frame is still answered once, in order, with
+/// the bits that it would have had. Send does not fail meanwhile; it waits for the window.
 class Stream final : public FrameStream {
  public:
   /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
   /// Errors: INVALID_ARGUMENT (address, credentials, parameters, name or labels), UNAVAILABLE (no
-  /// server there, or one of the two does not trust the other), UNAUTHENTICATED (token),
+  /// server at any address, or one of the two does not trust the other), UNAUTHENTICATED (token),
   /// RESOURCE_EXHAUSTED (no room for another stream), DEADLINE_EXCEEDED, each in one line.
   static absl::StatusOr<std::unique_ptr<Stream>> Open(std::string_view address,
                                                       const StreamOptions& options);
@@ -76,10 +108,9 @@ class Stream final : public FrameStream {
   void Cancel() override;
 
  private:
-  class Call;
-  explicit Stream(std::unique_ptr<Call> call);
+  explicit Stream(std::unique_ptr<ResumingStream> stream);
 
-  std::unique_ptr<Call> call_;
+  std::unique_ptr<ResumingStream> stream_;
 };
 
 }  // namespace partiemc::client

@@ -1,0 +1,52 @@
+#include "library/answer.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace partiemc::client {
+
+std::uint64_t AnsweredSequence(const v1::ReconstructResponse& response) {
+  if (response.has_frame()) return response.frame().sequence();
+  return response.has_error() ? response.error().sequence() : 0;
+}
+
+absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::string& address,
+                          wire::ReconstructedFrame& scratch, Event& event) {
+  event.sequence = AnsweredSequence(response);
+  if (response.has_frame()) {
+    std::swap(scratch.result, event.frame.result);  // The caller's buffers are used again.
+    const absl::Status status = wire::DecodeResult(response.frame(), scratch);
+    std::swap(scratch.result, event.frame.result);
+    if (!status.ok()) {
+      return absl::Status(status.code(), absl::StrCat("the server at ", address, " answered frame ",
+                                                      event.sequence, " with ", status.message()));
+    }
+    event.kind = Event::Kind::kResult;
+    event.time = scratch.time;
+    event.frame.times = {.stages_ms = scratch.times.stages_ms, .total_ms = scratch.times.total_ms};
+    event.frame.rings_digest = scratch.rings_digest;
+    event.frame.mesh_digest = scratch.mesh_digest;
+    return absl::OkStatus();
+  }
+  if (response.has_error()) {
+    const v1::FrameError& error = response.error();
+    event.kind = Event::Kind::kRefusal;
+    event.violation = {.reason = error.reason(),
+                       .field = error.field(),
+                       .value = error.value(),
+                       .rule = error.rule()};
+    event.message = error.message();
+    return absl::OkStatus();
+  }
+  if (response.has_notice()) {
+    event.kind = Event::Kind::kNotice;
+    event.message = response.notice().message();
+    return absl::OkStatus();
+  }
+  return absl::DataLossError(absl::StrCat("the server at ", address,
+                                          " sent an answer that this client does not know: use a "
+                                          "client of the server's version"));
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,49 @@
+#include "library/frame_request.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "wire/message_bytes.h"
+
+namespace partiemc::client {
+namespace {
+
+// What a message of gRPC holds at most, less room for what is round the frame.
+constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() - 64;
+
+}  // namespace
+
+absl::Status CheckParticleCount(const Frame& frame, const StreamLimits& limits) {
+  const std::uint64_t limit = limits.max_particles_per_frame;
+  if (frame.components < 1 || limit == 0 || frame.ParticleCount() <= limit) {
+    return absl::OkStatus();
+  }
+  return ViolationError(absl::StatusCode::kResourceExhausted,
+                        {.reason = std::string(kReasonTooManyParticles),
+                         .field = "positions",
+                         .value = absl::StrCat(frame.ParticleCount(), " particles"),
+                         .rule = absl::StrCat("the server takes at most ", limit)});
+}
+
+absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const Frame& frame, double time,
+                                                    std::uint64_t sequence,
+                                                    const StreamLimits& limits) {
+  Frame timed = frame;
+  timed.time = time;
+  const wire::FrameRequest request(timed, sequence);
+  const std::uint64_t bytes = request.frame_bytes();
+  const std::uint64_t announced = limits.max_frame_bytes;
+  const std::uint64_t limit = announced == 0 ? kMaxFrameBytes : std::min(announced, kMaxFrameBytes);
+  if (bytes > limit) {
+    return ViolationError(absl::StatusCode::kResourceExhausted,
+                          {.reason = "MESSAGE_TOO_LARGE",
+                           .field = "frame",
+                           .value = absl::StrCat(bytes, " bytes"),
+                           .rule = absl::StrCat("the server takes at most ", limit)});
+  }
+  return request.ToBytes();
+}
+
+}  // namespace partiemc::client

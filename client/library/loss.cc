@@ -1,0 +1,47 @@
+#include "library/loss.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "absl/strings/str_cat.h"
+#include "library/channel.h"
+
+namespace partiemc::client {
+namespace {
+
+// Reasons of proto/PROTOCOL.md. A name or a place may be held by what is left of the stream's own
+// former call, and a server of another version may have one of this version beside it.
+constexpr std::string_view kDraining = "DRAINING";
+constexpr std::array<std::string_view, 3> kMendableWhileResuming = {
+    "NAME_IN_USE", "TOO_MANY_STREAMS", "CHECKPOINT_MISMATCH"};
+
+bool IsMendable(grpc::StatusCode code, std::string_view reason, bool resuming) {
+  if (reason == kDraining) return true;
+  if (!reason.empty()) return resuming && std::ranges::count(kMendableWhileResuming, reason) > 0;
+  switch (code) {
+    case grpc::StatusCode::OK:
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::INTERNAL:
+    case grpc::StatusCode::UNKNOWN:
+    case grpc::StatusCode::CANCELLED:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+Loss LossOf(const StreamCall& call, bool resuming) {
+  Loss loss{.status = FromGrpc(call.end(), call.address()),
+            .why = Reason(call.end()),
+            .mendable = IsMendable(call.end().error_code(), call.reason(), resuming)};
+  if (loss.status.ok()) {
+    loss.status = absl::UnavailableError(
+        absl::StrCat("the server at ", call.address(), " ended the stream: start again"));
+  }
+  return loss;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,23 @@
+// Why a call has ended before its stream, and whether another call may do better.
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "library/stream_call.h"
+
+namespace partiemc::client {
+
+struct Loss {
+  absl::Status status;  ///< One line that names the server; never OK.
+  std::string why;      ///< In a few words.
+  bool mendable = false;
+};
+
+/// Of a call that is done. A server that gives a reason has decided: only its going away is
+/// mendable and, `resuming`, what another replica or a moment may change. Without a reason the
+/// connection has ended the call, in words that depend on what was between: UNAVAILABLE for none,
+/// INTERNAL, UNKNOWN or CANCELLED for a proxy, OK for one that closes politely.
+Loss LossOf(const StreamCall& call, bool resuming);
+
+}  // namespace partiemc::client

@@ -1,0 +1,364 @@
+#include "library/resuming_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "library/answer.h"
+#include "library/channel.h"
+#include "library/frame_request.h"
+#include "partiemc/status.h"
+
+namespace partiemc::client {
+namespace {
+
+// A server may announce any window; this one bounds the memory of this side.
+constexpr std::size_t kMaxFramesInFlight = 64;
+
+std::string Seconds(std::chrono::milliseconds duration) {
+  return absl::StrCat(static_cast<double>(duration.count()) / 1000, " s");
+}
+
+absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
+  auto parameters = wire::DecodeParameters(opened.parameters());
+  if (!parameters.ok()) return parameters.status();
+  return StreamInfo{
+      .stream_id = opened.stream_id(),
+      .parameters = *parameters,
+      .frames_in_flight = std::clamp<std::size_t>(opened.frames_in_flight(), 1, kMaxFramesInFlight),
+      .limits = {.max_particles_per_frame = opened.limits().max_particles_per_frame(),
+                 .max_frame_bytes = opened.limits().max_frame_bytes(),
+                 .max_tiles_per_frame = opened.limits().max_tiles_per_frame()}};
+}
+
+// 0 is no limit.
+bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
+  return limit == 0 || (former != 0 && limit >= former);
+}
+
+}  // namespace
+
+ResumingStream::ResumingStream(std::vector<std::string> addresses, const StreamOptions& options)
+    : options_(options), opener_(monitor_, std::move(addresses), options) {}
+
+absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string_view address,
+                                                                     const StreamOptions& options) {
+  std::vector<std::string> addresses{std::string(address)};
+  addresses.insert(addresses.end(), options.fallback_addresses.begin(),
+                   options.fallback_addresses.end());
+  for (const std::string& one : addresses) {
+    if (auto channel = MakeChannel(one, options.credentials); !channel.ok())
+      return channel.status();
+  }
+  std::unique_ptr<ResumingStream> stream(new ResumingStream(std::move(addresses), options));
+  Lock lock(stream->monitor_.mutex);
+  absl::Status status = stream->OpenFirst(lock);
+  lock.unlock();
+  if (!status.ok()) return status;
+  return stream;
+}
+
+absl::Status ResumingStream::OpenFirst(Lock& lock) {
+  auto opened = opener_.OpenNew(lock);
+  if (!opened.ok()) return opened.status();
+  auto info = ReadOpened(opened->message);
+  if (!info.ok()) {
+    opener_.Drop(lock, std::move(opened->call));
+    return info.status();
+  }
+  info_ = *std::move(info);
+  survives_ = options_.reconnect.give_up_after.count() > 0 && options_.checkpoint_interval > 0 &&
+              !opened->message.stream_token().empty();
+  checkpoint_next_ = next_answer_ = std::max<std::uint64_t>(1, opened->message.next_sequence());
+  ring_ = FrameRing(next_answer_);
+  Adopt(lock, *std::move(opened), info_.frames_in_flight);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::uint64_t> ResumingStream::Send(const Frame& frame, double time) {
+  if (auto fits = CheckParticleCount(frame, info_.limits); !fits.ok()) return fits;
+  Lock lock(monitor_.mutex);
+  if (auto ready = WaitToSend(lock, 0); !ready.ok()) return ready;
+  const std::uint64_t sequence = ring_.end();
+  lock.unlock();
+  auto request = EncodeFrameRequest(frame, time, sequence, info_.limits);
+  if (!request.ok()) return request.status();
+  lock.lock();
+  if (auto ready = WaitToSend(lock, request->Length()); !ready.ok()) return ready;
+  if (all_answered()) due_since_ = Clock::now();
+  ring_.Add(*request);
+  if (call_ != nullptr) call_->Queue(lock, *std::move(request));
+  return sequence;
+}
+
+// Whether a frame of that many bytes may be taken now.
+bool ResumingStream::MaySend(std::uint64_t bytes) const {
+  if (ring_.end() - next_answer_ >= info_.frames_in_flight) return false;
+  if (ring_.bytes() + bytes > options_.max_held_bytes && !all_answered()) return false;
+  // One frame at a time waits for being written; what is left of a lost call counts no more.
+  return call_ == nullptr || call_->reads_over() || call_->backlog() == 0;
+}
+
+// What the stream has ended for, if its call is done and no other may do better.
+std::optional<absl::Status> ResumingStream::FatalEnd() const {
+  if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
+  Loss loss = LossOf(*call_, /*resuming=*/false);
+  if (survives_ && loss.mendable) return std::nullopt;
+  if (call_->end().ok() && !all_answered()) {
+    return absl::UnavailableError(
+        absl::StrCat("the server at ", call_->address(), " ended the stream and left ",
+                     ring_.end() - next_answer_, " frames unanswered: start again"));
+  }
+  return std::move(loss.status);
+}
+
+absl::Status ResumingStream::WaitToSend(Lock& lock, std::uint64_t bytes) {
+  const auto start = Clock::now();
+  for (;;) {
+    if (!failure_.ok()) return failure_;
+    if (finished_) return absl::FailedPreconditionError("Send after FinishSending");
+    if (auto end = FatalEnd()) return *std::move(end);
+    if (MaySend(bytes)) break;
+    const auto due = (call_ != nullptr ? std::max(start, adopted_at_)
+                                       : start + options_.reconnect.give_up_after) +
+                     options_.deadline;
+    if (Clock::now() >= due) return Fail(lock, TooSlowToSend());
+    monitor_.changed.wait_until(lock, due);
+  }
+  if (ring_.bytes() + bytes <= options_.max_held_bytes) return absl::OkStatus();
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {.reason = "HELD_BYTES",
+       .field = "frame",
+       .value = absl::StrCat(bytes, " bytes"),
+       .rule = absl::StrCat("must fit into max_held_bytes, ", options_.max_held_bytes, ", beside ",
+                            ring_.bytes(),
+                            " that are held since the last checkpoint; allow more, "
+                            "or a smaller checkpoint_interval")});
+}
+
+absl::Status ResumingStream::TooSlowToSend() const {
+  const std::string deadline = Seconds(options_.deadline);
+  if (call_ == nullptr || call_->ready() > 0 || call_->done()) {
+    return absl::DeadlineExceededError(absl::StrCat(
+        "no answer was received for ", deadline, " while ", call_ == nullptr ? 0 : call_->ready(),
+        " waited: call Receive before or beside Send"));
+  }
+  return absl::DeadlineExceededError(absl::StrCat("the server at ", call_->address(),
+                                                  " has taken no frame for ", deadline,
+                                                  ": it may be overloaded; try again later"));
+}
+
+absl::Status ResumingStream::FinishSending() {
+  Lock lock(monitor_.mutex);
+  if (!failure_.ok()) return failure_;
+  if (finished_) return absl::OkStatus();
+  if (auto end = FatalEnd()) return *std::move(end);
+  finished_ = true;
+  if (all_answered()) due_since_ = Clock::now();
+  if (call_ != nullptr) call_->HalfClose(lock);
+  monitor_.changed.notify_all();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Received> ResumingStream::Receive(Event& event,
+                                                 std::optional<std::chrono::milliseconds> wait) {
+  const auto until = wait ? OptionalTime(Clock::now() + *wait) : std::nullopt;
+  Lock lock(monitor_.mutex);
+  auto received = Advance(lock, event, until);
+  if (!received.ok()) return Fail(lock, received.status());
+  return received;
+}
+
+absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, OptionalTime until) {
+  for (;;) {
+    if (!failure_.ok()) return failure_;
+    if (call_ == nullptr) {
+      const auto gone_on = GoOn(lock, until);
+      if (!gone_on.ok()) return gone_on.status();
+      if (!*gone_on) return Received::kNothingYet;
+      continue;
+    }
+    if (std::exchange(owes_event_, false)) {
+      event.kind = Event::Kind::kReconnected;
+      event.sequence = 0;
+      event.message = opener_.Story();
+      return Received::kEvent;
+    }
+    if (auto response = call_->Take(lock)) {
+      const auto delivered = Deliver(lock, std::move(response), event);
+      if (!delivered.ok()) return delivered.status();
+      if (*delivered) return Received::kEvent;
+      continue;
+    }
+    if (call_->done()) {
+      const auto is_end = EndCall(lock);
+      if (!is_end.ok()) return is_end.status();
+      if (*is_end) return Received::kEnd;
+      continue;
+    }
+    const auto due = AnswerDue();
+    const auto now = Clock::now();
+    if (due && now >= *due) {
+      if (call_->reads_over()) {
+        return absl::DataLossError(absl::StrCat("an answer of the server at ", call_->address(),
+                                                " cannot be read: it breaks the protocol"));
+      }
+      return absl::DeadlineExceededError(absl::StrCat(
+          "the server at ", call_->address(), " did not answer frame ", next_answer_, " within ",
+          Seconds(options_.deadline), ": it may be overloaded; try again later"));
+    }
+    if (until && now >= *until) return Received::kNothingYet;
+    if (due || until) {
+      monitor_.changed.wait_until(lock, due && until ? std::min(*due, *until)
+                                        : due        ? *due
+                                                     : *until);
+    } else {
+      monitor_.changed.wait(lock);
+    }
+  }
+}
+
+ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
+  if (call_->reads_over()) return call_->progress_at() + kEndTimeout;
+  if (all_answered() && !finished_) return std::nullopt;
+  return std::max(due_since_, call_->progress_at()) + options_.deadline;
+}
+
+// Delivers an answer that the caller has not had yet; else drops it and gives false.
+absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response response,
+                                             Event& event) {
+  // The receiver's thread alone changes what is used here without the lock.
+  const bool is_answer = response->has_frame() || response->has_error();
+  const bool is_new = is_answer ? next_of_call_ == next_answer_ : !survives_;
+  lock.unlock();
+  absl::Status status;
+  if (const auto sequence = AnsweredSequence(*response); is_answer && sequence != next_of_call_) {
+    status = absl::DataLossError(absl::StrCat("the server at ", call_->address(),
+                                              " answered frame ", sequence, " where frame ",
+                                              next_of_call_, " was due: it breaks the protocol"));
+  } else if (is_new || !is_answer) {
+    status = DecodeAnswer(*response, call_->address(), scratch_, event);
+  }
+  lock.lock();
+  if (!status.ok()) return status;
+  if (is_answer) {
+    Remember(*response);
+    ++next_of_call_;
+    if (is_new) {
+      ++next_answer_;
+      opener_.Mended();
+    }
+    if (!survives_) ring_.DropBelow(next_answer_);
+  }
+  call_->Recycle(lock, std::move(response));
+  monitor_.changed.notify_all();
+  return is_new;
+}
+
+// Of an answer with a checkpoint: the frames up to this one need not be sent again.
+void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
+  const std::string& checkpoint =
+      answer.has_frame() ? answer.frame().checkpoint() : answer.error().checkpoint();
+  if (checkpoint.empty() || next_of_call_ < checkpoint_next_) return;
+  checkpoint_ = checkpoint;
+  checkpoint_next_ = next_of_call_ + 1;
+  ring_.DropBelow(checkpoint_next_);
+}
+
+// The call has ended: whether the stream has, too. False where it is to go on.
+absl::StatusOr<bool> ResumingStream::EndCall(Lock& lock) {
+  const Loss loss = LossOf(*call_, /*resuming=*/false);
+  if (finished_ && all_answered() && (call_->end().ok() || (survives_ && loss.mendable))) {
+    return true;
+  }
+  if (auto end = FatalEnd()) return *std::move(end);
+  LoseCall(lock, std::move(call_), loss);
+  return false;
+}
+
+void ResumingStream::LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, const Loss& loss) {
+  v1::ResumeStream resume;
+  resume.set_checkpoint(checkpoint_);
+  resume.set_stream_token(token_);
+  opener_.Lost(loss, std::move(resume));
+  monitor_.changed.notify_all();  // What waits for the call's backlog need not any more.
+  opener_.Drop(lock, std::move(call));
+}
+
+// False where there is no other call at `until`.
+absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
+  auto opened = opener_.OpenAgain(lock, until);
+  if (!opened.ok()) return opened.status();
+  if (!*opened) return false;
+  const auto info = ReadOpened((*opened)->message);
+  if (!info.ok()) return info.status();
+  if (auto suits = CheckReplica(**opened, *info); !suits.ok()) {
+    LoseCall(lock, std::move((*opened)->call), {.status = suits, .why = "does not suit"});
+    return true;
+  }
+  owes_event_ = options_.reconnect.announce;
+  Adopt(lock, **std::move(opened), info->frames_in_flight);
+  return true;
+}
+
+// Whether the frames that were taken under the first server's terms are good here.
+absl::Status ResumingStream::CheckReplica(const CallOpener::Opened& opened,
+                                          const StreamInfo& info) const {
+  const std::string& address = opened.call->address();
+  if (opened.message.next_sequence() != checkpoint_next_) {
+    return absl::DataLossError(absl::StrCat("the server at ", address, " goes on with frame ",
+                                            opened.message.next_sequence(), " where frame ",
+                                            checkpoint_next_, " was due"));
+  }
+  if (info.parameters != info_.parameters) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the server at ", address, " resolves the stream's parameters otherwise"));
+  }
+  const StreamLimits& limits = info.limits;
+  if (AllowsAsMuch(limits.max_particles_per_frame, info_.limits.max_particles_per_frame) &&
+      AllowsAsMuch(limits.max_frame_bytes, info_.limits.max_frame_bytes) &&
+      AllowsAsMuch(limits.max_tiles_per_frame, info_.limits.max_tiles_per_frame)) {
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat("the server at ", address,
+                   " has smaller limits than the first: give all servers of a stream the same"));
+}
+
+// Sends what is unanswered through a call that has been opened, and makes it the stream's.
+void ResumingStream::Adopt(Lock& lock, CallOpener::Opened opened, std::size_t window) {
+  token_ = opened.message.stream_token();
+  next_of_call_ = checkpoint_next_;
+  StreamCall& call = *opened.call;
+  call.SetWindow(lock, window);
+  // Until it is the stream's call, the sender adds to the ring alone: frames keep their order.
+  for (std::uint64_t k = checkpoint_next_; k < ring_.end(); ++k) call.Queue(lock, ring_.at(k));
+  due_since_ = adopted_at_ = Clock::now();
+  call_ = std::move(opened.call);
+  if (all_answered()) opener_.Mended();
+  if (!failure_.ok()) call_->Cancel(lock);
+  if (finished_) call_->HalfClose(lock);
+  monitor_.changed.notify_all();
+}
+
+std::size_t ResumingStream::InFlight() const {
+  const Lock lock(monitor_.mutex);
+  return ring_.end() - next_answer_;
+}
+
+void ResumingStream::Cancel() {
+  Lock lock(monitor_.mutex);
+  if (FatalEnd()) return;  // It is to be told what for.
+  Fail(lock, absl::CancelledError("the stream was cancelled")).IgnoreError();
+}
+
+absl::Status ResumingStream::Fail(Lock& lock, absl::Status failure) {
+  if (failure_.ok()) failure_ = std::move(failure);
+  opener_.Cancel(lock);
+  if (call_ != nullptr) call_->Cancel(lock);
+  monitor_.changed.notify_all();
+  return failure_;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,362 @@
+// What the client does about a loss, step by step, against servers that do as they are told.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include "client/library/fake_server.h"
+#include "library/backoff.h"
+#include "library/frame_ring.h"
+#include "partiemc/client/stream.h"
+
+namespace partiemc::client {
+namespace {
+
+using std::chrono::milliseconds;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr milliseconds kShort(200);
+const std::string kToken(32, '7');
+const std::vector<double> kPositions = {1, 2};
+const Frame kFrame{.positions = std::span<const double>(kPositions)};
+
+// Accepts a stream that can be resumed; gives the request.
+v1::OpenStream AcceptResumable(FakeServer::Rpc& rpc, std::uint64_t next_sequence,
+                               std::uint64_t max_frame_bytes = 1 << 20) {
+  v1::ReconstructRequest request;
+  rpc.Read(&request);
+  v1::ReconstructResponse response;
+  v1::StreamOpened& opened = *response.mutable_opened();
+  opened.set_stream_token(kToken);
+  *opened.mutable_parameters() = request.open().parameters();
+  opened.set_frames_in_flight(2);
+  opened.mutable_limits()->set_max_frame_bytes(max_frame_bytes);
+  opened.set_next_sequence(next_sequence);
+  rpc.Write(response);
+  return request.open();
+}
+
+// Answers the next `count` frames, with a checkpoint "after N" every `interval`-th.
+void AnswerSome(FakeServer::Rpc& rpc, int count, std::uint64_t interval) {
+  v1::ParticleFrame frame;
+  for (int k = 0; k < count && ReadFrame(rpc, frame); ++k) {
+    auto answer = TriangleAt(frame);
+    if (frame.sequence() % interval == 0) {
+      answer.mutable_frame()->set_checkpoint("after " + std::to_string(frame.sequence()));
+    }
+    rpc.Write(answer);
+  }
+}
+
+StreamOptions Options(const FakeServer* other = nullptr) {
+  StreamOptions options{.name = "tank", .checkpoint_interval = 2};
+  if (other != nullptr) options.fallback_addresses = {other->address()};
+  options.reconnect.give_up_after = milliseconds(20000);
+  return options;
+}
+
+// Sends frame after frame, each answered before the next; gives the numbers of the answers.
+std::vector<std::uint64_t> Exchange(FrameStream& stream, int count) {
+  std::vector<std::uint64_t> answered;
+  Event event;
+  for (int k = 0; k < count; ++k) {
+    if (!stream.Send(kFrame, k).ok() || !stream.Receive(event).ok()) break;
+    answered.push_back(event.sequence);
+  }
+  return answered;
+}
+
+grpc::Status Lost(grpc::StatusCode code) { return grpc::Status(code, "as told"); }
+
+class WorthRetrying : public testing::TestWithParam<grpc::StatusCode> {};
+
+INSTANTIATE_TEST_SUITE_P(Status, WorthRetrying,
+                         testing::Values(grpc::StatusCode::OK, grpc::StatusCode::UNAVAILABLE,
+                                         grpc::StatusCode::INTERNAL, grpc::StatusCode::UNKNOWN,
+                                         grpc::StatusCode::CANCELLED));
+
+TEST_P(WorthRetrying, GoesOnElsewhereFromTheCheckpointAndDeliversEachAnswerOnce) {
+  FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    EXPECT_EQ(AcceptResumable(rpc, 1).checkpoint_interval(), 2u);
+    AnswerSome(rpc, 3, 2);
+    return Lost(GetParam());
+  });
+  v1::OpenStream resumed;
+  std::vector<std::uint64_t> sent_again;
+  FakeServer second([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    resumed = AcceptResumable(rpc, 3);
+    v1::ParticleFrame frame;
+    while (ReadFrame(rpc, frame)) {
+      sent_again.push_back(frame.sequence());
+      rpc.Write(TriangleAt(frame));
+    }
+    return grpc::Status::OK;
+  });
+  const auto stream = Stream::Open(first.address(), Options(&second));
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_THAT(Exchange(**stream, 6), ElementsAre(1, 2, 3, 4, 5, 6));
+  ASSERT_TRUE((*stream)->FinishSending().ok());
+  Event event;
+  EXPECT_EQ(*(*stream)->Receive(event), Received::kEnd);
+  EXPECT_EQ(resumed.stream_name(), "tank");
+  EXPECT_EQ(resumed.resume().checkpoint(), "after 2");
+  EXPECT_EQ(resumed.resume().stream_token(), kToken);
+  EXPECT_THAT(sent_again, ElementsAre(3, 4, 5, 6)) << "3 was answered before, by a dropped answer";
+}
+
+class NotWorthRetrying : public testing::TestWithParam<grpc::StatusCode> {};
+
+INSTANTIATE_TEST_SUITE_P(Status, NotWorthRetrying,
+                         testing::Values(grpc::StatusCode::INVALID_ARGUMENT,
+                                         grpc::StatusCode::RESOURCE_EXHAUSTED,
+                                         grpc::StatusCode::UNAUTHENTICATED,
+                                         grpc::StatusCode::DEADLINE_EXCEEDED,
+                                         grpc::StatusCode::ABORTED));
+
+TEST_P(NotWorthRetrying, EndsTheStream) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    ++calls;
+    AcceptResumable(rpc, 1);
+    return Lost(GetParam());
+  });
+  const auto stream = Stream::Open(server.address(), Options());
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  Event event;
+  EXPECT_EQ(static_cast<int>((*stream)->Receive(event).status().code()),
+            static_cast<int>(GetParam()));
+  EXPECT_EQ(calls, 1);
+}
+
+TEST(Resume, AVerdictOfTheServerIsNoLostConnectionWhateverItsCode) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    ++calls;
+    AcceptResumable(rpc, 1);
+    context.AddTrailingMetadata("partiemc-reason", "TAKEN_OVER");
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  const auto stream = Stream::Open(server.address(), Options());
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  Event event;
+  EXPECT_FALSE((*stream)->Receive(event).ok());
+  EXPECT_EQ(calls, 1);
+}
+
+TEST(Resume, ADrainingServerIsLeftWithoutAWordToTheCaller) {
+  FakeServer first([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 1, 2);
+    v1::ReconstructResponse notice;
+    notice.mutable_notice()->set_kind(v1::StreamNotice::KIND_DRAINING);
+    rpc.Write(notice);
+    context.AddTrailingMetadata("partiemc-reason", "DRAINING");
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  FakeServer second([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    EXPECT_TRUE(AcceptResumable(rpc, 1).resume().checkpoint().empty()) << "none had come yet";
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  const auto stream = Stream::Open(first.address(), Options(&second));
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_THAT(Exchange(**stream, 4), ElementsAre(1, 2, 3, 4));
+}
+
+TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    if (++calls == 1) return Lost(grpc::StatusCode::UNAVAILABLE);
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  StreamOptions options = Options();
+  options.reconnect.announce = true;
+  const auto stream = Stream::Open(server.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  ASSERT_EQ(*(*stream)->Receive(event), Received::kEvent);
+  EXPECT_EQ(event.kind, Event::Kind::kReconnected);
+  EXPECT_THAT(event.message, HasSubstr("went on at " + server.address()));
+  ASSERT_EQ(*(*stream)->Receive(event), Received::kEvent);
+  EXPECT_EQ(event.sequence, 1u);
+}
+
+TEST(Resume, AReplicaWithSmallerLimitsIsPassedOver) {
+  FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  FakeServer small([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1, 100);
+    return WaitForCancel(context);
+  });
+  FakeServer good([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  StreamOptions options = Options(&small);
+  options.fallback_addresses.push_back(good.address());
+  const auto stream = Stream::Open(first.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_THAT(Exchange(**stream, 2), ElementsAre(1, 2));
+}
+
+TEST(Resume, GivesUpInTimeWithTheLastError) {
+  std::optional<FakeServer> server;
+  server.emplace([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  StreamOptions options = Options();
+  options.reconnect.give_up_after = kShort;
+  const auto stream = Stream::Open(server->address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  const auto received = (*stream)->Receive(event);
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(received.status().message()), HasSubstr("could not go on within 0.2 s"));
+  EXPECT_EQ((*stream)->Send(kFrame, 1).status().code(), absl::StatusCode::kUnavailable);
+}
+
+TEST(Resume, ACallThatIsOnlyAcceptedAgainAndAgainIsNoProgress) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    ++calls;
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);  // As a server that a frame brings down.
+  });
+  StreamOptions options = Options();
+  options.reconnect = {.give_up_after = milliseconds(500), .first_pause = milliseconds(20)};
+  const auto stream = Stream::Open(server.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  EXPECT_FALSE((*stream)->Receive(event).ok());
+  EXPECT_GT(calls, 2);
+}
+
+TEST(Resume, CancelEndsTheSearchForAServer) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    if (++calls > 1) return WaitForCancel(context);
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  const auto stream = Stream::Open(server.address(), Options());
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  absl::Status status;
+  std::thread receiver([&] {
+    Event event;
+    status = (*stream)->Receive(event).status();
+  });
+  while (calls < 2) std::this_thread::sleep_for(milliseconds(1));
+  (*stream)->Cancel();
+  receiver.join();
+  EXPECT_EQ(status.code(), absl::StatusCode::kCancelled) << status;
+}
+
+TEST(Resume, ReceiveKeepsItsWaitWhileThereIsNoServer) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    if (++calls > 1) return WaitForCancel(context);
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  const auto stream = Stream::Open(server.address(), Options());
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  Event event;
+  while (calls < 2) ASSERT_EQ(*(*stream)->Receive(event, milliseconds(1)), Received::kNothingYet);
+  EXPECT_TRUE((*stream)->Send(kFrame, 0).ok()) << "a loss is no concern of the sender";
+  EXPECT_EQ((*stream)->InFlight(), 1u);
+}
+
+TEST(Resume, AFrameThatCannotBeHeldIsRefusedAndTheStreamGoesOn) {
+  FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  StreamOptions options = Options();
+  options.max_held_bytes = 1000;
+  const auto stream = Stream::Open(server.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  const std::vector<double> many(1000, 1.0);
+  const auto refused = (*stream)->Send({.positions = std::span<const double>(many)}, 0);
+  ASSERT_TRUE(FindViolation(refused.status())) << refused.status();
+  EXPECT_EQ(FindViolation(refused.status())->reason, "HELD_BYTES");
+  EXPECT_THAT(Exchange(**stream, 50).size(), 50u) << "checkpoints make room";
+}
+
+TEST(Resume, WithoutCheckpointsALossEndsTheStream) {
+  FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    EXPECT_EQ(AcceptResumable(rpc, 1).checkpoint_interval(), 0u);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  StreamOptions options = Options();
+  options.checkpoint_interval = 0;
+  const auto stream = Stream::Open(server.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  Event event;
+  EXPECT_EQ((*stream)->Receive(event).status().code(), absl::StatusCode::kUnavailable);
+}
+
+TEST(Resume, AnotherAddressServesWhereTheFirstHasNobody) {
+  FakeServer server(AnswerAll);
+  StreamOptions options = Options(&server);
+  const auto stream = Stream::Open("127.0.0.1:1", options);
+  EXPECT_TRUE(stream.ok()) << stream.status();
+}
+
+TEST(Backoff, TriesEachAddressAtOnceThenPausesLongerAndLongerButNeverTooLong) {
+  const ReconnectPolicy policy{.first_pause = milliseconds(100),
+                               .longest_pause = milliseconds(1000)};
+  Backoff backoff(policy, 3, 42);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(backoff.NextPause(), milliseconds(0));
+  for (const int pause : {100, 200, 400, 800, 1000, 1000, 1000}) {
+    const auto first_of_round = backoff.NextPause();
+    EXPECT_GE(first_of_round, milliseconds(pause / 2 - 1));
+    EXPECT_LE(first_of_round, milliseconds(pause));
+    for (int k = 1; k < 3; ++k) EXPECT_EQ(backoff.NextPause(), milliseconds(0));
+  }
+  for (int k = 0; k < 1000; ++k) EXPECT_LE(backoff.NextPause(), policy.longest_pause);
+}
+
+TEST(Backoff, ClientsDoNotComeBackAsOne) {
+  const ReconnectPolicy policy{.first_pause = milliseconds(1000)};
+  Backoff one(policy, 1, 1), other(policy, 1, 2);
+  one.NextPause();
+  other.NextPause();
+  EXPECT_NE(one.NextPause(), other.NextPause());
+}
+
+TEST(FrameRing, HoldsFramesByTheirNumbersAndCountsTheirBytes) {
+  const auto request = [](const std::string& text) {
+    const grpc::Slice slice(text);
+    return grpc::ByteBuffer(&slice, 1);
+  };
+  FrameRing ring(5);
+  ring.Add(request("12"));
+  ring.Add(request("1234"));
+  ring.Add(request("1"));
+  EXPECT_EQ(ring.begin(), 5u);
+  EXPECT_EQ(ring.end(), 8u);
+  EXPECT_EQ(ring.bytes(), 7u);
+  EXPECT_EQ(ring.at(6).Length(), 4u);
+  ring.DropBelow(7);
+  EXPECT_EQ(ring.begin(), 7u);
+  EXPECT_EQ(ring.bytes(), 1u);
+  ring.DropBelow(100);
+  EXPECT_EQ(ring.begin(), 8u) << "what was never there cannot go";
+  EXPECT_EQ(ring.bytes(), 0u);
+}
+
+}  // namespace
+}  // namespace partiemc::client
