@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "partiemc/v1/reconstruction.grpc.pb.h"
+#include "server/logging.h"
 
 namespace partiemc::server {
 namespace {
@@ -66,7 +67,9 @@ absl::StatusOr<std::string> Authenticate(const Authentication& authentication,
   if (begin != end && std::next(begin) == end) {
     authorization.emplace(begin->second.data(), begin->second.size());
   }
-  return authentication.Authenticate(authorization);
+  auto client = authentication.Authenticate(authorization);
+  if (!client.ok()) LogRefusal("call refused", context.peer(), client.status());
+  return client;
 }
 
 std::unique_ptr<ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(

@@ -12,8 +12,8 @@
 
 namespace partiemc::server {
 
-/// Authentication::Authenticate for the caller of `context`. Each method of our service asks this
-/// first, so that a refusal carries its reason.
+/// Authentication::Authenticate for the caller of `context`; a refusal is logged. Each method of
+/// our service asks this first, so that a refusal carries its reason.
 absl::StatusOr<std::string> Authenticate(const Authentication& authentication,
                                          const grpc::ServerContextBase& context);
 

@@ -23,8 +23,10 @@ constexpr bool kShareArena = true;
 // of one frame can pick up pieces of another, but never another frame as a whole. There are as many
 // runners as the arena has places: small frames then run side by side, and a large one that is
 // alone gets every place for its pieces.
-ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time)
+ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
+                         FrameObserver* observer)
     : warm_time_(warm_time),
+      observer_(observer),
       parallelism_(oneapi::tbb::global_control::max_allowed_parallelism,
                    kShareArena ? std::max(threads, 1u) : 1u),
       arena_(static_cast<int>(std::max(threads, 1u))) {
@@ -49,6 +51,11 @@ void ComputePool::Submit(Job job, Afterwards afterwards) {
     tasks_.push_back({std::move(job), std::move(afterwards)});
   }
   task_came_.notify_one();
+}
+
+std::size_t ComputePool::QueueLength() const {
+  const std::lock_guard lock(mutex_);
+  return tasks_.size();
 }
 
 void ComputePool::Run() {
@@ -89,7 +96,11 @@ void ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
 }
 
 std::unique_ptr<Worker> ComputePool::TakeWorker() {
-  if (idle_.empty()) return std::make_unique<Worker>();
+  if (idle_.empty()) {
+    auto worker = std::make_unique<Worker>();
+    worker->observer = observer_;
+    return worker;
+  }
   std::unique_ptr<Worker> worker = std::move(idle_.back());
   idle_.pop_back();
   return worker;

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -36,7 +37,9 @@ class ComputePool {
 
   /// `threads` is what all jobs together may use, at least 1. While it lives, the whole process
   /// gives oneTBB no more than that.
-  explicit ComputePool(unsigned threads, WarmSize::Clock::duration warm_time = kWarmTime);
+  /// `observer` outlives the pool.
+  explicit ComputePool(unsigned threads, WarmSize::Clock::duration warm_time = kWarmTime,
+                       FrameObserver* observer = nullptr);
   /// Runs what was submitted, then joins.
   ~ComputePool();
   ComputePool(const ComputePool&) = delete;
@@ -46,6 +49,9 @@ class ComputePool {
   /// one. Never blocks on computing. Neither may throw. Safe from any thread, jobs included.
   void Submit(
       Job job, Afterwards afterwards = [] {});
+
+  /// Jobs that have been submitted and not begun.
+  std::size_t QueueLength() const;
 
   unsigned threads() const { return static_cast<unsigned>(runners_.size()); }
 
@@ -64,9 +70,10 @@ class ComputePool {
   static void Drop(Workers workers, std::unique_lock<std::mutex>& lock);
 
   const WarmSize::Clock::duration warm_time_;
+  FrameObserver* const observer_;
   oneapi::tbb::global_control parallelism_;
   oneapi::tbb::task_arena arena_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable task_came_;
   std::deque<Task> tasks_;  // Guarded by mutex_.
   Workers idle_;            // Guarded by mutex_. The one that was used last is the last.

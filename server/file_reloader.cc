@@ -1,11 +1,11 @@
 #include "server/file_reloader.h"
 
-#include <spdlog/spdlog.h>
 #include <sys/stat.h>
 
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/logging.h"
 
 namespace partiemc::server {
 namespace {
@@ -64,10 +64,11 @@ void FileReloader::Look(Watched& watched) {
   if (stamp == watched.stamp) return;
   watched.stamp = std::move(stamp);
   if (const auto status = watched.load(); status.ok()) {
-    spdlog::info("{} reloaded", watched.what);
+    LogEvent(spdlog::level::info, watched.what + " reloaded", {});
   } else {
-    spdlog::error("{} not reloaded, what was loaded before stays in force: {}", watched.what,
-                  std::string(status.message()));
+    LogEvent(spdlog::level::err,
+             watched.what + " not reloaded, what was loaded before stays in force",
+             {{"error", std::string(status.message())}});
   }
 }
 

@@ -56,9 +56,15 @@ int Serve(const CommandLine& line) {
       return Fail(status);
     }
   }
-  spdlog::info("listening on {} version={} threads={} max_streams={} memory_budget={}",
-               (*server)->address().ToString(), PARTIEMC_VERSION, line.server.threads,
-               line.server.limits.max_streams, line.server.limits.memory_budget);
+  const auto metrics = (*server)->metrics_address();
+  LogEvent(spdlog::level::info, "listening on " + (*server)->address().ToString(),
+           {{"version", PARTIEMC_VERSION},
+            {"threads", std::uint64_t{line.server.threads}},
+            {"max_streams", std::uint64_t{line.server.limits.max_streams}},
+            {"memory_budget", line.server.limits.memory_budget},
+            {"tls", line.server.tls ? "on" : "off"},
+            {"tokens", line.server.token_file ? "on" : "off"},
+            {"metrics", metrics ? metrics->ToString() : "off"}});
   int signal = 0;
   sigwait(&signals, &signal);
   spdlog::info("draining after {}", strsignal(signal));

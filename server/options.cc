@@ -41,6 +41,7 @@ struct Raw {
   double grace_seconds = 4;
   double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
   std::string token_file;
+  std::string metrics;
   TlsFiles tls;
   std::string log_format = "text";
   CommandLine line;
@@ -177,6 +178,16 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
 }
 
+void AddMetrics(CLI::App& app, Raw& raw) {
+  app.add_option(
+         "--metrics", raw.metrics,
+         "Serve metrics to Prometheus at http://ADDRESS/metrics, 127.0.0.1:9464 say: counts "
+         "and times, no names and no data of streams. Without it there are none")
+      ->type_name("ADDRESS")
+      ->envname("PARTIEMC_METRICS")
+      ->group("Metrics");
+}
+
 void AddLogging(CLI::App& app, Raw& raw) {
   const char* const kGroup = "Log (to standard error)";
   app.add_option("--log-level", raw.line.log_level, "How much: one line per stream event at info")
@@ -213,6 +224,11 @@ std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
     if (!asked.ok()) return Wrong(std::string(asked.status().message()));
     raw.line.health_check = *asked;
   }
+  if (!raw.metrics.empty()) {
+    const auto metrics = ParseAddress(raw.metrics);
+    if (!metrics.ok()) return Wrong("--metrics: " + std::string(metrics.status().message()));
+    raw.line.server.metrics = *metrics;
+  }
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
   if (!raw.token_file.empty()) raw.line.server.token_file = raw.token_file;
   raw.line.health_check_security.tls = raw.line.server.tls.has_value();
@@ -243,6 +259,7 @@ std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* a
   AddServingOptions(app, raw);
   AddSecurity(app, raw);
   AddLimits(app, raw);
+  AddMetrics(app, raw);
   AddLogging(app, raw);
   app.add_option(
          "--health-check", raw.health_check,

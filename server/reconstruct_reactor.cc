@@ -1,38 +1,43 @@
 #include "server/reconstruct_reactor.h"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "server/grpc_status.h"
+#include "server/logging.h"
 
 namespace partiemc::server {
 namespace {
 
 void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
             const absl::Status& status) {
-  const std::string code = absl::StatusCodeToString(status.code());
   if (!stream) {
-    spdlog::warn("stream refused peer={} status={} message={}", peer, code,
-                 std::string(status.message()));
+    LogRefusal("stream refused", peer, status);
     return;
   }
+  const auto violation = FindViolation(status);
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - stream->opened;
-  spdlog::info(
-      "stream closed id={} name={} frames={} frame_errors={} watch_waits={} "
-      "seconds={:.3f} status={}",
-      stream->id, stream->description.name, stream->counts.frames, stream->counts.frame_errors,
-      stream->description.hub->producer_waits(), open.count(), code);
+  LogEvent(spdlog::level::info, "stream closed",
+           {{"id", stream->id},
+            {"name", stream->description.name},
+            {"frames", stream->counts.frames},
+            {"frame_errors", stream->counts.frame_errors},
+            {"watch_waits", stream->description.hub->producer_waits()},
+            {"seconds", open.count()},
+            {"status", absl::StatusCodeToString(status.code())},
+            {"reason", violation ? violation->reason : std::string()}});
 }
 
 }  // namespace
 
 ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
                                        const ServerLimits& limits, StreamRegistry& registry,
-                                       MemoryBudget& budget, ComputePool& pool, WatchPump& pump)
+                                       MemoryBudget& budget, ComputePool& pool, WatchPump& pump,
+                                       std::string client)
     : context_(context),
+      client_(std::move(client)),
       registry_(registry),
       messages_(limits, registry, pump),
       flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget,
@@ -81,9 +86,13 @@ absl::Status ReconstructReactor::Open(std::size_t slot) {
   const auto stream = messages_.Open(slot, *flow_);
   if (!stream.ok()) return stream.status();
   const StreamDescription& description = stream->description;
-  spdlog::info("stream opened id={} name={} peer={} placement={} fill={}", stream->id,
-               description.name, context_.peer(), Name(description.parameters.placement),
-               Name(description.parameters.fill));
+  LogEvent(spdlog::level::info, "stream opened",
+           {{"id", stream->id},
+            {"name", description.name},
+            {"peer", context_.peer()},
+            {"client", client_},
+            {"placement", std::string(Name(description.parameters.placement))},
+            {"fill", std::string(Name(description.parameters.fill))}});
   return absl::OkStatus();
 }
 

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 
 #include "absl/status/status.h"
 #include "server/compute_pool.h"
@@ -22,10 +23,10 @@ namespace partiemc::server {
 class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                                  private StreamDoor {
  public:
-  /// The arguments outlive the call.
+  /// What is passed by reference outlives the call. `client` is the caller's name for the log.
   ReconstructReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
                      StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool,
-                     WatchPump& pump);
+                     WatchPump& pump, std::string client);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -41,6 +42,7 @@ class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   void Finish(const absl::Status& status) override;
 
   grpc::CallbackServerContext& context_;
+  const std::string client_;
   StreamRegistry& registry_;
   StreamMessages messages_;
   std::size_t read_slot_ = 0;  // Of the read that is going on.

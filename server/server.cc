@@ -14,6 +14,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/call_guard.h"
+#include "server/call_metrics.h"
+#include "server/logging.h"
 #include "server/service.h"
 #include "server/tls_credentials.h"
 
@@ -66,7 +68,7 @@ Server::Server(const ServerOptions& options)
       watchers_(options.limits.max_watchers),
       registry_(options.limits.max_streams),
       budget_(options.limits.memory_budget),
-      pool_(options.threads),
+      pool_(options.threads, kWarmTime, metrics_.get()),
       idle_timer_(registry_, options.limits.idle),
       service_(std::make_unique<Service>(options_.limits, authentication_, registry_, budget_,
                                          pool_, watchers_, pump_)) {}
@@ -78,6 +80,12 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   if (auto status = server->LoadFiles(); !status.ok()) return status;
   if (auto status = server->Listen(); !status.ok()) return status;
   server->reloader_.Start(options.reload_interval);
+  if (options.metrics) {
+    server->AddGauges();
+    auto endpoint = MetricsEndpoint::Listen(*options.metrics, server->metrics_);
+    if (!endpoint.ok()) return endpoint.status();
+    server->metrics_endpoint_ = *std::move(endpoint);
+  }
   return server;
 }
 
@@ -87,8 +95,8 @@ absl::Status Server::LoadFiles() {
       auto identity = ReadTlsIdentity(*options_.tls);
       if (!identity.ok()) return identity.status();
       if (identity->not_after < std::chrono::system_clock::now()) {
-        spdlog::warn("--tls-cert {} has expired: clients will refuse it",
-                     options_.tls->certificate);
+        LogEvent(spdlog::level::warn, "TLS certificate has expired, clients will refuse it",
+                 {{"file", options_.tls->certificate}});
       }
       tls_identity_->Set(*std::move(identity));
       return absl::OkStatus();
@@ -107,6 +115,30 @@ absl::Status Server::LoadFiles() {
   return absl::OkStatus();
 }
 
+std::optional<Address> Server::metrics_address() const {
+  if (metrics_endpoint_ == nullptr) return std::nullopt;
+  return metrics_endpoint_->address();
+}
+
+void Server::AddGauges() {
+  const auto add = [this](const char* name, const char* help, auto value) {
+    metrics_->AddGauge(name, help, [value] { return static_cast<double>(value()); });
+  };
+  add("partiemc_streams", "Open streams.", [this] { return registry_.OpenCount(); });
+  add("partiemc_watchers", "Watchers of all streams.", [this] { return watchers_.count(); });
+  add("partiemc_compute_queue_length", "Frames that wait for a thread.",
+      [this] { return pool_.QueueLength(); });
+  add("partiemc_memory_held_bytes", "Requests and answers of all streams.",
+      [this] { return budget_.held(); });
+  add("partiemc_memory_budget_bytes", "What they may hold together.",
+      [this] { return budget_.bytes(); });
+  if (!options_.tls) return;
+  add("partiemc_tls_certificate_not_after_seconds", "When the server's certificate expires (Unix).",
+      [this] {
+        return std::chrono::system_clock::to_time_t(tls_identity_->Get().identity->not_after);
+      });
+}
+
 absl::Status Server::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -115,11 +147,12 @@ absl::Status Server::Listen() {
   credentials_ =
       options_.tls ? MakeTlsCredentials(*tls_identity_) : grpc::InsecureServerCredentials();
   builder.AddListeningPort(address_.ToString(), credentials_, &port);
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
   if (authentication_.required()) {
-    std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> guards;
-    guards.push_back(MakeGuardOfForeignServices(authentication_));
-    builder.experimental().SetInterceptorCreators(std::move(guards));
+    interceptors.push_back(MakeGuardOfForeignServices(authentication_));
   }
+  if (options_.metrics) interceptors.push_back(MakeCallMetrics(*metrics_));
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
   builder.RegisterService(service_.get());
   builder.SetMaxReceiveMessageSize(ReceiveLimit(options_.limits.max_frame_bytes));
   // Clients ask a connection for a sign of life this often at most, whether it carries data or not.
@@ -165,6 +198,8 @@ void Server::Drain(std::chrono::milliseconds grace) {
   // Cutting those who do not take their answers takes a moment of the grace time too.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
   server_->GetHealthCheckService()->SetServingStatus(false);
+  // Its web server takes two seconds to stop: beside the streams, not after them.
+  std::thread stop_metrics([this] { metrics_endpoint_.reset(); });
   registry_.Drain();
   // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
   // to the last word: a connection that closes with requests unread takes back what was just
@@ -176,6 +211,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
                              std::chrono::steady_clock::duration::zero());
   server_->Shutdown(std::chrono::system_clock::now() + left);
   server_->Wait();
+  stop_metrics.join();
 }
 
 }  // namespace partiemc::server

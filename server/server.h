@@ -14,6 +14,8 @@
 #include "server/idle_timer.h"
 #include "server/limits.h"
 #include "server/memory_budget.h"
+#include "server/metrics.h"
+#include "server/metrics_endpoint.h"
 #include "server/stream_registry.h"
 #include "server/tls_identity.h"
 #include "server/watch_pump.h"
@@ -40,6 +42,8 @@ struct ServerOptions {
   std::optional<std::string> token_file;
   /// How soon a change of those files counts: for connections and calls that begin after it.
   std::chrono::milliseconds reload_interval{1000};
+  /// Where metrics are served over HTTP; they hold no names and no data of streams.
+  std::optional<Address> metrics;
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
@@ -60,6 +64,8 @@ class Server {
 
   /// With the port that it got.
   const Address& address() const { return address_; }
+  /// Where metrics are served, if they are.
+  std::optional<Address> metrics_address() const;
 
   /// To this server without a socket, for tests and embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
@@ -74,10 +80,12 @@ class Server {
 
   absl::Status LoadFiles();
   absl::Status Listen();
+  void AddGauges();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
   const ServerOptions options_;
   Address address_;
+  const std::shared_ptr<Metrics> metrics_ = std::make_shared<Metrics>();
   Authentication authentication_;
   std::unique_ptr<CurrentTlsIdentity> tls_identity_;
   std::shared_ptr<grpc::ServerCredentials> credentials_;
@@ -89,7 +97,9 @@ class Server {
   IdleTimer idle_timer_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<grpc::Server> server_;
-  FileReloader reloader_;  // The last: it stops before what it loads into goes.
+  // The last two stop before what they load into and read from goes.
+  FileReloader reloader_;
+  std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };
 
 }  // namespace partiemc::server

@@ -72,10 +72,10 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruct(
     grpc::CallbackServerContext* context) {
-  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return new RefusedStream(ToGrpcStatus(client.status(), *context));
-  }
-  return new ReconstructReactor(*context, limits_, registry_, budget_, pool_, pump_);
+  auto client = Authenticate(authentication_, *context);
+  if (!client.ok()) return new RefusedStream(ToGrpcStatus(client.status(), *context));
+  return new ReconstructReactor(*context, limits_, registry_, budget_, pool_, pump_,
+                                *std::move(client));
 }
 
 absl::Status Service::LetCallIn(std::uint64_t bytes) {
@@ -117,10 +117,9 @@ grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext*
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::WatchStream(
     grpc::CallbackServerContext* context) {
-  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return new RefusedStream(ToGrpcStatus(client.status(), *context));
-  }
-  return new WatchReactor(*context, limits_, registry_, watchers_);
+  auto client = Authenticate(authentication_, *context);
+  if (!client.ok()) return new RefusedStream(ToGrpcStatus(client.status(), *context));
+  return new WatchReactor(*context, limits_, registry_, watchers_, *std::move(client));
 }
 
 grpc::ServerUnaryReactor* Service::ListStreams(grpc::CallbackServerContext* context,
@@ -156,9 +155,8 @@ grpc::ServerUnaryReactor* Service::ListStreams(grpc::CallbackServerContext* cont
 grpc::ServerUnaryReactor* Service::GetServerInfo(grpc::CallbackServerContext* context,
                                                  const v1::GetServerInfoRequest*,
                                                  v1::GetServerInfoResponse* response) {
-  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return Refuse(client.status(), *context);
-  }
+  const auto client = Authenticate(authentication_, *context);
+  if (!client.ok()) return Refuse(client.status(), *context);
   response->set_version(PARTIEMC_VERSION);
   response->set_method_version(kMethodVersion);
   EncodeLimits(limits_, *response->mutable_limits());

@@ -41,6 +41,16 @@ std::string Session::Checkpoint() const {
 
 absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
                              Worker& worker, Deliver deliver) {
+  absl::Status status = TryAnswer(sequence, frame, worker, deliver);
+  if (!status.ok() && worker.observer != nullptr) {
+    const auto violation = FindViolation(status);
+    worker.observer->FrameRefused(violation ? std::string_view(violation->reason) : "INTERNAL");
+  }
+  return status;
+}
+
+absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
+                                Worker& worker, Deliver deliver) {
   if (sequence != next_sequence_) {
     const bool gap = sequence > next_sequence_;
     return ViolationError(
@@ -56,7 +66,7 @@ absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>
     return Reconstruct(*frame, worker, deliver);
   } catch (const std::bad_alloc&) {
     // What the workspace holds is anybody's guess now, and its memory is wanted.
-    worker = Worker();
+    worker = Worker{.observer = worker.observer};
     return OutOfMemory(absl::StrCat(frame->ParticleCount(), " particles"));
   }
 }
@@ -69,7 +79,11 @@ absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver de
   absl::Status status =
       reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result, &clock);
   if (status.ok()) status = deliver(worker.result, clock);
-  if (status.ok()) std::swap(state_, worker.next_state);
+  if (!status.ok()) return status;
+  std::swap(state_, worker.next_state);
+  if (worker.observer != nullptr) {
+    worker.observer->FrameReconstructed(frame.ParticleCount(), clock);
+  }
   return status;
 }
 

@@ -88,6 +88,8 @@ class Session {
  private:
   explicit Session(Reconstructor reconstructor) : reconstructor_(std::move(reconstructor)) {}
 
+  absl::Status TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
+                         Deliver deliver);
   absl::Status Reconstruct(const Frame& frame, Worker& worker, Deliver deliver);
 
   Reconstructor reconstructor_;

@@ -1,12 +1,11 @@
 #include "server/watch_reactor.h"
 
-#include <spdlog/spdlog.h>
-
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/grpc_status.h"
+#include "server/logging.h"
 #include "server/watch_hub.h"
 #include "wire/codec.h"
 #include "wire/message_bytes.h"
@@ -34,8 +33,9 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
 }  // namespace
 
 WatchReactor::WatchReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-                           StreamRegistry& streams, WatchRegistry& watchers)
+                           StreamRegistry& streams, WatchRegistry& watchers, std::string client)
     : context_(context),
+      client_(std::move(client)),
       streams_(streams),
       watchers_(watchers),
       flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), limits.max_watcher_bytes)) {
@@ -98,8 +98,12 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
   opened.set_stream_id(stream->id);
   wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
   opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
-  spdlog::info("watch opened stream={} name={} mode={} peer={}", stream->id, stream_name_,
-               *mode == WatchMode::kEvery ? "every" : "latest", context_.peer());
+  LogEvent(spdlog::level::info, "watch opened",
+           {{"stream", stream->id},
+            {"name", stream_name_},
+            {"mode", *mode == WatchMode::kEvery ? "every" : "latest"},
+            {"peer", context_.peer()},
+            {"client", client_}});
   return WatchTerms{.hub = description.hub, .mode = *mode, .credit = open.credits()};
 }
 
@@ -131,19 +135,20 @@ void WatchReactor::Finish(const absl::Status& status) {
 }
 
 void WatchReactor::LogEnd(const absl::Status& status) const {
-  const std::string code = absl::StatusCodeToString(status.code());
   if (stream_name_.empty()) {
-    spdlog::warn("watch refused peer={} status={} message={}", context_.peer(), code,
-                 std::string(status.message()));
+    LogRefusal("watch refused", context_.peer(), status);
     return;
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;
   const WatchCounts counts = flow_->counts();
-  spdlog::info(
-      "watch closed stream={} name={} frames={} dropped={} seconds={:.3f} reason={} "
-      "status={}",
-      opened_.opened().stream_id(), stream_name_, counts.frames, counts.dropped, open.count(),
-      end_reason_.empty() ? "LEFT" : end_reason_, code);
+  LogEvent(spdlog::level::info, "watch closed",
+           {{"stream", opened_.opened().stream_id()},
+            {"name", stream_name_},
+            {"frames", counts.frames},
+            {"dropped", counts.dropped},
+            {"seconds", open.count()},
+            {"reason", end_reason_.empty() ? "LEFT" : end_reason_},
+            {"status", absl::StatusCodeToString(status.code())}});
 }
 
 }  // namespace partiemc::server

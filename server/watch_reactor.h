@@ -36,7 +36,7 @@ class WatchReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc
  public:
   /// The arguments outlive the call.
   WatchReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-               StreamRegistry& streams, WatchRegistry& watchers);
+               StreamRegistry& streams, WatchRegistry& watchers, std::string client);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -56,6 +56,7 @@ class WatchReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc
   void LogEnd(const absl::Status& status) const;
 
   grpc::CallbackServerContext& context_;
+  const std::string client_;
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
   grpc::ByteBuffer request_, response_;

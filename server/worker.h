@@ -9,6 +9,7 @@
 #include "partiemc/reconstructor.h"
 #include "partiemc/result.h"
 #include "partiemc/state.h"
+#include "server/frame_observer.h"
 
 namespace partiemc::server {
 
@@ -44,7 +45,8 @@ struct Worker {
   Result result;
   State next_state;  ///< Becomes the stream's state once the frame has been answered.
   std::unique_ptr<DoorBuffers> door_buffers;
-  WarmSize particles;  ///< Of the frames that it has worked on.
+  WarmSize particles;                 ///< Of the frames that it has worked on.
+  FrameObserver* observer = nullptr;  ///< Told of each frame; none: nobody asks.
 };
 
 }  // namespace partiemc::server

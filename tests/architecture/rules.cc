@@ -68,6 +68,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"partiemc", {}},
       {"PkgConfig", {"pkg-config"}},
       {"OpenSSL", {"libssl-dev"}},
+      {"prometheus-cpp", {"prometheus-cpp-dev"}},
       {"Protobuf", {"libprotobuf-dev", "protobuf-compiler"}},
       {"spdlog", {"libspdlog-dev"}},
       {"TBB", {"libtbb-dev"}},

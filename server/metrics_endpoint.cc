@@ -1,0 +1,42 @@
+#include "server/metrics_endpoint.h"
+
+#include <prometheus/exposer.h>
+
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+namespace partiemc::server {
+
+absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
+    const Address& address, const std::shared_ptr<Metrics>& metrics) {
+  if (!address.unix_path.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--metrics ", address.ToString(), ": must be HOST:PORT or [IPV6]:PORT"));
+  }
+  try {
+    // Prometheus reads every few seconds; whoever connects and says nothing gives up its thread.
+    const std::vector<std::string> options = {
+        "listening_ports", address.ToString(), "num_threads", "2", "request_timeout_ms", "5000"};
+    auto exposer = std::make_unique<prometheus::Exposer>(options);
+    exposer->RegisterCollectable(metrics);
+    Address bound = address;
+    bound.port = static_cast<std::uint16_t>(exposer->GetListeningPorts().at(0));
+    return std::unique_ptr<MetricsEndpoint>(
+        new MetricsEndpoint(std::move(bound), std::move(exposer)));
+  } catch (const std::exception&) {
+    return absl::UnavailableError(absl::StrCat("cannot listen on --metrics ", address.ToString(),
+                                               ": is it in use, and is it an address of this "
+                                               "machine? Choose another"));
+  }
+}
+
+MetricsEndpoint::MetricsEndpoint(Address address, std::unique_ptr<prometheus::Exposer> exposer)
+    : address_(std::move(address)), exposer_(std::move(exposer)) {}
+
+MetricsEndpoint::~MetricsEndpoint() = default;
+
+}  // namespace partiemc::server
