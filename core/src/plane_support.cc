@@ -6,22 +6,11 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "point_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Lanes = hn::CappedTag<double, kPointPadding>;
-using Vector = hn::Vec<Lanes>;
-using FloatLanes = hn::Rebind<float, Lanes>;
-constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
-// Vectors that make up the four partial sums.
-constexpr int kParts = kPointPadding / kLanes;
-
-HWY_INLINE Vector LoadDouble(const float* values) {
-  return hn::PromoteTo(Lanes(), hn::LoadU(FloatLanes(), values));
-}
 
 HWY_INLINE double SumOfParts(const Vector* sums) {
   HWY_ALIGN double parts[kPointPadding];

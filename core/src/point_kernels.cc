@@ -6,18 +6,11 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "point_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Lanes = hn::CappedTag<double, kPointPadding>;
-using Vector = hn::Vec<Lanes>;
-using FloatLanes = hn::Rebind<float, Lanes>;
-constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
-// Vectors that make up the four partial sums.
-constexpr int kParts = kPointPadding / kLanes;
 
 // sum w k etc. follow from the others where all weights are the same.
 enum Channel {
@@ -36,10 +29,6 @@ enum Channel {
 };
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
 enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
-
-HWY_INLINE Vector LoadDouble(const float* values) {
-  return hn::PromoteTo(Lanes(), hn::LoadU(FloatLanes(), values));
-}
 
 // What particles contribute: d, k and dk / da, 0 beyond the row and beyond the kernel.
 struct Terms {
