@@ -144,8 +144,9 @@ std::vector<ArrayColumn> NpyColumns(const NpyHeader& header, const std::vector<c
   for (std::size_t k = 0; k < count; ++k) {
     columns[k].type = header.type;
     columns[k].swapped = header.swapped;
-    columns[k].data = bytes.data() + k * element * (header.column_major ? rows : 1);
     columns[k].stride = element * (header.column_major ? 1 : count);
+    if (bytes.empty()) continue;  // No rows: there is nothing to point at.
+    columns[k].data = bytes.data() + k * element * (header.column_major ? rows : 1);
   }
   return columns;
 }

@@ -1,0 +1,255 @@
+// Streams of random orders of messages and events, legal and illegal, each step of which is held
+// against a small model. PARTIEMC_ORDERS sets how many: the default is for every day, 1000000 for a
+// release. An order prints its seed when it fails; PARTIEMC_SEED starts from that one.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "partiemc/status.h"
+#include "server/scripted_door.h"
+#include "server/stream_model.h"
+#include "support/random.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr FrameLimits kLimits{.max_particles = 40, .max_tiles = 8};
+constexpr std::size_t kMostSteps = 60;
+
+std::uint64_t NumberFromEnvironment(const char* name, std::uint64_t otherwise) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
+}
+
+ReconstructionParameters Parameters(bool legal) {
+  return {
+      .placement = Placement::kMarchingSquares, .spacing = 1, .kernel_radius = legal ? 2.0 : 99.0};
+}
+
+// The good frame that comes after `index` other good ones: a few particles that move.
+std::vector<double> GoodFrame(std::size_t index) {
+  std::vector<double> positions;
+  for (int k = 0; k < 9; ++k) {
+    positions.push_back(k % 3 + 0.1 * static_cast<double>(index));
+    positions.push_back(k / 3);
+  }
+  return positions;
+}
+
+std::vector<StreamModel::Digests> ResultsOfAnUndisturbedStream() {
+  auto session = Session::Open(Parameters(true), kLimits);
+  Worker worker;
+  std::vector<StreamModel::Digests> results;
+  for (std::size_t k = 0; k < kMostSteps; ++k) {
+    const MemoryRequest request{RequestKind::kFrame, k + 1, GoodFrame(k)};
+    results.push_back(AnswerInMemory(request, *session, worker).digests);
+  }
+  return results;
+}
+
+// One order: a client, a network and a server in trouble, all of them from one seed.
+class Order {
+ public:
+  Order(std::uint64_t seed, SteppedPool& pool, MemoryBudget& budget,
+        const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen)
+      : random_(seed),
+        window_(1 + random_.Below(4)),
+        legal_(!random_.Chance(0.03)),
+        slow_reader_(random_.Chance(0.3)),
+        pool_(pool),
+        seen_(seen),
+        model_(window_, legal_, results),
+        door_(pool, budget, window_, Parameters(legal_), kLimits) {}
+
+  void Run() {
+    ExpectAsPredicted("start");
+    const std::size_t steps = random_.Below(kMostSteps);
+    for (std::size_t k = 0; k < steps && !testing::Test::HasFailure(); ++k) Step();
+    half_closed_ = true;
+    while (!testing::Test::HasFailure() && !door_.finished()) {
+      if (door_.reading()) {
+        EndReads();
+      } else if (door_.writing()) {
+        EndWrite(!door_.cut());
+      } else if (model_.computing()) {
+        Compute();
+      } else {
+        FAIL() << "stands still";
+      }
+    }
+    if (door_.reading()) EndReads();  // What a transport may still do after the end.
+    door_.flow().Cancelled();
+    door_.flow().Drain();
+    ExpectAsPredicted("the end");
+    if (const auto end = model_.finished()) {
+      ++seen_["ended " + absl::StatusCodeToString(end->code) + " " + end->reason];
+    }
+  }
+
+ private:
+  void Step() {
+    const double dice = random_.Unit();
+    if (dice < 0.02) {
+      SomethingMeanwhile();
+      ExpectAsPredicted("an event");
+    } else if (dice < 0.4 && door_.reading()) {
+      half_closed_ || random_.Chance(0.05) ? EndReads() : BringRequest();
+    } else if (dice < (slow_reader_ ? 0.45 : 0.7) && door_.writing()) {
+      EndWrite(!door_.cut() && !random_.Chance(0.01));
+    } else if (model_.computing()) {
+      Compute();
+    }
+  }
+
+  // What may happen at any moment, also in the middle of opening and answering.
+  void SomethingMeanwhile() {
+    switch (random_.Below(3)) {
+      case 0:
+        return Cancel();
+      case 1:
+        return Drain();
+      default:
+        return WaitTooLong();
+    }
+  }
+
+  void BringRequest() {
+    auto [request, fault] = RandomRequest();
+    ++seen_[request.kind == RequestKind::kFrame && fault.empty() ? "frame" : "other request"];
+    if (request.kind == RequestKind::kOpen && random_.Chance(0.1)) {
+      door_.meanwhile = [this] { SomethingMeanwhile(); };
+    }
+    const bool opens = request.kind == RequestKind::kOpen;
+    model_.RequestCame(request, fault);
+    const bool opening = opens && model_.opening();
+    if (!opening) door_.meanwhile = nullptr;
+    door_.BringRequest(std::move(request));
+    if (opening) model_.OpeningDone();
+    ExpectAsPredicted("a request");
+  }
+
+  std::pair<MemoryRequest, std::string> RandomRequest() {
+    // Nearly always `open` first and frames behind it, so that streams get somewhere.
+    const bool first = std::exchange(first_, false);
+    if (first != random_.Chance(0.04)) return {{RequestKind::kOpen, 0, {}}, ""};
+    if (random_.Chance(0.01)) return {{RequestKind::kMalformed, 0, {}}, ""};
+    if (random_.Chance(0.01)) return {{RequestKind::kEmpty, 0, {}}, ""};
+    MemoryRequest frame{RequestKind::kFrame, model_.next_sequence(),
+                        GoodFrame(model_.good_frames())};
+    if (random_.Chance(0.1)) frame.sequence += 1 + random_.Below(3);
+    if (random_.Chance(0.1)) frame.sequence -= std::min<std::uint64_t>(frame.sequence, 1);
+    switch (random_.Below(12)) {
+      case 0:
+        frame.positions[random_.Below(18)] = std::numeric_limits<double>::quiet_NaN();
+        return {frame, "NOT_FINITE"};
+      case 1:
+        frame.positions.resize(2 * (kLimits.max_particles + 1));
+        return {frame, "TOO_MANY_PARTICLES"};
+      case 2:
+        for (std::size_t k = 0; k < 18; ++k) frame.positions[k] *= 1000;
+        return {frame, "TOO_MANY_TILES"};
+      case 3:
+        frame.positions[random_.Below(18)] = 1e300;
+        return {frame, "OUT_OF_RANGE"};
+      default:
+        return {frame, ""};
+    }
+  }
+
+  void EndReads() {
+    half_closed_ = true;
+    model_.ReadsEnded();
+    door_.EndReads();
+    ExpectAsPredicted("no more requests");
+  }
+
+  void EndWrite(bool ok) {
+    model_.WriteDone(ok);
+    door_.EndWrite(ok);
+    ExpectAsPredicted(ok ? "a write" : "a failed write");
+  }
+
+  void Compute() {
+    const bool answers = model_.TakeUp();
+    if (answers && random_.Chance(0.03)) door_.meanwhile = [this] { SomethingMeanwhile(); };
+    pool_.Step();
+    model_.Computed(answers);
+    ExpectAsPredicted("a frame computed");
+  }
+
+  void Cancel() {
+    half_closed_ = true;
+    model_.Cancelled();
+    door_.flow().Cancelled();
+    ++seen_["cancel"];
+  }
+  void Drain() {
+    model_.Drained();
+    door_.flow().Drain();
+    ++seen_["drain"];
+  }
+  void WaitTooLong() {
+    constexpr IdleLimits kLimit{std::chrono::milliseconds(1), std::chrono::milliseconds(1)};
+    model_.WaitedTooLong();
+    door_.flow().EndIfIdle(kLimit, std::chrono::steady_clock::now() + std::chrono::hours(1));
+    ++seen_["idle"];
+  }
+
+  void ExpectAsPredicted(const char* after) {
+    SCOPED_TRACE(testing::Message() << "after " << after);
+    EXPECT_EQ(door_.reading(), model_.reading());
+    EXPECT_EQ(door_.writing() == model_.writing(), true)
+        << "sequence " << (door_.writing() ? door_.writing()->sequence : 0) << " and "
+        << (model_.writing() ? model_.writing()->sequence : 0);
+    EXPECT_EQ(door_.cut(), model_.cut());
+    EXPECT_EQ(End(), model_.finished());
+    const StreamCounts counts = door_.flow().counts();
+    EXPECT_EQ(counts.frames, model_.results());
+    EXPECT_EQ(counts.frame_errors, model_.errors());
+    EXPECT_EQ(counts.last_sequence, model_.last_sequence());
+  }
+
+  std::optional<StreamEnd> End() const {
+    if (!door_.finished()) return std::nullopt;
+    const auto violation = FindViolation(*door_.finished());
+    return StreamEnd{door_.finished()->code(), violation ? violation->reason : ""};
+  }
+
+  support::Random random_;
+  const std::size_t window_;
+  const bool legal_, slow_reader_;
+  SteppedPool& pool_;
+  std::map<std::string, int>& seen_;
+  StreamModel model_;
+  ScriptedDoor door_;
+  bool first_ = true, half_closed_ = false;
+};
+
+TEST(MessageOrders, AreAnsweredAsTheModelSays) {
+  const std::uint64_t orders = NumberFromEnvironment("PARTIEMC_ORDERS", 4000);
+  const std::uint64_t first = NumberFromEnvironment("PARTIEMC_SEED", 1);
+  const auto results = ResultsOfAnUndisturbedStream();
+  SteppedPool pool;
+  MemoryBudget budget(std::uint64_t{1} << 40);
+  std::map<std::string, int> seen;
+  for (std::uint64_t seed = first; seed < first + orders; ++seed) {
+    SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed << " PARTIEMC_ORDERS=1");
+    Order(seed, pool, budget, results, seen).Run();
+    EXPECT_EQ(budget.held(), 0u);
+    if (HasFailure()) return;  // The first order tells more than a flood.
+  }
+  for (const auto& [what, count] : seen) std::cout << what << ": " << count << '\n';
+  if (orders < 1000) return;
+  // The script reaches everything that it is about.
+  for (const char* end : {"OK ", "CANCELLED ", "INVALID_ARGUMENT PROTOCOL", "UNAVAILABLE DRAINING",
+                          "DEADLINE_EXCEEDED IDLE", "INVALID_ARGUMENT OUT_OF_RANGE"}) {
+    EXPECT_GT(seen[std::string("ended ") + end], 0) << end;
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::server

@@ -1,0 +1,86 @@
+#include "server/scripted_door.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+
+MemoryAnswer AnswerInMemory(const MemoryRequest& request, Session& session, Worker& worker) {
+  MemoryAnswer answer{Outgoing::kAnswer, request.sequence, {}, {}};
+  Frame frame;
+  frame.positions = std::span<const double>(request.positions);
+  const auto status =
+      session.Answer(request.sequence, frame, worker, [&](const Result& result, auto&) {
+        answer.digests = {DigestRings(result.rings), DigestMesh(result.mesh)};
+        return absl::OkStatus();
+      });
+  if (!status.ok()) answer.reason = FindViolation(status)->reason;
+  return answer;
+}
+
+ScriptedDoor::ScriptedDoor(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
+                           const ReconstructionParameters& parameters, const FrameLimits& limits)
+    : parameters_(parameters),
+      limits_(limits),
+      requests_(window),
+      answers_(window),
+      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool.pool(), budget,
+                                         window)) {
+  flow_->Start();
+}
+
+void ScriptedDoor::BringRequest(MemoryRequest request) {
+  const RequestKind kind = request.kind;
+  const std::uint64_t bytes = request.positions.size() * sizeof(double);
+  requests_.at(read_slot_.value()) = std::move(request);
+  read_slot_.reset();
+  flow_->ReadDone(kind, bytes);
+}
+
+void ScriptedDoor::EndReads() {
+  read_slot_.reset();
+  flow_->ReadEnded();
+}
+
+void ScriptedDoor::EndWrite(bool ok) {
+  writing_.reset();
+  flow_->WriteDone(ok);
+}
+
+void ScriptedDoor::StartRead(std::size_t slot) {
+  if (read_slot_ || finished_) throw std::logic_error("two reads at once, or one after the end");
+  read_slot_ = slot;
+}
+
+void ScriptedDoor::StartWrite(Outgoing what, std::size_t slot) {
+  if (writing_ || finished_) throw std::logic_error("two writes at once, or one after the end");
+  writing_ = what == Outgoing::kAnswer ? answers_.at(slot) : MemoryAnswer{what, 0, {}, {}};
+}
+
+absl::Status ScriptedDoor::Open(std::size_t) {
+  auto session = Session::Open(parameters_, limits_);
+  if (session.ok()) session_ = *std::move(session);
+  Meanwhile();
+  return session.status();
+}
+
+Answered ScriptedDoor::Answer(std::size_t slot, Worker& worker) {
+  answers_.at(slot) = AnswerInMemory(requests_.at(slot), *session_, worker);
+  Meanwhile();
+  return {.is_result = answers_[slot].reason.empty(),
+          .last_sequence = session_->next_sequence() - 1,
+          .bytes = 0};
+}
+
+void ScriptedDoor::Finish(const absl::Status& status) {
+  if (finished_ || writing_) throw std::logic_error("finished twice, or while writing");
+  finished_ = status;
+}
+
+void ScriptedDoor::Meanwhile() {
+  if (const auto happens = std::exchange(meanwhile, nullptr)) happens();
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,93 @@
+// A transport in which nothing happens by itself: a test decides when a read brings what, when a
+// write has gone out and when a worker takes its next job, and sees what the flow asks for next.
+// The same script gives the same run, however many threads are behind it.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <semaphore>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "server/memory_budget.h"
+#include "server/memory_door.h"
+#include "server/session.h"
+#include "server/stream_flow.h"
+
+namespace partiemc::server {
+
+/// A pool whose only thread takes one job at a time, when it is told to.
+class SteppedPool {
+ public:
+  SteppedPool() { Hold(); }
+  ~SteppedPool() { go_on_.release(); }
+
+  /// Runs what was submitted so far, with what follows each job, and returns when that is done.
+  void Step() {
+    pool_.Submit([this](Worker&) { WaitHere(); });
+    go_on_.release();
+    held_.acquire();
+  }
+  ComputePool& pool() { return pool_; }
+
+ private:
+  void Hold() {
+    pool_.Submit([this](Worker&) { WaitHere(); });
+    held_.acquire();
+  }
+  void WaitHere() {
+    held_.release();
+    go_on_.acquire();
+  }
+
+  std::counting_semaphore<> held_{0}, go_on_{0};
+  ComputePool pool_{1};
+};
+
+class ScriptedDoor final : private StreamDoor {
+ public:
+  ScriptedDoor(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
+               const ReconstructionParameters& parameters, const FrameLimits& limits);
+
+  // What the flow has asked for and not been told the end of.
+  bool reading() const { return read_slot_.has_value(); }
+  const std::optional<MemoryAnswer>& writing() const { return writing_; }
+  bool cut() const { return cut_; }
+  const std::optional<absl::Status>& finished() const { return finished_; }
+
+  // What happens next. Require what they end to be going on.
+  void BringRequest(MemoryRequest request);
+  void EndReads();
+  void EndWrite(bool ok);
+
+  /// Called in the middle of opening or answering, once.
+  std::function<void()> meanwhile;
+
+  StreamFlow& flow() { return *flow_; }
+
+ private:
+  void StartRead(std::size_t slot) override;
+  void StartWrite(Outgoing what, std::size_t slot) override;
+  absl::Status Open(std::size_t slot) override;
+  Answered Answer(std::size_t slot, Worker& worker) override;
+  void Cut() override { cut_ = true; }
+  void Finish(const absl::Status& status) override;
+  void Meanwhile();
+
+  const ReconstructionParameters parameters_;
+  const FrameLimits limits_;
+  std::vector<MemoryRequest> requests_;
+  std::vector<MemoryAnswer> answers_;
+  std::optional<Session> session_;
+  std::optional<std::size_t> read_slot_;
+  std::optional<MemoryAnswer> writing_;
+  bool cut_ = false;
+  std::optional<absl::Status> finished_;
+  std::shared_ptr<StreamFlow> flow_;
+};
+
+/// A session's answer to `request`, as tests in memory compare it.
+MemoryAnswer AnswerInMemory(const MemoryRequest& request, Session& session, Worker& worker);
+
+}  // namespace partiemc::server
