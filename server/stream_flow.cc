@@ -152,10 +152,12 @@ void StreamFlow::Granted(std::uint64_t bytes) {
 
 void StreamFlow::TakenOver() {
   On([&] {
+    // Of one that is over there is nothing to take, and no door to cut any more.
+    if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
     Abandon(ViolationError(absl::StatusCode::kAborted, {std::string(kReasonTakenOver), "stream",
                                                         "resumed by its producer in another call",
                                                         "must be read where it was resumed"}));
-    owes_cut_ = true;
+    owes_cut_ = writing_;  // Whoever takes no answers would keep it from ending.
   });
 }
 

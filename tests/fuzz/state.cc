@@ -7,6 +7,7 @@
 #include "fuzz/choices.h"
 #include "fuzz/hostile_frames.h"
 #include "fuzz/require.h"
+#include "partiemc/byte_string.h"
 #include "partiemc/status.h"
 
 namespace partiemc::fuzz {
@@ -15,25 +16,13 @@ namespace {
 constexpr std::size_t kMarkBytes = 8;  // Magic number and version.
 constexpr std::size_t kChecksumBytes = 8;
 
-// FNV-1a, as state.cc has it.
-std::uint64_t ChecksumOf(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char byte : bytes) {
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x00000100000001b3u;
-  }
-  return hash;
-}
-
 std::string PutRight(std::string_view bytes) {
   static const auto* const kMark = new std::string(Serialize(State{}).substr(0, kMarkBytes));
   std::string state = *kMark;
   if (bytes.size() > kMarkBytes + kChecksumBytes) {
     state += bytes.substr(kMarkBytes, bytes.size() - kMarkBytes - kChecksumBytes);
   }
-  const std::uint64_t checksum = ChecksumOf(state);
-  for (std::size_t k = 0; k < kChecksumBytes; ++k) {
-    state.push_back(static_cast<char>(checksum >> (8 * k)));
-  }
+  PutNumber(ChecksumOf(state), state);
   return state;
 }
 

@@ -4,6 +4,7 @@ namespace partiemc::fuzz {
 
 std::span<const Target> AllTargets() {
   static constexpr Target kTargets[] = {
+      {"checkpoint", AttackCheckpoint},
       {"expressions", AttackExpressions},
       {"frame_message", AttackFrameMessage},
       {"frames", AttackFrames},

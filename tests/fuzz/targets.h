@@ -14,6 +14,7 @@ using Bytes = std::span<const std::uint8_t>;
 /// the process (Require), as do the sanitizers.
 using Attack = void(Bytes bytes);
 
+Attack AttackCheckpoint;    // What a client resumes from, and frames after it.
 Attack AttackExpressions;   // What a person writes behind --select, --columns, --frames, ...
 Attack AttackFrameMessage;  // A ReconstructFrameRequest, decoded, reconstructed, encoded.
 Attack AttackFrames;        // Frames of hostile coordinates, every guarantee of a result checked.

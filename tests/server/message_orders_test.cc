@@ -84,6 +84,7 @@ class Order {
     if (door_.reading()) EndReads();  // What a transport may still do after the end.
     door_.flow().Cancelled();
     door_.flow().Drain();
+    door_.flow().TakenOver();
     ExpectAsPredicted("the end");
     if (const auto end = model_.finished()) {
       ++seen_["ended " + absl::StatusCodeToString(end->code) + " " + end->reason];
@@ -107,11 +108,13 @@ class Order {
 
   // What may happen at any moment, also in the middle of opening and answering.
   void SomethingMeanwhile() {
-    switch (random_.Below(3)) {
+    switch (random_.Below(4)) {
       case 0:
         return Cancel();
       case 1:
         return Drain();
+      case 2:
+        return TakeOver();
       default:
         return WaitTooLong();
     }
@@ -192,6 +195,11 @@ class Order {
     door_.flow().Drain();
     ++seen_["drain"];
   }
+  void TakeOver() {
+    model_.TakenOver();
+    door_.flow().TakenOver();
+    ++seen_["taken over"];
+  }
   void WaitTooLong() {
     constexpr IdleLimits kLimit{std::chrono::milliseconds(1), std::chrono::milliseconds(1)};
     model_.WaitedTooLong();
@@ -245,8 +253,9 @@ TEST(MessageOrders, AreAnsweredAsTheModelSays) {
   for (const auto& [what, count] : seen) std::cout << what << ": " << count << '\n';
   if (orders < 1000) return;
   // The script reaches everything that it is about.
-  for (const char* end : {"OK ", "CANCELLED ", "INVALID_ARGUMENT PROTOCOL", "UNAVAILABLE DRAINING",
-                          "DEADLINE_EXCEEDED IDLE", "INVALID_ARGUMENT OUT_OF_RANGE"}) {
+  for (const char* end :
+       {"OK ", "CANCELLED ", "INVALID_ARGUMENT PROTOCOL", "UNAVAILABLE DRAINING",
+        "DEADLINE_EXCEEDED IDLE", "ABORTED TAKEN_OVER", "INVALID_ARGUMENT OUT_OF_RANGE"}) {
     EXPECT_GT(seen[std::string("ended ") + end], 0) << end;
   }
 }

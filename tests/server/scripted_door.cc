@@ -74,6 +74,11 @@ Answered ScriptedDoor::Answer(std::size_t slot, Worker& worker) {
           .bytes = 0};
 }
 
+void ScriptedDoor::Cut() {
+  if (finished_) throw std::logic_error("cut after the end");
+  cut_ = true;
+}
+
 void ScriptedDoor::Finish(const absl::Status& status) {
   if (finished_ || writing_) throw std::logic_error("finished twice, or while writing");
   finished_ = status;

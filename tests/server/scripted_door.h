@@ -71,7 +71,7 @@ class ScriptedDoor final : private StreamDoor {
   void StartWrite(Outgoing what, std::size_t slot) override;
   absl::Status Open(std::size_t slot) override;
   Answered Answer(std::size_t slot, Worker& worker) override;
-  void Cut() override { cut_ = true; }
+  void Cut() override;
   void Finish(const absl::Status& status) override;
   void Meanwhile();
 

@@ -8,6 +8,7 @@ namespace {
 const StreamEnd kBrokenProtocol{absl::StatusCode::kInvalidArgument, "PROTOCOL"};
 const StreamEnd kClientGone{absl::StatusCode::kCancelled, ""};
 const StreamEnd kDraining{absl::StatusCode::kUnavailable, "DRAINING"};
+const StreamEnd kTakenOver{absl::StatusCode::kAborted, "TAKEN_OVER"};
 const StreamEnd kIdle{absl::StatusCode::kDeadlineExceeded, "IDLE"};
 
 }  // namespace
@@ -88,6 +89,13 @@ void StreamModel::WaitedTooLong() {
   } else {
     End(kIdle);
   }
+  GoOn();
+}
+
+void StreamModel::TakenOver() {
+  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+  Abandon(kTakenOver);
+  cut_ = writing_.has_value();
   GoOn();
 }
 

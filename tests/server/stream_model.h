@@ -36,6 +36,7 @@ class StreamModel {
   void Cancelled();
   void Drained();
   void WaitedTooLong();
+  void TakenOver();
   /// A worker takes the next frame; false where nobody waits for its answer any more.
   bool TakeUp();
   void Computed(bool answered);

@@ -1,6 +1,5 @@
 // What ends a stream or refuses it: the code, the reason and the words of each.
 #include <gmock/gmock.h>
-#include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -71,63 +70,25 @@ TEST_P(Protocol, AnEmptyRequestEndsTheStream) {
   EXPECT_EQ(status.error_message(), "request: empty; must be `frame`");
 }
 
-// Sends bytes that no message serialises to; gives the status of the call and what came before it.
-struct RawEnd {
-  grpc::Status status;
-  std::string reason;
-  std::vector<v1::ReconstructResponse> answers;
-};
-RawEnd SendBytes(const std::shared_ptr<grpc::Channel>& channel,
-                 const std::vector<std::string>& requests) {
-  grpc::ClientContext context;
-  SetDeadline(context);
-  grpc::CompletionQueue queue;
-  const auto wait = [&queue] {
-    void* tag = nullptr;
-    bool ok = false;
-    return queue.Next(&tag, &ok) && ok;
-  };
-  grpc::TemplatedGenericStub<grpc::ByteBuffer, v1::ReconstructResponse> stub(channel);
-  const auto call =
-      stub.PrepareCall(&context, "/partiemc.v1.ReconstructionService/Reconstruct", &queue);
-  call->StartCall(nullptr);
-  bool ok = wait();
-  RawEnd end;
-  for (const std::string& request : requests) {
-    const grpc::Slice slice(request);
-    call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
-    ok = ok && wait();
-  }
-  for (v1::ReconstructResponse answer; ok;) {
-    call->Read(&answer, nullptr);
-    ok = wait();
-    if (ok) end.answers.push_back(answer);
-  }
-  call->Finish(&end.status, nullptr);
-  wait();
-  end.reason = ReasonOf(context);
-  return end;
-}
-
 TEST_P(Protocol, BytesThatAreNoRequestEndTheStream) {
-  const RawEnd first = SendBytes(channel_, {"\x07"});
+  const StreamEnd first = SendBytes(channel_, {"\x07"});
   EXPECT_EQ(first.status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(first.reason, "PROTOCOL");
   EXPECT_EQ(first.status.error_message(), "request: malformed; the first must be `open`");
 
-  const RawEnd open = SendBytes(channel_, {std::string("\x0a\x02\x0a\x09", 4)});
+  const StreamEnd open = SendBytes(channel_, {std::string("\x0a\x02\x0a\x09", 4)});
   EXPECT_EQ(open.status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(open.reason, "PROTOCOL");
   EXPECT_EQ(open.status.error_message(), "request: malformed; must be a ReconstructRequest");
 
-  const RawEnd later = SendBytes(channel_, {OpenRequest().SerializeAsString(), "\x12\x7f"});
+  const StreamEnd later = SendBytes(channel_, {OpenRequest().SerializeAsString(), "\x12\x7f"});
   EXPECT_EQ(later.status.error_message(), "request: malformed; must be `frame`");
 }
 
 TEST_P(Protocol, AFrameThatIsNoMessageIsRefusedAndLeavesNoTrace) {
   const v1::ReconstructRequest good = BlobRequest(2, 1, 0), other = BlobRequest(3, 1, 1);
   const std::string number_1_and_cut_off_positions("\x12\x05\x08\x01\x22\x05p", 7);
-  const RawEnd end = SendBytes(
+  const StreamEnd end = SendBytes(
       channel_, {OpenRequest().SerializeAsString(), number_1_and_cut_off_positions,
                  good.SerializeAsString(), other.SerializeAsString(), std::string("\x07")});
   ASSERT_EQ(end.answers.size(), 4u) << end.status.error_message();

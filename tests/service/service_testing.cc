@@ -1,5 +1,6 @@
 #include "service/service_testing.h"
 
+#include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -154,6 +155,38 @@ grpc::Status WatchClient::Finish() {
   }
   finished_ = true;
   return rpc_->Finish();
+}
+
+StreamEnd SendBytes(const std::shared_ptr<grpc::Channel>& channel,
+                    const std::vector<std::string>& requests) {
+  grpc::ClientContext context;
+  SetDeadline(context);
+  grpc::CompletionQueue queue;
+  const auto wait = [&queue] {
+    void* tag = nullptr;
+    bool ok = false;
+    return queue.Next(&tag, &ok) && ok;
+  };
+  grpc::TemplatedGenericStub<grpc::ByteBuffer, v1::ReconstructResponse> stub(channel);
+  const auto call =
+      stub.PrepareCall(&context, "/partiemc.v1.ReconstructionService/Reconstruct", &queue);
+  call->StartCall(nullptr);
+  bool ok = wait();
+  StreamEnd end;
+  for (const std::string& request : requests) {
+    const grpc::Slice slice(request);
+    call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+    ok = ok && wait();
+  }
+  for (v1::ReconstructResponse answer; ok;) {
+    call->Read(&answer, nullptr);
+    ok = wait();
+    if (ok) end.answers.push_back(answer);
+  }
+  call->Finish(&end.status, nullptr);
+  wait();
+  end.reason = ReasonOf(context);
+  return end;
 }
 
 std::vector<Digests> LocalDigests(unsigned seed, std::uint64_t frames) {

@@ -92,6 +92,17 @@ class WatchClient {
   bool finished_ = false;
 };
 
+/// How a Reconstruct call ended, and what came before that.
+struct StreamEnd {
+  grpc::Status status;
+  std::string reason;
+  std::vector<v1::ReconstructResponse> answers;
+};
+
+/// Sends bytes that no message may serialise to as the requests of a stream.
+StreamEnd SendBytes(const std::shared_ptr<grpc::Channel>& channel,
+                    const std::vector<std::string>& requests);
+
 struct Digests {
   std::uint64_t rings = 0, mesh = 0;
 

@@ -1,0 +1,263 @@
+// Each row of "A call is refused or ended" in proto/PROTOCOL.md: a test named as the row's reason,
+// with the exact code, reason and words (error_table_test.cc looks for rows without).
+#include <grpcpp/generic/generic_stub.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <fstream>
+#include <string>
+
+#include "service/error_testing.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
+
+class CallRefused : public ErrorTable {
+ protected:
+  void Expect(const grpc::Status& status, const std::string& found, grpc::StatusCode code,
+              const std::string& reason, const std::string& message) {
+    EXPECT_EQ(status.error_code(), code) << status.error_message();
+    EXPECT_EQ(found, reason);
+    EXPECT_EQ(status.error_message(), message);
+  }
+  // Of a stream whose first request is `open`.
+  void ExpectOfOpen(const v1::ReconstructRequest& open, grpc::StatusCode code,
+                    const std::string& reason, const std::string& message) {
+    if (!server_) Serve();
+    StreamClient client(channel_);
+    client.Send(open);
+    const auto status = client.Finish();
+    Expect(status, client.reason(), code, reason, message);
+  }
+  static v1::ReconstructFrameRequest CallRequest() {
+    v1::ReconstructFrameRequest request;
+    *request.mutable_parameters() = OpenRequest().open().parameters();
+    *request.mutable_frame() = BlobRequest(0, 1, 0).frame();
+    return request;
+  }
+  // Of a call of ReconstructFrame with a good frame.
+  void ExpectOfCall(grpc::StatusCode code, const std::string& reason, const std::string& message) {
+    Serve();
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::ReconstructFrameResponse response;
+    const auto status = stub_->ReconstructFrame(&context, CallRequest(), &response);
+    Expect(status, ReasonOf(context), code, reason, message);
+  }
+  void WantToken() {
+    const std::string path = testing::TempDir() + "error_table_tokens";
+    std::ofstream(path) << kToken << '\n';
+    options_.token_file = path;
+    Serve();
+  }
+  // Of GetServerInfo on a server that wants a token.
+  void ExpectOfCaller(const std::string& authorization, const std::string& reason,
+                      const std::string& message) {
+    WantToken();
+    grpc::ClientContext context;
+    SetDeadline(context);
+    if (!authorization.empty()) context.AddMetadata("authorization", authorization);
+    v1::GetServerInfoResponse response;
+    const auto status = stub_->GetServerInfo(&context, {}, &response);
+    Expect(status, ReasonOf(context), grpc::StatusCode::UNAUTHENTICATED, reason, message);
+  }
+  static v1::ReconstructRequest Resume(const std::string& checkpoint, const std::string& token) {
+    auto open = OpenRequest("tank");
+    open.mutable_open()->mutable_resume()->set_checkpoint(checkpoint);
+    open.mutable_open()->mutable_resume()->set_stream_token(token);
+    return open;
+  }
+  // What a server sent after one frame.
+  std::string Checkpoint() {
+    Serve();
+    auto open = OpenRequest();
+    open.mutable_open()->set_checkpoint_interval(1);
+    StreamClient client(channel_);
+    client.SendAndReceive(open);
+    return client.SendAndReceive(BlobRequest(1, 1, 0)).frame().checkpoint();
+  }
+};
+
+using grpc::StatusCode;
+
+TEST_F(CallRefused, PROTOCOL) {
+  ExpectOfOpen(BlobRequest(1, 1, 0), StatusCode::INVALID_ARGUMENT, "PROTOCOL",
+               "request: frame; the first must be `open`");
+}
+
+TEST_F(CallRefused, OUT_OF_RANGE) {
+  auto open = OpenRequest();
+  open.mutable_open()->mutable_parameters()->set_kernel_radius(20);
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+               "parameters.kernel_radius: 20; must be in [1.5, 8] spacings");
+}
+
+TEST_F(CallRefused, UNSUPPORTED) {
+  auto open = OpenRequest();
+  open.mutable_open()->mutable_parameters()->set_placement(static_cast<v1::Placement>(99));
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
+               "parameters.placement: 99; must be a value that this version knows");
+}
+
+TEST_F(CallRefused, NAME) {
+  ExpectOfOpen(OpenRequest("a b"), StatusCode::INVALID_ARGUMENT, "NAME",
+               "open.stream_name: \"a b\"; must be at most 128 characters of [A-Za-z0-9._-]");
+}
+
+TEST_F(CallRefused, LABELS) {
+  auto open = OpenRequest();
+  (*open.mutable_open()->mutable_labels())["key"] = std::string(200, 'x');
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "LABELS",
+               "open.labels: \"key\"; must have a key and a value of at most 128 bytes each");
+}
+
+TEST_F(CallRefused, STREAM_TOKEN) {
+  ExpectOfOpen(Resume("", "mine"), StatusCode::INVALID_ARGUMENT, "STREAM_TOKEN",
+               "open.resume.stream_token: 4 characters; must be the stream_token of StreamOpened");
+}
+
+TEST_F(CallRefused, CORRUPT_CHECKPOINT) {
+  ExpectOfOpen(Resume("nonsense", kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_CHECKPOINT",
+               "open.resume.checkpoint: 8 bytes; must be as a server sent it; start the stream "
+               "anew");
+}
+
+TEST_F(CallRefused, CORRUPT_STATE) {
+  std::string damaged = Checkpoint();
+  damaged.back() = static_cast<char>(damaged.back() ^ 1);
+  ExpectOfOpen(Resume(damaged, kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_STATE",
+               "state: a wrong checksum; must be what Serialize wrote");
+}
+
+TEST_F(CallRefused, CHECKPOINT_MISMATCH) {
+  auto open = Resume(Checkpoint(), kToken);
+  open.mutable_open()->mutable_parameters()->set_kernel_radius(2);
+  ExpectOfOpen(open, StatusCode::FAILED_PRECONDITION, "CHECKPOINT_MISMATCH",
+               "open.resume.checkpoint: other parameters; must be resumed with the parameters that "
+               "it was made with");
+}
+
+TEST_F(CallRefused, TAKEN_OVER) {
+  Serve();
+  auto open = OpenRequest("tank");
+  open.mutable_open()->set_checkpoint_interval(1);
+  StreamClient old_call(channel_);
+  const auto opened = old_call.SendAndReceive(open);
+  StreamClient new_call(channel_);
+  ASSERT_TRUE(new_call.SendAndReceive(Resume("", opened.opened().stream_token())).has_opened());
+  const auto status = old_call.Finish();
+  Expect(status, old_call.reason(), StatusCode::ABORTED, "TAKEN_OVER",
+         "stream: resumed by its producer in another call; must be read where it was resumed");
+}
+
+TEST_F(CallRefused, NAME_IN_USE) {
+  Serve();
+  StreamClient first(channel_);
+  ASSERT_TRUE(first.SendAndReceive(OpenRequest("tank")).has_opened());
+  ExpectOfOpen(OpenRequest("tank"), StatusCode::ALREADY_EXISTS, "NAME_IN_USE",
+               "open.stream_name: \"tank\"; must not be the name of an open stream; choose "
+               "another, or none");
+}
+
+TEST_F(CallRefused, TOO_MANY_STREAMS) {
+  options_.limits.max_streams = 1;
+  Serve();
+  StreamClient first(channel_);
+  ASSERT_TRUE(first.SendAndReceive(OpenRequest()).has_opened());
+  ExpectOfOpen(OpenRequest(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_STREAMS",
+               "streams: 1 open; must be at most 1; try again when one has ended, or start the "
+               "server with a larger --max-streams");
+}
+
+TEST_F(CallRefused, TOO_MANY_CALLS) {
+  options_.limits.max_streams = 0;
+  ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_CALLS",
+               "calls of ReconstructFrame: 0 going on; must be at most 0; try again later");
+}
+
+TEST_F(CallRefused, MEMORY_BUDGET) {
+  options_.limits.memory_budget = 100;
+  ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET",
+               "request: " + std::to_string(CallRequest().ByteSizeLong()) +
+                   " bytes; must fit with what is being worked on into 100 bytes; try again later, "
+                   "or start the server with a larger --memory-budget");
+}
+
+TEST_F(CallRefused, IDLE) {
+  options_.limits.idle.opening = std::chrono::milliseconds(50);
+  Serve();
+  StreamClient client(channel_);
+  const auto status = client.Finish();
+  Expect(status, client.reason(), StatusCode::DEADLINE_EXCEEDED, "IDLE",
+         "client: sends no `open` for 0.05 s; must do so within this time "
+         "(Limits.idle_timeout_seconds once open); open a new stream");
+}
+
+TEST_F(CallRefused, DRAINING) {
+  Serve();
+  StreamClient client(channel_);
+  ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
+  server_->Drain(std::chrono::seconds(60));
+  const auto status = client.Finish();
+  Expect(status, client.reason(), StatusCode::UNAVAILABLE, "DRAINING",
+         "server: draining; connect to another one, or again later");
+}
+
+TEST_F(CallRefused, TOKEN_MISSING) {
+  ExpectOfCaller(
+      "", "TOKEN_MISSING",
+      "authorization: absent; must be \"Bearer \" and a token of this server's --token-file");
+}
+
+TEST_F(CallRefused, TOKEN_UNKNOWN) {
+  ExpectOfCaller("Bearer " + std::string(32, 'f'), "TOKEN_UNKNOWN",
+                 "authorization: a token that is not known; must be \"Bearer \" and a token of "
+                 "this server's --token-file");
+}
+
+TEST_F(CallRefused, NoReason_RESOURCE_EXHAUSTED) {
+  Serve();
+  StreamClient client(channel_);
+  ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
+  auto request = BlobRequest(1, 1, 0);
+  request.mutable_frame()->set_positions(std::string(2'000'000, '\0'));
+  client.Send(request);
+  EXPECT_EQ(client.Finish().error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(client.reason(), "");
+}
+
+TEST_F(CallRefused, NoReason_INVALID_ARGUMENT) {
+  Serve();
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::ListStreamsRequest request;
+  request.set_page_token("elsewhere");
+  v1::ListStreamsResponse response;
+  const auto status = stub_->ListStreams(&context, request, &response);
+  Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "",
+         "page_token: not from here; must be the next_page_token of an answer");
+}
+
+TEST_F(CallRefused, NoReason_UNAUTHENTICATED) {
+  WantToken();
+  grpc::ClientContext context;
+  SetDeadline(context);
+  grpc::GenericStub stub(channel_);
+  grpc::CompletionQueue queue;
+  const auto call = stub.PrepareCall(
+      &context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
+  void* tag = nullptr;
+  bool ok = false;
+  call->StartCall(nullptr);
+  queue.Next(&tag, &ok);
+  grpc::Status status;
+  call->Finish(&status, nullptr);
+  queue.Next(&tag, &ok);
+  Expect(status, ReasonOf(context), StatusCode::UNAUTHENTICATED, "",
+         "authorization: absent; must be \"Bearer \" and a token of this server's --token-file");
+}
+
+}  // namespace
+}  // namespace partiemc::server

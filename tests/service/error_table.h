@@ -1,0 +1,28 @@
+// The error tables of proto/PROTOCOL.md, as tests read them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace partiemc::server {
+
+struct ErrorRow {
+  std::string reason;  ///< Empty for "(none)".
+  std::string code;    ///< Of a call: "INVALID_ARGUMENT"; empty for a frame.
+
+  /// Of the test that tries it: "NAME", or "NoReason_UNIMPLEMENTED" where there is no reason.
+  std::string TestName() const { return reason.empty() ? "NoReason_" + code : reason; }
+};
+
+/// The rows of the table "A frame is refused".
+std::vector<ErrorRow> FrameErrorRows();
+/// The rows of the table "A call is refused or ended".
+std::vector<ErrorRow> CallErrorRows();
+
+/// The rows of the table of watches behind it.
+std::vector<ErrorRow> WatchErrorRows();
+
+/// Every reason that a constant `kReason... = "..."` of core, proto or server gives.
+std::vector<std::string> ReasonsInCode();
+
+}  // namespace partiemc::server

@@ -1,0 +1,187 @@
+// Each row of "A frame is refused" in proto/PROTOCOL.md: a test named as the row's reason, with the
+// exact reason and words, and the stream that goes on (error_table_test.cc looks for rows without).
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "partiemc/status.h"
+#include "server/session.h"
+#include "service/error_testing.h"
+
+namespace partiemc::server {
+namespace {
+
+class FrameRefused : public ErrorTable {
+ protected:
+  void SetUp() override {
+    options_.limits.frame.max_tiles = 100;
+    Serve();
+  }
+
+  // The answer to `frame` on a stream that `open` opens, and then that the stream goes on.
+  void Expect(const v1::ReconstructRequest& frame, const std::string& reason,
+              const std::string& message, std::uint64_t next_sequence = 2,
+              const v1::ReconstructRequest& open = OpenRequest()) {
+    StreamClient client(channel_);
+    ASSERT_TRUE(client.SendAndReceive(open).has_opened());
+    const auto answer = client.SendAndReceive(frame);
+    ASSERT_TRUE(answer.has_error()) << answer.ShortDebugString().substr(0, 200);
+    const v1::FrameError& error = answer.error();
+    EXPECT_EQ(error.reason(), reason);
+    EXPECT_EQ(error.message(), message);
+    EXPECT_EQ(error.message(), error.field() + ": " + error.value() + "; " + error.rule());
+    EXPECT_EQ(error.sequence(), frame.frame().sequence());
+    EXPECT_EQ(error.next_sequence(), next_sequence);
+    EXPECT_TRUE(client.SendAndReceive(BlobRequest(next_sequence, 1, 0)).has_frame());
+  }
+  // A good frame whose number at `index` of `positions` is `value`.
+  static v1::ReconstructRequest WithCoordinate(std::size_t index, double value) {
+    auto request = BlobRequest(1, 1, 0);
+    std::memcpy(request.mutable_frame()->mutable_positions()->data() + 8 * index, &value, 8);
+    return request;
+  }
+};
+
+TEST_F(FrameRefused, SEQUENCE_GAP) {
+  Expect(BlobRequest(7, 1, 0), "SEQUENCE_GAP",
+         "sequence: 7; must be 1; a frame before it is missing", 1);
+}
+
+TEST_F(FrameRefused, SEQUENCE_DUPLICATE) {
+  Expect(BlobRequest(0, 1, 0), "SEQUENCE_DUPLICATE",
+         "sequence: 0; must be 1; this number has been used", 1);
+}
+
+TEST_F(FrameRefused, FRAME_BYTES) {
+  auto request = BlobRequest(1, 1, 0);
+  request.mutable_frame()->set_positions(std::string(16 * 65'000, '\0'));
+  Expect(request, "FRAME_BYTES",
+         "frame: " + std::to_string(request.frame().ByteSizeLong()) +
+             " bytes; must be at most 1000000 bytes");
+}
+
+TEST_F(FrameRefused, MALFORMED) {
+  const std::string number_1_and_cut_off_positions("\x12\x05\x08\x01\x22\x05p", 7);
+  const StreamEnd end = SendBytes(channel_, {OpenRequest().SerializeAsString(),
+                                             number_1_and_cut_off_positions, std::string("\x07")});
+  ASSERT_EQ(end.answers.size(), 2u) << end.status.error_message();
+  const v1::FrameError& error = end.answers[1].error();
+  EXPECT_EQ(error.reason(), "MALFORMED");
+  EXPECT_EQ(error.message(), "frame: 7 bytes; must be a ParticleFrame");
+  EXPECT_EQ(error.next_sequence(), 2u);
+}
+
+TEST_F(FrameRefused, UNSUPPORTED) {
+  auto request = BlobRequest(1, 1, 0);
+  request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_UNSPECIFIED);
+  Expect(request, "UNSUPPORTED",
+         "position_format: 0; must be FLOAT32_2, FLOAT64_2, FLOAT32_3 or FLOAT64_3");
+}
+
+TEST_F(FrameRefused, BYTE_COUNT) {
+  auto request = BlobRequest(1, 1, 0);
+  request.mutable_frame()->set_ids("123");
+  const auto particles = std::to_string(request.frame().positions().size() / 16);
+  Expect(request, "BYTE_COUNT",
+         "ids: 3 bytes; must be empty or 8 bytes for each of " + particles + " particles");
+}
+
+TEST_F(FrameRefused, TOO_MANY_PARTICLES) {
+  auto request = BlobRequest(1, 1, 0);
+  request.mutable_frame()->set_positions(std::string(16 * 20'001, '\0'));
+  Expect(request, "TOO_MANY_PARTICLES",
+         "positions: 20001 particles; must be at most 20000 in one frame");
+}
+
+TEST_F(FrameRefused, TOO_MANY_TILES) {
+  auto request = BlobRequest(1, 1, 0);
+  std::vector<double> line;
+  for (int k = 0; k < 200; ++k) line.insert(line.end(), {100.0 * k, 0.0});
+  request.mutable_frame()->set_positions(line.data(), line.size() * sizeof(double));
+  Expect(request, "TOO_MANY_TILES",
+         "positions: more than 100 tiles of 32 x 32 cells; must reach at most 100 tiles: is the "
+         "spacing of 0.05 right?");
+}
+
+TEST_F(FrameRefused, DUPLICATE) {
+  auto request = BlobRequest(1, 1, 0);
+  std::vector<std::uint64_t> ids(request.frame().positions().size() / 16);
+  for (std::size_t k = 0; k < ids.size(); ++k) ids[k] = k;
+  ids[5] = 2;
+  request.mutable_frame()->set_ids(ids.data(), ids.size() * sizeof(std::uint64_t));
+  Expect(request, "DUPLICATE",
+         "ids[5]: 2; must be that of one particle only, but ids[2] is the same; leave ids out "
+         "where particles have none");
+}
+
+TEST_F(FrameRefused, NOT_FINITE) {
+  Expect(WithCoordinate(7, std::numeric_limits<double>::quiet_NaN()), "NOT_FINITE",
+         "positions[3].y: nan; must be finite");
+}
+
+TEST_F(FrameRefused, OUT_OF_RANGE) {
+  Expect(WithCoordinate(7, 1e300), "OUT_OF_RANGE",
+         "positions[3].y: 1e+300; must be at most 1e69 in magnitude");
+}
+
+TEST_F(FrameRefused, NOT_PLANAR) {
+  auto request = BlobRequest(1, 1, 0);
+  const std::vector<double> corner = {0, 0, 0, 1, 0, 0, 0, 1, 0.5};
+  request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_FLOAT64_3);
+  request.mutable_frame()->set_positions(corner.data(), corner.size() * sizeof(double));
+  Expect(request, "NOT_PLANAR",
+         "positions[2].z: 0.5; particles must lie in the xy plane, but z ranges over [0, 0.5]");
+}
+
+TEST_F(FrameRefused, RESOLUTION) {
+  auto open = OpenRequest();
+  open.mutable_open()->mutable_outputs()->set_rings(true);
+  open.mutable_open()->mutable_outputs()->set_coordinate_format(
+      v1::COORDINATE_FORMAT_FLOAT32_RELATIVE);
+  StreamClient client(channel_);
+  ASSERT_TRUE(client.SendAndReceive(open).has_opened());
+  const auto answer = client.SendAndReceive(WithCoordinate(7, 1e5 + 0.013));
+  EXPECT_EQ(answer.error().reason(), "RESOLUTION");
+  EXPECT_TRUE(answer.error().field().starts_with("rings.points[")) << answer.error().field();
+  EXPECT_TRUE(answer.error().value().starts_with("moved by ")) << answer.error().value();
+  EXPECT_EQ(answer.error().rule(),
+            "must move by at most 1e-04 spacings; ask for COORDINATE_FORMAT_FLOAT64");
+  EXPECT_EQ(answer.error().next_sequence(), 2u);
+}
+
+// Beyond what a message can say: the codec has looked at all counts before the core does.
+TEST_F(FrameRefused, COUNT) {
+  Session session = *Session::Open({.spacing = 1}, {});
+  Worker worker;
+  const std::vector<double> positions(6);
+  const std::vector<float> volumes(2, 1);
+  const Frame frame{.positions = std::span<const double>(positions), .volumes = volumes};
+  const auto status =
+      session.Answer(1, frame, worker, [](auto&, auto&) { return absl::OkStatus(); });
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FindViolation(status)->reason, "COUNT");
+  EXPECT_EQ(std::string(status.message()),
+            "volumes: 2 values; must be empty or one per particle (3)");
+}
+
+TEST_F(FrameRefused, OUT_OF_MEMORY) {
+  Session session = *Session::Open({.spacing = 1}, {});
+  Worker worker;
+  const std::vector<double> positions(6);
+  const Frame frame{.positions = std::span<const double>(positions)};
+  const auto status = session.Answer(1, frame, worker,
+                                     [](auto&, auto&) -> absl::Status { throw std::bad_alloc(); });
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(FindViolation(status)->reason, "OUT_OF_MEMORY");
+  EXPECT_EQ(status.message(),
+            "frame: 3 particles; must fit into the server's memory; send a smaller frame or try "
+            "again later");
+  EXPECT_EQ(session.next_sequence(), 2u);
+}
+
+}  // namespace
+}  // namespace partiemc::server

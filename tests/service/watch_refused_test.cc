@@ -1,0 +1,103 @@
+// Each row of the table of watches in proto/PROTOCOL.md: a test named as the row's reason, with the
+// exact code, reason and words (error_table_test.cc looks for rows without).
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "service/error_testing.h"
+
+namespace partiemc::server {
+namespace {
+
+using grpc::StatusCode;
+using ::testing::MatchesRegex;
+
+class WatchRefused : public ErrorTable {
+ protected:
+  void SetUp() override { options_.limits.max_watchers = 1; }
+
+  // Serves a stream named "tank".
+  void OpenProducer() {
+    Serve();
+    producer_ = std::make_unique<StreamClient>(channel_);
+    ASSERT_TRUE(producer_->SendAndReceive(OpenRequest("tank")).has_opened());
+  }
+  void Expect(WatchClient& watcher, StatusCode code, const std::string& reason,
+              const std::string& message) {
+    const auto status = watcher.Finish();
+    EXPECT_EQ(status.error_code(), code);
+    EXPECT_EQ(watcher.reason(), reason);
+    EXPECT_THAT(status.error_message(), MatchesRegex(message));
+  }
+  void ExpectOfOpen(const std::string& name, v1::WatchMode mode, std::uint32_t credits,
+                    StatusCode code, const std::string& reason, const std::string& message) {
+    OpenProducer();
+    WatchClient watcher(channel_);
+    watcher.Open(name, mode, credits);
+    Expect(watcher, code, reason, message);
+  }
+  // Of a watcher in mode `every` with one credit, while the producer goes on.
+  void ExpectOfFrames(std::uint64_t max_watcher_bytes, const std::string& reason,
+                      const std::string& message) {
+    options_.limits.max_watcher_bytes = max_watcher_bytes;
+    OpenProducer();
+    WatchClient watcher(channel_);
+    watcher.Open("tank", v1::WATCH_MODE_EVERY, 1);
+    ASSERT_TRUE(watcher.Receive().has_opened());
+    for (std::uint64_t k = 1; k <= 40; ++k) {
+      ASSERT_TRUE(producer_->SendAndReceive(BlobRequest(k, 1, k)).has_frame());
+    }
+    Expect(watcher, StatusCode::RESOURCE_EXHAUSTED, reason, message);
+  }
+
+  std::unique_ptr<StreamClient> producer_;
+};
+
+TEST_F(WatchRefused, PROTOCOL) {
+  OpenProducer();
+  WatchClient watcher(channel_);
+  watcher.Credit(1);
+  Expect(watcher, StatusCode::INVALID_ARGUMENT, "PROTOCOL", "");
+}
+
+TEST_F(WatchRefused, OUT_OF_RANGE) {
+  ExpectOfOpen("tank", v1::WATCH_MODE_LATEST, 0, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE", "");
+}
+
+TEST_F(WatchRefused, UNSUPPORTED) {
+  ExpectOfOpen("tank", static_cast<v1::WatchMode>(9), 1, StatusCode::INVALID_ARGUMENT,
+               "UNSUPPORTED", "");
+}
+
+TEST_F(WatchRefused, NO_SUCH_STREAM) {
+  ExpectOfOpen("tonk", v1::WATCH_MODE_LATEST, 1, StatusCode::NOT_FOUND, "NO_SUCH_STREAM",
+               "open.stream_name: \"tonk\"; must be the name of an open stream; ListStreams tells "
+               "them");
+}
+
+TEST_F(WatchRefused, TOO_MANY_WATCHERS) {
+  OpenProducer();
+  WatchClient first(channel_);
+  first.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  ASSERT_TRUE(first.Receive().has_opened());
+  WatchClient second(channel_);
+  Expect(second, StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS",
+         "watchers: 1 watch; must be at most 1; try again when one has left, or start the server "
+         "with a larger --max-watchers");
+}
+
+TEST_F(WatchRefused, FELL_BEHIND) {
+  ExpectOfFrames(200'000, "FELL_BEHIND",
+                 "watcher: [0-9]+ frames of [0-9]+ bytes behind; must be at most 200000 bytes "
+                 "behind in mode `every`; give credit sooner, or watch in mode `latest`");
+}
+
+TEST_F(WatchRefused, WATCHED_BYTES) {
+  ExpectOfFrames(100, "WATCHED_BYTES",
+                 "frame: [0-9]+ bytes; must be at most 100 to be watched; have the producer ask "
+                 "for less, or start the server with a larger --max-watcher-bytes");
+}
+
+}  // namespace
+}  // namespace partiemc::server
