@@ -48,7 +48,7 @@ std::vector<Table> TablesUnder(const std::string& heading) {
   for (std::string line; std::getline(page, line);) {
     if (line.starts_with("#")) under = line.starts_with(heading);
     if (!under || !line.starts_with("|") || line.starts_with("|--")) continue;
-    if (line.starts_with("| reason |")) {
+    if (line.starts_with("| reason |") || line.starts_with("| `WatchEnded.reason` |")) {
       tables.emplace_back();
     } else if (!tables.empty()) {
       tables.back().push_back(CellsOf(line));
@@ -69,7 +69,8 @@ std::vector<ErrorRow> CallRowsOf(const Table& table) {
 
 std::vector<ErrorRow> FrameErrorRows() {
   std::vector<ErrorRow> rows;
-  for (const auto& cells : TablesUnder("### A frame is refused").at(0)) {
+  const std::vector<Table> tables = TablesUnder("### A frame is refused");
+  for (const auto& cells : tables.at(0)) {
     for (const std::string& reason : ReasonsOf(cells.at(0))) rows.push_back({reason, ""});
   }
   return rows;
@@ -81,6 +82,16 @@ std::vector<ErrorRow> CallErrorRows() {
 
 std::vector<ErrorRow> WatchErrorRows() {
   return CallRowsOf(TablesUnder("### A call is refused").at(1));
+}
+
+std::vector<std::string> ReasonsInTables() {
+  std::vector<std::string> reasons;
+  for (const Table& table : TablesUnder("#")) {
+    for (const auto& cells : table) {
+      for (const std::string& reason : ReasonsOf(cells.at(0))) reasons.push_back(reason);
+    }
+  }
+  return reasons;
 }
 
 std::vector<std::string> ReasonsInCode() {

@@ -22,6 +22,9 @@ std::vector<ErrorRow> CallErrorRows();
 /// The rows of the table of watches behind it.
 std::vector<ErrorRow> WatchErrorRows();
 
+/// The reasons of all tables of the page, those of ends that are no errors too.
+std::vector<std::string> ReasonsInTables();
+
 /// Every reason that a constant `kReason... = "..."` of core, proto or server gives.
 std::vector<std::string> ReasonsInCode();
 

@@ -58,16 +58,18 @@ TEST_F(WatchRefused, PROTOCOL) {
   OpenProducer();
   WatchClient watcher(channel_);
   watcher.Credit(1);
-  Expect(watcher, StatusCode::INVALID_ARGUMENT, "PROTOCOL", "");
+  Expect(watcher, StatusCode::INVALID_ARGUMENT, "PROTOCOL",
+         "request: no `open`; the first must be `open`");
 }
 
 TEST_F(WatchRefused, OUT_OF_RANGE) {
-  ExpectOfOpen("tank", v1::WATCH_MODE_LATEST, 0, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE", "");
+  ExpectOfOpen("tank", v1::WATCH_MODE_LATEST, 0, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+               "open.credits: 0; must be at least 1");
 }
 
 TEST_F(WatchRefused, UNSUPPORTED) {
   ExpectOfOpen("tank", static_cast<v1::WatchMode>(9), 1, StatusCode::INVALID_ARGUMENT,
-               "UNSUPPORTED", "");
+               "UNSUPPORTED", "open.mode: 9; must be WATCH_MODE_LATEST or WATCH_MODE_EVERY");
 }
 
 TEST_F(WatchRefused, NO_SUCH_STREAM) {
