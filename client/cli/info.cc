@@ -32,11 +32,23 @@ std::string JsonArray(const std::vector<std::string>& words) {
   return array + "]";
 }
 
+bool SendsToken(const Credentials& credentials) {
+  return !credentials.token.empty() || !credentials.token_file.empty();
+}
+
+// How this client reached the server.
+std::string SecurityText(const Credentials& credentials) {
+  return Concat(credentials.tls ? "TLS" : "in the clear",
+                credentials.cert_file.empty() ? "" : ", own certificate",
+                SendsToken(credentials) ? ", token" : "");
+}
+
 }  // namespace
 
-std::string InfoText(const ServerInfo& info, const std::string& address) {
+std::string InfoText(const ServerInfo& info, const ServerFlags& server) {
   const std::vector<std::pair<std::string_view, std::string>> lines = {
-      {"server", address},
+      {"server", server.address},
+      {"security", SecurityText(server.credentials)},
       {"version", OneLine(info.version)},
       {"method version", Concat(info.method_version)},
       {"state", info.draining ? "draining: takes no new streams" : "serving"},
@@ -61,21 +73,23 @@ std::string InfoText(const ServerInfo& info, const std::string& address) {
   return text;
 }
 
-std::string InfoJson(const ServerInfo& info, const std::string& address) {
-  return Concat("{\"server\":", JsonString(address), ",\"version\":", JsonString(info.version),
-                ",\"method_version\":", info.method_version,
-                ",\"draining\":", info.draining ? "true" : "false",
-                ",\"open_streams\":", info.open_streams, ",\"max_streams\":", info.max_streams,
-                ",\"frames_in_flight\":", info.frames_in_flight,
-                ",\"compute_threads\":", info.compute_threads,
-                ",\"max_particles_per_frame\":", info.limits.max_particles_per_frame,
-                ",\"max_frame_bytes\":", info.limits.max_frame_bytes,
-                ",\"max_tiles_per_frame\":", info.limits.max_tiles_per_frame,
-                ",\"max_watchers\":", info.max_watchers,
-                ",\"idle_timeout_seconds\":", info.idle_timeout_seconds,
-                ",\"placements\":", JsonArray(NamesOf(info.placements)),
-                ",\"fills\":", JsonArray(NamesOf(info.fills)),
-                ",\"capabilities\":", JsonArray(info.capabilities), "}\n");
+std::string InfoJson(const ServerInfo& info, const ServerFlags& server) {
+  return Concat(
+      "{\"server\":", JsonString(server.address),
+      ",\"tls\":", server.credentials.tls ? "true" : "false",
+      ",\"token\":", SendsToken(server.credentials) ? "true" : "false",
+      ",\"version\":", JsonString(info.version), ",\"method_version\":", info.method_version,
+      ",\"draining\":", info.draining ? "true" : "false", ",\"open_streams\":", info.open_streams,
+      ",\"max_streams\":", info.max_streams, ",\"frames_in_flight\":", info.frames_in_flight,
+      ",\"compute_threads\":", info.compute_threads,
+      ",\"max_particles_per_frame\":", info.limits.max_particles_per_frame,
+      ",\"max_frame_bytes\":", info.limits.max_frame_bytes,
+      ",\"max_tiles_per_frame\":", info.limits.max_tiles_per_frame,
+      ",\"max_watchers\":", info.max_watchers,
+      ",\"idle_timeout_seconds\":", info.idle_timeout_seconds,
+      ",\"placements\":", JsonArray(NamesOf(info.placements)),
+      ",\"fills\":", JsonArray(NamesOf(info.fills)),
+      ",\"capabilities\":", JsonArray(info.capabilities), "}\n");
 }
 
 CLI::App* AddInfo(CLI::App& app, InfoFlags& flags) {
@@ -102,7 +116,7 @@ int Info(const InfoFlags& flags) {
     return Complain(wrong_flag ? kUsage : kServer, AsFlag(info.status()));
   }
   const std::string text =
-      flags.json ? InfoJson(*info, flags.server.address) : InfoText(*info, flags.server.address);
+      flags.json ? InfoJson(*info, flags.server) : InfoText(*info, flags.server);
   std::fputs(text.c_str(), stdout);
   return kGood;
 }

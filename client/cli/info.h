@@ -21,9 +21,9 @@ CLI::App* AddInfo(CLI::App& app, InfoFlags& flags);
 int Info(const InfoFlags& flags);
 
 /// Aligned lines for a person; every line ends in '\n'.
-std::string InfoText(const ServerInfo& info, const std::string& address);
+std::string InfoText(const ServerInfo& info, const ServerFlags& server);
 
 /// One JSON object on one line.
-std::string InfoJson(const ServerInfo& info, const std::string& address);
+std::string InfoJson(const ServerInfo& info, const ServerFlags& server);
 
 }  // namespace partiemc::client
