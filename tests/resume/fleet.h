@@ -1,0 +1,59 @@
+// Several servers as processes that come back where they were, and a proxy in front of them.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "service/server_process.h"
+
+namespace partiemc::resume {
+
+class Fleet {
+ public:
+  explicit Fleet(std::size_t count);
+
+  std::size_t size() const { return servers_.size(); }
+  /// Stay the same.
+  const std::vector<std::string>& addresses() const { return addresses_; }
+
+  /// kill -9, and once it has gone the same again at the same address.
+  void KillAndRestart(std::size_t server);
+  /// SIGTERM likewise; gives the exit code, nothing where it did not go within `grace`.
+  std::optional<int> TerminateAndRestart(std::size_t server, std::chrono::seconds grace);
+
+ private:
+  void Start(std::size_t server, const std::string& address);
+
+  std::vector<std::unique_ptr<server::ServerProcess>> servers_;
+  std::vector<std::string> addresses_;
+};
+
+/// What stands between clients and servers.
+enum class Door { kList, kHaproxy, kNginx };
+
+/// "List", "Haproxy" or "Nginx".
+std::string DoorName(Door door);
+
+/// A proxy as Debian has it, on a Unix socket. Ended when it goes out of scope.
+class ProxyProcess {
+ public:
+  /// Serves when it returns. A missing program fails the test.
+  ProxyProcess(Door door, const std::vector<std::string>& servers);
+  ~ProxyProcess();
+  ProxyProcess(const ProxyProcess&) = delete;
+  ProxyProcess& operator=(const ProxyProcess&) = delete;
+
+  std::string address() const { return "unix:" + socket_; }
+
+ private:
+  std::string folder_, socket_;
+  pid_t process_ = 0;
+};
+
+}  // namespace partiemc::resume

@@ -1,0 +1,44 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <utility>
+
+#include "resume/options.h"
+
+namespace partiemc::resume {
+
+Options& GetOptions() {
+  static Options options;
+  return options;
+}
+
+namespace {
+
+// Takes `--name N`, as often as there are; false for anything else.
+bool Parse(int argc, char** argv) {
+  Options& options = GetOptions();
+  for (int k = 1; k < argc; k += 2) {
+    bool known = false;
+    for (const auto& [name, value] :
+         {std::pair("--kills", &options.kills), std::pair("--terminations", &options.terminations),
+          std::pair("--faults", &options.faults), std::pair("--seed", &options.seed)}) {
+      if (name != std::string(argv[k]) || k + 1 >= argc) continue;
+      *value = std::strtoull(argv[k + 1], nullptr, 10);
+      known = true;
+    }
+    if (!known) return false;
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace partiemc::resume
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  if (partiemc::resume::Parse(argc, argv)) return RUN_ALL_TESTS();
+  std::fputs("usage: resume_test [--kills N] [--terminations N] [--faults N] [--seed N]\n", stderr);
+  return 2;
+}

@@ -1,0 +1,18 @@
+// How long the tests of this room take: a moment by default, as long as asked for by flags.
+#pragma once
+
+#include <cstdint>
+
+namespace partiemc::resume {
+
+struct Options {
+  std::uint64_t kills = 6;         ///< --kills: of servers, for each door.
+  std::uint64_t terminations = 6;  ///< --terminations: likewise, by SIGTERM.
+  std::uint64_t faults = 12;       ///< --faults: of the network.
+  std::uint64_t seed = 1;          ///< --seed: of what is random.
+};
+
+/// Of this run.
+Options& GetOptions();
+
+}  // namespace partiemc::resume

@@ -1,0 +1,121 @@
+#include "resume/workload.h"
+
+#include <limits>
+#include <thread>
+
+#include "client/recording/recording.h"
+#include "partiemc/client/local_stream.h"
+#include "server/moving_blob.h"
+
+namespace partiemc::resume {
+namespace {
+
+// Simulation time between frames; frame by frame also where a sequence begins again.
+constexpr double kTimeStep = 0.01;
+
+void Receive(client::FrameStream& stream, History& history) {
+  client::Event event;
+  for (;;) {
+    const auto received = stream.Receive(event);
+    if (!received.ok()) history.end = received.status();
+    if (!received.ok() || *received == client::Received::kEnd) return;
+    if (event.kind == client::Event::Kind::kReconnected) {
+      history.reconnections.push_back(Clock::now());
+    }
+    const bool is_result = event.kind == client::Event::Kind::kResult;
+    if (!is_result && event.kind != client::Event::Kind::kRefusal) continue;
+    Answer answer{.sequence = event.sequence, .is_result = is_result, .at = Clock::now()};
+    if (is_result) {
+      answer.rings_digest = event.frame.rings_digest;
+      answer.mesh_digest = event.frame.mesh_digest;
+      answer.time = event.time;
+      for (const auto& ring : event.frame.result.rings.measures) {
+        answer.identities.push_back(ring.identity);
+      }
+    }
+    history.answers.push_back(std::move(answer));
+  }
+}
+
+}  // namespace
+
+Workload DamBreak() {
+  const std::string path = PARTIEMC_SOURCE_DIR "/client/recordings/dam_break.pemc";
+  const auto reader = client::RecordingReader::Open(path, "");
+  EXPECT_TRUE(reader.ok()) << reader.status();
+  Workload workload{.name = "dam-break"};
+  workload.parameters.spacing = (*reader)->header().spacing;
+  client::RecordedFrame frame;
+  for (auto more = (*reader)->Next(frame); more.ok() && *more; more = (*reader)->Next(frame)) {
+    workload.frames.push_back({.positions = frame.positions, .ids = frame.ids});
+  }
+  return workload;
+}
+
+Workload Blob() {
+  Workload workload{.name = "blob"};
+  workload.parameters.spacing = server::kBlobSpacing;
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    workload.frames.push_back({.positions = server::MovingBlob(3, k)});
+    if (k % 11 != 10) continue;
+    workload.frames.back().positions[4] = std::numeric_limits<double>::quiet_NaN();
+    workload.frames.back().is_bad = true;
+  }
+  return workload;
+}
+
+Workload Leap() {
+  Workload workload{.name = "leap"};
+  workload.parameters.spacing = 1;
+  for (int k = 0; k < 30; ++k) {
+    Workload::Particles frame;
+    const auto add = [&](int x, int y, std::uint64_t id) {
+      frame.positions.insert(frame.positions.end(), {1.0 * x, 1.0 * y});
+      frame.ids.push_back(id);
+    };
+    for (int i = 0; i < 400; ++i) add(i % 40, i / 40, static_cast<std::uint64_t>(i));
+    for (int i = 0; i < 16; ++i) {
+      add(40 * k + i % 4, 20 + i / 4, 1000 + static_cast<std::uint64_t>(i));
+    }
+    workload.frames.push_back(std::move(frame));
+  }
+  return workload;
+}
+
+History RunThrough(client::FrameStream& stream, const Workload& workload, double per_second,
+                   const std::function<bool(std::uint64_t)>& enough) {
+  History history;
+  std::thread receiver([&] { Receive(stream, history); });
+  std::uint64_t sent = 0;
+  std::size_t most_in_flight = 0;
+  auto due = Clock::now();
+  while (!enough(sent)) {
+    if (per_second > 0) {
+      std::this_thread::sleep_until(due);
+      due = std::max(due, Clock::now() - std::chrono::milliseconds(100)) +
+            std::chrono::duration_cast<Clock::duration>(
+                std::chrono::duration<double>(1 / per_second));
+    }
+    const auto& particles = workload.at(sent);
+    const Frame frame{.positions = std::span<const double>(particles.positions),
+                      .ids = particles.ids};
+    const auto sequence = stream.Send(frame, kTimeStep * static_cast<double>(sent));
+    if (!sequence.ok()) break;  // The receiver is told, too.
+    EXPECT_EQ(*sequence, sent + 1);
+    ++sent;
+    most_in_flight = std::max(most_in_flight, stream.InFlight());
+  }
+  stream.FinishSending().IgnoreError();
+  receiver.join();
+  history.sent = sent;
+  history.most_in_flight = most_in_flight;
+  return history;
+}
+
+History RunUndisturbed(const Workload& workload, std::uint64_t frames) {
+  const auto stream = client::LocalStream::Open({.parameters = workload.parameters, .threads = 2});
+  EXPECT_TRUE(stream.ok()) << stream.status();
+  return RunThrough(**stream, workload, 0, [frames](std::uint64_t sent) { return sent >= frames; });
+}
+
+}  // namespace partiemc::resume
