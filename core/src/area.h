@@ -13,8 +13,8 @@ namespace partiemc {
 /// thirty particles and more approaches the sum of their volumes. Does nothing where volumes are
 /// unknown: neither given nor implied by a given spacing.
 ///
-/// The offset is at most 0.05 spacings, and fades where much more is wanted, which is a sign that
-/// the volumes are not those of this outline. It follows the frames' wishes by half of the
+/// The offset is at most 0.15 spacings, and fades where much more is wanted, which is a sign that
+/// the volumes are not those of this outline. It follows the frames' wishes by nine tenths of the
 /// difference a frame: `offset`, in spacings, is the one of the frame before (nothing at first) and
 /// becomes this frame's.
 /// Cost: linear in the points.

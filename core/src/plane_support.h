@@ -1,4 +1,4 @@
-// The sums over particles behind the support of a virtual plane, in the vectors of the processor
+// The sums over particles that say where a virtual plane belongs, in the vectors of the processor
 // at hand.
 #pragma once
 
@@ -13,6 +13,12 @@ struct SupportShape {
   double depth;  ///< In spacings.
 };
 
+/// Which particles count as volume below a plane, lengths in cells: those in a disc around its
+/// point, up to a height above it, by B(along, half_width) B(min(distance, 0), depth).
+struct StripShape {
+  double radius, half_width, height, depth;
+};
+
 /// A plane bent to a parabola, in cells relative to a tile.
 struct BentPlane {
   double x, y;
@@ -20,13 +26,17 @@ struct BentPlane {
   double curvature;
 };
 
-/// Weighted sum of the particles' distances to the parabola, positive above it.
+/// Over the particles of a support: the weighted sum of their distances to the parabola, positive
+/// above it, and the sum of those weights. Over those of a strip: the sum of their weights in the
+/// field, or their number where all weigh the same.
 struct SupportSums {
   double distance, weight;
+  double volume;
 };
 
-/// Sums over the particles of `near`, which lists all in the disc and may list more. Same bits for
-/// any processor, as SumAtPoint.
-SupportSums SumSupport(const NearRows& near, const SupportShape& shape, const BentPlane& plane);
+/// Sums over the particles of `near`, which lists all in both discs and may list more. Same bits
+/// for any processor, as SumAtPoint.
+SupportSums SumSupport(const NearRows& near, const SupportShape& support, const StripShape& strip,
+                       const BentPlane& plane);
 
 }  // namespace partiemc

@@ -30,6 +30,7 @@ struct FieldSample {
 /// read up to kPointPadding entries past the end of a row.
 struct NearRows {
   const float *x, *y;            ///< By entry, in cells relative to the tile.
+  const float* weight;           ///< By entry; null where all weigh Scale::uniform_weight.
   const std::uint32_t* offsets;  ///< First bucket of the first row.
   int rows, columns;             ///< Buckets to look at.
   int row_stride;                ///< Buckets from one row to the next.
@@ -112,6 +113,7 @@ inline NearRows PointField::RowsNear(std::uint32_t tile, double x, double y, dou
   const BucketRange rows = Buckets(y, radius);
   return {.x = x_.data(),
           .y = y_.data(),
+          .weight = weight_.empty() ? nullptr : weight_.data(),
           .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * bucket_columns_ +
                      columns.first,
           .rows = rows.last - rows.first + 1,

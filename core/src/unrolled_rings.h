@@ -13,7 +13,7 @@ struct UnrolledRing {
   std::ptrdiff_t count, margin;
   double *x, *y;                ///< Lattice coordinates of the world, in cells.
   double *normal_x, *normal_y;  ///< Unit, outward.
-  double *next_x, *next_y;      ///< Scratch: the normals of the next step.
+  double *next_x, *next_y;      ///< Scratch: the normals of the next step; then the strips.
   double* arc;                  ///< Length of the ring up to the vertex; ascends in margins, too.
   double* weight;               ///< l: half of the two segments at the vertex.
   double* base;                 ///< Shift along the normal that the vertex's plane asks for.

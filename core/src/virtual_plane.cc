@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "placement.h"
-#include "plane_support.h"
+#include "plane_estimates.h"
 #include "ring_windows.h"
 
 namespace partiemc {
@@ -27,8 +27,8 @@ constexpr std::size_t kMinRefinedVertices = 24;
 // tuning set; a factor of 1.5 either way changes no ratio by more than a few percent.
 constexpr double kNormalReach = 2.5;
 constexpr double kBilateralReach = 6;
-constexpr double kCurvatureReach = 2;
-constexpr double kSmoothingReach = 3;
+constexpr double kCurvatureReach = 1.5;
+constexpr double kSmoothingReach = 2.5;
 constexpr double kWidestReach =
     std::max({kNormalReach, kBilateralReach, kCurvatureReach, kSmoothingReach});
 static_assert(2 * kWidestReach <= kMinRefinedLength, "a window must not meet its own end");
@@ -36,20 +36,17 @@ static_assert(2 * kWidestReach <= kMinRefinedLength, "a window must not meet its
 // The kernel rounds a boundary of curvature kappa off by about half of h^2 kappa, and fills it by
 // more where it is concave: in a notch the particles of both flanks count.
 constexpr double kRoundingPerConvexCurvature = 0.5;
-constexpr double kRoundingPerConcaveCurvature = 0.8;
+constexpr double kRoundingPerConcaveCurvature = 1;
 // Tighter bends than this are noise: no kernel resolves them. In 1 / spacings.
 constexpr double kMaxCurvature = 0.6;
 
-// Particles that support a plane, in spacings: in a disc around the vertex, near it along the
-// plane, not beyond the plane, and with a weight that falls from the plane to twice the spacing
-// below it.
-constexpr double kSupportRadius = 2.5;
-constexpr double kSupportHalfWidth = 2;
-constexpr double kSupportHeight = 1.2;
-constexpr double kSupportDepth = 2;
-constexpr double kMaxSupportShift = 0.8;
-// A plane's own estimate is noisy: this share of it is believed.
-constexpr double kSupportTrust = 0.6;
+// A plane's own estimates are noisy: these shares of them are believed. The errors of the two are
+// different ones, so that both together do better than any one.
+constexpr double kSupportTrust = 0.35;
+constexpr double kStripTrust = 0.25;
+// Of a ring's mean strip, where volumes are known, in spacings; more is a sign that they are not
+// the volumes of this outline.
+constexpr double kMaxMeanStrip = 0.4;
 
 // Edge vertices nearer than this to the chord of their neighbours say nothing, in spacings.
 constexpr double kThinningDistance = 0.02;
@@ -196,28 +193,21 @@ void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
   }
 }
 
-// How far outside the vertex the particles near its plane put the boundary: their weighted mean
-// distance to the parabola of the given curvature, plus half a spacing. 0 without particles.
-double SupportAt(const VertexInput& input, std::size_t segment, const UnrolledRing& ring,
-                 std::ptrdiff_t k, double curvature) {
-  const double h = input.scale.spacing;
+// Whether particles have volumes that the outline should hold.
+bool VolumesAreKnown(const VertexInput& input) {
+  return input.parameters.spacing.has_value() || !input.frame.volumes.empty();
+}
+
+PlaneEstimates EstimatesAt(const VertexInput& input, std::size_t segment, const UnrolledRing& ring,
+                           std::ptrdiff_t k, double curvature) {
   const TilePoint p = Locate(input, segment, {ring.x[k], ring.y[k]});
-  if (p.tile == kNoTile) return 0;
-  const double radius = std::min(kSupportRadius * h, input.scale.kernel_radius);
-  const SupportSums sums = SumSupport(input.field.RowsNear(p.tile, p.x, p.y, radius),
-                                      {.radius = radius,
-                                       .half_width = kSupportHalfWidth * h,
-                                       .height = kSupportHeight * h,
-                                       .spacing = h,
-                                       .depth = kSupportDepth},
-                                      {.x = p.x,
-                                       .y = p.y,
-                                       .normal_x = ring.normal_x[k],
-                                       .normal_y = ring.normal_y[k],
-                                       .curvature = curvature});
-  if (sums.weight <= 0) return 0;
-  return std::clamp(sums.distance / sums.weight + h / 2, -kMaxSupportShift * h,
-                    kMaxSupportShift * h);
+  if (p.tile == kNoTile) return {};
+  return EstimatePlane(input.field, input.scale, p.tile,
+                       {.x = p.x,
+                        .y = p.y,
+                        .normal_x = ring.normal_x[k],
+                        .normal_y = ring.normal_y[k],
+                        .curvature = curvature});
 }
 
 // How far the kernel has moved a boundary of this curvature inward.
@@ -226,30 +216,45 @@ double RoundingOf(double curvature, double spacing) {
   return share * spacing * spacing * curvature;
 }
 
-// Step 3: how far each vertex's plane moves along its normal. Of the support only the variation
-// along the ring counts: its mean depends on how the particles are arranged, not on the shape.
+// Mean of a ring's values by length.
+double MeanOf(const UnrolledRing& ring, const double* values) {
+  double sum = 0, weight = 0;
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    sum += ring.weight[k] * values[k];
+    weight += ring.weight[k];
+  }
+  return weight > 0 ? sum / weight : 0;
+}
+
+// Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
+// along the ring counts: their means depend on how the particles are arranged, not on the shape.
+// Where volumes are known, the mean of the strips is part of the truth.
 void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const UnrolledRing& ring) {
   const double h = input.scale.spacing;
   const double max_curvature = kMaxCurvature / h;
   const VirtualPlaneSteps& steps = input.parameters.steps;
+  double* strips = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, kCurvatureReach * h);
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       const double curvature = std::clamp(ring.shift[k], -max_curvature, max_curvature);
       ring.base[k] = steps.curvature ? RoundingOf(curvature, h) : 0;
-      ring.shift[k] =
-          steps.support ? SupportAt(input, first_segment + k / 2, ring, k, curvature) - ring.base[k]
-                        : 0;
+      ring.shift[k] = strips[k] = 0;
+      if (!steps.support) continue;
+      const PlaneEstimates estimates =
+          EstimatesAt(input, first_segment + k / 2, ring, k, curvature);
+      ring.shift[k] = kSupportTrust * (estimates.support - ring.base[k]);
+      strips[k] = kStripTrust * (estimates.strip - ring.base[k]);
     }
   });
-  double sum = 0, weight = 0;
-  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    sum += ring.weight[k] * ring.shift[k];
-    weight += ring.weight[k];
+  const double mean_strip = MeanOf(ring, strips);
+  double mean = MeanOf(ring, ring.shift) + mean_strip;
+  if (VolumesAreKnown(input)) {
+    const double limit = kStripTrust * kMaxMeanStrip * h;
+    mean -= std::clamp(mean_strip, -limit, limit);
   }
-  const double mean = weight > 0 ? sum / weight : 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.base[k] += kSupportTrust * (ring.shift[k] - mean);
+    ring.base[k] += ring.shift[k] + strips[k] - mean;
   }
   ring.Repeat(ring.base, 0, ring.count);
 }

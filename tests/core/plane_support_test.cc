@@ -22,6 +22,7 @@ struct Rows {
         for (int n = static_cast<int>(random.Uniform(0, 4)); n > 0; --n) {
           x.push_back(static_cast<float>(random.Uniform(-3, 3)));
           y.push_back(static_cast<float>(random.Uniform(-3, 3)));
+          weight.push_back(static_cast<float>(random.Uniform(0.5, 2)));
           is_near.push_back(bucket < 3);
         }
         offsets.push_back(static_cast<std::uint32_t>(x.size()));
@@ -29,24 +30,32 @@ struct Rows {
     }
     x.resize(x.size() + kPointPadding);
     y.resize(y.size() + kPointPadding);
+    weight.resize(weight.size() + kPointPadding);
   }
 
-  NearRows AsNear() const {
+  NearRows AsNear(bool weighted) const {
     return {.x = x.data(),
             .y = y.data(),
+            .weight = weighted ? weight.data() : nullptr,
             .offsets = offsets.data(),
             .rows = 5,
             .columns = 3,
             .row_stride = 4};
   }
 
-  std::vector<float> x, y;
+  std::vector<float> x, y, weight;
   std::vector<bool> is_near;
   std::vector<std::uint32_t> offsets;
 };
 
 constexpr SupportShape kShape{
     .radius = 2.4, .half_width = 1.9, .height = 1.1, .spacing = 0.9, .depth = 2};
+constexpr StripShape kStrip{.radius = 2.6, .half_width = 1.4, .height = 1.3, .depth = 2.3};
+
+double Bump(double d, double reach) {
+  const double t = std::max(0.0, 1 - d * d / (reach * reach));
+  return t * t;
+}
 
 BentPlane RandomPlane(support::Random& random) {
   const double angle = random.Uniform(0, 6.3);
@@ -62,24 +71,69 @@ TEST(PlaneSupport, AgreesWithASumOverAllParticles) {
     support::Random random(seed);
     const Rows rows(random);
     const BentPlane plane = RandomPlane(random);
-    double sum = 0, weight = 0;
+    double sum = 0, weight = 0, count = 0, volume = 0;
     for (std::size_t k = 0; k < rows.is_near.size(); ++k) {
       const double dx = rows.x[k] - plane.x;
       const double dy = rows.y[k] - plane.y;
       const double along = plane.normal_x * dy - plane.normal_y * dx;
       const double above = plane.normal_x * dx + plane.normal_y * dy;
       const double distance = above + plane.curvature * along * along / 2;
-      if (!rows.is_near[k] || std::hypot(dx, dy) >= kShape.radius || above >= kShape.height) {
-        continue;
+      if (!rows.is_near[k]) continue;
+      if (std::hypot(dx, dy) < kShape.radius && above < kShape.height) {
+        const double w = Bump(along, kShape.half_width) *
+                         std::pow(std::max(0.0, distance / kShape.spacing + kShape.depth), 8);
+        sum += w * distance;
+        weight += w;
       }
-      const double t = std::max(0.0, 1 - along * along / (kShape.half_width * kShape.half_width));
-      const double w = t * t * std::pow(std::max(0.0, distance / kShape.spacing + kShape.depth), 8);
-      sum += w * distance;
-      weight += w;
+      if (std::hypot(dx, dy) < kStrip.radius && above < kStrip.height) {
+        const double w =
+            Bump(along, kStrip.half_width) * Bump(std::min(distance, 0.0), kStrip.depth);
+        count += w;
+        volume += rows.weight[k] * w;
+      }
     }
-    const SupportSums sums = SumSupport(rows.AsNear(), kShape, plane);
-    EXPECT_NEAR(sums.weight, weight, 1e-12 * weight) << "seed " << seed;
-    EXPECT_NEAR(sums.distance, sum, 1e-11 * weight) << "seed " << seed;
+    for (const bool weighted : {false, true}) {
+      const SupportSums sums = SumSupport(rows.AsNear(weighted), kShape, kStrip, plane);
+      EXPECT_NEAR(sums.weight, weight, 1e-12 * weight) << "seed " << seed;
+      EXPECT_NEAR(sums.distance, sum, 1e-11 * weight) << "seed " << seed;
+      const double expected = weighted ? volume : count;
+      EXPECT_NEAR(sums.volume, expected, 1e-12 * expected) << "seed " << seed;
+    }
+  }
+}
+
+// Rows of particles a spacing apart, of which the outermost lies half a spacing inside the
+// boundary.
+TEST(PlaneSupport, TellsByTheVolumeOfAStripHowFarInsideOfTheBoundaryAPlaneIs) {
+  constexpr StripShape kWide{.radius = 2.92, .half_width = 1.5, .height = 1.2, .depth = 2.5};
+  const double width = 16.0 / 15 * kWide.half_width;
+  support::Random random(8);
+  for (int round = 0; round < 200; ++round) {
+    const double inside = random.Uniform(-0.3, 0.3);
+    const double along_rows = random.Uniform(0, 1);
+    BentPlane plane = RandomPlane(random);
+    plane.curvature = 0;
+    std::vector<float> x, y;
+    for (int row = 0; row < 5; ++row) {
+      for (int k = -4; k <= 4; ++k) {
+        const double above = inside - row - 0.5;
+        const double along = k + along_rows;
+        x.push_back(static_cast<float>(plane.x + above * plane.normal_x - along * plane.normal_y));
+        y.push_back(static_cast<float>(plane.y + above * plane.normal_y + along * plane.normal_x));
+      }
+    }
+    const std::uint32_t offsets[] = {0, static_cast<std::uint32_t>(x.size())};
+    x.resize(x.size() + kPointPadding);
+    y.resize(y.size() + kPointPadding);
+    const NearRows near{.x = x.data(),
+                        .y = y.data(),
+                        .weight = nullptr,
+                        .offsets = offsets,
+                        .rows = 1,
+                        .columns = 1,
+                        .row_stride = 1};
+    const double volume = SumSupport(near, kShape, kWide, plane).volume;
+    EXPECT_NEAR(volume / width - 8.0 / 15 * kWide.depth, inside, 0.03) << "round " << round;
   }
 }
 
@@ -88,12 +142,14 @@ TEST(PlaneSupport, HasTheSameBitsForAnyInstructionSet) {
   for (int round = 0; round < 50; ++round) {
     const Rows rows(random);
     const BentPlane plane = RandomPlane(random);
+    const NearRows near = rows.AsNear(round % 2 == 1);
     std::vector<SupportSums> results;
     support::ForEachInstructionSet(
-        [&] { results.push_back(SumSupport(rows.AsNear(), kShape, plane)); });
+        [&] { results.push_back(SumSupport(near, kShape, kStrip, plane)); });
     for (const SupportSums& result : results) {
       EXPECT_EQ(result.distance, results[0].distance);
       EXPECT_EQ(result.weight, results[0].weight);
+      EXPECT_EQ(result.volume, results[0].volume);
     }
   }
 }
