@@ -58,6 +58,11 @@ std::string AsFlag(const absl::Status& status) {
   return line;
 }
 
+int ComplainOfServer(const absl::Status& status) {
+  const bool wrong_flag = status.code() == absl::StatusCode::kInvalidArgument;
+  return Complain(wrong_flag ? kUsage : kServer, AsFlag(status));
+}
+
 void CatchInterrupts() {
   struct sigaction action = {};
   action.sa_handler = OnSignal;

@@ -21,6 +21,10 @@ std::string OneLine(const absl::Status& status);
 /// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...".
 std::string AsFlag(const absl::Status& status);
 
+/// Complains of a server that could not be reached, or of the flags that say how, which
+/// INVALID_ARGUMENT tells; returns kServer or kUsage.
+int ComplainOfServer(const absl::Status& status);
+
 /// From here on SIGINT and SIGTERM only set a flag, the second one ends the program at once.
 void CatchInterrupts();
 bool Interrupted();

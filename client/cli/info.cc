@@ -1,6 +1,5 @@
 #include "cli/info.h"
 
-#include <chrono>
 #include <cstdio>
 #include <utility>
 #include <vector>
@@ -92,13 +91,9 @@ std::string InfoJson(const ServerInfo& info, const ServerFlags& server) {
       ",\"capabilities\":", JsonArray(info.capabilities), "}\n");
 }
 
-CLI::App* AddInfo(CLI::App& app, InfoFlags& flags) {
+CLI::App* AddInfo(CLI::App& app, QueryFlags& flags) {
   CLI::App* verb = app.add_subcommand("info", "Ask a server for its version and limits");
-  AddServerFlags(*verb, flags.server, "Server");
-  verb->add_option("--deadline", flags.deadline_seconds, "Seconds that the answer may take")
-      ->check(CLI::Range(0.001, 86400.0))
-      ->capture_default_str();
-  verb->add_flag("--json", flags.json, "One JSON object on one line");
+  AddQueryFlags(*verb, flags);
   verb->footer(
       "Examples:\n"
       "  partiemc info --server 127.0.0.1:50051\n"
@@ -106,15 +101,9 @@ CLI::App* AddInfo(CLI::App& app, InfoFlags& flags) {
   return verb;
 }
 
-int Info(const InfoFlags& flags) {
-  const auto info = GetServerInfo(flags.server.address,
-                                  std::chrono::duration_cast<std::chrono::milliseconds>(
-                                      std::chrono::duration<double>(flags.deadline_seconds)),
-                                  flags.server.credentials);
-  if (!info.ok()) {
-    const bool wrong_flag = info.status().code() == absl::StatusCode::kInvalidArgument;
-    return Complain(wrong_flag ? kUsage : kServer, AsFlag(info.status()));
-  }
+int Info(const QueryFlags& flags) {
+  const auto info = GetServerInfo(flags.server.address, flags.Deadline(), flags.server.credentials);
+  if (!info.ok()) return ComplainOfServer(info.status());
   const std::string text =
       flags.json ? InfoJson(*info, flags.server) : InfoText(*info, flags.server);
   std::fputs(text.c_str(), stdout);

@@ -9,16 +9,10 @@
 
 namespace partiemc::client {
 
-struct InfoFlags {
-  ServerFlags server;
-  double deadline_seconds = 5;
-  bool json = false;
-};
-
-CLI::App* AddInfo(CLI::App& app, InfoFlags& flags);
+CLI::App* AddInfo(CLI::App& app, QueryFlags& flags);
 
 /// Returns the exit code.
-int Info(const InfoFlags& flags);
+int Info(const QueryFlags& flags);
 
 /// Aligned lines for a person; every line ends in '\n'.
 std::string InfoText(const ServerInfo& info, const ServerFlags& server);

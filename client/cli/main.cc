@@ -35,8 +35,8 @@ int main(int argc, char** argv) {
   app.footer("`partiemc VERB --help` tells more and has examples.");
   partiemc::client::ReplayFlags replay;
   partiemc::client::WatchFlags watch;
-  partiemc::client::StreamsFlags streams;
-  partiemc::client::InfoFlags info;
+  partiemc::client::QueryFlags streams;
+  partiemc::client::QueryFlags info;
   partiemc::client::ConvertFlags convert;
   partiemc::client::EvaluateFlags evaluate;
   const CLI::App* replay_verb = AddReplay(app, replay);

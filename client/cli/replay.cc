@@ -360,10 +360,7 @@ int Replay(const ReplayFlags& flags) {
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
   const auto stream = OpenStream(flags, *parameters, outputs->WantsNormals());
-  if (!stream.ok()) {
-    const bool wrong_flag = stream.status().code() == absl::StatusCode::kInvalidArgument;
-    return Complain(wrong_flag ? kUsage : kServer, AsFlag(stream.status()));
-  }
+  if (!stream.ok()) return ComplainOfServer(stream.status());
 
   Progress::Options progress_options = Progress::ForStandardError();
   progress_options.quiet = flags.quiet;

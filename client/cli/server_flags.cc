@@ -49,4 +49,17 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
   return server;
 }
 
+std::chrono::milliseconds QueryFlags::Deadline() const {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::duration<double>(deadline_seconds));
+}
+
+void AddQueryFlags(CLI::App& app, QueryFlags& flags) {
+  AddServerFlags(app, flags.server, "Server");
+  app.add_option("--deadline", flags.deadline_seconds, "Seconds that the answer may take")
+      ->check(CLI::Range(0.001, 86400.0))
+      ->capture_default_str();
+  app.add_flag("--json", flags.json, "One JSON object on one line");
+}
+
 }  // namespace partiemc::client

@@ -1,6 +1,7 @@
 // The flags of every verb that speaks to a server: where it is and how to be sure of each other.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include "CLI/CLI.hpp"
@@ -17,5 +18,17 @@ struct ServerFlags {
 /// outlives the parsing. The token itself is read from PARTIEMC_TOKEN alone: a command line is no
 /// place for a secret.
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group);
+
+/// Of a verb that asks a server one question and prints the answer.
+struct QueryFlags {
+  ServerFlags server;
+  double deadline_seconds = 5;
+  bool json = false;
+
+  std::chrono::milliseconds Deadline() const;
+};
+
+/// Adds the flags of AddServerFlags, --deadline and --json.
+void AddQueryFlags(CLI::App& app, QueryFlags& flags);
 
 }  // namespace partiemc::client

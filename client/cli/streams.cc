@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <vector>
 
@@ -76,13 +75,9 @@ std::string StreamsJson(std::span<const StreamSummary> streams, const std::strin
   return Concat("{\"server\":", JsonString(address), ",\"streams\":[", list, "]}\n");
 }
 
-CLI::App* AddStreams(CLI::App& app, StreamsFlags& flags) {
+CLI::App* AddStreams(CLI::App& app, QueryFlags& flags) {
   CLI::App* verb = app.add_subcommand("streams", "List the streams that are open on a server");
-  AddServerFlags(*verb, flags.server, "Server");
-  verb->add_option("--deadline", flags.deadline_seconds, "Seconds that the answer may take")
-      ->check(CLI::Range(0.001, 86400.0))
-      ->capture_default_str();
-  verb->add_flag("--json", flags.json, "One JSON object on one line");
+  AddQueryFlags(*verb, flags);
   verb->footer(
       "Examples:\n"
       "  partiemc streams\n"
@@ -91,15 +86,10 @@ CLI::App* AddStreams(CLI::App& app, StreamsFlags& flags) {
   return verb;
 }
 
-int Streams(const StreamsFlags& flags) {
-  const auto streams = ListStreams(flags.server.address,
-                                   std::chrono::duration_cast<std::chrono::milliseconds>(
-                                       std::chrono::duration<double>(flags.deadline_seconds)),
-                                   flags.server.credentials);
-  if (!streams.ok()) {
-    const bool wrong_flag = streams.status().code() == absl::StatusCode::kInvalidArgument;
-    return Complain(wrong_flag ? kUsage : kServer, AsFlag(streams.status()));
-  }
+int Streams(const QueryFlags& flags) {
+  const auto streams =
+      ListStreams(flags.server.address, flags.Deadline(), flags.server.credentials);
+  if (!streams.ok()) return ComplainOfServer(streams.status());
   if (streams->empty() && !flags.json) {
     std::puts("no open streams");
     return kGood;

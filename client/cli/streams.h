@@ -10,16 +10,10 @@
 
 namespace partiemc::client {
 
-struct StreamsFlags {
-  ServerFlags server;
-  double deadline_seconds = 5;
-  bool json = false;
-};
-
-CLI::App* AddStreams(CLI::App& app, StreamsFlags& flags);
+CLI::App* AddStreams(CLI::App& app, QueryFlags& flags);
 
 /// Returns the exit code.
-int Streams(const StreamsFlags& flags);
+int Streams(const QueryFlags& flags);
 
 /// An aligned table for a person; every line ends in '\n'.
 std::string StreamsText(std::span<const StreamSummary> streams);

@@ -173,10 +173,7 @@ int Watch(const WatchFlags& flags) {
                      .credentials = flags.server.credentials,
                      .deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
                          std::chrono::duration<double>(flags.deadline_seconds))});
-  if (!watcher.ok()) {
-    const bool wrong_flag = watcher.status().code() == absl::StatusCode::kInvalidArgument;
-    return Complain(wrong_flag ? kUsage : kServer, AsFlag(watcher.status()));
-  }
+  if (!watcher.ok()) return ComplainOfServer(watcher.status());
 
   Progress::Options progress_options = Progress::ForStandardError();
   progress_options.quiet = flags.quiet;

@@ -1,5 +1,6 @@
 #include "library/channel.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <system_error>
@@ -24,6 +25,9 @@ constexpr int kLongestBackoffMs = 500;
 // megabytes under way, too.
 constexpr int kKeepaliveMs = 4000;
 constexpr int kKeepaliveTimeoutMs = 6000;
+
+// Enough for a server that starts at the same time.
+constexpr std::chrono::milliseconds kConnectTimeout(2000);
 
 // For asking gRPC why there is no connection; it knows the answer already.
 constexpr std::chrono::seconds kReasonTimeout(1);
@@ -112,6 +116,16 @@ absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::s
   return absl::UnavailableError(absl::StrCat("no server at ", address, " (", reason,
                                              "): start one with `partiemc-server --address ",
                                              address, "`, or use --local"));
+}
+
+absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(
+    const std::string& address, const Credentials& credentials,
+    std::chrono::milliseconds deadline) {
+  auto channel = MakeChannel(address, credentials);
+  if (!channel.ok()) return channel;
+  const absl::Status connected = Connect(*channel, address, std::min(deadline, kConnectTimeout));
+  if (!connected.ok()) return connected;
+  return channel;
 }
 
 absl::Status FromGrpc(const grpc::Status& status, const std::string& address) {

@@ -25,6 +25,12 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout);
 
+/// A channel for one call that has until `deadline`: as MakeChannel, then Connect, which gets as
+/// long as a server needs that starts at the same time.
+absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(const std::string& address,
+                                                                const Credentials& credentials,
+                                                                std::chrono::milliseconds deadline);
+
 /// Why a call has failed, in the system's words, which gRPC's end in:
 /// "...: Failed to connect to remote host: Connection refused".
 std::string Reason(const grpc::Status& status);

@@ -47,8 +47,8 @@ absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string
   addresses.insert(addresses.end(), options.fallback_addresses.begin(),
                    options.fallback_addresses.end());
   for (const std::string& one : addresses) {
-    if (auto channel = MakeChannel(one, options.credentials); !channel.ok())
-      return channel.status();
+    const auto channel = MakeChannel(one, options.credentials);
+    if (!channel.ok()) return channel.status();
   }
   std::unique_ptr<ResumingStream> stream(new ResumingStream(std::move(addresses), options));
   Lock lock(stream->monitor_.mutex);

@@ -2,7 +2,6 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <algorithm>
 #include <memory>
 
 #include "library/channel.h"
@@ -11,9 +10,6 @@
 
 namespace partiemc::client {
 namespace {
-
-// As for a stream: enough for a server that starts at the same time.
-constexpr std::chrono::milliseconds kConnectTimeout(2000);
 
 StreamSummary Decode(const v1::StreamSummary& message) {
   StreamSummary summary{.stream_id = message.stream_id(),
@@ -38,10 +34,8 @@ absl::StatusOr<std::vector<StreamSummary>> ListStreams(std::string_view address_
                                                        const Credentials& credentials) {
   const std::string address(address_text);
   const auto until = std::chrono::system_clock::now() + deadline;
-  const auto channel = MakeChannel(address, credentials);
+  const auto channel = ConnectedChannel(address, credentials, deadline);
   if (!channel.ok()) return channel.status();
-  const absl::Status connected = Connect(*channel, address, std::min(deadline, kConnectTimeout));
-  if (!connected.ok()) return connected;
 
   const auto stub = v1::ReconstructionService::NewStub(*channel);
   std::vector<StreamSummary> streams;
