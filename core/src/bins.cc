@@ -1,8 +1,5 @@
 #include "bins.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -13,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "coordinate_block.h"
+#include "parallel.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -217,16 +215,14 @@ bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   const auto homes = static_cast<std::uint32_t>(scratch.homes.size());
   const ReachedTiles reached(reach);
   scratch.reached.resize(homes);
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, homes), [&](const auto& range) {
-    for (std::uint32_t k = range.begin(); k < range.end(); ++k) {
-      // In the middle of a body nothing is to be added, whatever its particles reach.
-      scratch.reached[k] = 0;
-      if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) continue;
-      const std::uint32_t end =
-          k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.entries.size());
-      scratch.reached[k] =
-          reached.Of(std::span(bins.entries).subspan(scratch.offsets[k], end - scratch.offsets[k]));
-    }
+  ParallelFor(homes, [&](std::uint32_t k) {
+    // In the middle of a body nothing is to be added, whatever its particles reach.
+    scratch.reached[k] = 0;
+    if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) return;
+    const std::uint32_t end =
+        k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.entries.size());
+    scratch.reached[k] =
+        reached.Of(std::span(bins.entries).subspan(scratch.offsets[k], end - scratch.offsets[k]));
   });
   for (std::uint32_t k = 0; k < homes; ++k) {
     ReachedTiles::ForEach(scratch.homes[k], scratch.reached[k],
@@ -297,7 +293,7 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   const std::size_t length = std::max(kMinStretch, (count + kMaxStretches - 1) / kMaxStretches);
   scratch.stretches.resize((count + length - 1) / length);
   const auto for_each_stretch = [&](auto visit) {
-    tbb::parallel_for(std::size_t{0}, scratch.stretches.size(), [&](std::size_t k) {
+    ParallelFor(scratch.stretches.size(), [&](std::size_t k) {
       visit(scratch.stretches[k], k * length, std::min(count, (k + 1) * length));
     });
   };

@@ -1,13 +1,11 @@
 #include "components.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <bit>
 #include <limits>
 #include <numeric>
 
 #include "bits.h"
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -186,12 +184,7 @@ void Components::CountParticles(const ParticleBins& bins, const Crossings& cross
                                 std::span<std::uint64_t> counts, std::span<double> weights) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
   shares_.resize(tiles);
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, tiles),
-                    [&](const tbb::blocked_range<std::uint32_t>& range) {
-                      for (std::uint32_t tile = range.begin(); tile < range.end(); ++tile) {
-                        shares_[tile] = ShareOf(bins, crossings, tile);
-                      }
-                    });
+  ParallelFor(tiles, [&](std::uint32_t tile) { shares_[tile] = ShareOf(bins, crossings, tile); });
   for (std::uint32_t tile = 0; tile < tiles; ++tile) {
     const TileShare& share = shares_[tile];
     if (share.component == kNoComponent) continue;

@@ -1,12 +1,10 @@
 #include "crossings.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 
 #include "bits.h"
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -132,12 +130,7 @@ void FillTile(const TileDirectory& directory, const LevelSet& level_set, std::ui
 
 template <typename Visit>
 void ForEachTile(std::size_t count, Visit visit) {
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(count)),
-                    [&](const tbb::blocked_range<std::uint32_t>& range) {
-                      for (std::uint32_t tile = range.begin(); tile < range.end(); ++tile) {
-                        visit(tile);
-                      }
-                    });
+  ParallelFor(static_cast<std::uint32_t>(count), visit);
 }
 
 }  // namespace

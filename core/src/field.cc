@@ -1,14 +1,12 @@
 #include "field.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
 #include "level_set_formula.h"
 #include "near_entries.h"
+#include "parallel.h"
 #include "tile_kernels.h"
 
 namespace partiemc {
@@ -147,11 +145,7 @@ void SampleBand(const ParticleBins& bins, const Scale& scale, std::uint32_t tile
 
 template <typename Visit>
 void ForEachTile(const ParticleBins& bins, Visit visit) {
-  tbb::parallel_for(
-      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(bins.tiles.size())),
-      [&](const tbb::blocked_range<std::uint32_t>& range) {
-        for (std::uint32_t tile = range.begin(); tile < range.end(); ++tile) visit(tile);
-      });
+  ParallelFor(static_cast<std::uint32_t>(bins.tiles.size()), visit);
 }
 
 }  // namespace

@@ -1,8 +1,5 @@
 #include "frame_view.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -11,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "distinct_ids.h"
+#include "parallel.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -43,12 +41,11 @@ bool AreCoordinates(std::span<const Real> values) {
 template <typename Real>
 bool AreCoordinatesInParallel(std::span<const Real> values) {
   std::atomic<bool> good = true;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, values.size(), kCheckedAtOnce),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      if (!AreCoordinates(values.subspan(range.begin(), range.size()))) {
-                        good.store(false, std::memory_order_relaxed);
-                      }
-                    });
+  ParallelForRanges(values.size(), kCheckedAtOnce, [&](std::size_t first, std::size_t last) {
+    if (!AreCoordinates(values.subspan(first, last - first))) {
+      good.store(false, std::memory_order_relaxed);
+    }
+  });
   return good;
 }
 

@@ -1,14 +1,13 @@
 #include "interior.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -174,10 +173,9 @@ void ExcludeBox(const TileDirectory& directory, const CellBox& box, std::vector<
 void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
                          std::span<const std::uint32_t> offsets, std::span<const double> roots,
                          double cell_size, std::vector<TileBits>& tiles) {
-  using Range = tbb::blocked_range<std::size_t>;
-  tbb::parallel_for(Range(0, points.size() / 2, kExcludeGrain), [&](const Range& range) {
-    auto after = std::upper_bound(offsets.begin(), offsets.end(), range.begin());
-    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+  ParallelForRanges(points.size() / 2, kExcludeGrain, [&](std::size_t first, std::size_t last) {
+    auto after = std::upper_bound(offsets.begin(), offsets.end(), first);
+    for (std::size_t k = first; k < last; ++k) {
       while (k == *after) ++after;
       const std::size_t next = k + 1 == *after ? *(after - 1) : k + 1;
       CellBox box;

@@ -8,14 +8,13 @@
 // few cells can hold runs that reach it.
 #include "intersections.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
 #include <limits>
 
+#include "parallel.h"
 #include "predicates.h"
 
 namespace partiemc {
@@ -179,7 +178,7 @@ void PairSearch::CollectRuns(std::span<const std::uint32_t> ring_offsets) {
                       .ring_end = end});
     }
   }
-  tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t k) { Measure(runs[k]); });
+  ParallelFor(runs.size(), [&](std::size_t k) { Measure(runs[k]); });
 }
 
 void PairSearch::Measure(Run& run) const {
@@ -299,13 +298,12 @@ void PairSearch::ForEachPair(const Grids& grids, std::uint32_t index, Visit visi
 /// Finds out which runs find pairs; returns whether any does.
 bool PairSearch::FindPairs(const Grids& grids) {
   std::atomic<bool> has_pair = false;
-  tbb::parallel_for(
-      std::uint32_t{0}, static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t run) {
-        bool finds_pair = false;
-        ForEachPair(grids, run, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
-        buffers_.runs[run].finds_pair = finds_pair;
-        if (finds_pair) has_pair.store(true, std::memory_order_relaxed);
-      });
+  ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t run) {
+    bool finds_pair = false;
+    ForEachPair(grids, run, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
+    buffers_.runs[run].finds_pair = finds_pair;
+    if (finds_pair) has_pair.store(true, std::memory_order_relaxed);
+  });
   return has_pair;
 }
 

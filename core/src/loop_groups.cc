@@ -1,8 +1,8 @@
 #include "loop_groups.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
+
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -56,7 +56,7 @@ bool LoopGroups::Triangulate(std::span<const double> points,
                              std::vector<std::uint32_t>& triangles) {
   const std::size_t batch_count = FillBatches();
   Clear();
-  tbb::parallel_for(std::size_t{0}, batch_count, [&](std::size_t k) {
+  ParallelFor(batch_count, [&](std::size_t k) {
     Batch& batch = batches_[k];
     batch.triangles.clear();
     batch.is_done =

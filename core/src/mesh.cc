@@ -1,12 +1,11 @@
 #include "mesh.h"
 
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 
 #include "bits.h"
+#include "parallel.h"
 #include "predicates.h"
 
 namespace partiemc {
@@ -178,13 +177,13 @@ absl::Status MeshBuilder::FillInterior() {
 // not depend on it.
 absl::Status MeshBuilder::FillBand() {
   absl::Status status;
-  tbb::parallel_invoke([&] { status = TriangulateLoops(TriangleClass::kBoundary); },
-                       [&] {
-                         if (input_.parameters.fill != Fill::kGreedy) return;
-                         scratch_.rectangles.clear();
-                         MergeCells(input_.directory, input_.crossings.tiles, scratch_.merge,
-                                    scratch_.rectangles);
-                       });
+  ParallelInvoke([&] { status = TriangulateLoops(TriangleClass::kBoundary); },
+                 [&] {
+                   if (input_.parameters.fill != Fill::kGreedy) return;
+                   scratch_.rectangles.clear();
+                   MergeCells(input_.directory, input_.crossings.tiles, scratch_.merge,
+                              scratch_.rectangles);
+                 });
   return status;
 }
 

@@ -1,11 +1,10 @@
 #include "normals.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -149,10 +148,9 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
     SetNormal(plane.gradient_x, plane.gradient_y, plane);
     Orient(FindPrevious(previous, bins.tiles, cell), plane);
   };
-  using Range = tbb::blocked_range<std::size_t>;
-  tbb::parallel_for(Range(0, planes.size()), [&](const Range& range) {
-    auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), range.begin());
-    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+  ParallelForRanges(planes.size(), 1, [&](std::size_t first, std::size_t last) {
+    auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
+    for (std::size_t k = first; k < last; ++k) {
       if (k == *end) ++end;
       estimate(k, k + 1 == *end ? *(end - 1) : k + 1);
     }

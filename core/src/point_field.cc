@@ -1,7 +1,5 @@
 #include "point_field.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -9,6 +7,7 @@
 #include "cell_mask.h"
 #include "level_set_formula.h"
 #include "near_entries.h"
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -31,7 +30,7 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
   // Farther than a mask holds everything is asked for.
   const int distance = static_cast<int>(std::min<double>(std::ceil(wander), kMaskMargin));
   const bool all = wander > kMaskMargin;
-  tbb::parallel_for(std::uint32_t{0}, tiles, [&](std::uint32_t tile) {
+  ParallelFor(tiles, [&](std::uint32_t tile) {
     const Neighbourhood& near = bins.tiles.neighbours(tile);
     if (!std::any_of(near.begin(), near.end(), is_active)) return;
     asked_[tile] = CellsNear(bins.tiles, tile, distance, [&](std::uint32_t of) -> const BitRows& {
@@ -60,7 +59,7 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
   }
   bucket_offsets_.resize(bucket_count);
   const auto for_each_indexed = [&](auto visit) {
-    tbb::parallel_for(std::uint32_t{0}, tiles, [&](std::uint32_t tile) {
+    ParallelFor(tiles, [&](std::uint32_t tile) {
       if (IsIndexed(tile)) visit(tile);
     });
   };

@@ -1,12 +1,10 @@
 #include "rings.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <span>
 #include <utility>
 
+#include "parallel.h"
 #include "partiemc/result.h"
 
 namespace partiemc {
@@ -26,9 +24,8 @@ void Trace(const TileDirectory& directory, const Crossings& crossings,
   constexpr std::uint32_t kTaken = 0xffffffff;
   const std::size_t count = crossings.segments.size();
   next.resize(count);
-  using Range = tbb::blocked_range<std::size_t>;
-  tbb::parallel_for(Range(0, count, kSegmentGrain), [&](const Range& range) {
-    for (std::size_t segment = range.begin(); segment < range.end(); ++segment) {
+  ParallelForRanges(count, kSegmentGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t segment = first; segment < last; ++segment) {
       next[segment] = NextSegment(directory, crossings, static_cast<std::uint32_t>(segment));
     }
   });
@@ -65,10 +62,10 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
 
 void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
                  const Crossings& crossings, RingTopology& rings) {
-  rings.entries.resize(rings.segments.size());
-  using Range = tbb::blocked_range<std::size_t>;
-  tbb::parallel_for(Range(0, rings.segments.size(), kSegmentGrain), [&](const Range& range) {
-    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+  const std::size_t count = rings.segments.size();
+  rings.entries.resize(count);
+  ParallelForRanges(count, kSegmentGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
       const Segment& segment = crossings.segments[rings.segments[k]];
       rings.entries[k] =
           EdgeCrossing(directory, level_set, crossings.cells[segment.cell], segment.entry);

@@ -1,9 +1,5 @@
 #include "spacing.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -12,6 +8,8 @@
 #include <limits>
 #include <span>
 #include <vector>
+
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -64,7 +62,7 @@ void BuildTree(std::span<WorldPosition> positions, int axis) {
   const auto build_lower = [=] { BuildTree(positions.first(middle), 1 - axis); };
   const auto build_upper = [=] { BuildTree(positions.subspan(middle + 1), 1 - axis); };
   if (positions.size() >= kMinParallel) {
-    tbb::parallel_invoke(build_lower, build_upper);
+    ParallelInvoke(build_lower, build_upper);
   } else {
     build_lower();
     build_upper();
@@ -132,7 +130,7 @@ std::optional<double> SpacingOfDensity(std::span<const WorldPosition> tree,
                                        std::span<const WorldPosition> asked, double radius,
                                        std::vector<double>& weights) {
   weights.resize(asked.size());
-  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t k) {
+  ParallelFor(asked.size(), [&](std::size_t k) {
     const WorldPosition& direction = kDirections[k % std::size(kDirections)];
     const WorldPosition point{asked[k].x + radius * direction.x, asked[k].y + radius * direction.y};
     weights[k] = FilledWeight(tree, point, radius);
@@ -170,9 +168,7 @@ std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingSc
   });
   // Sorted and without duplicates: the tree is the same for any order of the particles, and no
   // query wades through a million copies of itself.
-  tbb::parallel_sort(positions.begin(), positions.end(), [](const auto& a, const auto& b) {
-    return a.x != b.x ? a.x < b.x : a.y < b.y;
-  });
+  ParallelSort(positions);
   const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
   positions.erase(std::unique(positions.begin(), positions.end(), same), positions.end());
   BuildTree(positions, 0);
@@ -184,7 +180,7 @@ std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingSc
     if (HashOf(position) % stride == 0) asked.push_back(position);
   }
   distances.resize(asked.size());
-  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t k) {
+  ParallelFor(asked.size(), [&](std::size_t k) {
     scratch.distances[k] =
         std::sqrt(NearestSquare(scratch.positions, scratch.asked[k], 0, infinity));
   });

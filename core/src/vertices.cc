@@ -1,11 +1,10 @@
 #include "vertices.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cmath>
 
 #include "area.h"
 #include "measure.h"
+#include "parallel.h"
 #include "placement.h"
 #include "virtual_plane.h"
 
@@ -162,7 +161,7 @@ void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
   const int per_segment = input.parameters.placement == Placement::kQef ? 2 : 1;
   placed.points.resize(2 * per_segment * topology.segments.size());
   placed.point_of_segment.resize(topology.segments.size());
-  tbb::parallel_for(std::size_t{0}, topology.segments.size(), [&](std::size_t k) {
+  ParallelFor(topology.segments.size(), [&](std::size_t k) {
     PlaceSegment(input, k, placed.points.data() + 2 * per_segment * k);
   });
 

@@ -1,12 +1,10 @@
 #include "virtual_plane.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "parallel.h"
 #include "placement.h"
 #include "plane_estimates.h"
 #include "ring_windows.h"
@@ -172,11 +170,10 @@ void ForEachStretch(const UnrolledRing& ring, Body body) {
     body(0, ring.count);
     return;
   }
-  tbb::parallel_for(std::ptrdiff_t{0}, (ring.count + kStretch - 1) / kStretch,
-                    [&](std::ptrdiff_t stretch) {
-                      const std::ptrdiff_t begin = stretch * kStretch;
-                      body(begin, std::min(begin + kStretch, ring.count));
-                    });
+  ParallelFor((ring.count + kStretch - 1) / kStretch, [&](std::ptrdiff_t stretch) {
+    const std::ptrdiff_t begin = stretch * kStretch;
+    body(begin, std::min(begin + kStretch, ring.count));
+  });
 }
 
 // Step 2: normals averaged along the ring, first by distance, then also by angle.
@@ -299,15 +296,14 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size());
-  tbb::parallel_for(std::size_t{0}, topology.segments.size(),
-                    [&](std::size_t segment) { FindRoots(input, segment, vertices); });
+  ParallelFor(topology.segments.size(),
+              [&](std::size_t segment) { FindRoots(input, segment, vertices); });
   UnrolledRings& unrolled = vertices.unrolled;
   unrolled.sizes().resize(topology.RingCount());
-  tbb::parallel_for(std::size_t{0}, topology.RingCount(), [&](std::size_t ring) {
-    unrolled.sizes()[ring] = SizeOf(input, ring, vertices);
-  });
+  ParallelFor(topology.RingCount(),
+              [&](std::size_t ring) { unrolled.sizes()[ring] = SizeOf(input, ring, vertices); });
   unrolled.Allocate();
-  tbb::parallel_for(std::size_t{0}, topology.RingCount(), [&](std::size_t r) {
+  ParallelFor(topology.RingCount(), [&](std::size_t r) {
     if (UnrolledRing ring = unrolled[r]; ring.count > 0) {
       const std::size_t first_segment = topology.offsets[r];
       Unroll(vertices, 2 * first_segment, ring);

@@ -128,6 +128,22 @@ Violations CoreIsPlain(const SourceTree& tree) {
   return violations;
 }
 
+Violations CoreHasOneDoorToTasks(const SourceTree& tree) {
+  static const std::string kDoor = "core/src/parallel.cc";
+  static const std::regex kTasks("(oneapi/)?tbb/.*");
+  Violations violations;
+  RequireFile(tree, kDoor, violations);
+  for (const auto& [path, text] : tree) {
+    if (Room(path) != "core" || !IsCxx(path) || path == kDoor) continue;
+    for (const std::string& include : Includes(text)) {
+      if (std::regex_match(include, kTasks)) {
+        violations.push_back(path + ": includes " + include + "; tasks go through parallel.h");
+      }
+    }
+  }
+  return violations;
+}
+
 Violations StagesKeepTheirOrder(const SourceTree& tree) {
   static const std::string kReconstructor = "core/src/reconstructor.cc";
   static const std::string kLastStage = StageFile(static_cast<Stage>(kStageCount - 1), ".cc");

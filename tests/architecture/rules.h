@@ -15,6 +15,10 @@ using Violations = std::vector<std::string>;
 /// room.
 Violations CoreIsPlain(const SourceTree& tree);
 
+/// In the core only parallel.cc, which is compiled without ThreadSanitizer, includes oneTBB, so
+/// that every fork and join is one that the sanitizer is told about.
+Violations CoreHasOneDoorToTasks(const SourceTree& tree);
+
 /// Each of the seven stages has its header and source; a stage reaches the headers of earlier
 /// stages only; no other source than reconstructor.cc reaches all of them.
 Violations StagesKeepTheirOrder(const SourceTree& tree);

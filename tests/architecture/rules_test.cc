@@ -75,6 +75,17 @@ TEST(Architecture, TheEnvironmentReadInTheCoreIsSeen) {
   EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("uses getenv")));
 }
 
+TEST(Architecture, TheCoreHasOneDoorToTasks) {
+  EXPECT_THAT(CoreHasOneDoorToTasks(Project()), IsEmpty());
+}
+
+TEST(Architecture, AStageThatMakesTasksOfItsOwnIsSeen) {
+  for (const std::string header : {"<tbb/parallel_for.h>", "<oneapi/tbb/task_group.h>"}) {
+    const SourceTree tree = Planted("core/src/field.cc", "\n#include " + header + "\n");
+    EXPECT_THAT(CoreHasOneDoorToTasks(tree), Contains(HasSubstr("core/src/field.cc"))) << header;
+  }
+}
+
 TEST(Architecture, StagesKeepTheirOrder) {
   EXPECT_THAT(StagesKeepTheirOrder(Project()), IsEmpty());
 }
