@@ -1,6 +1,7 @@
 #include "vertices.h"
 
 #include <cmath>
+#include <span>
 
 #include "area.h"
 #include "measure.h"
@@ -10,6 +11,17 @@
 
 namespace partiemc {
 namespace {
+
+// Puts coordinates closer to an axis than this many cells on it: an offset that has decayed to next
+// to nothing would else move a vertex from 0 to where the predicates (predicates.h) are not exact.
+constexpr double kAxisReach = 0x1p-96;
+
+void SnapToAxes(double cell_size, std::span<double> coordinates) {
+  const double reach = kAxisReach * cell_size;
+  for (double& coordinate : coordinates) {
+    if (coordinate != 0 && std::abs(coordinate) < reach) coordinate = 0;
+  }
+}
 
 void Store(LatticePoint point, double cell_size, double* target) {
   target[0] = point.x * cell_size;
@@ -141,6 +153,8 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   }
   rings.outer_of = topology.outer_of;
   MatchArea(input, placed.offset_points, area_offset, rings);
+  SnapToAxes(cell_size, rings.points);
+  SnapToAxes(cell_size, placed.roots);
   RepairRings(placed.roots, placed.repair, rings);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
     rings.measures.push_back(MeasureRing(rings.RingPoints(ring)));
@@ -164,6 +178,7 @@ void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
   ParallelFor(topology.segments.size(), [&](std::size_t k) {
     PlaceSegment(input, k, placed.points.data() + 2 * per_segment * k);
   });
+  SnapToAxes(input.scale.cell_size, placed.points);
 
   std::vector<std::uint32_t>& kept_as = placed.kept_as;
   kept_as.assign(topology.RingCount(), kNoRing);

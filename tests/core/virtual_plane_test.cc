@@ -137,6 +137,24 @@ TEST(VirtualPlane, DoesNotMoveTheOutlineByMoreThanItsLimitForAnyVolume) {
   EXPECT_LE(std::abs(*state.area_offset), 0.15);
 }
 
+// Vertices on an axis, which such an offset would move to 1e-300, where no product of two
+// coordinates is told from 0.
+TEST(VirtualPlane, LeavesVerticesOnAnAxisWhenTheOffsetHasDecayedToNextToNothing) {
+  // A drop whose ring is too short to be refined, and has vertices at x = 0 exactly.
+  const std::vector<double> positions = {0, 7.5, 0, 7.5};
+  for (const double offset : {1e-300, -1e-300, 5e-324}) {
+    State state{.cell_size = 1.0322265625, .spacing = 1, .area_offset = offset};
+    const Result result = Reconstructed(positions, {}, state);
+    EXPECT_EQ(state.area_offset, offset);
+    std::size_t on_axis = 0;
+    for (const double coordinate : result.rings.points) {
+      EXPECT_TRUE(coordinate == 0 || std::abs(coordinate) > 1e-30) << coordinate;
+      on_axis += coordinate == 0;
+    }
+    EXPECT_GE(on_axis, 1u);
+  }
+}
+
 TEST(VirtualPlane, KeepsFewMoreVerticesThanMarchingSquares) {
   const std::vector<double> positions = Disc(15, 0.05, 6);
   const auto squares =
