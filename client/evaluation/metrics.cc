@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace partiemc::evaluation {
 namespace {
 
 constexpr double kCornerTurn = 0.1;  // Radians.
-constexpr double kTruthTolerance = 0.1;
+// What has moved otherwise than the map says by more than this is left out of jitter: well below
+// what methods differ by, well above what truths and fits are off by. Spacings.
+constexpr double kMotionTolerance = 0.1;
 
 // Width of index cells in spacings: compared curves are a fraction of a spacing apart.
 constexpr double kIndexCell = 0.25;
@@ -32,6 +35,24 @@ Directed DirectedDistance(const CurveSamples& from, const SegmentIndex& to, Coun
   }
   for (const Point& p : from.corners) {
     if (counts(p)) directed.largest = std::max(directed.largest, to.Find(p).distance);
+  }
+  return directed;
+}
+
+// Of the samples of `from` that `trace` can follow to where `to` is, their distances there.
+template <typename Trace>
+Directed TracedDistance(const Curve& from, const SegmentIndex& to, Trace trace) {
+  const double tolerance = kMotionTolerance * from.spacing;
+  Directed directed;
+  for (const Point& p : from.samples.middles) {
+    if (const auto [arrival, off] = trace(p); off <= tolerance) {
+      directed.Add(to.Find(arrival).distance);
+    }
+  }
+  for (const Point& p : from.samples.corners) {
+    if (const auto [arrival, off] = trace(p); off <= tolerance) {
+      directed.largest = std::max(directed.largest, to.Find(arrival).distance);
+    }
   }
   return directed;
 }
@@ -97,8 +118,26 @@ Deviation Jitter(const Curve& carried, const Curve& next, const SegmentIndex* ca
   if (carried_truth == nullptr || next_truth == nullptr) return Compare(carried, next);
   return SymmetricDeviation(carried, next, [&](Point p) {
     const double change = carried_truth->Find(p).distance - next_truth->Find(p).distance;
-    return std::abs(change) <= kTruthTolerance * carried.spacing;
+    return std::abs(change) <= kMotionTolerance * carried.spacing;
   });
+}
+
+KnownJitter JitterWhereKnown(const Curve& before, const Curve& next, const Advection& advection) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  KnownJitter jitter{{kNone, kNone}, 0};
+  if (before.index.Empty() || next.index.Empty()) return jitter;
+  const Directed there =
+      TracedDistance(before, next.index, [&](Point p) { return advection.Forward(p); });
+  const Directed back =
+      TracedDistance(next, before.index, [&](Point p) { return advection.Backward(p); });
+  jitter.known_share =
+      (there.count + back.count) /
+      static_cast<double>(before.samples.middles.size() + next.samples.middles.size());
+  if (there.count > 0 && back.count > 0) {
+    jitter.deviation = {std::max(there.largest, back.largest) / next.spacing,
+                        (there.Mean() + back.Mean()) / 2 / next.spacing};
+  }
+  return jitter;
 }
 
 Outline Carried(const Outline& contour, const Motion& motion, std::size_t frame, double spacing) {

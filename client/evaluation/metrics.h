@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <vector>
 
+#include "evaluation/advection.h"
 #include "evaluation/outline.h"
 #include "evaluation/segment_index.h"
 #include "evaluation/sequence.h"
@@ -56,13 +56,20 @@ Deviation Jitter(const Curve& carried, const Curve& next, const SegmentIndex* ca
 /// `contour` (world units) sampled every kSampleStep spacings and carried from `frame` to the next.
 Outline Carried(const Outline& contour, const Motion& motion, std::size_t frame, double spacing);
 
-/// The same for recordings: every point moves by an affine field fitted to the displacements of the
-/// particles within three spacings, weighted by the kernel (1 - s^2)^3, and as the nearest particle
-/// where there is none.
-/// Displacements come from identities where both frames have them, else from velocities, by the
-/// time between the frames. Nothing if there is neither.
-std::optional<Outline> Advected(const Outline& contour, const SequenceFrame& from,
-                                const SequenceFrame& to, double spacing);
+/// The jitter of a recording where its particles tell how the contour moves.
+struct KnownJitter {
+  Deviation deviation;     ///< NaN if in one of the two directions nothing is known.
+  double known_share = 0;  ///< Of the samples of both contours.
+};
+
+/// Jitter from frame t to t + 1 without what nobody knows: where particles scatter, a contour can
+/// not be carried along, and the distance of the next one says nothing of its method.
+///
+/// Samples of contour t go forward, those of contour t + 1 back, each by its own particles, and are
+/// compared with the contour there. Those count of which Advection::Trace::uncertainty is at most
+/// 0.1 spacings, the tolerance that Jitter() has for truths. That is a property of a place and the
+/// particles around it: whatever method put a contour there, it is judged alike.
+KnownJitter JitterWhereKnown(const Curve& before, const Curve& next, const Advection& advection);
 
 /// What is wrong with a result as a picture, in numbers.
 struct Defects {

@@ -48,6 +48,20 @@ double MeanOf(std::span<const FrameNumbers> numbers, Number number) {
   return mean.Value();
 }
 
+// Of the jitter where the motion is known. Pairs of frames count by the share of their samples that
+// it is taken from, so that a few stray ones do not weigh as much as a whole contour.
+template <typename Number>
+double MeanOfKnown(std::span<const FrameNumbers> numbers, Number number) {
+  double sum = 0, weight = 0;
+  for (const FrameNumbers& frame : numbers) {
+    const double value = number(frame.known_jitter.deviation);
+    if (std::isnan(value)) continue;
+    sum += frame.known_jitter.known_share * value;
+    weight += frame.known_jitter.known_share;
+  }
+  return weight > 0 ? sum / weight : kAbsent;
+}
+
 double AreaDeviation(std::span<const FrameNumbers> numbers) {
   if (numbers.size() < 2) return kAbsent;
   const double first = 1 + numbers[0].area_error;
@@ -93,6 +107,9 @@ std::string_view Name(Metric metric) {
                                                                  "area_deviation",
                                                                  "hausdorff_jitter",
                                                                  "mean_jitter",
+                                                                 "known_hausdorff_jitter",
+                                                                 "known_mean_jitter",
+                                                                 "known_share",
                                                                  "area_error",
                                                                  "center_hausdorff",
                                                                  "center_mean",
@@ -111,6 +128,10 @@ std::string_view Name(Metric metric) {
 }
 
 Evaluator::Evaluator(Sequence sequence, bool centers) : sequence_(std::move(sequence)) {
+  for (std::size_t t = 1; sequence_.motion == nullptr && t < sequence_.frames.size(); ++t) {
+    advections_.push_back(
+        Advection::Between(sequence_.frames[t - 1], sequence_.frames[t], sequence_.spacing));
+  }
   for (std::size_t t = 0; t < sequence_.frames.size(); ++t) {
     const Outline& truth = sequence_.frames[t].truth;
     if (truth.Empty()) break;
@@ -184,24 +205,25 @@ void Evaluator::Measure(std::size_t frame, const Result& result, const Curve& co
       FindDefects(result, sequence_.frames[frame].truth, reference.truth.index, sequence_.spacing);
 }
 
-Deviation Evaluator::JitterBetween(std::size_t frame, const Outline& before,
-                                   const Curve& contour) const {
+void Evaluator::MeasureJitter(std::size_t frame, const Outline& before, const Curve& contour,
+                              FrameNumbers& numbers) const {
   const std::size_t from = frame - 1;
-  std::optional<Outline> carried;
-  if (sequence_.motion != nullptr) {
-    carried = Carried(before, *sequence_.motion, from, sequence_.spacing);
-  } else {
-    carried = Advected(before, sequence_.frames[from], sequence_.frames[frame], sequence_.spacing);
+  const double spacing = sequence_.spacing;
+  if (sequence_.motion == nullptr) {
+    const std::optional<Advection>& advection = advections_[from];
+    if (!advection) return;
+    numbers.jitter = Compare(Curve(advection->Carry(before), spacing), contour);
+    numbers.known_jitter = JitterWhereKnown(Curve(before, spacing), contour, *advection);
+    return;
   }
-  if (!carried) return {kAbsent, kAbsent};
-  const Curve curve(*carried, sequence_.spacing);
+  const Curve carried(Carried(before, *sequence_.motion, from, spacing), spacing);
   const SegmentIndex* carried_truth = nullptr;
   const SegmentIndex* truth = nullptr;
   if (!references_.empty() && references_[frame].carried_truth) {
     carried_truth = &*references_[frame].carried_truth;
     truth = &references_[frame].truth.index;
   }
-  return Jitter(curve, contour, carried_truth, truth);
+  numbers.jitter = Jitter(carried, contour, carried_truth, truth);
 }
 
 absl::StatusOr<Row> Evaluator::Run(const Method& method, const RunOptions& options) const {
@@ -213,7 +235,7 @@ absl::StatusOr<Row> Evaluator::Run(const Method& method, const RunOptions& optio
     Outline outline = OutlineOf((*results)[t].rings);
     const Curve contour(outline, sequence_.spacing);
     Measure(t, (*results)[t], contour, numbers[t]);
-    if (t > 0) numbers[t].jitter = JitterBetween(t, before, contour);
+    if (t > 0) MeasureJitter(t, before, contour, numbers[t]);
     before = std::move(outline);
   }
   Row row = Summary(numbers);
@@ -242,6 +264,11 @@ Row Evaluator::Summary(const std::vector<FrameNumbers>& numbers) const {
   put(Metric::kAreaDeviation, AreaDeviation(numbers));
   mean(Metric::kHausdorffJitter, [](F f) { return f.jitter.hausdorff; });
   mean(Metric::kMeanJitter, [](F f) { return f.jitter.mean; });
+  put(Metric::kKnownHausdorffJitter,
+      MeanOfKnown(numbers, [](const Deviation& jitter) { return jitter.hausdorff; }));
+  put(Metric::kKnownMeanJitter,
+      MeanOfKnown(numbers, [](const Deviation& jitter) { return jitter.mean; }));
+  mean(Metric::kKnownShare, [](F f) { return f.known_jitter.known_share; });
   mean(Metric::kCenterHausdorff, [](F f) { return f.centers.hausdorff; });
   mean(Metric::kCenterMean, [](F f) { return f.centers.mean; });
   mean(Metric::kTriangles, [](F f) { return f.triangles; });

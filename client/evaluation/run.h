@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "evaluation/advection.h"
 #include "evaluation/metrics.h"
 #include "evaluation/sequence.h"
 #include "partiemc/parameters.h"
@@ -42,6 +43,10 @@ enum class Metric : std::uint8_t {
                      ///< to the first frame, mean over the frames after it.
   kHausdorffJitter,  ///< Jitter() of metrics.h, mean over pairs of frames.
   kMeanJitter,
+  kKnownHausdorffJitter,  ///< JitterWhereKnown() of metrics.h, frames weighted by their known
+                          ///< share; recordings only.
+  kKnownMeanJitter,
+  kKnownShare,       ///< Of the samples, what those two are taken from.
   kAreaError,        ///< Signed relative area error.
   kCenterHausdorff,  ///< To the curve through the outermost centres, where it is defined.
   kCenterMean,
@@ -57,7 +62,7 @@ enum class Metric : std::uint8_t {
   kVertices,
   kMilliseconds,  ///< All stages.
 };
-inline constexpr std::size_t kMetricCount = 20;
+inline constexpr std::size_t kMetricCount = 23;
 
 std::string_view Name(Metric metric);
 
@@ -69,6 +74,7 @@ struct FrameNumbers {
   Deviation truth{kAbsent, kAbsent};    ///< From the true boundary.
   Deviation centers{kAbsent, kAbsent};  ///< From the curve through the outermost centres.
   Deviation jitter{kAbsent, kAbsent};   ///< From the frame before; absent in the first.
+  KnownJitter known_jitter{{kAbsent, kAbsent}, kAbsent};  ///< The same; absent in scenes.
   Defects defects;
   std::uint64_t vertices = 0, triangles = 0, triangles_grid = 0;
   std::array<double, kStageCount> stage_ms = {};  ///< Wall clock.
@@ -120,12 +126,15 @@ class Evaluator {
                                                   std::vector<FrameNumbers>& numbers) const;
   void Measure(std::size_t frame, const Result& result, const Curve& contour,
                FrameNumbers& numbers) const;
-  Deviation JitterBetween(std::size_t frame, const Outline& before, const Curve& contour) const;
+  void MeasureJitter(std::size_t frame, const Outline& before, const Curve& contour,
+                     FrameNumbers& numbers) const;
   double TrueArea(std::size_t frame) const;
   Row Summary(const std::vector<FrameNumbers>& numbers) const;
 
   Sequence sequence_;
   std::vector<Reference> references_;  ///< Per frame; empty for recordings.
+  /// From each frame but the last to the next one; empty for scenes.
+  std::vector<std::optional<Advection>> advections_;
 };
 
 }  // namespace partiemc::evaluation

@@ -116,60 +116,6 @@ TEST(Motion, OfAFlowKeepsAreas) {
   EXPECT_NEAR(SignedArea(disc) / before, 1, 1e-6);
 }
 
-SequenceFrame FrameOf(const std::vector<Point>& particles, double time) {
-  SequenceFrame frame;
-  frame.time = time;
-  for (const Point& p : particles) frame.positions.insert(frame.positions.end(), {p.x, p.y});
-  return frame;
-}
-
-TEST(Advection, FollowsIdentitiesInAnyOrder) {
-  std::vector<Point> particles;
-  for (int k = 0; k < 400; ++k) particles.push_back({k % 20 - 9.5, k / 20 - 9.5});
-  SequenceFrame from = FrameOf(particles, 0);
-  for (std::size_t k = 0; k < particles.size(); ++k) from.ids.push_back(k + 1);
-  for (Point& p : particles) p = p + Point{3, -1};
-  std::reverse(particles.begin(), particles.end());
-  SequenceFrame to = FrameOf(particles, 1);
-  to.ids.assign(from.ids.rbegin(), from.ids.rend());
-  const Outline contour = Disc({}, 8);
-  const auto advected = Advected(contour, from, to, 1);
-  ASSERT_TRUE(advected.has_value());
-  const Deviation jitter = Compare(Curve(*advected, 1), Curve(Disc({3, -1}, 8), 1));
-  EXPECT_LT(jitter.hausdorff, 1e-9);
-}
-
-TEST(Advection, UsesVelocitiesWhereThereAreNoIdentities) {
-  const std::vector<Point> particles = {{0, 0}, {1, 0}, {0, 1}};
-  SequenceFrame from = FrameOf(particles, 2);
-  from.velocities = {4, 0, 4, 0, 4, 0};
-  const SequenceFrame to = FrameOf(particles, 2.5);
-  Outline contour;
-  contour.AddLoop(std::vector<Point>{{0, 0}, {1, 0}, {50, 50}});  // The last one is far from all.
-  const auto advected = Advected(contour, from, to, 1);
-  ASSERT_TRUE(advected.has_value());
-  EXPECT_NEAR(advected->points[0].x, 2, 1e-12);
-  EXPECT_FALSE(Advected(contour, FrameOf(particles, 0), to, 1).has_value());
-}
-
-// A contour has all of its particles on one side: their mean would lag behind by the shear over the
-// distance to their centre, 0.1 of it here.
-TEST(Advection, FollowsAShearBeyondTheOutermostParticles) {
-  std::vector<Point> particles;
-  for (int k = 0; k < 400; ++k) particles.push_back({k % 20 - 9.5, k / 20 - 19.5});
-  SequenceFrame from = FrameOf(particles, 0);
-  for (std::size_t k = 0; k < particles.size(); ++k) from.ids.push_back(k + 1);
-  for (Point& p : particles) p.x += 0.1 * p.y;
-  SequenceFrame to = FrameOf(particles, 1);
-  to.ids = from.ids;
-  Outline contour;
-  contour.AddLoop(std::vector<Point>{{0, 0}, {-1, 0}, {-1, -10}});
-  const auto advected = Advected(contour, from, to, 1);
-  ASSERT_TRUE(advected.has_value());
-  EXPECT_NEAR(advected->points[0].x, 0, 0.05);
-  EXPECT_NEAR(advected->points[0].y, 0, 1e-12);
-}
-
 TEST(Defects, CountsFoldsCrossingsAndWrongNormals) {
   Outline eight;
   eight.AddLoop(std::vector<Point>{{0, 0}, {2, 2}, {2, 0}, {0, 2}});

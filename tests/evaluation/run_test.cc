@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "evaluation/random.h"
 #include "evaluation/scenes.h"
 
 namespace partiemc::evaluation {
@@ -97,6 +98,41 @@ TEST(Run, RecordingsHaveJitterByVelocitiesAndAreaByVolumes) {
   EXPECT_TRUE(std::isnan((*row)[Metric::kHausdorff]));
   EXPECT_LT((*row)[Metric::kMeanJitter], 0.1);
   EXPECT_LT(std::abs((*row)[Metric::kAreaError]), 0.03);
+  // The last frame has no velocities to lead back.
+  EXPECT_TRUE(std::isnan(row->frames.back().known_jitter.deviation.mean));
+  EXPECT_EQ(row->frames.back().known_jitter.known_share, 0);
+}
+
+// A square moves as one, and beside it a cloud is drawn anew in every frame: how much of the motion
+// is known hangs on the particles, and what is measured there is the square's.
+TEST(Run, KnowsTheMotionOfRecordingsWhateverTheMethod) {
+  Sequence recording;
+  recording.name = "square and cloud";
+  recording.group = Group::kRecording;
+  Random random(5);
+  for (std::size_t t = 0; t < 4; ++t) {
+    SequenceFrame& frame = recording.frames.emplace_back();
+    for (std::size_t k = 0; k < 400; ++k) {
+      const Point square{0.3 * static_cast<double>(t) + static_cast<double>(k % 20),
+                         static_cast<double>(k / 20)};
+      const Point cloud{random.Uniform(40, 60), random.Uniform(0, 20)};
+      for (const Point& p : {square, cloud}) {
+        frame.ids.push_back(frame.ids.size() + 1);
+        frame.positions.insert(frame.positions.end(), {p.x, p.y});
+      }
+    }
+  }
+  const Evaluator evaluator(recording);
+  for (const Placement placement :
+       {Placement::kMarchingSquares, Placement::kQef, Placement::kVirtualPlane}) {
+    const auto row = evaluator.Run(MethodOf(placement), {});
+    ASSERT_TRUE(row.ok()) << row.status();
+    SCOPED_TRACE(Name(placement));
+    EXPECT_GT((*row)[Metric::kMeanJitter], 0.2);
+    EXPECT_LT((*row)[Metric::kKnownMeanJitter], 0.1);
+    EXPECT_GT((*row)[Metric::kKnownShare], 0.4);
+    EXPECT_LT((*row)[Metric::kKnownShare], 0.55);
+  }
 }
 
 TEST(Run, SaysWhichSequenceAndFrameWasRefused) {

@@ -121,7 +121,10 @@ std::string MethodSections(const Evaluation& evaluation) {
     out += Section(recordings ? "Methods on recordings" : "Methods on synthetic sequences",
                    recordings ? "There is no true boundary: areas are compared with the sum of the "
                                 "particles' volumes, contours with the one before, carried along "
-                                "by the particles."
+                                "by the particles. Where particles scatter, nobody knows how a "
+                                "contour should move, and what is measured there is that. "
+                                "'Motion known' leaves out such places: whether one is told is "
+                                "for the particles around it to say, not for the contour."
                               : "Every ratio is one of means over the sequences; every method has "
                                 "its own calibration, the field and its guard are the same.",
                    content);
@@ -251,7 +254,11 @@ std::string NotesSection(const Evaluation& evaluation) {
       "<p class=\"headline\">Hausdorff and mean deviation: symmetric, curves sampled every 0.1 "
       "spacings. Area bias: size of the mean signed relative area error. Area deviation: Eq. 29 "
       "and 30 on the area over the true area. Jitter: deviation of a contour from the one before, "
-      "carried along by the known motion. True boundary: the outline that holds the particles&#39; "
+      "carried along by the known motion. Motion known, on recordings: a sample of either contour "
+      "counts if its place in the other frame is told within 0.1 spacings, by the standard error "
+      "of the displacement fitted to the particles around it, in both frames, and by how far the "
+      "way back misses it, and if all those particles are in both frames. True boundary: the "
+      "outline that holds the particles&#39; "
       "area. Outermost centres: the curve half a spacing inside it. A claim reproduces if at least "
       "nine tenths of the paper&#39;s effect are there; it is weaker if the direction is right and "
       "more than 2 % are left of it.</p>\n";

@@ -72,7 +72,7 @@ void AppendComparisons(std::string& out, const Study& study) {
                   Name(knowledge), "\",\"recordings\":", recordings ? "true" : "false",
                   ",\"metrics\":");
         std::vector<Comparison> comparisons;
-        for (const Metric metric : kJudgedMetrics) {
+        for (const Metric metric : JudgedMetrics(recordings)) {
           comparisons.push_back(CompareRows(rows, baseline, metric));
         }
         AppendArray(out, comparisons, AppendComparison);

@@ -29,9 +29,33 @@ std::string Title(const char* what, const Selection& selection) {
                       Told(selection.knowledge));
 }
 
-std::vector<std::string> JudgedHeads() {
-  return {"Hausdorff",      "mean deviation",   "area bias",
-          "area deviation", "Hausdorff jitter", "mean jitter"};
+std::string_view Head(Metric metric) {
+  switch (metric) {
+    case Metric::kHausdorff:
+      return "Hausdorff";
+    case Metric::kMeanDeviation:
+      return "mean deviation";
+    case Metric::kBias:
+      return "area bias";
+    case Metric::kAreaDeviation:
+      return "area deviation";
+    case Metric::kHausdorffJitter:
+      return "Hausdorff jitter";
+    case Metric::kMeanJitter:
+      return "mean jitter";
+    case Metric::kKnownHausdorffJitter:
+      return "Hausdorff jitter, motion known";
+    case Metric::kKnownMeanJitter:
+      return "mean jitter, motion known";
+    default:
+      return Name(metric);
+  }
+}
+
+std::vector<std::string> JudgedHeads(const Selection& selection) {
+  std::vector<std::string> heads;
+  for (const Metric metric : JudgedMetrics(selection.recordings)) heads.emplace_back(Head(metric));
+  return heads;
 }
 
 // Calls row(method, its rows) for every method that has rows.
@@ -51,15 +75,17 @@ Cell RatioCell(double ratio, double alert_above) { return {Fixed(ratio, 3), rati
 Table MeansTable(const Study& study, const Selection& selection) {
   Table table{Title("means", selection),
               "Lengths in spacings, areas relative; over the judged sequences.",
-              JudgedHeads(),
+              JudgedHeads(selection),
               {}};
   table.heads.push_back("signed area error");
+  if (selection.recordings) table.heads.push_back("share with known motion");
   ForMethods(study, selection, [&](const std::string& name, std::span<const Row> rows) {
     TableRow& row = table.rows.emplace_back(TableRow{name, {}});
-    for (const Metric metric : kJudgedMetrics) {
+    for (const Metric metric : JudgedMetrics(selection.recordings)) {
       row.cells.push_back({Fixed(MeanOver(rows, metric), 5)});
     }
     row.cells.push_back({Fixed(MeanOver(rows, Metric::kAreaError), 5)});
+    if (selection.recordings) row.cells.push_back({Fixed(MeanOver(rows, Metric::kKnownShare), 3)});
   });
   return table;
 }
@@ -128,14 +154,14 @@ Table StageTable(const Study& study, const Selection& selection) {
 Table RatioTable(const Study& study, const Selection& selection) {
   Table table{Title("ratios of means to marching squares", selection),
               "Below 1 is better. 95 % bootstrap interval; sequences won / tied (1 %) / lost.",
-              JudgedHeads(),
+              JudgedHeads(selection),
               {}};
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
   ForMethods(study, selection, [&](const std::string& name, std::span<const Row> rows) {
     if (name == kBaseline) return;
     TableRow ratio{name, {}}, interval{"95 % interval", {}, true};
     TableRow verdicts{"won / tied / lost", {}, true};
-    for (const Metric metric : kJudgedMetrics) {
+    for (const Metric metric : JudgedMetrics(selection.recordings)) {
       const Comparison comparison = CompareRows(rows, baseline, metric);
       ratio.cells.push_back(RatioCell(comparison.ratio.value, 1));
       const bool absent = std::isnan(comparison.ratio.value);
@@ -154,7 +180,7 @@ Table RatioTable(const Study& study, const Selection& selection) {
 Table StepTable(const Study& study, const Selection& selection) {
   Table table{Title("ratios of virtual-plane with a step switched off", selection),
               "To marching squares; marked where the method is better without the step by 1 %.",
-              JudgedHeads(),
+              JudgedHeads(selection),
               {}};
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
   const std::string whole(Name(Placement::kVirtualPlane));
@@ -167,7 +193,7 @@ Table StepTable(const Study& study, const Selection& selection) {
     const auto rows = study.Of(name, selection.knowledge, selection.recordings);
     if ((!method.is_step && name != whole) || rows.empty()) continue;
     TableRow& row = table.rows.emplace_back(TableRow{name, {}});
-    for (const Metric metric : kJudgedMetrics) {
+    for (const Metric metric : JudgedMetrics(selection.recordings)) {
       const double without = ratio(rows, metric);
       row.cells.push_back(
           {Fixed(without, 3), without < (1 - kTieShare) * ratio(whole_rows, metric)});
@@ -180,12 +206,12 @@ Table StepTable(const Study& study, const Selection& selection) {
 Table GroupTable(const Study& study, const Selection& selection, std::string_view method) {
   Table table{Title("ratios by group", selection) + ", " + std::string(method),
               "A group that loses more than 5 % is marked.",
-              JudgedHeads(),
+              JudgedHeads(selection),
               {}};
   const auto rows = study.Of(method, selection.knowledge, selection.recordings);
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
   std::vector<Comparison> comparisons;
-  for (const Metric metric : kJudgedMetrics) {
+  for (const Metric metric : JudgedMetrics(selection.recordings)) {
     comparisons.push_back(CompareRows(rows, baseline, metric));
   }
   for (std::size_t k = 0; k < kGroupCount; ++k) {
@@ -202,16 +228,18 @@ Table GroupTable(const Study& study, const Selection& selection, std::string_vie
 Table SequenceTable(const Study& study, const Selection& selection, std::string_view method) {
   Table table{Title("ratios by sequence", selection) + ", " + std::string(method),
               "More than 5 % lost is marked.",
-              JudgedHeads(),
+              JudgedHeads(selection),
               {}};
   const auto rows = study.Of(method, selection.knowledge, selection.recordings);
+  if (selection.recordings) table.heads.push_back("share with known motion");
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
   for (const Row& row : rows) {
     TableRow& line = table.rows.emplace_back(TableRow{row.sequence, {}});
-    for (const Metric metric : kJudgedMetrics) {
+    for (const Metric metric : JudgedMetrics(selection.recordings)) {
       const auto pairs = MatchPairs(std::span(&row, 1), baseline, metric);
       line.cells.push_back(RatioCell(RatioOfMeans(pairs), kGroupLossRatio));
     }
+    if (selection.recordings) line.cells.push_back({Fixed(row[Metric::kKnownShare], 3)});
   }
   return table;
 }

@@ -12,10 +12,17 @@
 
 namespace partiemc::evaluation {
 
-/// The metrics that methods are judged by, in the order of the tables.
-inline constexpr std::array<Metric, 6> kJudgedMetrics = {
+/// The metrics that methods are judged by, in the order of the tables: of scenes against the truth,
+/// of recordings, which have none, beside all jitter that where the motion is known.
+inline constexpr std::array<Metric, 6> kSceneMetrics = {
     Metric::kHausdorff,     Metric::kMeanDeviation,   Metric::kBias,
     Metric::kAreaDeviation, Metric::kHausdorffJitter, Metric::kMeanJitter};
+inline constexpr std::array<Metric, 6> kRecordingMetrics = {
+    Metric::kBias,       Metric::kAreaDeviation,        Metric::kHausdorffJitter,
+    Metric::kMeanJitter, Metric::kKnownHausdorffJitter, Metric::kKnownMeanJitter};
+inline constexpr const std::array<Metric, 6>& JudgedMetrics(bool recordings) {
+  return recordings ? kRecordingMetrics : kSceneMetrics;
+}
 
 /// Which rows of a study a table is about. Methods of a step have StepTable only.
 struct Selection {
