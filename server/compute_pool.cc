@@ -1,5 +1,7 @@
 #include "server/compute_pool.h"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -59,6 +61,8 @@ std::size_t ComputePool::QueueLength() const {
 }
 
 void ComputePool::Run() {
+  // Threads that oneTBB starts for the pieces of a frame have it from this one.
+  pthread_setname_np(pthread_self(), "compute");
   oneapi::tbb::task_arena own_arena(1);
   oneapi::tbb::task_arena& arena = kShareArena ? arena_ : own_arena;
   std::unique_lock lock(mutex_);

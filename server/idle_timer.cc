@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// For as long a stream that comes only now cannot have waited for too long.
+// For as long one that comes only now cannot have waited for too long.
 milliseconds ShortestLimit(const IdleLimits& limits) {
   if (limits.opening <= milliseconds(0)) return limits.streaming;
   if (limits.streaming <= milliseconds(0)) return limits.opening;
@@ -17,8 +17,8 @@ milliseconds ShortestLimit(const IdleLimits& limits) {
 
 }  // namespace
 
-IdleTimer::IdleTimer(StreamRegistry& registry, const IdleLimits& limits)
-    : registry_(registry), limits_(limits) {
+IdleTimer::IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, const IdleLimits& limits)
+    : streams_(streams), watchers_(watchers), limits_(limits) {
   if (ShortestLimit(limits) > milliseconds(0)) thread_ = std::thread([this] { Run(); });
 }
 
@@ -36,7 +36,9 @@ void IdleTimer::Run() {
   while (!stopping_) {
     lock.unlock();
     const auto now = std::chrono::steady_clock::now();
-    const auto next = std::min(registry_.EndIdle(limits_, now), now + ShortestLimit(limits_));
+    const auto next =
+        std::min({streams_.EndIdle(limits_, now), watchers_.EndSilent(limits_.opening, now),
+                  now + ShortestLimit(limits_)});
     lock.lock();
     stop_came_.wait_until(lock, next, [this] { return stopping_; });
   }

@@ -1,4 +1,4 @@
-// The one thread that ends streams whose clients keep them waiting.
+// The one thread that ends streams and watches whose clients keep them waiting.
 #pragma once
 
 #include <condition_variable>
@@ -6,14 +6,15 @@
 #include <thread>
 
 #include "server/stream_registry.h"
+#include "server/watch_registry.h"
 
 namespace partiemc::server {
 
-/// Sleeps until the first stream may have waited for too long. No thread where nothing is limited.
+/// Sleeps until the first of them may have waited for too long. No thread where nothing is limited.
 class IdleTimer {
  public:
-  /// `registry` lives longer.
-  IdleTimer(StreamRegistry& registry, const IdleLimits& limits);
+  /// The registries live longer.
+  IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, const IdleLimits& limits);
   ~IdleTimer();
   IdleTimer(const IdleTimer&) = delete;
   IdleTimer& operator=(const IdleTimer&) = delete;
@@ -21,7 +22,8 @@ class IdleTimer {
  private:
   void Run();
 
-  StreamRegistry& registry_;
+  StreamRegistry& streams_;
+  WatchRegistry& watchers_;
   const IdleLimits limits_;
   std::mutex mutex_;
   std::condition_variable stop_came_;

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 
+#include "absl/synchronization/mutex.h"
 #include "server/health_check.h"
 #include "server/heap.h"
 #include "server/logging.h"
@@ -41,6 +42,8 @@ absl::Status WritePortFile(const std::string& path, const Address& address) {
 
 int Serve(const CommandLine& line) {
   KeepFreedMemory();
+  // Distributions build abseil with its search for deadlocks, which every lock of gRPC pays for.
+  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   // Before gRPC starts threads, so that these signals wait for sigwait and interrupt nobody.
   sigset_t signals;
   sigemptyset(&signals);

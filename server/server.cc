@@ -69,7 +69,7 @@ Server::Server(const ServerOptions& options)
       registry_(options.limits.max_streams),
       budget_(options.limits.memory_budget),
       pool_(options.threads, kWarmTime, metrics_.get()),
-      idle_timer_(registry_, options.limits.idle),
+      idle_timer_(registry_, watchers_, options.limits.idle),
       service_(std::make_unique<Service>(options_.limits, authentication_, registry_, budget_,
                                          pool_, watchers_, pump_)) {}
 
@@ -205,6 +205,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
   // to the last word: a connection that closes with requests unread takes back what was just
   // written.
   registry_.WaitUntilEmpty(deadline);
+  pump_.Flush();  // So that watchers hear of the last results before they are sent home.
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
   const auto left = std::max(deadline - std::chrono::steady_clock::now(),

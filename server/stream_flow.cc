@@ -34,6 +34,8 @@ absl::Status BrokenProtocol(std::string found, std::string rule) {
 
 absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
 
+}  // namespace
+
 absl::Status IdleError(std::string what, std::chrono::milliseconds limit) {
   const std::string seconds = absl::StrCat(std::chrono::duration<double>(limit).count(), " s");
   return ViolationError(
@@ -41,8 +43,6 @@ absl::Status IdleError(std::string what, std::chrono::milliseconds limit) {
       {std::string(kReasonIdle), "client", absl::StrCat(what, " for ", seconds),
        "must do so within this time (Limits.idle_timeout_seconds once open); open a new stream"});
 }
-
-}  // namespace
 
 absl::Status DrainingError() {
   return ViolationError(absl::StatusCode::kUnavailable,

@@ -25,6 +25,8 @@ inline constexpr std::string_view kReasonIdle = "IDLE";
 
 /// UNAVAILABLE with the Violation that a draining server gives everybody.
 absl::Status DrainingError();
+/// DEADLINE_EXCEEDED (IDLE) for a client that did `what` for `limit`: "sends no `open`".
+absl::Status IdleError(std::string what, std::chrono::milliseconds limit);
 
 /// What a request turned out to be.
 enum class RequestKind { kMalformed, kEmpty, kOpen, kFrame };

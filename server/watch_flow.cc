@@ -101,11 +101,13 @@ void WatchFlow::TakeRequest(const WatchRequest& request) {
   }
 }
 
+// The watcher joins before it is told that it is in, so that it misses nothing that is published
+// after that. Nothing is written, and nothing ends, until then.
 void WatchFlow::Open() {
   absl::StatusOr<WatchTerms> terms = door_.Open();
   std::shared_ptr<WatchHub> hub;
-  On([&] {
-    opening_ = false;
+  {
+    const std::lock_guard lock(mutex_);
     if (!terms.ok()) {
       Refuse(terms.status());
     } else if (phase_ == Phase::kOpening) {
@@ -115,16 +117,9 @@ void WatchFlow::Open() {
       credit_ = terms->credit;
       hub = hub_ = terms->hub;
     }
-  });
-  if (hub == nullptr) return;
-  hub->Join(shared_from_this());
-  // A watch that has ended before it joined has left before it joined.
-  bool finished = false;
-  {
-    const std::lock_guard lock(mutex_);
-    finished = phase_ == Phase::kFinished;
   }
-  if (finished) hub->Leave(*this);
+  if (hub != nullptr) hub->Join(shared_from_this());
+  On([&] { opening_ = false; });
 }
 
 void WatchFlow::ReadEnded() {
@@ -200,6 +195,20 @@ void WatchFlow::Drain() {
   });
 }
 
+std::chrono::steady_clock::time_point WatchFlow::EndIfSilent(
+    std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  On([&] {
+    if (phase_ != Phase::kOpening || opening_ || limit <= limit.zero()) return;
+    if (now < came_ + limit) {
+      look_again = came_ + limit;
+    } else {
+      Refuse(IdleError("sends no `open`", limit));
+    }
+  });
+  return look_again;
+}
+
 void WatchFlow::Cut() {
   {
     const std::lock_guard lock(mutex_);
@@ -259,7 +268,7 @@ WatchFlow::Actions WatchFlow::Decide() {
       !starting_read_) {
     actions.read = reading_ = starting_read_ = true;
   }
-  if (open && !writing_) DecideWrite(actions);
+  if (open && !writing_ && !opening_) DecideWrite(actions);
   const bool all_said =
       phase_ == Phase::kAbandoned || (phase_ == Phase::kEnding && !owes_ended_ && !owes_opened_);
   if (all_said && !opening_ && !writing_ && !starting_read_ && !cutting_) {

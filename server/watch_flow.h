@@ -2,6 +2,7 @@
 // how they travel; a door (gRPC, or a test's memory) does.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -116,6 +117,10 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   void StreamEnded(const WatchEnd& end);
   /// The server is going away: says so and ends, credit or not.
   void Drain();
+  /// Ends a watch with DEADLINE_EXCEEDED (IDLE) that at `now` has not sent its `open` for `limit`;
+  /// 0: for ever. Gives the time before which there is no need to look again.
+  std::chrono::steady_clock::time_point EndIfSilent(std::chrono::milliseconds limit,
+                                                    std::chrono::steady_clock::time_point now);
   /// Ends at once, said or not.
   void Cut();
 
@@ -153,6 +158,8 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
 
   WatchDoor& door_;
   const std::size_t max_bytes_;
+
+  const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
 
   mutable std::mutex mutex_;  // Guards everything below.
   Phase phase_ = Phase::kOpening;

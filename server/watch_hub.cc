@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace partiemc::server {
@@ -49,49 +50,56 @@ void WatchHub::End(WatchEnd end) {
 void WatchHub::Join(std::shared_ptr<WatchFlow> watcher) {
   {
     const std::lock_guard lock(mutex_);
-    watchers_.push_back({.flow = std::move(watcher)});
+    // From here on the tap keeps everything.
     ++watcher_count_;
+    TakeNews();
+    watchers_.push_back({.flow = std::move(watcher), .first = newest_});
   }
   pump_.Wake(*this);
 }
 
 void WatchHub::Leave(const WatchFlow& watcher) {
-  std::shared_ptr<WatchFlow> left;  // Given up without the lock, and so is the frame.
+  Entry left;  // Given up without the lock, and so are the frames.
+  std::vector<Published> news;
   Published newest;
   const std::lock_guard lock(mutex_);
   const auto found = std::ranges::find_if(
       watchers_, [&](const Entry& entry) { return entry.flow.get() == &watcher; });
   if (found == watchers_.end()) return;
-  left = std::move(found->flow);
+  left = std::move(*found);
   watchers_.erase(found);
   if (--watcher_count_ != 0) return;
+  news = std::exchange(news_, {});
   newest = std::exchange(newest_, {});
   if (newest.frame != nullptr && newest.frame->bytes() <= limits_.kept_bytes) {
     tap_.PutBack(std::move(newest));
   }
 }
 
+void WatchHub::TakeNews() {
+  std::vector<Published> news = tap_.Take();
+  if (news.empty()) return;
+  newest_ = news.back();
+  news_.insert(news_.end(), std::make_move_iterator(news.begin()),
+               std::make_move_iterator(news.end()));
+}
+
 void WatchHub::Serve() {
   std::vector<Published> news;
   std::vector<Entry> watchers;
-  Published newest;
   std::optional<WatchEnd> end;
   {
     const std::lock_guard lock(mutex_);
     if (watchers_.empty()) return;
-    news = tap_.Take();
-    if (!news.empty()) newest_ = news.back();
-    newest = newest_;
+    TakeNews();
+    news = std::exchange(news_, {});
     watchers = watchers_;
-    for (Entry& entry : watchers_) entry.is_new = false;
+    for (Entry& entry : watchers_) entry.first = {};
     end = end_;
   }
   for (const Entry& entry : watchers) {
-    if (!entry.is_new) {
-      entry.flow->Offer(news);
-    } else if (newest.frame != nullptr) {
-      entry.flow->Offer({&newest, 1});
-    }
+    if (entry.first.frame != nullptr) entry.flow->Offer({&entry.first, 1});
+    entry.flow->Offer(news);
     if (end) entry.flow->StreamEnded(*end);
   }
 }

@@ -35,7 +35,8 @@ class WatchHub final : public Pumped {
   /// The stream has ended. Watchers get what was published, then this.
   void End(WatchEnd end);
 
-  /// From the newest frame on, which it gets at once if there is one.
+  /// From the newest frame on, which it gets at once if there is one; of what is published after
+  /// this call it misses nothing.
   void Join(std::shared_ptr<WatchFlow> watcher);
   void Leave(const WatchFlow& watcher);
 
@@ -46,10 +47,11 @@ class WatchHub final : public Pumped {
  private:
   struct Entry {
     std::shared_ptr<WatchFlow> flow;
-    bool is_new = true;  // Has been offered nothing yet.
+    Published first = {};  // The newest frame when it joined; until it has been served.
   };
 
   void Serve() override;
+  void TakeNews();  // With the lock held.
 
   WatchPump& pump_;
   const Limits limits_;
@@ -60,7 +62,8 @@ class WatchHub final : public Pumped {
 
   std::mutex mutex_;  // Guards everything below. Publish never takes it.
   std::vector<Entry> watchers_;
-  Published newest_;
+  std::vector<Published> news_;  // Taken from the tap, not yet offered.
+  Published newest_;             // While somebody watches.
   std::optional<WatchEnd> end_;
 };
 

@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <cerrno>
+#include <future>
 #include <utility>
 
 namespace partiemc::server {
@@ -33,6 +34,19 @@ void WatchPump::Wake(Pumped& pumped) {
     pumped.next_ = head;
   } while (!waiting_.compare_exchange_weak(head, &pumped));
   if (head == nullptr) sem_post(&wakes_);
+}
+
+void WatchPump::Flush() {
+  class Mark final : public Pumped {
+   public:
+    std::promise<void> served;
+
+   private:
+    void Serve() override { served.set_value(); }
+  };
+  const auto mark = std::make_shared<Mark>();
+  Wake(*mark);
+  mark->served.get_future().wait();
 }
 
 void WatchPump::Run() {

@@ -38,6 +38,8 @@ class WatchPump {
   /// Has `pumped` served once more after this call began. Takes no lock and never waits; from any
   /// thread.
   void Wake(Pumped& pumped);
+  /// Returns when all that was woken before has been served.
+  void Flush();
 
  private:
   void Run();

@@ -130,6 +130,7 @@ void WatchReactor::Write(grpc::ByteBuffer response) {
 void WatchReactor::Cut() { context_.TryCancel(); }
 
 void WatchReactor::Finish(const absl::Status& status) {
+  watchers_.Close(*flow_);  // Who hears of the end may come again at once.
   LogEnd(status);
   ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
 }

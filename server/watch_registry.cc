@@ -1,5 +1,6 @@
 #include "server/watch_registry.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -12,21 +13,28 @@ namespace partiemc::server {
 absl::Status WatchRegistry::Enter(std::shared_ptr<WatchFlow> watcher) {
   const std::lock_guard lock(mutex_);
   if (draining_) return DrainingError();
-  if (watchers_.size() >= max_watchers_) {
+  if (placed_.size() >= max_watchers_) {
     return ViolationError(
         absl::StatusCode::kResourceExhausted,
-        {std::string(kReasonTooManyWatchers), "watchers", absl::StrCat(watchers_.size(), " watch"),
+        {std::string(kReasonTooManyWatchers), "watchers", absl::StrCat(placed_.size(), " watch"),
          absl::StrCat("must be at most ", max_watchers_,
                       "; try again when one has left, or start the server with a larger "
                       "--max-watchers")});
   }
   const WatchFlow* key = watcher.get();
   watchers_[key] = std::move(watcher);
+  placed_.insert(key);
   return absl::OkStatus();
+}
+
+void WatchRegistry::Close(const WatchFlow& watcher) {
+  const std::lock_guard lock(mutex_);
+  placed_.erase(&watcher);
 }
 
 void WatchRegistry::Leave(const WatchFlow& watcher) {
   const std::lock_guard lock(mutex_);
+  placed_.erase(&watcher);
   watchers_.erase(&watcher);
   // With the lock held: whoever waits for the last one may take the registry away after that.
   left_.notify_all();
@@ -34,7 +42,17 @@ void WatchRegistry::Leave(const WatchFlow& watcher) {
 
 std::size_t WatchRegistry::count() const {
   const std::lock_guard lock(mutex_);
-  return watchers_.size();
+  return placed_.size();
+}
+
+std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
+    std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  // Without the lock: one that ends may leave at once.
+  for (const auto& watcher : All()) {
+    look_again = std::min(look_again, watcher->EndIfSilent(limit, now));
+  }
+  return look_again;
 }
 
 std::vector<std::shared_ptr<WatchFlow>> WatchRegistry::All() const {

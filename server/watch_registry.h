@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string_view>
 #include <vector>
 
@@ -25,10 +26,18 @@ class WatchRegistry {
   /// A watcher comes in, before it has said what it wants to watch. Errors, each with a Violation:
   /// UNAVAILABLE (DRAINING), RESOURCE_EXHAUSTED (TOO_MANY_WATCHERS).
   absl::Status Enter(std::shared_ptr<WatchFlow> watcher);
+  /// Its last word is about to be sent: its place is free.
+  void Close(const WatchFlow& watcher);
   /// Its last word has been sent.
   void Leave(const WatchFlow& watcher);
 
+  /// Of those that have a place.
   std::size_t count() const;
+
+  /// Ends those that have not said for `limit` what they want to watch. Gives the time before which
+  /// none of those that are here now will have.
+  std::chrono::steady_clock::time_point EndSilent(std::chrono::milliseconds limit,
+                                                  std::chrono::steady_clock::time_point now);
 
   /// Lets nobody in any more and ends every watch. Those that cannot be told by `patience` are cut.
   void Drain(std::chrono::steady_clock::time_point patience);
@@ -42,6 +51,7 @@ class WatchRegistry {
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
   std::map<const WatchFlow*, std::shared_ptr<WatchFlow>> watchers_;
+  std::set<const WatchFlow*> placed_;  // Those of them that have not been closed.
   bool draining_ = false;
 };
 

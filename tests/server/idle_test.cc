@@ -105,7 +105,9 @@ TEST_F(Idle, WithoutALimitNothingEnds) {
 TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
   ComputePool pool(1);
   StreamRegistry registry(10);
-  const IdleTimer timer(registry, {.opening = milliseconds(20), .streaming = minutes(10)});
+  WatchRegistry watchers(10);
+  const IdleTimer timer(registry, watchers,
+                        {.opening = milliseconds(20), .streaming = minutes(10)});
   // It sleeps already when they come.
   for (int round = 0; round < 3; ++round) {
     MemoryDoor door(pool, 2, BlobParameters(), kLimits);

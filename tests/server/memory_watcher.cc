@@ -43,6 +43,11 @@ void MemoryWatcher::StopReading() {
   taking_ = false;
 }
 
+void MemoryWatcher::WaitUntilOpened() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return opened_ || finished_; });
+}
+
 void MemoryWatcher::WaitForFrames(std::size_t count) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return seen_.size() >= count || finished_; });
@@ -91,6 +96,7 @@ void MemoryWatcher::BeginWrite() {
 
 void MemoryWatcher::WriteOpened() {
   const std::lock_guard lock(mutex_);
+  opened_ = true;
   BeginWrite();
 }
 

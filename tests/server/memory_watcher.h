@@ -45,6 +45,8 @@ class MemoryWatcher final : private WatchDoor {
   void Cancel();
   /// What is written from here on is not taken: one write stays under way.
   void StopReading();
+  /// Waits until it is told that it is in.
+  void WaitUntilOpened();
   /// Waits until as many frames have come in all, or the watch has ended.
   void WaitForFrames(std::size_t count);
   /// Waits for the end.
@@ -80,7 +82,7 @@ class MemoryWatcher final : private WatchDoor {
   std::vector<SeenFrame> seen_;
   std::string end_reason_;
   std::uint64_t end_dropped_ = 0, paid_ = 0, unpaid_ = 0;
-  bool reading_ = false, writing_ = false, taking_ = true, cut_ = false;
+  bool opened_ = false, reading_ = false, writing_ = false, taking_ = true, cut_ = false;
   std::optional<absl::Status> finished_;
   std::thread thread_;
 };

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "partiemc/status.h"
 #include "server/memory_watcher.h"
 #include "server/stream_flow.h"
 #include "server/watch_registry.h"
@@ -143,16 +144,62 @@ class StepDoor final : public WatchDoor {
     ended = {end.reason, dropped};
   }
   void Cut() override {}
-  void Finish(const absl::Status&) override { finished = true; }
+  void Finish(const absl::Status& end) override { status = end; }
 
   int under_way = 0;
   std::vector<SeenFrame> written;
   std::optional<std::pair<std::string, std::uint64_t>> ended;
-  bool finished = false;
+  std::optional<absl::Status> status;
 
  private:
   const WatchTerms terms_;
 };
+
+TEST_F(WatchTest, OfWhatIsPublishedAfterItIsInAWatcherOfEveryMissesNothing) {
+  for (std::uint64_t round = 0; round < 200; ++round) {
+    const auto watcher = Join(WatchMode::kEvery, 9);
+    watcher->WaitUntilOpened();
+    const std::uint64_t first = 10 * round + 1;
+    for (std::uint64_t k = first; k < first + 4; ++k) Publish(k);
+    const std::size_t newest = round == 0 ? 0 : 1;  // Of the round before.
+    watcher->WaitForFrames(newest + 4);
+    const auto seen = watcher->seen();
+    ASSERT_EQ(seen.size(), newest + 4) << "round " << round;
+    EXPECT_EQ(seen[newest].number, first);
+  }
+}
+
+TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
+  using std::chrono::minutes;
+  WatchRegistry registry(1);
+  const auto now = std::chrono::steady_clock::now();
+  StepDoor silent({hub_, WatchMode::kLatest, 1}), next({hub_, WatchMode::kLatest, 1});
+  const auto flow = std::make_shared<WatchFlow>(silent, kMaxBytes);
+  ASSERT_TRUE(registry.Enter(flow).ok());
+  flow->Start();
+  EXPECT_GE(registry.EndSilent(minutes(1), now), now + minutes(1));
+  EXPECT_EQ(registry.EndSilent(minutes(0), now + minutes(9)),
+            std::chrono::steady_clock::time_point::max());
+  EXPECT_FALSE(silent.status.has_value());
+  registry.EndSilent(minutes(1), now + minutes(2));
+  ASSERT_TRUE(silent.status.has_value());
+  EXPECT_EQ(silent.status->code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(FindViolation(*silent.status)->reason, kReasonIdle);
+  EXPECT_EQ(FindViolation(*silent.status)->value, "sends no `open` for 60 s");
+  registry.Close(*flow);
+  EXPECT_EQ(registry.count(), 0u);
+  const auto other = std::make_shared<WatchFlow>(next, kMaxBytes);
+  ASSERT_TRUE(registry.Enter(other).ok());
+  other->Start();
+  other->ReadDone({WatchRequest::Kind::kOpen, 0});
+  EXPECT_EQ(registry.EndSilent(minutes(1), now + minutes(9)),
+            std::chrono::steady_clock::time_point::max());
+  EXPECT_FALSE(next.status.has_value());
+  other->Cancelled();
+  registry.Leave(*flow);
+  registry.Leave(*other);
+  hub_->Leave(*other);
+}
 
 // What a watcher should get, written down as plainly as possible.
 struct Reference {
@@ -213,7 +260,7 @@ TEST_F(WatchTest, RandomOrdersGiveWhatAPlainReferenceSays) {
     Reference reference{.mode = mode, .credit = credit};
     std::uint64_t number = pick(100);
     const int length = 20 + static_cast<int>(pick(100));
-    for (int step = 0; step < length || !door.finished; ++step, ++steps) {
+    for (int step = 0; step < length || !door.status; ++step, ++steps) {
       const unsigned what = step < length ? pick(8) : 6 + pick(2);
       if (step == length && !reference.stream_ended) {
         flow->StreamEnded(WatchEnd::OfStream(absl::OkStatus()));

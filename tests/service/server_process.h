@@ -55,6 +55,7 @@ class ServingProcess {
   explicit ServingProcess(std::vector<std::string> arguments = {});
   const std::string& address() const { return address_; }
   ServerProcess& process() { return process_; }
+  const ServerProcess& process() const { return process_; }
 
  private:
   std::string port_file_;

@@ -62,6 +62,15 @@ TEST_F(WatchRefused, PROTOCOL) {
          "request: no `open`; the first must be `open`");
 }
 
+TEST_F(WatchRefused, IDLE) {
+  options_.limits.idle.opening = std::chrono::milliseconds(20);
+  Serve();
+  WatchClient watcher(channel_);
+  Expect(watcher, StatusCode::DEADLINE_EXCEEDED, "IDLE",
+         "client: sends no `open` for 0.02 s; must do so within this time "
+         "\\(Limits.idle_timeout_seconds once open\\); open a new stream");
+}
+
 TEST_F(WatchRefused, OUT_OF_RANGE) {
   ExpectOfOpen("tank", v1::WATCH_MODE_LATEST, 0, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
                "open.credits: 0; must be at least 1");

@@ -33,6 +33,7 @@ class Program {
   /// Waits for its end, at most a minute. 128 + N for a signal N, -1 if it did not end in time.
   int Wait();
 
+  pid_t id() const { return id_; }
   std::string Out() const;
   std::string Error() const;
 
