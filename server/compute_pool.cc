@@ -8,18 +8,6 @@
 #include "server/heap.h"
 
 namespace partiemc::server {
-namespace {
-
-// ThreadSanitizer cannot see how oneTBB hands work from thread to thread, because the library as
-// distributed is not instrumented: it takes every hand-over for a race. Under it each runner
-// computes alone, so that all that it sees, and all that it reports, is ours.
-#ifdef __SANITIZE_THREAD__
-constexpr bool kShareArena = false;
-#else
-constexpr bool kShareArena = true;
-#endif
-
-}  // namespace
 
 // Runners are plain threads and not tasks of the arena, so that a thread that waits for the pieces
 // of one frame can pick up pieces of another, but never another frame as a whole. There are as many
@@ -29,9 +17,8 @@ ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
                          FrameObserver* observer)
     : warm_time_(warm_time),
       observer_(observer),
-      parallelism_(oneapi::tbb::global_control::max_allowed_parallelism,
-                   kShareArena ? std::max(threads, 1u) : 1u),
-      arena_(static_cast<int>(std::max(threads, 1u))) {
+      parallelism_(oneapi::tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)),
+      arena_(std::max(threads, 1u)) {
   runners_.reserve(std::max(threads, 1u));
   for (unsigned i = 0; i < std::max(threads, 1u); ++i) {
     runners_.emplace_back([this] { Run(); });
@@ -63,8 +50,6 @@ std::size_t ComputePool::QueueLength() const {
 void ComputePool::Run() {
   // Threads that oneTBB starts for the pieces of a frame have it from this one.
   pthread_setname_np(pthread_self(), "compute");
-  oneapi::tbb::task_arena own_arena(1);
-  oneapi::tbb::task_arena& arena = kShareArena ? arena_ : own_arena;
   std::unique_lock lock(mutex_);
   for (;;) {
     WaitForTask(lock);
@@ -74,7 +59,7 @@ void ComputePool::Run() {
       tasks_.pop_front();
       std::unique_ptr<Worker> worker = TakeWorker();
       lock.unlock();
-      arena.execute([&] { task.job(*worker); });
+      arena_.Execute([&] { task.job(*worker); });
       lock.lock();
       idle_.push_back(std::move(worker));
       lock.unlock();

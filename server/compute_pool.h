@@ -2,7 +2,6 @@
 #pragma once
 
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -14,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "partiemc/arena.h"
 #include "server/worker.h"
 
 namespace partiemc::server {
@@ -22,7 +22,7 @@ namespace partiemc::server {
 inline constexpr std::chrono::seconds kWarmTime(10);
 
 /// Runs jobs in the order in which they were submitted, several at once, all parallel parts of all
-/// of them in one oneTBB arena. A stream submits its next frame only when the one before is done,
+/// of them in one arena. A stream submits its next frame only when the one before is done,
 /// so that this order is a round robin over the streams that have work: a stream of large frames
 /// delays every other by one of its frames at most, never by its backlog.
 ///
@@ -72,7 +72,7 @@ class ComputePool {
   const WarmSize::Clock::duration warm_time_;
   FrameObserver* const observer_;
   oneapi::tbb::global_control parallelism_;
-  oneapi::tbb::task_arena arena_;
+  Arena arena_;
   mutable std::mutex mutex_;
   std::condition_variable task_came_;
   std::deque<Task> tasks_;  // Guarded by mutex_.

@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout release recordings sanitized fuzz core-alone consumer bench)
+readonly all_steps=(layout release recordings sanitized threads fuzz core-alone consumer bench)
 
 usage() {
   cat <<'USAGE'
@@ -14,6 +14,7 @@ Steps, all of them by default:
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
   sanitized   core and sessions under AddressSanitizer and UndefinedBehaviorSanitizer
+  threads     the same under ThreadSanitizer, as far as threads meet in them
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
   core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
@@ -63,11 +64,13 @@ check() {
   fi
 }
 
-# Runs the tests of a build directory and adds CTest's own figures to the sum.
+# run_ctest NAME DIRECTORY [OPTION...]: runs the tests of a build directory, or those that CTest's
+# options choose, and adds CTest's own figures to the sum.
 run_ctest() {
   local name=$1 directory=$2 log
+  shift 2
   log=$(mktemp)
-  ctest --test-dir "$directory" --output-on-failure --no-tests=error -j "$test_jobs" |
+  ctest --test-dir "$directory" --output-on-failure --no-tests=error -j "$test_jobs" "$@" |
     tee "$log" | sed -u -E '/^ +Start +[0-9]+: /d; s/ \.{3,} */ .. /'
   local summary='^[0-9]+% tests passed, ([0-9]+) tests failed out of ([0-9]+)$'
   if [[ $(grep -E "$summary" "$log") =~ $summary ]]; then
@@ -114,6 +117,12 @@ step_sanitized() {
     check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
       run_ctest "sanitized $room" "build/asan/tests/$room"
   done
+}
+
+step_threads() {
+  check "threads: configure" cmake --preset tsan &&
+    check "threads: build" cmake --build --preset tsan -j "$jobs" &&
+    run_ctest threads build/tsan -L threads
 }
 
 step_fuzz() {

@@ -1,7 +1,5 @@
 #include "evaluation/paper.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -11,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_format.h"
 #include "evaluation/random.h"
+#include "partiemc/arena.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/validate.h"
 
@@ -386,8 +385,9 @@ Sequence DefaultFilm() {
 
 absl::StatusOr<PaperRuns> RunPaper(const Sequence& film, std::span<const std::string_view> shapes,
                                    const StudyProgress& progress) {
-  tbb::task_arena arena(1);
-  return arena.execute([&] { return PaperRunner(film, shapes, progress).Run(); });
+  absl::StatusOr<PaperRuns> runs;
+  Arena(1).Execute([&] { runs = PaperRunner(film, shapes, progress).Run(); });
+  return runs;
 }
 
 }  // namespace partiemc::evaluation

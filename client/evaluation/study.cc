@@ -1,7 +1,5 @@
 #include "evaluation/study.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "partiemc/arena.h"
 
 namespace partiemc::evaluation {
 namespace {
@@ -54,8 +53,8 @@ class StudyRunner {
 
  private:
   void Work() {
-    tbb::task_arena arena(1);
-    arena.execute([this] {
+    Arena arena(1);
+    arena.Execute([this] {
       for (std::size_t k = next_++; k < rows_.size() && !ended_; k = next_++) RunSequence(k);
     });
   }

@@ -1,8 +1,5 @@
 #include "partiemc/client/local_stream.h"
 
-#include <oneapi/tbb/info.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
@@ -13,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "partiemc/arena.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/state.h"
 
@@ -80,7 +78,7 @@ class LocalStream::Worker {
  public:
   Worker(Reconstructor reconstructor, const LocalStreamOptions& options)
       : reconstructor_(std::move(reconstructor)),
-        arena_(options.threads > 0 ? options.threads : tbb::info::default_concurrency()) {
+        arena_(static_cast<unsigned>(std::max(options.threads, 0))) {
     info_ = {.parameters = reconstructor_.parameters(),
              .frames_in_flight = std::max<std::size_t>(1, options.frames_in_flight),
              .limits = {.max_particles_per_frame = options.limits.max_particles,
@@ -106,7 +104,7 @@ class LocalStream::Worker {
 
   const Reconstructor reconstructor_;
   StreamInfo info_;
-  tbb::task_arena arena_;
+  Arena arena_;
   State state_;          // Of the worker's thread alone.
   Workspace workspace_;  // Likewise.
 
@@ -212,7 +210,7 @@ void LocalStream::Worker::Process(const OwnedFrame& frame, Event& event) {
   StageClock stages(event.frame.times);
   const Clock::time_point begin = Clock::now();
   absl::Status status;
-  arena_.execute([&] {
+  arena_.Execute([&] {
     status =
         reconstructor_.Reconstruct(frame.View(), state_, workspace_, event.frame.result, &stages);
   });

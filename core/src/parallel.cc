@@ -1,32 +1,41 @@
 #include "parallel.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
-#include <tbb/parallel_sort.h>
-
-#include "frame_view.h"
+#include <tbb/task_arena.h>
 
 namespace partiemc {
+
+class TaskArena : public tbb::task_arena {
+ public:
+  using tbb::task_arena::task_arena;
+};
+
 namespace erased {
 
-void Invoke(Action a, Action b) {
-  tbb::parallel_invoke([&] { a.run(a.body); }, [&] { b.run(b.body); });
+void Invoke(const Action& a, const Action& b) {
+  tbb::parallel_invoke([&] { a.run(a.fork_join, a.body); }, [&] { b.run(b.fork_join, b.body); });
 }
 
-void ForRanges(std::size_t count, std::size_t grain, RangeAction action) {
+void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action) {
   using Range = tbb::blocked_range<std::size_t>;
   tbb::parallel_for(Range(0, count, grain), [&](const Range& range) {
-    action.run(action.body, range.begin(), range.end());
+    action.run(action.fork_join, action.body, range.begin(), range.end());
   });
+}
+
+TaskArena* MakeArena(unsigned threads) {
+  return new TaskArena(threads > 0 ? static_cast<int>(threads) : tbb::info::default_concurrency());
+}
+
+void DeleteArena(TaskArena* arena) { delete arena; }
+
+void Execute(TaskArena& arena, const Action& action) {
+  arena.execute([&] { action.run(action.fork_join, action.body); });
 }
 
 }  // namespace erased
-
-void ParallelSort(std::span<WorldPosition> positions) {
-  tbb::parallel_sort(positions.begin(), positions.end(), [](const auto& a, const auto& b) {
-    return a.x != b.x ? a.x < b.x : a.y < b.y;
-  });
-}
 
 }  // namespace partiemc

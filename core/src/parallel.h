@@ -1,7 +1,9 @@
-// Parts of a stage in parallel, in the oneTBB arena of the caller: the only place where the core
-// uses tasks. All return when everything is done; an exception of a body comes out of the call.
+// Parts of a stage in parallel, in the arena of the caller (partiemc/arena.h): the only place where
+// tasks are made. All return when everything is done; an exception of a body comes out of the call.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <concepts>
 #include <cstddef>
 #include <span>
@@ -10,23 +12,49 @@
 
 namespace partiemc {
 
-struct WorldPosition;
+class TaskArena;
 
 // What oneTBB runs, without types: parallel.cc alone is compiled against oneTBB's templates, and
 // without ThreadSanitizer, which would take their hand-overs for races. What tasks do themselves is
 // in the templates below and instrumented like everything else.
 namespace erased {
 
+// Requires of all of them: `body` and `fork_join` live as long as the action.
 struct Action {
-  void (*run)(const void* body);
+  void (*run)(ForkJoin& fork_join, const void* body);
+  ForkJoin& fork_join;
   const void* body;
 };
 struct RangeAction {
-  void (*run)(const void* body, std::size_t first, std::size_t last);
+  void (*run)(ForkJoin& fork_join, const void* body, std::size_t first, std::size_t last);
+  ForkJoin& fork_join;
   const void* body;
 };
-void Invoke(Action a, Action b);
-void ForRanges(std::size_t count, std::size_t grain, RangeAction action);
+
+template <std::invocable Body>
+Action ActionOf(ForkJoin& fork_join, const Body& body) {
+  const auto run = [](ForkJoin& forked, const void* erased) {
+    const ForkJoin::Task scope(forked);
+    (*static_cast<const Body*>(erased))();
+  };
+  return {run, fork_join, &body};
+}
+
+template <std::invocable<std::size_t, std::size_t> Body>
+RangeAction RangeActionOf(ForkJoin& fork_join, const Body& body) {
+  const auto run = [](ForkJoin& forked, const void* erased, std::size_t first, std::size_t last) {
+    const ForkJoin::Task scope(forked);
+    (*static_cast<const Body*>(erased))(first, last);
+  };
+  return {run, fork_join, &body};
+}
+
+void Invoke(const Action& a, const Action& b);
+void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action);
+
+TaskArena* MakeArena(unsigned threads);  // 0: one for each processor.
+void DeleteArena(TaskArena* arena);
+void Execute(TaskArena& arena, const Action& action);
 
 }  // namespace erased
 
@@ -35,14 +63,7 @@ void ForRanges(std::size_t count, std::size_t grain, RangeAction action);
 template <std::invocable<std::size_t, std::size_t> Body>
 void ParallelForRanges(std::size_t count, std::size_t grain, const Body& body) {
   ForkJoin fork_join;
-  const auto task = [&](std::size_t first, std::size_t last) {
-    const ForkJoin::Task scope(fork_join);
-    body(first, last);
-  };
-  const auto run = [](const void* erased, std::size_t first, std::size_t last) {
-    (*static_cast<const decltype(task)*>(erased))(first, last);
-  };
-  erased::ForRanges(count, grain, {run, &task});
+  erased::ForRanges(count, grain, erased::RangeActionOf(fork_join, body));
 }
 
 /// Calls body(k) for each k of [0, count).
@@ -57,21 +78,30 @@ void ParallelFor(Index count, const Body& body) {
 template <std::invocable A, std::invocable B>
 void ParallelInvoke(const A& a, const B& b) {
   ForkJoin fork_join;
-  const auto task = [&fork_join](const auto& body) {
-    return [&] {
-      const ForkJoin::Task scope(fork_join);
-      body();
-    };
-  };
-  const auto action = []<typename Task>(const Task& of) {
-    return erased::Action{[](const void* erased) { (*static_cast<const Task*>(erased))(); }, &of};
-  };
-  const auto task_a = task(a);
-  const auto task_b = task(b);
-  erased::Invoke(action(task_a), action(task_b));
+  erased::Invoke(erased::ActionOf(fork_join, a), erased::ActionOf(fork_join, b));
 }
 
-/// Sorts by x, then by y.
-void ParallelSort(std::span<WorldPosition> positions);
+/// Sorts by `less`. Splits as quicksort does, but at most `splits` times in a row, so that no order
+/// of the values makes it slow; equal ones come in any order.
+template <typename T, typename Less>
+void ParallelSort(std::span<T> values, const Less& less, int splits = 6) {
+  constexpr std::size_t kSortedAtOnce = 1 << 11;
+  if (splits == 0 || values.size() <= kSortedAtOnce) {
+    std::sort(values.begin(), values.end(), less);
+    return;
+  }
+  std::array<T, 9> sample;
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    sample[k] = values[k * (values.size() - 1) / (sample.size() - 1)];
+  }
+  const auto median = sample.begin() + sample.size() / 2;
+  std::nth_element(sample.begin(), median, sample.end(), less);
+  const auto equal = std::partition(values.begin(), values.end(),
+                                    [&](const T& value) { return less(value, *median); });
+  const auto greater =
+      std::partition(equal, values.end(), [&](const T& value) { return !less(*median, value); });
+  ParallelInvoke([&] { ParallelSort(std::span(values.begin(), equal), less, splits - 1); },
+                 [&] { ParallelSort(std::span(greater, values.end()), less, splits - 1); });
+}
 
 }  // namespace partiemc

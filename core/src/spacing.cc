@@ -168,7 +168,9 @@ std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingSc
   });
   // Sorted and without duplicates: the tree is the same for any order of the particles, and no
   // query wades through a million copies of itself.
-  ParallelSort(positions);
+  ParallelSort(std::span(positions), [](const WorldPosition& a, const WorldPosition& b) {
+    return a.x != b.x ? a.x < b.x : a.y < b.y;
+  });
   const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
   positions.erase(std::unique(positions.begin(), positions.end(), same), positions.end());
   BuildTree(positions, 0);

@@ -15,9 +15,9 @@ using Violations = std::vector<std::string>;
 /// room.
 Violations CoreIsPlain(const SourceTree& tree);
 
-/// In the core only parallel.cc, which is compiled without ThreadSanitizer, includes oneTBB, so
-/// that every fork and join is one that the sanitizer is told about.
-Violations CoreHasOneDoorToTasks(const SourceTree& tree);
+/// Outside of the tests only core/src/parallel.cc, which is compiled without ThreadSanitizer,
+/// includes what makes tasks of oneTBB, so that the sanitizer is told about every fork and join.
+Violations TasksHaveOneDoor(const SourceTree& tree);
 
 /// Each of the seven stages has its header and source; a stage reaches the headers of earlier
 /// stages only; no other source than reconstructor.cc reaches all of them.

@@ -1,8 +1,5 @@
-// What must not change when a frame is permuted, moved, scaled, written otherwise or worked on by
-// more threads.
+// What must not change when a frame is permuted, moved, scaled or written otherwise.
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,40 +45,6 @@ double LargestDistance(const Rings& a, const Rings& b) {
 }
 
 class Metamorphic : public testing::TestWithParam<Placement> {};
-
-TEST_P(Metamorphic, OneTwoOrSevenThreadsAndFreshOrUsedWorkspacesGiveTheSameBits) {
-  const auto reconstructor = Reconstructor::Create({.placement = GetParam()});
-  std::vector<Result> expected;
-  State end;
-  for (const int threads : {1, 2, 7}) {
-    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    tbb::task_arena arena(threads);
-    State state;
-    Workspace used;
-    for (int k = 0; k < 6; ++k) {
-      // A body of many tiles, so that there is work for all.
-      Particles body = support::MovingBody(k);
-      body.Add(support::Shifted(support::Disc(40), 100, -70));
-      Result result, fresh_result;
-      State fresh_state = state;
-      Workspace fresh;
-      arena.execute([&] {
-        ASSERT_TRUE(reconstructor->Reconstruct(body.AsFrame(), state, used, result).ok());
-        ASSERT_TRUE(
-            reconstructor->Reconstruct(body.AsFrame(), fresh_state, fresh, fresh_result).ok());
-      });
-      ExpectSameBits(result, fresh_result);
-      EXPECT_EQ(state, fresh_state);
-      if (threads == 1) {
-        expected.push_back(result);
-      } else {
-        ExpectSameBits(result, expected[static_cast<std::size_t>(k)]);
-      }
-    }
-    if (threads == 1) end = state;
-    EXPECT_EQ(state, end);
-  }
-}
 
 TEST_P(Metamorphic, AnyInstructionSetGivesTheSameBits) {
   const auto reconstructor = Reconstructor::Create({.placement = GetParam()});

@@ -11,6 +11,7 @@
 // core/METHOD.md tells the method; ARCHITECTURE.md tells where each stage lives.
 #pragma once
 
+#include "partiemc/arena.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/reconstructor.h"

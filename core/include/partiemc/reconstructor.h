@@ -40,8 +40,8 @@ class Reconstructor {
   static absl::StatusOr<Reconstructor> Create(const ReconstructionParameters& parameters,
                                               const FrameLimits& limits = {});
 
-  /// Reconstructs one frame. Runs its parallel parts in the caller's oneTBB arena; the result has
-  /// the same bits for any number of threads.
+  /// Reconstructs one frame. Runs its parallel parts in the Arena of the caller; the result has the
+  /// same bits for any number of threads.
   /// Errors: INVALID_ARGUMENT (a coordinate that is not finite, a wrong count, an id twice,
   /// particles outside one plane), RESOURCE_EXHAUSTED (more particles or tiles than the limits
   /// allow), each with a Violation; `state` is then as it was and `result` is empty. Cost: linear
