@@ -10,13 +10,6 @@
 #include "parallel.h"
 
 namespace partiemc {
-namespace {
-
-// Wide kernels get wider buckets: a query then still looks at about ten rows of them.
-constexpr double kBucketsPerRadius = 4;
-
-}  // namespace
-
 void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
   first_bucket_.assign(tiles, kNoTile);
@@ -44,13 +37,11 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
 void PointField::Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
                        double wander) {
   scale_ = scale;
-  buckets_per_cell_ = std::min(1.0, kBucketsPerRadius / scale.kernel_radius);
-  margin_ = scale.kernel_radius;
-  bucket_columns_ = static_cast<int>((kTileSize + 2 * margin_) * buckets_per_cell_) + 1;
+  grid_ = BucketGrid(scale.kernel_radius);
   MarkTiles(bins, crossings, wander);
 
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
-  const auto buckets = static_cast<std::uint32_t>(bucket_columns_ * bucket_columns_ + 1);
+  const std::uint32_t buckets = grid_.count() + 1;
   std::uint32_t bucket_count = 0;
   for (std::uint32_t tile = 0; tile < tiles; ++tile) {
     if (!IsIndexed(tile)) continue;
@@ -77,8 +68,7 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
 }
 
 std::span<std::uint32_t> PointField::OffsetsOf(std::uint32_t tile) {
-  return {bucket_offsets_.data() + first_bucket_[tile],
-          static_cast<std::size_t>(bucket_columns_) * bucket_columns_ + 1};
+  return {bucket_offsets_.data() + first_bucket_[tile], std::size_t{grid_.count()} + 1};
 }
 
 // The particles within reach of a point that may be asked for.
@@ -93,9 +83,11 @@ NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile) const {
 std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t tile) {
   const std::span<std::uint32_t> offsets = OffsetsOf(tile);
   std::fill(offsets.begin(), offsets.end(), 0);
+  BucketGrid::Buckets buckets;
   std::uint32_t count = 0;
   Near(bins, tile).InAnyOrder([&](const NearEntries& near) {
-    for (int k = 0; k < near.count; ++k) ++offsets[BucketOf(near, k)];
+    grid_.Find(near, buckets);
+    for (int k = 0; k < near.count; ++k) ++offsets[buckets[k]];
     count += static_cast<std::uint32_t>(near.count);
   });
   return count;
@@ -110,15 +102,20 @@ void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
     offset = next;
     next += in_bucket;
   }
-  Near(bins, tile).InOrder([&](const NearEntries& near) {
+  BucketGrid::Buckets buckets;
+  const auto fill = [&](const NearEntries& near) {
+    grid_.Find(near, buckets);
     for (int k = 0; k < near.count; ++k) {
-      const std::uint32_t to = offsets[BucketOf(near, k)]++;
+      const std::uint32_t to = offsets[buckets[k]]++;
       x_[to] = near.x[k];
       y_[to] = near.y[k];
       source_[to] = near.source[k];
       if (!bins.weight.empty()) weight_[to] = bins.weight[near.entry[k]];
     }
-  });
+  };
+  // Each bucket in the order of the frame: that of a tile's list, unless it has entries of two.
+  NearWalk walk = Near(bins, tile);
+  grid_.KeepsTilesApart() ? walk.InAnyOrder(fill) : walk.InOrder(fill);
   // Filling moved every offset to the start of the next bucket.
   std::copy_backward(offsets.begin(), offsets.end() - 1, offsets.end());
   offsets.front() = first_entry_[tile];
@@ -134,11 +131,11 @@ PointQuery PointField::QueryAt(std::uint32_t tile, double x, double y) const {
           .entry_x = x_.data(),
           .entry_y = y_.data(),
           .weight = weight_.empty() ? nullptr : weight_.data(),
-          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * bucket_columns_ +
+          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * grid_.columns() +
                      columns.first,
           .rows = rows.last - rows.first + 1,
           .columns = columns.last - columns.first + 1,
-          .row_stride = bucket_columns_};
+          .row_stride = grid_.columns()};
 }
 
 namespace {

@@ -1,12 +1,12 @@
 // The level set and its gradient at any point near the isoline, not only at nodes.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "bins.h"
+#include "bucket_grid.h"
 #include "crossings.h"
 #include "near_entries.h"
 #include "point_kernels.h"
@@ -75,21 +75,15 @@ class PointField {
   };
   BucketRange Buckets(double centre, double radius) const;
 
-  int Bucket(double coordinate) const;
   PointQuery QueryAt(std::uint32_t tile, double x, double y) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
   NearWalk Near(const ParticleBins& bins, std::uint32_t tile) const;
-  int BucketOf(const NearEntries& near, int k) const {
-    return Bucket(near.y[k]) * bucket_columns_ + Bucket(near.x[k]);
-  }
   std::uint32_t CountEntries(const ParticleBins& bins, std::uint32_t tile);
   void FillEntries(const ParticleBins& bins, std::uint32_t tile);
 
   Scale scale_;
-  double buckets_per_cell_ = 1;
-  double margin_ = 0;  // Cells that buckets extend beyond the tile on each side.
-  int bucket_columns_ = 0;
+  BucketGrid grid_;
   std::vector<BitRows> asked_;               // Per tile: the cells in which points may lie.
   std::vector<std::uint32_t> first_bucket_;  // Per tile: into bucket_offsets_, or kNoTile.
   std::vector<std::uint32_t> first_entry_;   // Per tile: into the arrays of entries.
@@ -98,14 +92,8 @@ class PointField {
   std::vector<std::uint32_t> source_;
 };
 
-inline int PointField::Bucket(double coordinate) const {
-  // Truncation rounds down: nothing is farther from its tile than the margin.
-  const int index = static_cast<int>((coordinate + margin_) * buckets_per_cell_);
-  return std::clamp(index, 0, bucket_columns_ - 1);
-}
-
 inline PointField::BucketRange PointField::Buckets(double centre, double radius) const {
-  return {Bucket(centre - radius), Bucket(centre + radius)};
+  return {grid_.Along(centre - radius), grid_.Along(centre + radius)};
 }
 
 inline NearRows PointField::RowsNear(std::uint32_t tile, double x, double y, double radius) const {
@@ -114,11 +102,11 @@ inline NearRows PointField::RowsNear(std::uint32_t tile, double x, double y, dou
   return {.x = x_.data(),
           .y = y_.data(),
           .weight = weight_.empty() ? nullptr : weight_.data(),
-          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * bucket_columns_ +
+          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * grid_.columns() +
                      columns.first,
           .rows = rows.last - rows.first + 1,
           .columns = columns.last - columns.first + 1,
-          .row_stride = bucket_columns_};
+          .row_stride = grid_.columns()};
 }
 
 template <typename Visit>
@@ -128,7 +116,7 @@ void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radi
   const BucketRange rows = Buckets(y, radius);
   for (int row = rows.first; row <= rows.last; ++row) {
     const std::uint32_t* offsets =
-        bucket_offsets_.data() + first_bucket_[tile] + row * bucket_columns_;
+        bucket_offsets_.data() + first_bucket_[tile] + row * grid_.columns();
     for (std::uint32_t e = offsets[columns.first]; e < offsets[columns.last + 1]; ++e) {
       visit(static_cast<double>(x_[e]), static_cast<double>(y_[e]), e);
     }

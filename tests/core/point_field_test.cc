@@ -151,5 +151,30 @@ TEST(PointField, FindsEveryParticleWithinARadiusAndNamesItsPlaceInTheFrame) {
   EXPECT_GT(found, 100);
 }
 
+// Sums over particles have the same bits however these were sorted only if their order is one.
+TEST(PointField, ListsParticlesOfABucketInTheOrderOfTheFrame) {
+  for (const double radius : {3.0, 2.6}) {  // Buckets within tiles, and across their sides.
+    support::Random random(7);
+    support::Particles particles = support::Blob(random, 20);
+    for (int k = 0; k < 2000; ++k) particles.Add(random.Uniform(-1, 1), random.Uniform(-25, 25));
+    Stages stages;
+    stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0, .kernel_radius = radius});
+    int pairs = 0;
+    for (int k = 0; k < 500; ++k) {
+      const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
+      const double x = random.Chance(0.5) ? random.Below(2) * 31.999 : random.Uniform(0, 32);
+      const double y = random.Uniform(0, 32);
+      if (!stages.field.Covers(tile, x, y)) continue;
+      std::uint32_t last = 0;
+      stages.field.ForEachNear(tile, x, y, 0, [&](double, double, std::uint32_t entry) {
+        EXPECT_LE(last, stages.field.SourceOf(entry));
+        pairs += last > 0;
+        last = stages.field.SourceOf(entry);
+      });
+    }
+    EXPECT_GT(pairs, 100);
+  }
+}
+
 }  // namespace
 }  // namespace partiemc
