@@ -1,8 +1,8 @@
 // The inner loops of the field stage, over one tile, in the vectors of the processor at hand.
 //
-// Every target (tile_kernels.cc is compiled once for each) gives the same bits: a lane does what
-// the scalar formula says, in the same order, without fused multiply-adds, and no sum runs across
-// lanes.
+// Every target (tile_kernels.cc and scatter_kernels.cc are compiled once for each) gives the same
+// bits: a lane does what the scalar formula says, in the same order, without fused multiply-adds,
+// and no sum runs across lanes.
 #pragma once
 
 #include <array>
