@@ -1,7 +1,31 @@
 #include "near_entries.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
+
+#ifndef PARTIEMC_NEAR_ENTRIES_ONCE
+#define PARTIEMC_NEAR_ENTRIES_ONCE
+namespace partiemc {
+namespace {
+
+// By mask of eight lanes: the chosen ones, then any. Its lower half is right for four lanes, too.
+constexpr std::array<std::array<std::uint8_t, 8>, 256> ChosenLanes() {
+  std::array<std::array<std::uint8_t, 8>, 256> chosen{};
+  for (unsigned mask = 0; mask < chosen.size(); ++mask) {
+    std::size_t count = 0;
+    for (std::uint8_t lane = 0; lane < 8; ++lane) {
+      if ((mask >> lane & 1) != 0) chosen[mask][count++] = lane;
+    }
+  }
+  return chosen;
+}
+
+constexpr auto kChosenLanes = ChosenLanes();
+
+}  // namespace
+}  // namespace partiemc
+#endif
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
@@ -15,35 +39,102 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+using Lanes = hn::CappedTag<float, NearEntries::kPadding>;
+using Indices = hn::RebindToUnsigned<Lanes>;
+using Bits = hn::RebindToSigned<Lanes>;
+
+// Looks up rows of cells by their number.
+class RowTable {
+ public:
+#if HWY_TARGET <= HWY_AVX3
+  // In two registers.
+  HWY_INLINE explicit RowTable(const BitRows& rows)
+      : lower_(hn::LoadU(Indices(), rows.data())),
+        upper_(hn::LoadU(Indices(), rows.data() + kTileSize / 2)) {}
+
+  HWY_INLINE hn::Vec<Bits> operator[](hn::Vec<Bits> row) const {
+    const Bits d;
+    const auto half = hn::Set(d, kTileSize / 2 - 1);
+    const auto place = hn::IndicesFromVec(Indices(), hn::And(row, half));
+    const auto is_upper = hn::RebindMask(Indices(), hn::Gt(row, half));
+    return hn::BitCast(d, hn::IfThenElse(is_upper, hn::TableLookupLanes(upper_, place),
+                                         hn::TableLookupLanes(lower_, place)));
+  }
+
+ private:
+  hn::Vec<Indices> lower_, upper_;
+#else
+  HWY_INLINE explicit RowTable(const BitRows& rows)
+      : rows_(reinterpret_cast<const std::int32_t*>(rows.data())) {}
+
+  HWY_INLINE hn::Vec<Bits> operator[](hn::Vec<Bits> row) const {
+    return hn::GatherIndex(Bits(), rows_, row);
+  }
+
+ private:
+  const std::int32_t* rows_;
+#endif
+};
+
+// Moves the lanes of a mask to the front. In a register: some processors are slow at compressing
+// into memory.
+class Compressor {
+ public:
+#if HWY_TARGET <= HWY_AVX3
+  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) : mask_(mask) {}
+
+  template <class D>
+  HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
+    return hn::Compress(values, hn::RebindMask(d, mask_));
+  }
+
+ private:
+  hn::Mask<Bits> mask_;
+#else
+  // One look-up for all that is compressed by a mask.
+  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(Bits(), mask, bits);
+    const hn::Rebind<std::uint8_t, Lanes> d_byte;
+    lanes_ = hn::PromoteTo(Bits(), hn::LoadU(d_byte, kChosenLanes[bits[0]].data()));
+  }
+
+  template <class D>
+  HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
+    return hn::TableLookupLanes(values, hn::IndicesFromVec(d, lanes_));
+  }
+
+ private:
+  hn::Vec<Bits> lanes_;
+#endif
+};
+
 // Sets `near` to those of the entries [first, last) that lie in `cells` of their tile.
 // Reads whole vectors, if need be of the entries behind them.
 void ChooseEntries(std::span<const BinEntry> entries, std::uint32_t first, std::uint32_t last,
                    const BitRows& cells, float shift_x, float shift_y, NearEntries& near) {
-  const hn::CappedTag<float, NearEntries::kPadding> d;
-  using D = decltype(d);
-  const hn::RebindToSigned<D> d_int;
-  const hn::RebindToUnsigned<D> d_index;
+  const Lanes d;
+  const Bits d_bits;
+  const Indices d_index;
   const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
-  const auto* rows = reinterpret_cast<const std::int32_t*>(cells.data());
+  const RowTable rows(cells);
   const auto lane = hn::Iota(d_index, 0);
   int chosen = 0;
   for (; first < last && first + lanes <= entries.size(); first += lanes) {
-    hn::Vec<D> x, y, source;
+    hn::Vec<Lanes> x, y, source;
     hn::LoadInterleaved3(d, &entries[first].x, x, y, source);
     // Truncation rounds down: nothing is before its tile.
-    const auto row = hn::GatherIndex(d_int, rows, hn::ConvertTo(d_int, y));
-    const auto bit = hn::Shl(hn::Set(d_int, 1), hn::ConvertTo(d_int, x));
-    const auto is_in = hn::And(hn::TestBit(row, bit), hn::FirstN(d_int, last - first));
-    // Compressed in a register: some processors are slow at compressing into memory.
-    const auto keep = [&](auto values, auto* to) HWY_ATTR {
-      const hn::DFromV<decltype(values)> d_values;
-      hn::StoreU(hn::Compress(values, hn::RebindMask(d_values, is_in)), d_values, to + chosen);
-    };
-    keep(hn::Add(x, hn::Set(d, shift_x)), near.x.data());
-    keep(hn::Add(y, hn::Set(d, shift_y)), near.y.data());
-    keep(hn::BitCast(d_index, source), near.source.data());
-    keep(hn::Add(hn::Set(d_index, first), lane), near.entry.data());
-    chosen += static_cast<int>(hn::CountTrue(d_int, is_in));
+    const auto row = rows[hn::ConvertTo(d_bits, y)];
+    const auto bit = hn::Shl(hn::Set(d_bits, 1), hn::ConvertTo(d_bits, x));
+    const auto is_in = hn::And(hn::TestBit(row, bit), hn::FirstN(d_bits, last - first));
+    const Compressor compress(is_in);
+    hn::StoreU(compress(d, hn::Add(x, hn::Set(d, shift_x))), d, near.x.data() + chosen);
+    hn::StoreU(compress(d, hn::Add(y, hn::Set(d, shift_y))), d, near.y.data() + chosen);
+    hn::StoreU(compress(d_index, hn::BitCast(d_index, source)), d_index,
+               near.source.data() + chosen);
+    hn::StoreU(compress(d_index, hn::Add(hn::Set(d_index, first), lane)), d_index,
+               near.entry.data() + chosen);
+    chosen += static_cast<int>(hn::CountTrue(d_bits, is_in));
   }
   for (; first < last; ++first) {
     const BinEntry& entry = entries[first];
