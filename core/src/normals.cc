@@ -1,6 +1,7 @@
 #include "normals.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <tuple>
 
@@ -37,16 +38,26 @@ void SetNormal(double x, double y, CellPlane& plane) {
   plane.normal_y = y / length;
 }
 
-// Samples F at the middle of the segment.
-void SampleAtMiddle(const TileDirectory& directory, const PointField& field, const ActiveCell& cell,
-                    CellPlane& plane) {
+// The middle of a segment.
+FieldPoint MiddleOf(const TileDirectory& directory, const ActiveCell& cell, CellPlane& plane) {
   plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
   const LatticePoint origin = CellOrigin(directory, cell);
-  const FieldSample sample =
-      field.Sample(cell.tile, plane.point.x - origin.x + cell.i, plane.point.y - origin.y + cell.j);
-  plane.value = sample.value;
-  plane.gradient_x = sample.gradient_x;
-  plane.gradient_y = sample.gradient_y;
+  return {cell.tile, plane.point.x - origin.x + cell.i, plane.point.y - origin.y + cell.j};
+}
+
+// Samples F at the middle of one segment or of two.
+void SampleAtMiddles(const TileDirectory& directory, const PointField& field,
+                     std::span<const ActiveCell* const> cells, std::span<CellPlane> planes) {
+  std::array<FieldPoint, 2> points;
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    points[k] = MiddleOf(directory, *cells[k], planes[k]);
+  }
+  const std::array<FieldSample, 2> samples = field.SampleTwo(points[0], points[1]);
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    planes[k].value = samples[k].value;
+    planes[k].gradient_x = samples[k].gradient_x;
+    planes[k].gradient_y = samples[k].gradient_y;
+  }
 }
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
@@ -132,28 +143,35 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
                      std::vector<CellNormal>& next) {
   if (!parameters.normal_memory) previous = {};
   planes.resize(rings.segments.size());
-  const auto estimate = [&](std::size_t k, std::size_t after) {
-    CellPlane& plane = planes[k];
-    const ActiveCell& cell = crossings.cells[crossings.segments[rings.segments[k]].cell];
-    plane.entry = rings.entries[k];
-    plane.exit = rings.entries[after];
-    if (parameters.placement == Placement::kFarthestParticle) {
-      SampleAtMean(bins.tiles, field, cell, plane);
-    } else {
-      SampleAtMiddle(bins.tiles, field, cell, plane);
-    }
-    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
-                    kWeakGradientSquare;
-    if (plane.is_weak) return;
-    SetNormal(plane.gradient_x, plane.gradient_y, plane);
-    Orient(FindPrevious(previous, bins.tiles, cell), plane);
+  const auto cell_of = [&](std::size_t k) {
+    return &crossings.cells[crossings.segments[rings.segments[k]].cell];
   };
-  ParallelForRanges(planes.size(), 1, [&](std::size_t first, std::size_t last) {
+  // One plane or two, which are successive.
+  const auto estimate = [&](std::size_t first, std::size_t count) {
+    const std::span<CellPlane> some = std::span(planes).subspan(first, count);
+    const std::array<const ActiveCell*, 2> cells{cell_of(first), cell_of(first + count - 1)};
+    if (parameters.placement == Placement::kFarthestParticle) {
+      for (std::size_t k = 0; k < count; ++k) SampleAtMean(bins.tiles, field, *cells[k], some[k]);
+    } else {
+      SampleAtMiddles(bins.tiles, field, cells, some);
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      CellPlane& plane = some[k];
+      plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
+                      kWeakGradientSquare;
+      if (plane.is_weak) continue;
+      SetNormal(plane.gradient_x, plane.gradient_y, plane);
+      Orient(FindPrevious(previous, bins.tiles, *cells[k]), plane);
+    }
+  };
+  ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t first, std::size_t last) {
     auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
     for (std::size_t k = first; k < last; ++k) {
       if (k == *end) ++end;
-      estimate(k, k + 1 == *end ? *(end - 1) : k + 1);
+      planes[k].entry = rings.entries[k];
+      planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
     }
+    for (std::size_t k = first; k < last; k += 2) estimate(k, std::min<std::size_t>(2, last - k));
   });
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::size_t first = rings.offsets[ring];

@@ -28,6 +28,9 @@ struct CellPlane {
   double OutwardY() const { return entry.x - exit.x; }
 };
 
+/// Segments of a task: enough to be sampled by twos.
+inline constexpr std::size_t kSegmentsAtOnce = 64;
+
 /// Below this squared length a gradient of F or phi says nothing about direction (METHOD, 14).
 inline constexpr double kWeakGradientSquare = 1e-3;
 

@@ -28,34 +28,57 @@ constexpr double kHalfBump = 8.0 / 15;
 
 }  // namespace
 
-PlaneEstimates EstimatePlane(const PointField& field, const Scale& scale, std::uint32_t tile,
-                             const BentPlane& plane) {
+PlaneEstimator::PlaneEstimator(const PointField& field, const Scale& scale)
+    : field_(field), scale_(scale) {
   const double h = scale.spacing;
-  const SupportShape support{.radius = std::min(kSupportRadius * h, scale.kernel_radius),
-                             .half_width = kSupportHalfWidth * h,
-                             .height = kHeight * h,
-                             .spacing = h,
-                             .depth = kSupportDepth};
+  support_ = {.radius = std::min(kSupportRadius * h, scale.kernel_radius),
+              .half_width = kSupportHalfWidth * h,
+              .height = kHeight * h,
+              .spacing = h,
+              .depth = kSupportDepth};
   // Particles are listed within the kernel radius: below a smaller one, the strip shrinks.
   const double unit = std::min(h, scale.kernel_radius / kStripRadius);
-  const StripShape strip{.radius = kStripRadius * unit,
-                         .half_width = kStripHalfWidth * unit,
-                         .height = kHeight * h,
-                         .depth = kStripDepth * unit};
-  const NearRows near =
-      field.RowsNear(tile, plane.x, plane.y, std::max(support.radius, strip.radius));
-  const SupportSums sums = SumSupport(near, support, strip, plane);
+  strip_ = {.radius = kStripRadius * unit,
+            .half_width = kStripHalfWidth * unit,
+            .height = kHeight * h,
+            .depth = kStripDepth * unit};
+}
 
+SupportQuery PlaneEstimator::QueryAt(std::uint32_t tile, const BentPlane& plane) const {
+  const double radius = std::max(support_.radius, strip_.radius);
+  return {field_.RowsNear(tile, plane.x, plane.y, radius), plane};
+}
+
+PlaneEstimates PlaneEstimator::EstimatesOf(const SupportSums& sums) const {
+  const double h = scale_.spacing;
   const auto limited = [h](double shift) {
     return std::clamp(shift, -kMaxEstimate * h, kMaxEstimate * h);
   };
   if (sums.weight <= 0) return {};
   const double volume =
-      near.weight == nullptr ? sums.volume * h * h : sums.volume / scale.weight_per_volume;
+      field_.HasWeights() ? sums.volume / scale_.weight_per_volume : sums.volume * h * h;
   // A plane that moves out by a length has so much more volume below it.
-  const double width = 2 * kHalfBump * strip.half_width;
+  const double width = 2 * kHalfBump * strip_.half_width;
   return {.support = limited(sums.distance / sums.weight + h / 2),
-          .strip = limited(volume / width - kHalfBump * strip.depth)};
+          .strip = limited(volume / width - kHalfBump * strip_.depth)};
+}
+
+PlaneEstimates PlaneEstimator::Estimate(std::uint32_t tile, const BentPlane& plane) const {
+  return EstimatesOf(SumSupport(QueryAt(tile, plane), support_, strip_));
+}
+
+std::array<PlaneEstimates, 2> PlaneEstimator::EstimateTwo(
+    const std::array<std::uint32_t, 2>& tiles, const std::array<BentPlane, 2>& planes) const {
+  if (tiles[0] != kNoTile && tiles[1] != kNoTile) {
+    const auto sums = SumTwoSupports(QueryAt(tiles[0], planes[0]), QueryAt(tiles[1], planes[1]),
+                                     support_, strip_);
+    return {EstimatesOf(sums[0]), EstimatesOf(sums[1])};
+  }
+  std::array<PlaneEstimates, 2> estimates;
+  for (int k = 0; k < 2; ++k) {
+    if (tiles[k] != kNoTile) estimates[k] = Estimate(tiles[k], planes[k]);
+  }
+  return estimates;
 }
 
 }  // namespace partiemc

@@ -2,6 +2,7 @@
 // placement", 3).
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "plane_support.h"
@@ -17,9 +18,28 @@ struct PlaneEstimates {
   double strip = 0;    ///< By the particles' volume in a strip below it.
 };
 
-/// `plane` in cells relative to `tile`. Cost: the particles within three spacings.
-/// Requires: field.Covers(tile, plane.x, plane.y).
-PlaneEstimates EstimatePlane(const PointField& field, const Scale& scale, std::uint32_t tile,
-                             const BentPlane& plane);
+/// Estimates planes of one field.
+class PlaneEstimator {
+ public:
+  PlaneEstimator(const PointField& field, const Scale& scale);
+
+  /// `plane` in cells relative to `tile`. Cost: the particles within three spacings.
+  /// Requires: field.Covers(tile, plane.x, plane.y).
+  PlaneEstimates Estimate(std::uint32_t tile, const BentPlane& plane) const;
+
+  /// Two neighbours at once, which costs less than one after the other. Either may be in no tile,
+  /// kNoTile: nothing tells where it belongs.
+  std::array<PlaneEstimates, 2> EstimateTwo(const std::array<std::uint32_t, 2>& tiles,
+                                            const std::array<BentPlane, 2>& planes) const;
+
+ private:
+  SupportQuery QueryAt(std::uint32_t tile, const BentPlane& plane) const;
+  PlaneEstimates EstimatesOf(const SupportSums& sums) const;
+
+  const PointField& field_;
+  const Scale& scale_;
+  SupportShape support_;
+  StripShape strip_;
+};
 
 }  // namespace partiemc

@@ -12,32 +12,33 @@ HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-HWY_INLINE double SumOfParts(const Vector* sums) {
-  HWY_ALIGN double parts[kPointPadding];
-  for (int part = 0; part < kParts; ++part) {
-    hn::Store(sums[part], Lanes(), parts + part * kLanes);
-  }
-  return (parts[0] + parts[1]) + (parts[2] + parts[3]);
-}
-
 // B(d, s) by d^2 and 1 / s^2.
-HWY_INLINE Vector Bump(Vector square, Vector inverse_square) {
-  const Lanes d;
-  const Vector t = hn::Max(hn::Sub(hn::Set(d, 1.0), hn::Mul(square, inverse_square)), hn::Zero(d));
+template <class D>
+HWY_INLINE hn::Vec<D> Bump(D d, hn::Vec<D> square, hn::Vec<D> inverse_square) {
+  const auto t = hn::Max(hn::Sub(hn::Set(d, 1.0), hn::Mul(square, inverse_square)), hn::Zero(d));
   return hn::Mul(t, t);
 }
 
-template <bool kWeighted>
-SupportSums Sum(const NearRows& near, const SupportShape& support, const StripShape& strip,
-                const BentPlane& plane) {
-  const Lanes d;
+// `Points` is OnePoint or TwoPoints; results[p] are the sums of point p.
+template <bool kWeighted, typename Points>
+HWY_INLINE void Sum(const SupportQuery& entries, const SupportShape& support,
+                    const StripShape& strip, Points points,
+                    SupportSums (&results)[Points::kPoints]) {
+  using D = typename Points::D;
+  using Vector = typename Points::Vector;
+  constexpr int kParts = Points::kParts;
+  const D d;
   const auto inverse_square = [d](double length)
                                   HWY_ATTR { return hn::Set(d, 1 / (length * length)); };
-  const Vector x = hn::Set(d, plane.x);
-  const Vector y = hn::Set(d, plane.y);
-  const Vector normal_x = hn::Set(d, plane.normal_x);
-  const Vector normal_y = hn::Set(d, plane.normal_y);
-  const Vector half_curvature = hn::Set(d, plane.curvature / 2);
+  const auto of_plane = [&](auto value) HWY_ATTR {
+    return points.PerPoint([&](const SupportQuery& query) { return value(query.plane); });
+  };
+  const Vector x = of_plane([](const BentPlane& plane) { return plane.x; });
+  const Vector y = of_plane([](const BentPlane& plane) { return plane.y; });
+  const Vector normal_x = of_plane([](const BentPlane& plane) { return plane.normal_x; });
+  const Vector normal_y = of_plane([](const BentPlane& plane) { return plane.normal_y; });
+  const Vector half_curvature =
+      of_plane([](const BentPlane& plane) { return plane.curvature / 2; });
   const Vector support_radius = hn::Set(d, support.radius * support.radius);
   const Vector support_height = hn::Set(d, support.height);
   const Vector support_width = inverse_square(support.half_width);
@@ -52,49 +53,65 @@ SupportSums Sum(const NearRows& near, const SupportShape& support, const StripSh
     distances[part] = weights[part] = volumes[part] = hn::Zero(d);
   }
 
-  for (int row = 0; row < near.rows; ++row) {
-    const std::uint32_t* offsets = near.offsets + row * near.row_stride;
-    const std::uint32_t end = offsets[near.columns];
-    for (std::uint32_t entry = offsets[0]; entry < end; entry += kPointPadding) {
-      for (int part = 0; part < kParts; ++part) {
-        const std::uint32_t at = entry + part * kLanes;
-        const int left = static_cast<int>(end - entry) - part * kLanes;
-        const Vector dx = hn::Sub(LoadDouble(near.x + at), x);
-        const Vector dy = hn::Sub(LoadDouble(near.y + at), y);
-        const Vector along = hn::Sub(hn::Mul(normal_x, dy), hn::Mul(normal_y, dx));
-        const Vector above = hn::Add(hn::Mul(dx, normal_x), hn::Mul(dy, normal_y));
-        const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
-        // Lanes past the end of the row hold other entries, or none.
-        const auto is_listed = hn::Lt(hn::Iota(d, 0.0), hn::Set(d, static_cast<double>(left)));
-        const Vector along_square = hn::Mul(along, along);
-        const Vector distance = hn::Add(above, hn::Mul(half_curvature, along_square));
+  points.ForEachVector([&](int part) HWY_ATTR {
+    const Vector dx = hn::Sub(points.Load(entries.x), x);
+    const Vector dy = hn::Sub(points.Load(entries.y), y);
+    const Vector along = hn::Sub(hn::Mul(normal_x, dy), hn::Mul(normal_y, dx));
+    const Vector above = hn::Add(hn::Mul(dx, normal_x), hn::Mul(dy, normal_y));
+    const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+    const auto is_entry = points.IsEntry();
+    const Vector along_square = hn::Mul(along, along);
+    const Vector distance = hn::Add(above, hn::Mul(half_curvature, along_square));
 
-        Vector w = hn::Max(hn::Add(hn::Mul(distance, inverse_spacing), support_depth), hn::Zero(d));
-        for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
-        const auto supports =
-            hn::And(hn::Lt(square, support_radius), hn::Lt(above, support_height));
-        w = hn::IfThenElseZero(hn::And(is_listed, supports),
-                               hn::Mul(Bump(along_square, support_width), w));
-        distances[part] = hn::Add(distances[part], hn::Mul(w, distance));
-        weights[part] = hn::Add(weights[part], w);
+    Vector w = hn::Max(hn::Add(hn::Mul(distance, inverse_spacing), support_depth), hn::Zero(d));
+    for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
+    const auto supports = hn::And(hn::Lt(square, support_radius), hn::Lt(above, support_height));
+    w = hn::IfThenElseZero(hn::And(is_entry, supports),
+                           hn::Mul(Bump(d, along_square, support_width), w));
+    distances[part] = hn::Add(distances[part], hn::Mul(w, distance));
+    weights[part] = hn::Add(weights[part], w);
 
-        const Vector below = hn::Min(distance, hn::Zero(d));
-        Vector volume =
-            hn::Mul(Bump(along_square, strip_width), Bump(hn::Mul(below, below), strip_depth));
-        if constexpr (kWeighted) volume = hn::Mul(volume, LoadDouble(near.weight + at));
-        const auto is_in_strip = hn::And(hn::Lt(square, strip_radius), hn::Lt(above, strip_height));
-        volumes[part] =
-            hn::Add(volumes[part], hn::IfThenElseZero(hn::And(is_listed, is_in_strip), volume));
-      }
-    }
+    const Vector below = hn::Min(distance, hn::Zero(d));
+    Vector volume =
+        hn::Mul(Bump(d, along_square, strip_width), Bump(d, hn::Mul(below, below), strip_depth));
+    if constexpr (kWeighted) volume = hn::Mul(volume, points.Load(entries.weight));
+    const auto is_in_strip = hn::And(hn::Lt(square, strip_radius), hn::Lt(above, strip_height));
+    volumes[part] =
+        hn::Add(volumes[part], hn::IfThenElseZero(hn::And(is_entry, is_in_strip), volume));
+  });
+  HWY_ALIGN double totals[2][Points::kPoints * kPointPadding];
+  StoreTotals(d, distances, weights, totals[0]);
+  StoreTotals(d, volumes, volumes, totals[1]);
+  for (int point = 0; point < Points::kPoints; ++point) {
+    const int at = point * kPointPadding;
+    results[point] = {totals[0][at], totals[0][at + 1], totals[1][at]};
   }
-  return {SumOfParts(distances), SumOfParts(weights), SumOfParts(volumes)};
 }
 
-SupportSums SumSupport(const NearRows& near, const SupportShape& support, const StripShape& strip,
-                       const BentPlane& plane) {
-  return near.weight == nullptr ? Sum<false>(near, support, strip, plane)
-                                : Sum<true>(near, support, strip, plane);
+SupportSums SumOne(const SupportQuery& query, const SupportShape& support,
+                   const StripShape& strip) {
+  SupportSums sums[1];
+  query.weight == nullptr ? Sum<false>(query, support, strip, OnePoint(query), sums)
+                          : Sum<true>(query, support, strip, OnePoint(query), sums);
+  return sums[0];
+}
+
+SupportSums SumSupport(const SupportQuery& query, const SupportShape& support,
+                       const StripShape& strip) {
+  return SumOne(query, support, strip);
+}
+
+std::array<SupportSums, 2> SumTwoSupports(const SupportQuery& first, const SupportQuery& second,
+                                          const SupportShape& support, const StripShape& strip) {
+#if PARTIEMC_TWO_POINTS_FIT
+  SupportSums sums[2];
+  const TwoPoints points(first, second);
+  first.weight == nullptr ? Sum<false>(first, support, strip, points, sums)
+                          : Sum<true>(first, support, strip, points, sums);
+  return {sums[0], sums[1]};
+#else
+  return {SumOne(first, support, strip), SumOne(second, support, strip)};
+#endif
 }
 
 }  // namespace HWY_NAMESPACE
@@ -105,10 +122,16 @@ HWY_AFTER_NAMESPACE();
 namespace partiemc {
 
 HWY_EXPORT(SumSupport);
+HWY_EXPORT(SumTwoSupports);
 
-SupportSums SumSupport(const NearRows& near, const SupportShape& support, const StripShape& strip,
-                       const BentPlane& plane) {
-  return HWY_DYNAMIC_DISPATCH(SumSupport)(near, support, strip, plane);
+SupportSums SumSupport(const SupportQuery& query, const SupportShape& support,
+                       const StripShape& strip) {
+  return HWY_DYNAMIC_DISPATCH(SumSupport)(query, support, strip);
+}
+
+std::array<SupportSums, 2> SumTwoSupports(const SupportQuery& first, const SupportQuery& second,
+                                          const SupportShape& support, const StripShape& strip) {
+  return HWY_DYNAMIC_DISPATCH(SumTwoSupports)(first, second, support, strip);
 }
 
 }  // namespace partiemc

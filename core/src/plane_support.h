@@ -2,6 +2,8 @@
 // at hand.
 #pragma once
 
+#include <array>
+
 #include "point_field.h"
 
 namespace partiemc {
@@ -34,9 +36,16 @@ struct SupportSums {
   double volume;
 };
 
-/// Sums over the particles of `near`, which lists all in both discs and may list more. Same bits
-/// for any processor, as SumAtPoint.
-SupportSums SumSupport(const NearRows& near, const SupportShape& support, const StripShape& strip,
-                       const BentPlane& plane);
+/// A plane and the particles around its point: at least those in both discs.
+struct SupportQuery : NearRows {
+  BentPlane plane;
+};
+
+/// Same bits for any processor, as SumAtPoint.
+SupportSums SumSupport(const SupportQuery& query, const SupportShape& support,
+                       const StripShape& strip);
+/// The same of two planes of one field, as SumAtTwoPoints.
+std::array<SupportSums, 2> SumTwoSupports(const SupportQuery& first, const SupportQuery& second,
+                                          const SupportShape& support, const StripShape& strip);
 
 }  // namespace partiemc

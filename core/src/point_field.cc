@@ -179,7 +179,24 @@ class Spread {
 
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
   const PointQuery query = QueryAt(tile, x, y);
-  const PointSums sums = SumAtPoint(query);
+  return SampleOf(query, SumAtPoint(query));
+}
+
+std::array<FieldSample, 2> PointField::SampleTwo(const FieldPoint& first,
+                                                 const FieldPoint& second) const {
+  if (first.tile != kNoTile && second.tile != kNoTile) {
+    const PointQuery queries[2] = {QueryAt(first.tile, first.x, first.y),
+                                   QueryAt(second.tile, second.x, second.y)};
+    const std::array<PointSums, 2> sums = SumAtTwoPoints(queries[0], queries[1]);
+    return {SampleOf(queries[0], sums[0]), SampleOf(queries[1], sums[1])};
+  }
+  const auto sample = [this](const FieldPoint& point) {
+    return point.tile == kNoTile ? FieldSample{} : Sample(point.tile, point.x, point.y);
+  };
+  return {sample(first), sample(second)};
+}
+
+FieldSample PointField::SampleOf(const PointQuery& query, const PointSums& sums) const {
   FieldSample sample;
   if (sums.kernel <= 0) {
     sample.phi = scale_.kernel_radius - scale_.reference_radius;

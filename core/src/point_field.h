@@ -1,6 +1,7 @@
 // The level set and its gradient at any point near the isoline, not only at nodes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -24,6 +25,12 @@ struct FieldSample {
   double value = 0;                       ///< F (level_set_formula.h)
   double gradient_x = 0, gradient_y = 0;  ///< grad F, of the branch that F is.
   bool has_support = false;               ///< Whether any particle is within the kernel radius.
+};
+
+/// A point of a tile, in cells relative to it; in tile kNoTile where no particle is near.
+struct FieldPoint {
+  std::uint32_t tile = kNoTile;
+  double x = 0, y = 0;
 };
 
 /// Entries around a point in memory: row after row of buckets, each a contiguous span. Vectors may
@@ -51,6 +58,13 @@ class PointField {
   /// Cost: the particles within a kernel radius and a bucket.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
+  /// The same of two points, neighbours at best, for less than one after the other. Either may be
+  /// in no tile: its sample is empty.
+  std::array<FieldSample, 2> SampleTwo(const FieldPoint& first, const FieldPoint& second) const;
+
+  /// Whether particles weigh each their own.
+  bool HasWeights() const { return !weight_.empty(); }
+
   /// Calls visit(x, y, entry) for the particles of `tile`'s list within `radius` of a point of it,
   /// and for some more. Requires: radius <= kernel radius.
   template <typename Visit>
@@ -76,6 +90,7 @@ class PointField {
   BucketRange Buckets(double centre, double radius) const;
 
   PointQuery QueryAt(std::uint32_t tile, double x, double y) const;
+  FieldSample SampleOf(const PointQuery& query, const PointSums& sums) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
   NearWalk Near(const ParticleBins& bins, std::uint32_t tile) const;

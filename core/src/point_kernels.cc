@@ -31,36 +31,22 @@ enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
 enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
 
 // What particles contribute: d, k and dk / da, 0 beyond the row and beyond the kernel.
+template <typename Vector>
 struct Terms {
   Vector dx, dy, kernel, slope_x, slope_y;
 };
 
-HWY_INLINE Terms TermsOf(const PointQuery& query, std::uint32_t entry, int left) {
-  const Lanes d;
-  const Vector dx = hn::Sub(LoadDouble(query.entry_x + entry), hn::Set(d, query.x));
-  const Vector dy = hn::Sub(LoadDouble(query.entry_y + entry), hn::Set(d, query.y));
-  const Vector inverse_square = hn::Set(d, query.inverse_square);
-  const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
-  Vector t = hn::Sub(hn::Set(d, 1.0), hn::Mul(square, inverse_square));
-  // Lanes past the end of the row hold other entries, or none.
-  const auto is_entry = hn::Lt(hn::Iota(d, 0.0), hn::Set(d, static_cast<double>(left)));
-  t = hn::IfThenElseZero(is_entry, hn::Max(hn::Zero(d), t));
-  const Vector t2 = hn::Mul(t, t);
-  const Vector slope = hn::Mul(hn::Mul(hn::Set(d, 6.0), t2), inverse_square);
-  return {dx, dy, hn::Mul(t2, t), hn::Mul(slope, dx), hn::Mul(slope, dy)};
-}
-
-// Each adds to the channels of one partial sum.
+// Each adds to the channels of one partial sum; `Points` is OnePoint or TwoPoints.
 template <bool kWeighted>
 struct AddSums {
   static constexpr int kChannels = kWeighted ? int{kWeightedSums} : int{kSums};
 
-  HWY_INLINE void operator()(const PointQuery& query, std::uint32_t entry, const Terms& terms,
+  template <typename Points, typename Vector>
+  HWY_INLINE void operator()(const Points& points, const float* weight, const Terms<Vector>& terms,
                              Vector* sums) const {
     const auto& [dx, dy, k, kx, ky] = terms;
-    const auto add = [&](int channel, Vector term) {
-      sums[channel] = hn::Add(sums[channel], term);
-    };
+    const auto add = [&](int channel, Vector term)
+                         HWY_ATTR { sums[channel] = hn::Add(sums[channel], term); };
     add(kKernel, k);
     const Vector moment_x = hn::Mul(k, dx);
     const Vector moment_y = hn::Mul(k, dy);
@@ -75,7 +61,7 @@ struct AddSums {
     add(kXy, hn::Mul(kx, dy));
     add(kYy, hn::Mul(ky, dy));
     if constexpr (kWeighted) {
-      const Vector w = LoadDouble(query.weight + entry);
+      const Vector w = points.Load(weight);
       add(kDensity, hn::Mul(w, k));
       add(kDensityX, hn::Mul(w, kx));
       add(kDensityY, hn::Mul(w, ky));
@@ -86,12 +72,12 @@ struct AddSums {
 struct AddThirdSums {
   static constexpr int kChannels = kThirdSums;
 
-  HWY_INLINE void operator()(const PointQuery&, std::uint32_t, const Terms& terms,
+  template <typename Points, typename Vector>
+  HWY_INLINE void operator()(const Points&, const float*, const Terms<Vector>& terms,
                              Vector* sums) const {
     const auto& [dx, dy, k, kx, ky] = terms;
-    const auto add = [&](int channel, Vector term) {
-      sums[channel] = hn::Add(sums[channel], term);
-    };
+    const auto add = [&](int channel, Vector term)
+                         HWY_ATTR { sums[channel] = hn::Add(sums[channel], term); };
     const Vector xx = hn::Mul(kx, dx);
     const Vector yy = hn::Mul(ky, dy);
     add(kXxx, hn::Mul(xx, dx));
@@ -101,43 +87,54 @@ struct AddThirdSums {
   }
 };
 
-template <typename Add>
-HWY_INLINE void Sum(const PointQuery& query, Add add, double* totals) {
-  const Lanes d;
+// Sums over the entries of `points`, all in the arrays of `entries`: totals[p] are those of point
+// p.
+template <typename Points, typename Add>
+HWY_INLINE void Sum(const PointQuery& entries, Points points, Add add,
+                    double (&totals)[Points::kPoints][Add::kChannels]) {
+  using D = typename Points::D;
+  using Vector = typename Points::Vector;
+  constexpr int kParts = Points::kParts;
+  const D d;
   Vector sums[kParts][Add::kChannels];
   for (auto& part : sums) {
     for (Vector& sum : part) sum = hn::Zero(d);
   }
-  for (int row = 0; row < query.rows; ++row) {
-    const std::uint32_t* offsets = query.offsets + row * query.row_stride;
-    const std::uint32_t end = offsets[query.columns];
-    for (std::uint32_t entry = offsets[0]; entry < end; entry += kPointPadding) {
-      for (int part = 0; part < kParts; ++part) {
-        const int left = static_cast<int>(end - entry) - part * kLanes;
-        const std::uint32_t first = entry + part * kLanes;
-        add(query, first, TermsOf(query, first, left), sums[part]);
-      }
-    }
-  }
-  for (int channel = 0; channel < Add::kChannels; ++channel) {
-    HWY_ALIGN double parts[kPointPadding];
+  const Vector x = points.PerPoint([](const PointQuery& query) { return query.x; });
+  const Vector y = points.PerPoint([](const PointQuery& query) { return query.y; });
+  const Vector inverse_square = hn::Set(d, entries.inverse_square);
+  points.ForEachVector([&](int part) HWY_ATTR {
+    const Vector dx = hn::Sub(points.Load(entries.entry_x), x);
+    const Vector dy = hn::Sub(points.Load(entries.entry_y), y);
+    const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+    Vector t = hn::Sub(hn::Set(d, 1.0), hn::Mul(square, inverse_square));
+    t = hn::IfThenElseZero(points.IsEntry(), hn::Max(hn::Zero(d), t));
+    const Vector t2 = hn::Mul(t, t);
+    const Vector slope = hn::Mul(hn::Mul(hn::Set(d, 6.0), t2), inverse_square);
+    add(points, entries.weight,
+        Terms<Vector>{dx, dy, hn::Mul(t2, t), hn::Mul(slope, dx), hn::Mul(slope, dy)}, sums[part]);
+  });
+  for (int channel = 0; channel < Add::kChannels; channel += 2) {
+    const bool has_next = channel + 1 < Add::kChannels;
+    Vector first[kParts], second[kParts];
     for (int part = 0; part < kParts; ++part) {
-      hn::StoreU(sums[part][channel], d, parts + part * kLanes);
+      first[part] = sums[part][channel];
+      second[part] = has_next ? sums[part][channel + 1] : hn::Zero(d);
     }
-    totals[channel] = (parts[0] + parts[1]) + (parts[2] + parts[3]);
+    HWY_ALIGN double both[Points::kPoints * kPointPadding];
+    StoreTotals(d, first, second, both);
+    for (int point = 0; point < Points::kPoints; ++point) {
+      totals[point][channel] = both[point * kPointPadding];
+      if (has_next) totals[point][channel + 1] = both[point * kPointPadding + 1];
+    }
   }
 }
 
-PointSums SumAtPoint(const PointQuery& query) {
-  double totals[kWeightedSums];
-  if (query.weight != nullptr) {
-    Sum(query, AddSums<true>(), totals);
-  } else {
-    Sum(query, AddSums<false>(), totals);
-    totals[kDensity] = query.uniform_weight * totals[kKernel];
-    totals[kDensityX] = query.uniform_weight * totals[kSlopeX];
-    totals[kDensityY] = query.uniform_weight * totals[kSlopeY];
-  }
+template <bool kWeighted>
+PointSums Named(const PointQuery& query, const double* totals) {
+  const auto weighted = [&](WeightedChannel channel, Channel plain) {
+    return kWeighted ? totals[channel] : query.uniform_weight * totals[plain];
+  };
   return {.kernel = totals[kKernel],
           .moment_x = totals[kMomentX],
           .moment_y = totals[kMomentY],
@@ -149,15 +146,42 @@ PointSums SumAtPoint(const PointQuery& query) {
           .xx = totals[kXx],
           .xy = totals[kXy],
           .yy = totals[kYy],
-          .density = totals[kDensity],
-          .density_x = totals[kDensityX],
-          .density_y = totals[kDensityY]};
+          .density = weighted(kDensity, kKernel),
+          .density_x = weighted(kDensityX, kSlopeX),
+          .density_y = weighted(kDensityY, kSlopeY)};
+}
+
+template <bool kWeighted>
+PointSums SumOne(const PointQuery& query) {
+  double totals[1][AddSums<kWeighted>::kChannels];
+  Sum(query, OnePoint(query), AddSums<kWeighted>(), totals);
+  return Named<kWeighted>(query, totals[0]);
+}
+
+template <bool kWeighted>
+std::array<PointSums, 2> SumTwo(const PointQuery& first, const PointQuery& second) {
+#if PARTIEMC_TWO_POINTS_FIT
+  double totals[2][AddSums<kWeighted>::kChannels];
+  Sum(first, TwoPoints(first, second), AddSums<kWeighted>(), totals);
+  return {Named<kWeighted>(first, totals[0]), Named<kWeighted>(second, totals[1])};
+#else
+  return {SumOne<kWeighted>(first), SumOne<kWeighted>(second)};
+#endif
+}
+
+PointSums SumAtPoint(const PointQuery& query) {
+  return query.weight != nullptr ? SumOne<true>(query) : SumOne<false>(query);
+}
+
+std::array<PointSums, 2> SumAtTwoPoints(const PointQuery& first, const PointQuery& second) {
+  return first.weight != nullptr ? SumTwo<true>(first, second) : SumTwo<false>(first, second);
 }
 
 PointThirdSums ThirdSumsAtPoint(const PointQuery& query) {
-  double totals[kThirdSums];
-  Sum(query, AddThirdSums(), totals);
-  return {.xxx = totals[kXxx], .xxy = totals[kXxy], .xyy = totals[kXyy], .yyy = totals[kYyy]};
+  double totals[1][kThirdSums];
+  Sum(query, OnePoint(query), AddThirdSums(), totals);
+  const double* const sums = totals[0];
+  return {.xxx = sums[kXxx], .xxy = sums[kXxy], .xyy = sums[kXyy], .yyy = sums[kYyy]};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -168,9 +192,14 @@ HWY_AFTER_NAMESPACE();
 namespace partiemc {
 
 HWY_EXPORT(SumAtPoint);
+HWY_EXPORT(SumAtTwoPoints);
 HWY_EXPORT(ThirdSumsAtPoint);
 
 PointSums SumAtPoint(const PointQuery& query) { return HWY_DYNAMIC_DISPATCH(SumAtPoint)(query); }
+
+std::array<PointSums, 2> SumAtTwoPoints(const PointQuery& first, const PointQuery& second) {
+  return HWY_DYNAMIC_DISPATCH(SumAtTwoPoints)(first, second);
+}
 
 PointThirdSums ThirdSumsAtPoint(const PointQuery& query) {
   return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(query);

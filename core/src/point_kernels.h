@@ -1,6 +1,7 @@
 // The sums over particles behind PointField::Sample, in the vectors of the processor at hand.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 namespace partiemc {
@@ -39,6 +40,10 @@ struct PointThirdSums {
 /// Reads up to kPointPadding entries past the end of a row.
 inline constexpr int kPointPadding = 4;
 PointSums SumAtPoint(const PointQuery& query);
+/// The same of two points that look at the same entries in memory, at once where vectors are wide
+/// enough: what their rows have in common in length costs once. Best for points that are
+/// neighbours.
+std::array<PointSums, 2> SumAtTwoPoints(const PointQuery& first, const PointQuery& second);
 PointThirdSums ThirdSumsAtPoint(const PointQuery& query);
 
 }  // namespace partiemc

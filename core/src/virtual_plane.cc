@@ -1,6 +1,7 @@
 #include "virtual_plane.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -68,13 +69,7 @@ const ActiveCell& CellOf(const VertexInput& input, std::size_t segment) {
   return input.crossings.cells[input.crossings.segments[index].cell];
 }
 
-// A point by the tile that it lies in; tile kNoTile where no particle is near.
-struct TilePoint {
-  std::uint32_t tile;
-  double x, y;
-};
-
-TilePoint Locate(const VertexInput& input, std::size_t segment, const LatticePoint& point) {
+FieldPoint Locate(const VertexInput& input, std::size_t segment, const LatticePoint& point) {
   const ActiveCell& cell = CellOf(input, segment);
   const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
   const double x = point.x - origin.x + cell.i;
@@ -86,28 +81,38 @@ TilePoint Locate(const VertexInput& input, std::size_t segment, const LatticePoi
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
-// Step 1: both vertices of a segment on the level set, by one Newton step each, and their normals.
-void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
+// Step 1 of one segment: both vertices on the level set, by one Newton step each. `at_entry` is the
+// field at its entry.
+void FindRoots(const VertexInput& input, std::size_t segment, const FieldSample& at_entry,
+               RingVertices& v) {
   const CellPlane& plane = input.planes[segment];
   const std::size_t edge = 2 * segment;
   const std::size_t inner = edge + 1;
-  v.root[edge] = v.point[edge] = plane.entry;
-  const TilePoint at = Locate(input, segment, plane.entry);
-  if (at.tile != kNoTile) {
-    const FieldSample sample = input.field.Sample(at.tile, at.x, at.y);
-    v.point[edge] = NewtonStep(plane.entry, sample, kMaxEdgeStep);
-  }
+  v.root[edge] = plane.entry;
+  v.point[edge] = NewtonStep(plane.entry, at_entry, kMaxEdgeStep);
   v.root[inner] = v.point[inner] =
       ClampToCell(input.bins.tiles, input.crossings, input.topology.segments[segment],
                   VirtualPlaneVertex(plane));
   const LatticePoint outward = UnitOr({plane.OutwardX(), plane.OutwardY()}, {1, 0});
+  const std::array<FieldSample, 2> samples = input.field.SampleTwo(
+      Locate(input, segment, v.point[edge]), Locate(input, segment, v.point[inner]));
   for (const std::size_t i : {edge, inner}) {
-    const TilePoint p = Locate(input, segment, v.point[i]);
-    v.normal[i] = outward;
-    if (p.tile == kNoTile) continue;
-    const FieldSample sample = input.field.Sample(p.tile, p.x, p.y);
-    const LatticePoint gradient{sample.gradient_x, sample.gradient_y};
-    if (Dot(gradient, gradient) >= kWeakGradientSquare) v.normal[i] = UnitOr(gradient, outward);
+    const LatticePoint gradient{samples[i - edge].gradient_x, samples[i - edge].gradient_y};
+    v.normal[i] =
+        Dot(gradient, gradient) >= kWeakGradientSquare ? UnitOr(gradient, outward) : outward;
+  }
+}
+
+// Step 1 of a stretch of segments, by two of them where there are two.
+void FindRoots(const VertexInput& input, std::size_t first, std::size_t last, RingVertices& v) {
+  const auto entry = [&](std::size_t segment) {
+    if (segment >= last) return FieldPoint{};
+    return Locate(input, segment, input.planes[segment].entry);
+  };
+  for (std::size_t segment = first; segment < last; segment += 2) {
+    const auto at_entries = input.field.SampleTwo(entry(segment), entry(segment + 1));
+    FindRoots(input, segment, at_entries[0], v);
+    if (segment + 1 < last) FindRoots(input, segment + 1, at_entries[1], v);
   }
 }
 
@@ -195,18 +200,6 @@ bool VolumesAreKnown(const VertexInput& input) {
   return input.parameters.spacing.has_value() || !input.frame.volumes.empty();
 }
 
-PlaneEstimates EstimatesAt(const VertexInput& input, std::size_t segment, const UnrolledRing& ring,
-                           std::ptrdiff_t k, double curvature) {
-  const TilePoint p = Locate(input, segment, {ring.x[k], ring.y[k]});
-  if (p.tile == kNoTile) return {};
-  return EstimatePlane(input.field, input.scale, p.tile,
-                       {.x = p.x,
-                        .y = p.y,
-                        .normal_x = ring.normal_x[k],
-                        .normal_y = ring.normal_y[k],
-                        .curvature = curvature});
-}
-
 // How far the kernel has moved a boundary of this curvature inward.
 double RoundingOf(double curvature, double spacing) {
   const double share = curvature > 0 ? kRoundingPerConvexCurvature : kRoundingPerConcaveCurvature;
@@ -230,18 +223,32 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
   const double h = input.scale.spacing;
   const double max_curvature = kMaxCurvature / h;
   const VirtualPlaneSteps& steps = input.parameters.steps;
+  const PlaneEstimator estimator(input.field, input.scale);
   double* strips = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, kCurvatureReach * h);
-    for (std::ptrdiff_t k = begin; k < end; ++k) {
-      const double curvature = std::clamp(ring.shift[k], -max_curvature, max_curvature);
-      ring.base[k] = steps.curvature ? RoundingOf(curvature, h) : 0;
-      ring.shift[k] = strips[k] = 0;
+    // By segments, which have two vertices each.
+    for (std::ptrdiff_t k = begin; k < end; k += 2) {
+      std::array<std::uint32_t, 2> tiles;
+      std::array<BentPlane, 2> planes;
+      for (int i = 0; i < 2; ++i) {
+        const double curvature = std::clamp(ring.shift[k + i], -max_curvature, max_curvature);
+        ring.base[k + i] = steps.curvature ? RoundingOf(curvature, h) : 0;
+        const FieldPoint at = Locate(input, first_segment + k / 2, {ring.x[k + i], ring.y[k + i]});
+        tiles[i] = at.tile;
+        planes[i] = {.x = at.x,
+                     .y = at.y,
+                     .normal_x = ring.normal_x[k + i],
+                     .normal_y = ring.normal_y[k + i],
+                     .curvature = curvature};
+        ring.shift[k + i] = strips[k + i] = 0;
+      }
       if (!steps.support) continue;
-      const PlaneEstimates estimates =
-          EstimatesAt(input, first_segment + k / 2, ring, k, curvature);
-      ring.shift[k] = kSupportTrust * (estimates.support - ring.base[k]);
-      strips[k] = kStripTrust * (estimates.strip - ring.base[k]);
+      const auto estimates = estimator.EstimateTwo(tiles, planes);
+      for (int i = 0; i < 2; ++i) {
+        ring.shift[k + i] = kSupportTrust * (estimates[i].support - ring.base[k + i]);
+        strips[k + i] = kStripTrust * (estimates[i].strip - ring.base[k + i]);
+      }
     }
   });
   const double mean_strip = MeanOf(ring, strips);
@@ -296,8 +303,9 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size());
-  ParallelFor(topology.segments.size(),
-              [&](std::size_t segment) { FindRoots(input, segment, vertices); });
+  ParallelForRanges(
+      topology.segments.size(), kSegmentsAtOnce,
+      [&](std::size_t first, std::size_t last) { FindRoots(input, first, last, vertices); });
   UnrolledRings& unrolled = vertices.unrolled;
   unrolled.sizes().resize(topology.RingCount());
   ParallelFor(topology.RingCount(),

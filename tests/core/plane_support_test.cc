@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "support/instruction_sets.h"
@@ -93,7 +94,7 @@ TEST(PlaneSupport, AgreesWithASumOverAllParticles) {
       }
     }
     for (const bool weighted : {false, true}) {
-      const SupportSums sums = SumSupport(rows.AsNear(weighted), kShape, kStrip, plane);
+      const SupportSums sums = SumSupport({rows.AsNear(weighted), plane}, kShape, kStrip);
       EXPECT_NEAR(sums.weight, weight, 1e-12 * weight) << "seed " << seed;
       EXPECT_NEAR(sums.distance, sum, 1e-11 * weight) << "seed " << seed;
       const double expected = weighted ? volume : count;
@@ -132,8 +133,30 @@ TEST(PlaneSupport, TellsByTheVolumeOfAStripHowFarInsideOfTheBoundaryAPlaneIs) {
                         .rows = 1,
                         .columns = 1,
                         .row_stride = 1};
-    const double volume = SumSupport(near, kShape, kWide, plane).volume;
+    const double volume = SumSupport({near, plane}, kShape, kWide).volume;
     EXPECT_NEAR(volume / width - 8.0 / 15 * kWide.depth, inside, 0.03) << "round " << round;
+  }
+}
+
+TEST(PlaneSupport, OfTwoPlanesAtOnceHasTheBitsOfEachAlone) {
+  support::Random random(5);
+  for (int round = 0; round < 100; ++round) {
+    const Rows rows(random);
+    // Rows of different lengths, and not as many of them.
+    SupportQuery first{rows.AsNear(round % 2 == 1), RandomPlane(random)};
+    SupportQuery second{first, RandomPlane(random)};
+    first.columns = static_cast<int>(random.Below(4));
+    second.rows = static_cast<int>(random.Below(6));
+    if (round % 3 == 0) std::swap(first, second);
+    support::ForEachInstructionSet([&] {
+      const auto both = SumTwoSupports(first, second, kShape, kStrip);
+      for (const auto& [query, sums] : {std::pair(first, both[0]), std::pair(second, both[1])}) {
+        const SupportSums alone = SumSupport(query, kShape, kStrip);
+        EXPECT_EQ(sums.distance, alone.distance);
+        EXPECT_EQ(sums.weight, alone.weight);
+        EXPECT_EQ(sums.volume, alone.volume);
+      }
+    });
   }
 }
 
@@ -144,8 +167,9 @@ TEST(PlaneSupport, HasTheSameBitsForAnyInstructionSet) {
     const BentPlane plane = RandomPlane(random);
     const NearRows near = rows.AsNear(round % 2 == 1);
     std::vector<SupportSums> results;
-    support::ForEachInstructionSet(
-        [&] { results.push_back(SumSupport(near, kShape, kStrip, plane)); });
+    support::ForEachInstructionSet([&] {
+      results.push_back(SumSupport({near, plane}, kShape, kStrip));
+    });
     for (const SupportSums& result : results) {
       EXPECT_EQ(result.distance, results[0].distance);
       EXPECT_EQ(result.weight, results[0].weight);
