@@ -5,9 +5,18 @@
 #include <array>
 #include <cstdint>
 
+#include "cell_mask.h"
 #include "near_entries.h"
 
 namespace partiemc {
+
+/// Buckets [column, column + columns) of the rows [row, row + rows) of a grid.
+struct BucketBox {
+  int column = 0, row = 0;
+  int columns = 0, rows = 0;
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(columns * rows); }
+};
 
 /// Rows of square buckets over a tile and a margin around it; what is farther out counts to the
 /// outermost ones.
@@ -24,16 +33,17 @@ class BucketGrid {
     return std::clamp(index, 0, columns_ - 1);
   }
 
-  /// In a row, and rows.
-  int columns() const { return columns_; }
-  std::uint32_t count() const { return static_cast<std::uint32_t>(columns_ * columns_); }
+  /// All buckets.
+  BucketBox All() const { return {0, 0, columns_, columns_}; }
+  /// The smallest box with all that lies in cells of a mask, which has some.
+  BucketBox Around(const CellMask& mask) const;
 
   /// Whether no bucket has particles of two tiles.
   bool KeepsTilesApart() const;
 
-  /// By entry: its bucket, row after row. Vectors may write a few more.
+  /// By entry: its bucket, row after row of a box that has them all. Vectors may write a few more.
   using Buckets = std::array<std::int32_t, NearEntries::kCapacity + NearEntries::kPadding>;
-  void Find(const NearEntries& near, Buckets& buckets) const;
+  void Find(const NearEntries& near, const BucketBox& box, Buckets& buckets) const;
 
  private:
   double margin_ = 0;  // Cells that buckets extend beyond the tile on each side.

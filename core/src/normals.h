@@ -1,6 +1,7 @@
 // Stage 5 of 7: segments -> stabilised cell normals (paper, Eq. 9-11).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>

@@ -12,7 +12,7 @@
 namespace partiemc {
 void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
-  first_bucket_.assign(tiles, kNoTile);
+  boxes_.assign(tiles, {});
   asked_.resize(tiles);
   const auto is_active = [&](std::uint32_t tile) {
     if (tile == kNoTile) return false;
@@ -30,7 +30,8 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
       return crossings.tiles[of].active;
     });
     if (all) asked_[tile].fill(~std::uint32_t{0});
-    if (!IsEmpty(asked_[tile])) first_bucket_[tile] = 0;
+    if (IsEmpty(asked_[tile])) return;
+    boxes_[tile] = HasMasks() ? grid_.Around(Widened(asked_[tile], Reach(), Reach())) : grid_.All();
   });
 }
 
@@ -41,12 +42,11 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
   MarkTiles(bins, crossings, wander);
 
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
-  const std::uint32_t buckets = grid_.count() + 1;
   std::uint32_t bucket_count = 0;
+  first_bucket_.resize(tiles);
   for (std::uint32_t tile = 0; tile < tiles; ++tile) {
-    if (!IsIndexed(tile)) continue;
     first_bucket_[tile] = bucket_count;
-    bucket_count += buckets;
+    if (IsIndexed(tile)) bucket_count += boxes_[tile].count() + 1;
   }
   bucket_offsets_.resize(bucket_count);
   const auto for_each_indexed = [&](auto visit) {
@@ -68,14 +68,13 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
 }
 
 std::span<std::uint32_t> PointField::OffsetsOf(std::uint32_t tile) {
-  return {bucket_offsets_.data() + first_bucket_[tile], std::size_t{grid_.count()} + 1};
+  return {bucket_offsets_.data() + first_bucket_[tile], std::size_t{boxes_[tile].count()} + 1};
 }
 
 // The particles within reach of a point that may be asked for.
 NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile) const {
-  const int reach = static_cast<int>(std::ceil(scale_.kernel_radius));
-  if (reach >= kMaskMargin) return NearWalk(bins, tile, nullptr);
-  const CellMask mask = Widened(asked_[tile], reach, reach);
+  if (!HasMasks()) return NearWalk(bins, tile, nullptr);
+  const CellMask mask = Widened(asked_[tile], Reach(), Reach());
   return NearWalk(bins, tile, &mask);
 }
 
@@ -86,7 +85,7 @@ std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t t
   BucketGrid::Buckets buckets;
   std::uint32_t count = 0;
   Near(bins, tile).InAnyOrder([&](const NearEntries& near) {
-    grid_.Find(near, buckets);
+    grid_.Find(near, boxes_[tile], buckets);
     for (int k = 0; k < near.count; ++k) ++offsets[buckets[k]];
     count += static_cast<std::uint32_t>(near.count);
   });
@@ -104,7 +103,7 @@ void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
   }
   BucketGrid::Buckets buckets;
   const auto fill = [&](const NearEntries& near) {
-    grid_.Find(near, buckets);
+    grid_.Find(near, boxes_[tile], buckets);
     for (int k = 0; k < near.count; ++k) {
       const std::uint32_t to = offsets[buckets[k]]++;
       x_[to] = near.x[k];
@@ -122,20 +121,18 @@ void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
 }
 
 PointQuery PointField::QueryAt(std::uint32_t tile, double x, double y) const {
-  const BucketRange columns = Buckets(x, scale_.kernel_radius);
-  const BucketRange rows = Buckets(y, scale_.kernel_radius);
+  const NearRows near = RowsNear(tile, x, y, scale_.kernel_radius);
   return {.x = x,
           .y = y,
           .inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius),
           .uniform_weight = scale_.uniform_weight,
-          .entry_x = x_.data(),
-          .entry_y = y_.data(),
-          .weight = weight_.empty() ? nullptr : weight_.data(),
-          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * grid_.columns() +
-                     columns.first,
-          .rows = rows.last - rows.first + 1,
-          .columns = columns.last - columns.first + 1,
-          .row_stride = grid_.columns()};
+          .entry_x = near.x,
+          .entry_y = near.y,
+          .weight = near.weight,
+          .offsets = near.offsets,
+          .rows = near.rows,
+          .columns = near.columns,
+          .row_stride = near.row_stride};
 }
 
 namespace {

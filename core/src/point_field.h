@@ -1,7 +1,9 @@
 // The level set and its gradient at any point near the isoline, not only at nodes.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -76,7 +78,7 @@ class PointField {
   /// Index in the frame of the particle of an entry.
   std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
 
-  bool IsIndexed(std::uint32_t tile) const { return first_bucket_[tile] != kNoTile; }
+  bool IsIndexed(std::uint32_t tile) const { return boxes_[tile].rows > 0; }
 
   /// Whether a point of a tile, 0 <= x, y < 32, is near enough to an active cell.
   bool Covers(std::uint32_t tile, double x, double y) const {
@@ -84,15 +86,21 @@ class PointField {
   }
 
  private:
-  struct BucketRange {
-    int first, last;  // Inclusive.
-  };
-  BucketRange Buckets(double centre, double radius) const;
+  // The buckets of a tile within `radius` of a point, as far as they have entries.
+  BucketBox BucketsNear(std::uint32_t tile, double x, double y, double radius) const;
+  // The first bucket of a row of such a box.
+  const std::uint32_t* RowOf(std::uint32_t tile, const BucketBox& near, int row) const {
+    const BucketBox& box = boxes_[tile];
+    return bucket_offsets_.data() + first_bucket_[tile] + (near.row + row - box.row) * box.columns +
+           near.column - box.column;
+  }
 
   PointQuery QueryAt(std::uint32_t tile, double x, double y) const;
   FieldSample SampleOf(const PointQuery& query, const PointSums& sums) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
+  bool HasMasks() const { return Reach() < kMaskMargin; }
+  int Reach() const { return static_cast<int>(std::ceil(scale_.kernel_radius)); }
   NearWalk Near(const ParticleBins& bins, std::uint32_t tile) const;
   std::uint32_t CountEntries(const ParticleBins& bins, std::uint32_t tile);
   void FillEntries(const ParticleBins& bins, std::uint32_t tile);
@@ -100,39 +108,46 @@ class PointField {
   Scale scale_;
   BucketGrid grid_;
   std::vector<BitRows> asked_;               // Per tile: the cells in which points may lie.
-  std::vector<std::uint32_t> first_bucket_;  // Per tile: into bucket_offsets_, or kNoTile.
+  std::vector<BucketBox> boxes_;             // Per tile: buckets that may have entries.
+  std::vector<std::uint32_t> first_bucket_;  // Per tile: the first of these in bucket_offsets_.
   std::vector<std::uint32_t> first_entry_;   // Per tile: into the arrays of entries.
   std::vector<std::uint32_t> bucket_offsets_;
   std::vector<float> x_, y_, weight_;
   std::vector<std::uint32_t> source_;
 };
 
-inline PointField::BucketRange PointField::Buckets(double centre, double radius) const {
-  return {grid_.Along(centre - radius), grid_.Along(centre + radius)};
+inline BucketBox PointField::BucketsNear(std::uint32_t tile, double x, double y,
+                                         double radius) const {
+  const BucketBox& box = boxes_[tile];
+  BucketBox near;
+  const auto clip = [&](double centre, int begin, int count, int& first, int& size) {
+    first = std::max(grid_.Along(centre - radius), begin);
+    size = std::min(grid_.Along(centre + radius), begin + count - 1) - first + 1;
+  };
+  clip(x, box.column, box.columns, near.column, near.columns);
+  clip(y, box.row, box.rows, near.row, near.rows);
+  const bool any = near.columns > 0 && near.rows > 0;
+  return any ? near : BucketBox{.column = box.column, .row = box.row};
 }
 
 inline NearRows PointField::RowsNear(std::uint32_t tile, double x, double y, double radius) const {
-  const BucketRange columns = Buckets(x, radius);
-  const BucketRange rows = Buckets(y, radius);
+  const BucketBox near = BucketsNear(tile, x, y, radius);
   return {.x = x_.data(),
           .y = y_.data(),
           .weight = weight_.empty() ? nullptr : weight_.data(),
-          .offsets = bucket_offsets_.data() + first_bucket_[tile] + rows.first * grid_.columns() +
-                     columns.first,
-          .rows = rows.last - rows.first + 1,
-          .columns = columns.last - columns.first + 1,
-          .row_stride = grid_.columns()};
+          .offsets = RowOf(tile, near, 0),
+          .rows = near.rows,
+          .columns = near.columns,
+          .row_stride = boxes_[tile].columns};
 }
 
 template <typename Visit>
 void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radius,
                              Visit visit) const {
-  const BucketRange columns = Buckets(x, radius);
-  const BucketRange rows = Buckets(y, radius);
-  for (int row = rows.first; row <= rows.last; ++row) {
-    const std::uint32_t* offsets =
-        bucket_offsets_.data() + first_bucket_[tile] + row * grid_.columns();
-    for (std::uint32_t e = offsets[columns.first]; e < offsets[columns.last + 1]; ++e) {
+  const BucketBox near = BucketsNear(tile, x, y, radius);
+  for (int row = 0; row < near.rows; ++row) {
+    const std::uint32_t* offsets = RowOf(tile, near, row);
+    for (std::uint32_t e = offsets[0]; e < offsets[near.columns]; ++e) {
       visit(static_cast<double>(x_[e]), static_cast<double>(y_[e]), e);
     }
   }

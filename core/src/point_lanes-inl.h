@@ -147,7 +147,7 @@ class TwoPoints {
 // Adds up the partial sums of two channels: writes the first point's totals to totals[0] and
 // totals[1], the second's kPointPadding further.
 template <class D, int kParts>
-HWY_INLINE void StoreTotals(D d, const hn::Vec<D> (&first)[kParts],
+HWY_INLINE void StoreTotals([[maybe_unused]] D d, const hn::Vec<D> (&first)[kParts],
                             const hn::Vec<D> (&second)[kParts], double* totals) {
 #if HWY_TARGET == HWY_SCALAR
   const auto total = [](const hn::Vec<D>(&parts)[kParts]) HWY_ATTR {
