@@ -117,6 +117,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
   entry.stream.emplace();
   entry.stream->number = ++opened_;
   entry.stream->id = absl::StrCat(id_prefix_, entry.stream->number);
+  entry.stream->lineage = LineageOf(token);
   entry.stream->opened = std::chrono::steady_clock::now();
   entry.stream->description = std::move(description);
   if (entry.stream->description.name.empty()) {

@@ -36,6 +36,7 @@ struct StreamDescription {
 
 struct StreamSummary {
   std::string id;
+  std::string lineage;       ///< LineageOf its token.
   std::uint64_t number = 0;  ///< 1 for the first stream that was opened, then one more each.
   StreamDescription description;
   StreamCounts counts;

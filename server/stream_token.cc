@@ -1,10 +1,14 @@
 #include "server/stream_token.h"
 
+#include <openssl/sha.h>
+
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <random>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 
 namespace partiemc::server {
@@ -25,6 +29,14 @@ bool IsStreamToken(std::string_view text) {
   return text.size() == kDigits && std::all_of(text.begin(), text.end(), [](unsigned char c) {
            return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
          });
+}
+
+std::string LineageOf(std::string_view token) {
+  const std::string text = "lineage of " + std::string(token);
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest;
+  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
+  return absl::BytesToHexString(
+      absl::string_view(reinterpret_cast<const char*>(digest.data()), kDigits / 2));
 }
 
 bool SameToken(std::string_view a, std::string_view b) {

@@ -15,6 +15,10 @@ std::string NewStreamToken();
 /// Whether `text` could be one. A server takes what another one has given.
 bool IsStreamToken(std::string_view text);
 
+/// What may be told of a token: the same for the same one, on every server; 32 hexadecimal digits
+/// from which nobody finds the token.
+std::string LineageOf(std::string_view token);
+
 /// In a time that does not tell how much of them is alike. Requires: both are tokens.
 bool SameToken(std::string_view a, std::string_view b);
 

@@ -96,6 +96,7 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
   stream_name_ = description.name;
   v1::WatchOpened& opened = *opened_.mutable_opened();
   opened.set_stream_id(stream->id);
+  opened.set_lineage(stream->lineage);
   wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
   opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
   LogEvent(spdlog::level::info, "watch opened",

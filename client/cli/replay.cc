@@ -25,10 +25,6 @@ using Clock = std::chrono::steady_clock;
 // How soon Ctrl-C is seen while no answer comes.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
-std::string Plural(std::uint64_t count, std::string_view noun) {
-  return Concat(count, " ", noun, count == 1 ? "" : "s");
-}
-
 absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags,
                                                         const ReconstructionParameters& parameters,
                                                         bool normals) {

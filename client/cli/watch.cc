@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "cli/console.h"
+#include "client/input/text.h"
 #include "output/frame_writer.h"
 #include "output/progress.h"
 #include "output/statistics_writer.h"
@@ -21,6 +22,11 @@ using Clock = std::chrono::steady_clock;
 
 // How soon Ctrl-C is seen while no frame comes.
 constexpr std::chrono::milliseconds kPollInterval(100);
+
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::duration<double>(seconds));
+}
 
 // What a watch leaves behind.
 class WatchOutputs {
@@ -73,7 +79,15 @@ class WatchOutputs {
 struct Ended {
   ExitCode code = kGood;
   std::uint64_t dropped = 0;
-  std::string word;  // Of the end, unless it is what was asked for.
+  std::uint64_t gaps = 0, in_gaps = 0;  // Where the watch was joined again; frames, at most.
+  std::string word;                     // Of the end, unless it is what was asked for.
+
+  Ended With(ExitCode end_code, std::string end_word) const {
+    Ended ended = *this;
+    ended.code = end_code;
+    ended.word = std::move(end_word);
+    return ended;
+  }
 };
 
 // "t = 1.25, 2278 particles, 5 polylines, 3 dropped".
@@ -89,21 +103,28 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, WatchOutputs& output
   Ended ended;
   WatchedFrame frame;
   for (std::uint64_t count = 0; flags.frames == 0 || count < flags.frames;) {
-    if (Interrupted()) return {kInterrupted, ended.dropped, "interrupted"};
+    if (Interrupted()) return ended.With(kInterrupted, "interrupted");
     const auto received = watcher.Receive(frame, kPollInterval);
     if (!received.ok()) {
-      return {kServer, ended.dropped + watcher.end().dropped, OneLine(received.status())};
+      ended.dropped += watcher.end().dropped;
+      return ended.With(kServer, OneLine(received.status()));
     }
     if (*received == Received::kNothingYet) continue;
     if (*received == Received::kEnd) {
       const bool finished = watcher.end().reason == "FINISHED";
       ended.dropped += watcher.end().dropped;
       if (finished) return ended;
-      return {kServer, ended.dropped, "the stream ended: " + OneLine(watcher.end().message)};
+      return ended.With(kServer, "the stream ended: " + OneLine(watcher.end().message));
     }
     ended.dropped += frame.dropped;
+    if (!frame.rejoined.empty()) {
+      ++ended.gaps;
+      ended.in_gaps += frame.gap;
+      progress.Note(Concat("partiemc: ", OneLine(frame.rejoined), "; missed: at most ",
+                           Plural(frame.gap, "frame")));
+    }
     const absl::Status status = outputs.Write(frame);
-    if (!status.ok()) return {kFailed, ended.dropped, OneLine(status)};
+    if (!status.ok()) return ended.With(kFailed, OneLine(status));
     progress.Update(++count, Detail(frame, ended.dropped));
   }
   return ended;
@@ -115,7 +136,10 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
   CLI::App* verb =
       app.add_subcommand("watch", "Show what a stream of somebody else gives, while it is running");
   verb->add_option("STREAM", flags.stream, "Its name, as `partiemc streams` tells it")->required();
-  AddServerFlags(*verb, flags.server, "Server");
+  AddServerFlags(*verb, flags.server, "Server")
+      ->description("Server: HOST:PORT or unix:PATH; several, where the stream may be on any")
+      ->multi_option_policy(CLI::MultiOptionPolicy::Join)
+      ->delimiter(',');
   verb->add_option("--mode", flags.mode,
                    "latest: the newest frame whenever there is room, others are dropped and "
                    "counted; every: all of them, or be disconnected for falling behind")
@@ -128,6 +152,10 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
   verb->add_option("--credits", flags.credits, "Frames on their way at once")
       ->check(CLI::Range(1, 64))
       ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--rejoin", flags.rejoin_seconds,
+                   "Seconds for which a lost stream is looked for, at every server; 0: not at all")
+      ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   verb->add_option("--deadline", flags.deadline_seconds,
                    "Seconds that the server may take to accept")
@@ -166,13 +194,15 @@ int Watch(const WatchFlags& flags) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
+  const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
   const auto watcher =
-      Watcher::Open(flags.server.address, flags.stream,
+      Watcher::Open(servers.front(), flags.stream,
                     {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
                      .credits = flags.credits,
                      .credentials = flags.server.credentials,
-                     .deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
-                         std::chrono::duration<double>(flags.deadline_seconds))});
+                     .fallback_addresses = {servers.begin() + 1, servers.end()},
+                     .rejoin = {.give_up_after = Milliseconds(flags.rejoin_seconds)},
+                     .deadline = Milliseconds(flags.deadline_seconds)});
   if (!watcher.ok()) return ComplainOfServer(watcher.status());
 
   Progress::Options progress_options = Progress::ForStandardError();
@@ -189,6 +219,12 @@ int Watch(const WatchFlags& flags) {
   if (!flags.quiet && outputs->summary().frame_count() > 0) {
     std::fputs(outputs->summary().Table(seconds).c_str(), stdout);
     std::fputs(Concat("dropped frames: ", ended.dropped, "\n").c_str(), stdout);
+    if (ended.gaps > 0) {
+      std::fputs(Concat("missed while the stream was lost ", ended.gaps, " times: at most ",
+                        Plural(ended.in_gaps, "frame"), "\n")
+                     .c_str(),
+                 stdout);
+    }
   }
   return ended.word.empty() ? ended.code : Complain(ended.code, ended.word);
 }

@@ -16,6 +16,7 @@ struct WatchFlags {
   std::uint32_t credits = 2;
   std::uint64_t frames = 0;  ///< 0: until the stream ends.
   double deadline_seconds = 30;
+  double rejoin_seconds = 30;  ///< 0: a watch that is lost is over.
   std::string output_dir;
   std::string format = "geojson";
   std::string stats;

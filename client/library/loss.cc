@@ -16,9 +16,10 @@ constexpr std::string_view kDraining = "DRAINING";
 constexpr std::array<std::string_view, 3> kMendableWhileResuming = {
     "NAME_IN_USE", "TOO_MANY_STREAMS", "CHECKPOINT_MISMATCH"};
 
-bool IsMendable(grpc::StatusCode code, std::string_view reason, bool resuming) {
-  if (reason == kDraining) return true;
-  if (!reason.empty()) return resuming && std::ranges::count(kMendableWhileResuming, reason) > 0;
+}  // namespace
+
+bool IsLostConnection(grpc::StatusCode code, std::string_view reason) {
+  if (!reason.empty()) return reason == kDraining;
   switch (code) {
     case grpc::StatusCode::OK:
     case grpc::StatusCode::UNAVAILABLE:
@@ -31,12 +32,12 @@ bool IsMendable(grpc::StatusCode code, std::string_view reason, bool resuming) {
   }
 }
 
-}  // namespace
-
 Loss LossOf(const StreamCall& call, bool resuming) {
-  Loss loss{.status = FromGrpc(call.end(), call.address()),
-            .why = Reason(call.end()),
-            .mendable = IsMendable(call.end().error_code(), call.reason(), resuming)};
+  Loss loss{
+      .status = FromGrpc(call.end(), call.address()),
+      .why = Reason(call.end()),
+      .mendable = IsLostConnection(call.end().error_code(), call.reason()) ||
+                  (resuming && std::ranges::count(kMendableWhileResuming, call.reason()) > 0)};
   if (loss.status.ok()) {
     loss.status = absl::UnavailableError(
         absl::StrCat("the server at ", call.address(), " ended the stream: start again"));

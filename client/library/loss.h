@@ -1,7 +1,10 @@
 // Why a call has ended before its stream, and whether another call may do better.
 #pragma once
 
+#include <grpcpp/grpcpp.h>
+
 #include <string>
+#include <string_view>
 
 #include "absl/status/status.h"
 #include "library/stream_call.h"
@@ -13,6 +16,10 @@ struct Loss {
   std::string why;      ///< In a few words.
   bool mendable = false;
 };
+
+/// Whether a call that ended with these has lost its connection or its server, rather than been
+/// refused.
+bool IsLostConnection(grpc::StatusCode code, std::string_view reason);
 
 /// Of a call that is done. A server that gives a reason has decided: only its going away is
 /// mendable and, `resuming`, what another replica or a moment may change. Without a reason the

@@ -45,6 +45,11 @@ std::string Concat(const Parts&... parts) {
   return out;
 }
 
+/// "1 frame", "2 frames".
+inline std::string Plural(std::uint64_t count, std::string_view noun) {
+  return Concat(count, " ", noun, count == 1 ? "" : "s");
+}
+
 /// `text` as a JSON string, quotes and all.
 inline std::string JsonString(std::string_view text) {
   std::string out = "\"";

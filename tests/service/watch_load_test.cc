@@ -180,7 +180,8 @@ WatchLoad::Run WatchLoad::RunOnce(const Sequence& sequence, const std::string& n
 
   std::vector<std::unique_ptr<Program>> watchers;
   if (watched) {
-    const std::vector<std::string> watch = {"watch", name, "--server", server_.address()};
+    const std::vector<std::string> watch = {"watch",           name,       "--server",
+                                            server_.address(), "--rejoin", "0"};
     for (unsigned k = 0; k < load.readers + 1; ++k) {
       watchers.push_back(std::make_unique<Program>(PARTIEMC_PROGRAM, watch));
     }

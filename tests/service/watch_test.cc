@@ -220,6 +220,26 @@ TEST_P(Watch, AProducerThatIsGoneIsTold) {
   EXPECT_TRUE(watcher.Finish().ok());
 }
 
+TEST_P(Watch, ALineageStaysThroughAResumeIsNoOtherStreamsAndTellsNoToken) {
+  const auto lineage = [&](const std::string& name) {
+    WatchClient watcher(channel_);
+    watcher.Open(name, v1::WATCH_MODE_LATEST, 1);
+    return watcher.Receive().opened().lineage();
+  };
+  const auto opened = producer_->SendAndReceive(OpenRequest("tank")).opened();
+  StreamClient other(channel_);
+  ASSERT_TRUE(other.SendAndReceive(OpenRequest("pond")).has_opened());
+  const std::string before = lineage("tank");
+  auto resume = OpenRequest("tank");
+  resume.mutable_open()->mutable_resume()->set_stream_token(opened.stream_token());
+  StreamClient resumed(channel_);
+  ASSERT_TRUE(resumed.SendAndReceive(resume).has_opened());
+  EXPECT_EQ(lineage("tank"), before);
+  EXPECT_EQ(before.size(), 32u);
+  EXPECT_NE(before, opened.stream_token());
+  EXPECT_NE(lineage("pond"), before);
+}
+
 TEST_P(Watch, WhatCannotBeWatchedIsRefusedWithItsReason) {
   OpenProducer();
   WatchClient unknown(channel_), mode(channel_), credits(channel_), early(channel_);

@@ -20,6 +20,7 @@
 #include "absl/status/statusor.h"
 #include "partiemc/client/credentials.h"
 #include "partiemc/client/frame_stream.h"
+#include "partiemc/client/stream.h"
 
 namespace partiemc::client {
 
@@ -34,6 +35,12 @@ struct WatcherOptions {
   /// newer frames.
   std::uint32_t credits = 2;
   Credentials credentials = {};
+  /// Servers where the stream may be, beside the one that Open is given.
+  std::vector<std::string> fallback_addresses = {};
+  /// How a watch goes on whose connection or server was lost, or whose stream was taken over or
+  /// lost its producer: the stream is looked for at every address. `announce` is not used: frames
+  /// tell.
+  ReconnectPolicy rejoin = {};
   /// For reaching the server; a server that starts meanwhile is found.
   std::chrono::milliseconds connect_timeout{2000};
   /// For the server to answer. Frames may take any time: they come when the producer sends them.
@@ -54,7 +61,13 @@ struct WatchedFrame {
   FrameResult frame;
   /// x0, y0, x1, y1, ... in the stream's plane, where its producer echoes them; else empty.
   std::vector<double> particles;
-  std::uint64_t dropped = 0;  ///< Frames that did not come since the one before.
+  std::uint64_t dropped = 0;  ///< Frames that did not come since the one before, as counted.
+  /// Of the first frame after the watch had been lost and joined again: where, why and for how
+  /// long, in one line; else empty.
+  std::string rejoined;
+  /// Then also the sequence numbers between the frame before and this one. Nobody has counted which
+  /// of them were results and which were frames that the server refused; `dropped` is 0.
+  std::uint64_t gap = 0;
 };
 
 /// Why a watch ended.
@@ -64,14 +77,16 @@ struct WatchEnd {
   std::uint64_t dropped = 0;  ///< Frames that did not come since the last one.
 };
 
+class RejoiningWatch;
+
 /// One thread receives; Cancel may come from any thread. Reading runs in the background, credit is
 /// given as frames are received.
 class Watcher {
  public:
   /// `stream_name` is as ListStreams tells it; `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
   /// Errors: INVALID_ARGUMENT (address, credentials), UNAVAILABLE (no server there, or one of the
-  /// two does not trust the other), UNAUTHENTICATED (token), NOT_FOUND (no such stream),
-  /// RESOURCE_EXHAUSTED (too many watchers), DEADLINE_EXCEEDED, each in one line.
+  /// two does not trust the other), UNAUTHENTICATED (token), NOT_FOUND (no such stream
+  /// at any address), RESOURCE_EXHAUSTED (too many watchers), DEADLINE_EXCEEDED, each in one line.
   static absl::StatusOr<std::unique_ptr<Watcher>> Open(std::string_view address,
                                                        std::string_view stream_name,
                                                        const WatcherOptions& options);
@@ -85,8 +100,10 @@ class Watcher {
 
   /// Waits for the next frame, at most `wait` where it is given. kEnd: the watch has ended, as
   /// end() tells.
+  /// Sequence numbers rise, also where a resumed stream shows frames again.
   /// Errors: RESOURCE_EXHAUSTED (fell behind in mode kEvery; a frame too large to be watched),
-  /// UNAVAILABLE (the server drains, or the connection was lost), DATA_LOSS when a message makes no
+  /// UNAVAILABLE (the server drains, or the connection was lost, and the stream was not found
+  /// again), DATA_LOSS when a message makes no
   /// sense, CANCELLED after Cancel; each has ended the watch.
   absl::StatusOr<Received> Receive(WatchedFrame& frame,
                                    std::optional<std::chrono::milliseconds> wait = std::nullopt);
@@ -98,10 +115,9 @@ class Watcher {
   void Cancel();
 
  private:
-  class Call;
-  explicit Watcher(std::unique_ptr<Call> call);
+  explicit Watcher(std::unique_ptr<RejoiningWatch> watch);
 
-  std::unique_ptr<Call> call_;
+  std::unique_ptr<RejoiningWatch> watch_;
 };
 
 }  // namespace partiemc::client

@@ -1,0 +1,193 @@
+#include "library/watch_call.h"
+
+#include <algorithm>
+#include <utility>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "library/channel.h"
+#include "library/loss.h"
+
+namespace partiemc::client {
+namespace {
+
+v1::WatchMode ToWire(WatchMode mode) {
+  return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
+}
+
+// The two coordinates of `plane`, particle by particle.
+void ProjectParticles(const Frame& frame, Plane plane, std::vector<double>& xy) {
+  const auto components = static_cast<std::size_t>(frame.components);
+  const std::size_t first = components == 3 && plane == Plane::kYz ? 1 : 0;
+  const std::size_t second = components == 3 && plane != Plane::kXy ? 2 : 1;
+  std::visit(
+      [&](auto positions) {
+        const std::size_t count = positions.size() / components;
+        xy.resize(2 * count);
+        for (std::size_t i = 0; i < count; ++i) {
+          xy[2 * i] = static_cast<double>(positions[i * components + first]);
+          xy[2 * i + 1] = static_cast<double>(positions[i * components + second]);
+        }
+      },
+      frame.positions);
+}
+
+}  // namespace
+
+WatchCall::~WatchCall() {
+  context_.TryCancel();
+  if (thread_.joinable()) thread_.join();
+}
+
+void WatchCall::Start(std::string_view stream_name, const WatcherOptions& options) {
+  v1::WatchStreamRequest open;
+  open.mutable_open()->set_stream_name(std::string(stream_name));
+  open.mutable_open()->set_mode(ToWire(options.mode));
+  open.mutable_open()->set_credits(std::max<std::uint32_t>(options.credits, 1));
+  thread_ = std::thread([this, open = std::move(open)]() mutable { Run(std::move(open)); });
+}
+
+void WatchCall::Run(v1::WatchStreamRequest open) {
+  rpc_ = stub_->WatchStream(&context_);
+  rpc_->Write(open);  // Where it fails, the end of the call says why.
+  for (;;) {
+    Message message;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!spare_.empty()) {
+        message = std::move(spare_.back());
+        spare_.pop_back();
+      }
+    }
+    if (message == nullptr) message = std::make_unique<v1::WatchStreamResponse>();
+    if (!rpc_->Read(message.get())) break;
+    const std::lock_guard lock(mutex_);
+    ready_.push_back(std::move(message));
+    changed_.notify_all();
+  }
+  const grpc::Status status = rpc_->Finish();
+  const std::lock_guard lock(mutex_);
+  status_ = status;
+  const auto& metadata = context_.GetServerTrailingMetadata();
+  const auto reason = metadata.find("partiemc-reason");
+  if (reason != metadata.end()) reason_.assign(reason->second.data(), reason->second.size());
+  changed_.notify_all();
+}
+
+absl::StatusOr<bool> WatchCall::WaitUntilOpened(Clock::time_point until) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, until, [this] { return cancelled_ || !ready_.empty() || status_; });
+  if (cancelled_) return absl::CancelledError("the watch was cancelled");
+  if (ready_.empty() && !status_) return false;
+  if (ready_.empty()) {
+    if (status_->ok()) return Broken("ended the watch at once");
+    return FromGrpc(*status_, address_);
+  }
+  const Message message = std::move(ready_.front());
+  ready_.pop_front();
+  if (!message->has_opened()) return Broken("did not begin with WatchOpened");
+  const v1::WatchOpened& opened = message->opened();
+  const auto parameters = wire::DecodeParameters(opened.parameters());
+  if (!parameters.ok()) return parameters.status();
+  stream_ = {.stream_id = opened.stream_id(),
+             .parameters = *parameters,
+             .labels = {opened.labels().begin(), opened.labels().end()}};
+  lineage_ = opened.lineage();
+  return true;
+}
+
+absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
+                                            std::optional<std::chrono::milliseconds> wait) {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    const auto something = [this] { return cancelled_ || !ready_.empty() || status_; };
+    if (!wait) {
+      changed_.wait(lock, something);
+    } else if (!changed_.wait_for(lock, *wait, something)) {
+      return Received::kNothingYet;
+    }
+    if (cancelled_) return absl::CancelledError("the watch was cancelled");
+    if (ready_.empty()) {
+      if (!status_->ok()) return FromGrpc(*status_, address_);
+      if (end_.reason.empty()) {
+        return absl::UnavailableError(
+            absl::StrCat("the server at ", address_, " ended the watch without a word"));
+      }
+      return Received::kEnd;
+    }
+    Message message = std::move(ready_.front());
+    ready_.pop_front();
+    if (message->has_ended()) {
+      end_ = {message->ended().reason(), message->ended().message(), message->ended().dropped()};
+      continue;  // The status of the call follows.
+    }
+    lock.unlock();
+    const absl::Status status = Decode(*message, frame);
+    if (!status.ok()) {
+      context_.TryCancel();
+      return status;
+    }
+    lock.lock();
+    spare_.push_back(std::move(message));
+    lock.unlock();
+    v1::WatchStreamRequest credit;
+    credit.mutable_credit()->set_frames(1);
+    rpc_->Write(credit);  // Where it fails, the end of the call says why.
+    return Received::kEvent;
+  }
+}
+
+absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& frame) {
+  if (!message.has_frame()) return Broken("sent a message that this client does not know");
+  v1::ReconstructedFrame& result = *message.mutable_frame()->mutable_frame();
+  std::swap(decoded_.result, frame.frame.result);  // The caller's buffers are used again.
+  const absl::Status status = wire::DecodeResult(result, decoded_);
+  std::swap(decoded_.result, frame.frame.result);
+  if (!status.ok()) return status;
+  frame.sequence = decoded_.sequence;
+  frame.time = decoded_.time;
+  frame.frame.times = {.stages_ms = decoded_.times.stages_ms, .total_ms = decoded_.times.total_ms};
+  frame.frame.rings_digest = decoded_.rings_digest;
+  frame.frame.mesh_digest = decoded_.mesh_digest;
+  frame.dropped = message.frame().dropped();
+  frame.particles.clear();
+  if (result.particles().empty()) return absl::OkStatus();
+  particles_.set_position_format(result.particle_format());
+  particles_.mutable_positions()->swap(*result.mutable_particles());
+  const auto particles = wire::DecodeFrame(particles_);
+  if (!particles.ok()) return Broken("sent particles that cannot be read");
+  ProjectParticles(*particles, stream_.parameters.plane, frame.particles);
+  return absl::OkStatus();
+}
+
+void WatchCall::Cancel() {
+  context_.TryCancel();
+  const std::lock_guard lock(mutex_);
+  cancelled_ = true;
+  changed_.notify_all();
+}
+
+std::string WatchCall::reason() {
+  const std::lock_guard lock(mutex_);
+  return reason_;
+}
+
+bool WatchCall::lost() {
+  const std::lock_guard lock(mutex_);
+  if (!status_ || cancelled_) return false;
+  if (!status_->ok()) return IsLostConnection(status_->error_code(), reason_);
+  return end_.reason.empty() || end_.reason == "TAKEN_OVER" || end_.reason == "PRODUCER_LOST";
+}
+
+std::string WatchCall::why() {
+  const std::lock_guard lock(mutex_);
+  if (status_ && !status_->ok()) return Reason(*status_);
+  return end_.message.empty() ? "ended without a word" : end_.message;
+}
+
+absl::Status WatchCall::Broken(const char* what) const {
+  return absl::DataLossError(
+      absl::StrCat("the server at ", address_, " ", what, ": it breaks the protocol"));
+}
+
+}  // namespace partiemc::client
