@@ -1,15 +1,41 @@
 #include "server/metrics_endpoint.h"
 
+#include <netdb.h>
 #include <prometheus/exposer.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <exception>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 
 namespace partiemc::server {
+namespace {
+
+constexpr std::chrono::milliseconds kKnockInterval(5);
+
+// Connects and hangs up.
+void Knock(const Address& address) {
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  if (getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found) != 0) {
+    return;
+  }
+  const int file = socket(found->ai_family, found->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (file >= 0) {
+    connect(file, found->ai_addr, found->ai_addrlen);
+    close(file);
+  }
+  freeaddrinfo(found);
+}
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
     const Address& address, const std::shared_ptr<Metrics>& metrics) {
@@ -37,6 +63,19 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
 MetricsEndpoint::MetricsEndpoint(Address address, std::unique_ptr<prometheus::Exposer> exposer)
     : address_(std::move(address)), exposer_(std::move(exposer)) {}
 
-MetricsEndpoint::~MetricsEndpoint() = default;
+// The web server looks whether it should stop when somebody connects, and otherwise every two
+// seconds.
+MetricsEndpoint::~MetricsEndpoint() {
+  std::atomic<bool> stopped = false;
+  std::thread stop([this, &stopped] {
+    exposer_.reset();
+    stopped = true;
+  });
+  while (!stopped) {
+    Knock(address_);
+    std::this_thread::sleep_for(kKnockInterval);
+  }
+  stop.join();
+}
 
 }  // namespace partiemc::server

@@ -132,6 +132,10 @@ void Server::AddGauges() {
       [this] { return budget_.held(); });
   add("partiemc_memory_budget_bytes", "What they may hold together.",
       [this] { return budget_.bytes(); });
+  add("partiemc_watched_bytes",
+      "Results that watchers have not taken yet, counted for each although they share them; "
+      "outside of the budget.",
+      [this] { return watchers_.held_bytes(); });
   if (!options_.tls) return;
   add("partiemc_tls_certificate_not_after_seconds", "When the server's certificate expires (Unix).",
       [this] {
@@ -198,8 +202,6 @@ void Server::Drain(std::chrono::milliseconds grace) {
   // Cutting those who do not take their answers takes a moment of the grace time too.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
   server_->GetHealthCheckService()->SetServingStatus(false);
-  // Its web server takes two seconds to stop: beside the streams, not after them.
-  std::thread stop_metrics([this] { metrics_endpoint_.reset(); });
   registry_.Drain();
   // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
   // to the last word: a connection that closes with requests unread takes back what was just
@@ -212,7 +214,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
                              std::chrono::steady_clock::duration::zero());
   server_->Shutdown(std::chrono::system_clock::now() + left);
   server_->Wait();
-  stop_metrics.join();
+  metrics_endpoint_.reset();  // Last, so that the drain can be watched.
 }
 
 }  // namespace partiemc::server

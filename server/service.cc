@@ -177,6 +177,12 @@ grpc::ServerUnaryReactor* Service::GetServerInfo(grpc::CallbackServerContext* co
   response->add_capabilities("watch");
   response->set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
   response->set_draining(registry_.draining());
+  v1::ServerLoad& load = *response->mutable_load();
+  load.set_watchers(static_cast<std::uint32_t>(watchers_.count()));
+  load.set_frames_waiting(pool_.QueueLength());
+  load.set_memory_held(budget_.held());
+  load.set_memory_budget(budget_.bytes());
+  load.set_watched_bytes(watchers_.held_bytes());
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;

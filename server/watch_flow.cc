@@ -227,6 +227,11 @@ WatchCounts WatchFlow::counts() const {
   return counts_;
 }
 
+std::size_t WatchFlow::held_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return held_bytes_;
+}
+
 void WatchFlow::DropPending() {
   counts_.dropped += pending_.size();
   for (const Published& dropped : pending_) held_bytes_ -= dropped.frame->bytes() + kPublishedBytes;

@@ -125,6 +125,8 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   void Cut();
 
   WatchCounts counts() const;
+  /// Of the frames that the watcher has not taken yet.
+  std::size_t held_bytes() const;
 
  private:
   enum class Phase { kOpening, kWatching, kEnding, kAbandoned, kFinished };

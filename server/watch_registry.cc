@@ -45,6 +45,12 @@ std::size_t WatchRegistry::count() const {
   return placed_.size();
 }
 
+std::uint64_t WatchRegistry::held_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& watcher : All()) bytes += watcher->held_bytes();
+  return bytes;
+}
+
 std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();

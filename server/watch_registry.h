@@ -33,6 +33,8 @@ class WatchRegistry {
 
   /// Of those that have a place.
   std::size_t count() const;
+  /// Of results that watchers have not taken yet, counted for each although they share them.
+  std::uint64_t held_bytes() const;
 
   /// Ends those that have not said for `limit` what they want to watch. Gives the time before which
   /// none of those that are here now will have.

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_format.h"
 #include "cli/console.h"
 #include "output/text.h"
 
@@ -42,10 +43,31 @@ std::string SecurityText(const Credentials& credentials) {
                 SendsToken(credentials) ? ", token" : "");
 }
 
+// To a tenth of a mebibyte.
+std::string Mebibytes(std::uint64_t bytes) {
+  return absl::StrFormat("%.1f MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+using Line = std::pair<std::string_view, std::string>;
+
+std::vector<Line> LoadLines(const ServerLoad& load) {
+  return {{"watching", Concat(load.watchers, ", with ", Mebibytes(load.watched_bytes), " to take")},
+          {"frames waiting", Concat(load.frames_waiting)},
+          {"memory", Concat(Mebibytes(load.memory_held), " of ", Mebibytes(load.memory_budget),
+                            " for frames and answers")}};
+}
+
+std::string LoadJson(const std::optional<ServerLoad>& load) {
+  if (!load) return "null";
+  return Concat("{\"watchers\":", load->watchers, ",\"frames_waiting\":", load->frames_waiting,
+                ",\"memory_held\":", load->memory_held, ",\"memory_budget\":", load->memory_budget,
+                ",\"watched_bytes\":", load->watched_bytes, "}");
+}
+
 }  // namespace
 
 std::string InfoText(const ServerInfo& info, const ServerFlags& server) {
-  const std::vector<std::pair<std::string_view, std::string>> lines = {
+  std::vector<Line> lines = {
       {"server", server.address},
       {"security", SecurityText(server.credentials)},
       {"version", OneLine(info.version)},
@@ -64,6 +86,10 @@ std::string InfoText(const ServerInfo& info, const ServerFlags& server) {
       {"fills", Joined(NamesOf(info.fills))},
       {"capabilities", Joined(info.capabilities)},
   };
+  if (info.load) {
+    const std::vector<Line> load = LoadLines(*info.load);
+    lines.insert(lines.begin() + 6, load.begin(), load.end());  // After the streams.
+  }
   constexpr std::size_t kColumn = 18;  // The longest name and two blanks.
   std::string text;
   for (const auto& [name, value] : lines) {
@@ -88,11 +114,11 @@ std::string InfoJson(const ServerInfo& info, const ServerFlags& server) {
       ",\"idle_timeout_seconds\":", info.idle_timeout_seconds,
       ",\"placements\":", JsonArray(NamesOf(info.placements)),
       ",\"fills\":", JsonArray(NamesOf(info.fills)),
-      ",\"capabilities\":", JsonArray(info.capabilities), "}\n");
+      ",\"capabilities\":", JsonArray(info.capabilities), ",\"load\":", LoadJson(info.load), "}\n");
 }
 
 CLI::App* AddInfo(CLI::App& app, QueryFlags& flags) {
-  CLI::App* verb = app.add_subcommand("info", "Ask a server for its version and limits");
+  CLI::App* verb = app.add_subcommand("info", "Ask a server for its version, limits and load");
   AddQueryFlags(*verb, flags);
   verb->footer(
       "Examples:\n"

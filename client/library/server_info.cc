@@ -25,6 +25,13 @@ ServerInfo Decode(const v1::GetServerInfoResponse& message) {
                   .capabilities = {message.capabilities().begin(), message.capabilities().end()},
                   .open_streams = message.open_streams(),
                   .draining = message.draining()};
+  if (message.has_load()) {
+    info.load = {.watchers = message.load().watchers(),
+                 .frames_waiting = message.load().frames_waiting(),
+                 .memory_held = message.load().memory_held(),
+                 .memory_budget = message.load().memory_budget(),
+                 .watched_bytes = message.load().watched_bytes()};
+  }
   // The codec knows the enums. It refuses those that this version does not know.
   for (const int placement : message.placements()) {
     v1::ReconstructionParameters parameters;

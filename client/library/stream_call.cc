@@ -63,11 +63,16 @@ void StreamCall::HalfClose(Lock& lock) {
 
 void StreamCall::Cancel(Lock& lock) {
   if (!started_ || done_) return;
+  cancelled_ = true;
   context_.TryCancel();
-  if (reading_ == nullptr) {
-    reads_over_ = true;  // No read will tell that the call is over.
-    ReleaseHoldWhenIdle(lock);
-  }
+  EndReadsIfCancelled(lock);
+}
+
+// While none goes on, no read will tell that the call is over.
+void StreamCall::EndReadsIfCancelled(Lock& lock) {
+  if (!cancelled_ || reading_ != nullptr) return;
+  reads_over_ = true;
+  ReleaseHoldWhenIdle(lock);
 }
 
 StreamCall::Response StreamCall::Take(Lock&) {
@@ -148,6 +153,7 @@ void StreamCall::OnReadDone(bool ok) {
     ready_.push_back(std::move(reading_));
     ReadNext(lock);
     WriteNext(lock);
+    EndReadsIfCancelled(lock);
   } else {
     spare_.push_back(std::move(reading_));
     reads_over_ = true;

@@ -91,6 +91,7 @@ class StreamCall final
   template <typename Operation>
   void RunOutside(Lock& lock, Operation operation);
   void ReleaseHoldWhenIdle(Lock& lock);
+  void EndReadsIfCancelled(Lock& lock);
 
   Monitor& monitor_;
   const std::string address_;
@@ -108,7 +109,7 @@ class StreamCall final
   Clock::time_point progress_at_ = Clock::now();
   bool writing_ = false;
   bool half_close_wanted_ = false, half_closed_ = false;
-  bool started_ = false, reads_over_ = false, hold_ = false, done_ = false;
+  bool started_ = false, cancelled_ = false, reads_over_ = false, hold_ = false, done_ = false;
   int outside_operations_ = 0;
   grpc::Status end_;  // Valid once done_.
 };

@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <thread>
@@ -13,6 +15,8 @@
 #include "resume/options.h"
 #include "resume/workload.h"
 #include "server/server.h"
+#include "service/server_process.h"
+#include "support/certificates.h"
 #include "support/chaos_proxy.h"
 #include "support/random.h"
 
@@ -23,9 +27,12 @@ using std::chrono::milliseconds;
 
 class Chaos : public testing::Test {
  protected:
-  Chaos() {
-    auto server = server::Server::Start({.address = {.host = "127.0.0.1", .port = 0}});
-    EXPECT_TRUE(server.ok()) << server.status();
+  void SetUp() override { Serve({}); }
+  void Serve(server::ServerOptions options) {
+    proxy_.reset();
+    options.address.port = 0;
+    auto server = server::Server::Start(options);
+    ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
     proxy_.emplace("127.0.0.1:" + std::to_string(server_->address().port));
   }
@@ -37,7 +44,8 @@ class Chaos : public testing::Test {
 
   // Streams while `disturb` goes on.
   Outcome Stream(const Workload& workload, double rate, const std::function<void()>& disturb) {
-    client::StreamOptions options{.name = workload.name, .parameters = workload.parameters};
+    client::StreamOptions options{
+        .name = workload.name, .parameters = workload.parameters, .credentials = credentials_};
     options.reconnect.announce = true;
     Outcome outcome;
     const auto stream = client::Stream::Open(proxy_->address(), options);
@@ -59,6 +67,7 @@ class Chaos : public testing::Test {
     ExpectGuarantees(outcome.history, outcome.undisturbed, outcome.window, what);
   }
 
+  client::Credentials credentials_;
   std::unique_ptr<server::Server> server_;
   std::optional<support::ChaosProxy> proxy_;
 };
@@ -124,6 +133,39 @@ TEST_F(Chaos, FlippedBitsNeverLoseDoubleOrReorderInSilence) {
     EXPECT_TRUE(Bounded(outcome.history, std::max<std::size_t>(1, outcome.window)));
   }
   EXPECT_GT(proxy_->flipped(), 0u);
+}
+
+// With TLS a falsified byte ends the connection, and the stream goes on in another one.
+TEST_F(Chaos, FlippedBitsUnderTlsAreSeenInNoAnswer) {
+  const CertificateAuthority authority("authority");
+  const IssuedCertificate identity = authority.Issue("server");
+  const auto write = [](const std::string& name, const std::string& text) {
+    std::string path = server::TemporaryPath(name);
+    std::ofstream(path) << text;
+    return path;
+  };
+  credentials_ = {.tls = true, .ca_file = write("ca.pem", authority.certificate())};
+  const server::TlsFiles files{.certificate = write("server.pem", identity.certificate),
+                               .key = write("server.key", identity.key)};
+  server::ServerOptions options;
+  options.tls = files;
+  ASSERT_NO_FATAL_FAILURE(Serve(options));
+  support::Random random(GetOptions().seed);
+  const auto outcome = Stream(Leap(), 0, [&] {
+    for (std::uint64_t k = 0; k < GetOptions().faults; ++k) {
+      std::this_thread::sleep_for(milliseconds(static_cast<int>(random.Uniform(20, 150))));
+      proxy_->Flip(1, random.Chance(0.5));
+    }
+  });
+  ExpectAll(outcome, "under TLS");
+  EXPECT_GT(proxy_->flipped(), 0u);
+  EXPECT_GT(outcome.history.reconnections.size(), 0u);
+  std::printf("%llu bits flipped, %zu reconnections, %zu answers\n",
+              static_cast<unsigned long long>(proxy_->flipped()),
+              outcome.history.reconnections.size(), outcome.history.answers.size());
+  for (const std::string& path : {credentials_.ca_file, files.certificate, files.key}) {
+    std::filesystem::remove(path);
+  }
 }
 
 // The proof that the validators can fail.

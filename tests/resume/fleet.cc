@@ -68,7 +68,8 @@ std::string HaproxyFile(const std::string& socket, const std::vector<std::string
   return text;
 }
 
-// Without these limits and times nginx ends a stream after one megabyte, or one minute.
+// Without these limits and times nginx ends a stream after one megabyte, or one minute; and it
+// would leave a server out for a while that is back at once.
 std::string NginxFile(const std::string& folder, const std::string& socket,
                       const std::vector<std::string>& servers) {
   std::string text = "daemon off;\nmaster_process off;\npid " + folder + "/pid;\nerror_log " +
@@ -90,7 +91,7 @@ std::string NginxFile(const std::string& folder, const std::string& socket,
   }
   text += "  upstream servers {\n";
   for (const std::string& server : servers) {
-    text += "    server " + server + " max_fails=1 fail_timeout=1s;\n";
+    text += "    server " + server + " max_fails=0;\n";
   }
   text +=
       "  }\n"

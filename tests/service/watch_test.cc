@@ -308,6 +308,34 @@ TEST_P(Watch, OneWatcherTooManyIsRefusedAtOnceAndThePlaceIsFreeWhenOneLeaves) {
   }
 }
 
+TEST_P(Watch, TheLoadTellsWatchersAndWhatTheyHaveNotTaken) {
+  const auto stub = v1::ReconstructionService::NewStub(channel_);
+  const auto wait_for = [&](auto expected) {
+    v1::GetServerInfoResponse info;
+    do {
+      grpc::ClientContext context;
+      SetDeadline(context);
+      ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
+      EXPECT_EQ(info.load().memory_budget(), TestOptions().limits.memory_budget);
+    } while (!expected(info.load()));
+  };
+  OpenProducer();
+  {
+    WatchClient watcher(channel_);
+    watcher.Open("tank", v1::WATCH_MODE_EVERY, 1);
+    ASSERT_TRUE(watcher.Receive().has_opened());
+    std::uint64_t bytes = 0;
+    for (std::uint64_t i = 0; i < 3; ++i) bytes += Produce(i).ByteSizeLong();
+    EXPECT_TRUE(watcher.Receive().has_frame());
+    wait_for([&](const v1::ServerLoad& load) {
+      return load.watchers() == 1 && load.watched_bytes() > bytes / 2 && load.memory_held() == 0 &&
+             load.frames_waiting() == 0;
+    });
+  }
+  wait_for(
+      [](const v1::ServerLoad& load) { return load.watchers() == 0 && load.watched_bytes() == 0; });
+}
+
 TEST_P(Watch, ADrainDeliversWhatIsDoneAndSaysGoodbye) {
   OpenProducer();
   WatchClient idle(channel_), without_credit(channel_);

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,15 @@
 #include "partiemc/parameters.h"
 
 namespace partiemc::client {
+
+/// What a server is busy with at the moment.
+struct ServerLoad {
+  std::uint32_t watchers = 0;        ///< Of all streams.
+  std::uint64_t frames_waiting = 0;  ///< For a thread that computes them.
+  std::uint64_t memory_held = 0;     ///< Bytes of requests and answers of all streams.
+  std::uint64_t memory_budget = 0;   ///< What they may hold together.
+  std::uint64_t watched_bytes = 0;   ///< Not taken by watchers yet; outside of the budget.
+};
 
 struct ServerInfo {
   std::string version;
@@ -28,6 +38,7 @@ struct ServerInfo {
   std::vector<std::string> capabilities;
   std::uint32_t open_streams = 0;
   bool draining = false;
+  std::optional<ServerLoad> load = {};  ///< Not of a server of version 0.1.
 };
 
 /// Asks the server at `address` (HOST:PORT, [IPV6]:PORT or unix:PATH).
