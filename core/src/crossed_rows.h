@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "cells_by_row.h"
 #include "crossings.h"
 #include "lattice.h"
 #include "partiemc/result.h"
@@ -71,25 +72,9 @@ void CrossedRows::VisitCell(const TileDirectory& directory, const Crossings& cro
 template <typename Visit>
 void CrossedRows::ForEachEdge(const TileDirectory& directory, const Crossings& crossings,
                               Visit visit) {
-  // Cells are sorted by tile, then row; a row of the lattice runs through a row of tiles.
-  const std::size_t tiles = crossings.tiles.size();
-  next_cell_.resize(tiles);
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    next_cell_[tile] = crossings.tiles[tile].first_cell;
-  }
-  for (std::size_t first = 0, last = 0; first < tiles; first = last) {
-    while (last < tiles && directory[last].y == directory[first].y) ++last;
-    for (int j = 0; j < kTileSize; ++j) {
-      for (std::size_t tile = first; tile < last; ++tile) {
-        const std::size_t end =
-            tile + 1 < tiles ? crossings.tiles[tile + 1].first_cell : crossings.cells.size();
-        std::uint32_t& cell = next_cell_[tile];
-        for (; cell < end && crossings.cells[cell].j == j; ++cell) {
-          VisitCell(directory, crossings, crossings.cells[cell], visit);
-        }
-      }
-    }
-  }
+  ForEachCellByRow(directory, crossings, next_cell_, [&](std::uint32_t cell) {
+    VisitCell(directory, crossings, crossings.cells[cell], visit);
+  });
 }
 
 }  // namespace partiemc

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "cells_by_row.h"
 #include "parallel.h"
 
 namespace partiemc {
@@ -20,16 +21,21 @@ CellNormal KeyOf(const TileDirectory& directory, const ActiveCell& cell) {
   return key;
 }
 
-// The normal that a cell had in the frame before, or nullptr. A saddle has two planes and so no
-// normal of its own to remember.
-const CellNormal* FindPrevious(std::span<const CellNormal> previous, const TileDirectory& directory,
-                               const ActiveCell& cell) {
-  if (cell.IsSaddle()) return nullptr;
-  const CellNormal key = KeyOf(directory, cell);
-  const auto it = std::lower_bound(
-      previous.begin(), previous.end(), key,
-      [](const CellNormal& a, const CellNormal& b) { return KeyOf(a) < KeyOf(b); });
-  return it != previous.end() && KeyOf(*it) == KeyOf(key) ? &*it : nullptr;
+constexpr std::uint32_t kNone = 0xffffffff;
+
+// Finds the normals that cells had in the frame before: both are in one order. A saddle has two
+// planes and so no normal of its own to remember.
+void MatchPrevious(std::span<const CellNormal> previous, const TileDirectory& directory,
+                   const Crossings& crossings, NormalScratch& scratch) {
+  scratch.previous.assign(crossings.cells.size(), kNone);
+  std::uint32_t next = 0;
+  for (const std::uint32_t index : scratch.order) {
+    const ActiveCell& cell = crossings.cells[index];
+    const auto key = KeyOf(KeyOf(directory, cell));
+    while (next < previous.size() && KeyOf(previous[next]) < key) ++next;
+    if (next == previous.size()) return;
+    if (KeyOf(previous[next]) == key && !cell.IsSaddle()) scratch.previous[index] = next;
+  }
 }
 
 void SetNormal(double x, double y, CellPlane& plane) {
@@ -91,16 +97,16 @@ void Orient(const CellNormal* reference, CellPlane& plane) {
   plane.normal_y = -plane.normal_y;
 }
 
-// Replaces the weak normals of one ring. Reliable ones were set before.
-void MendWeakNormals(const TileDirectory& directory, const Crossings& crossings,
-                     std::span<const std::uint32_t> segments, std::span<const CellNormal> previous,
+// Replaces the weak normals of one ring. Reliable ones were set before. previous_of(segment) is the
+// normal of the frame before, or nullptr.
+template <typename PreviousOf>
+void MendWeakNormals(std::span<const std::uint32_t> segments, PreviousOf previous_of,
                      std::span<CellPlane> planes) {
   const std::size_t count = planes.size();
   for (std::size_t k = 0; k < count; ++k) {
     CellPlane& plane = planes[k];
     if (!plane.is_weak) continue;
-    const ActiveCell& cell = crossings.cells[crossings.segments[segments[k]].cell];
-    if (const CellNormal* memory = FindPrevious(previous, directory, cell)) {
+    if (const CellNormal* memory = previous_of(segments[k])) {
       SetNormal(memory->x, memory->y, plane);
       continue;
     }
@@ -120,18 +126,21 @@ void MendWeakNormals(const TileDirectory& directory, const Crossings& crossings,
 
 // The cell normals to remember, one for each cell with one segment.
 void Remember(const TileDirectory& directory, const Crossings& crossings, const RingTopology& rings,
-              std::span<const CellPlane> planes, std::vector<CellNormal>& next) {
-  next.clear();
+              std::span<const CellPlane> planes, NormalScratch& scratch,
+              std::vector<CellNormal>& next) {
+  scratch.plane.assign(crossings.cells.size(), kNone);
   for (std::size_t k = 0; k < planes.size(); ++k) {
-    const ActiveCell& cell = crossings.cells[crossings.segments[rings.segments[k]].cell];
-    if (cell.IsSaddle()) continue;
-    CellNormal normal = KeyOf(directory, cell);
-    normal.x = static_cast<float>(planes[k].normal_x);
-    normal.y = static_cast<float>(planes[k].normal_y);
+    scratch.plane[crossings.segments[rings.segments[k]].cell] = static_cast<std::uint32_t>(k);
+  }
+  next.clear();
+  for (const std::uint32_t index : scratch.order) {
+    const std::uint32_t plane = scratch.plane[index];
+    if (plane == kNone || crossings.cells[index].IsSaddle()) continue;
+    CellNormal normal = KeyOf(directory, crossings.cells[index]);
+    normal.x = static_cast<float>(planes[plane].normal_x);
+    normal.y = static_cast<float>(planes[plane].normal_y);
     next.push_back(normal);
   }
-  std::sort(next.begin(), next.end(),
-            [](const CellNormal& a, const CellNormal& b) { return KeyOf(a) < KeyOf(b); });
 }
 
 }  // namespace
@@ -139,9 +148,18 @@ void Remember(const TileDirectory& directory, const Crossings& crossings, const 
 void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
                      const RingTopology& rings, const PointField& field,
                      const ReconstructionParameters& parameters,
-                     std::span<const CellNormal> previous, std::vector<CellPlane>& planes,
-                     std::vector<CellNormal>& next) {
+                     std::span<const CellNormal> previous, NormalScratch& scratch,
+                     std::vector<CellPlane>& planes, std::vector<CellNormal>& next) {
   if (!parameters.normal_memory) previous = {};
+  scratch.order.clear();
+  ForEachCellByRow(bins.tiles, crossings, scratch.next_cell,
+                   [&](std::uint32_t cell) { scratch.order.push_back(cell); });
+  MatchPrevious(previous, bins.tiles, crossings, scratch);
+  // The normal that a segment's cell had in the frame before, or nullptr.
+  const auto previous_of = [&](std::uint32_t segment) {
+    const std::uint32_t index = scratch.previous[crossings.segments[segment].cell];
+    return index == kNone ? nullptr : &previous[index];
+  };
   planes.resize(rings.segments.size());
   const auto cell_of = [&](std::size_t k) {
     return &crossings.cells[crossings.segments[rings.segments[k]].cell];
@@ -161,7 +179,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
                       kWeakGradientSquare;
       if (plane.is_weak) continue;
       SetNormal(plane.gradient_x, plane.gradient_y, plane);
-      Orient(FindPrevious(previous, bins.tiles, *cells[k]), plane);
+      Orient(previous_of(rings.segments[first + k]), plane);
     }
   };
   ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t first, std::size_t last) {
@@ -176,10 +194,10 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::size_t first = rings.offsets[ring];
     const std::size_t count = rings.offsets[ring + 1] - first;
-    MendWeakNormals(bins.tiles, crossings, std::span(rings.segments).subspan(first, count),
-                    previous, std::span(planes).subspan(first, count));
+    MendWeakNormals(std::span(rings.segments).subspan(first, count), previous_of,
+                    std::span(planes).subspan(first, count));
   }
-  Remember(bins.tiles, crossings, rings, planes, next);
+  Remember(bins.tiles, crossings, rings, planes, scratch, next);
 }
 
 }  // namespace partiemc

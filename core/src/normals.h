@@ -35,6 +35,14 @@ inline constexpr std::size_t kSegmentsAtOnce = 64;
 /// Below this squared length a gradient of F or phi says nothing about direction (METHOD, 14).
 inline constexpr double kWeakGradientSquare = 1e-3;
 
+/// Warm buffers of EstimateNormals.
+struct NormalScratch {
+  std::vector<std::uint32_t> order;     ///< Active cells in the order of State::normals.
+  std::vector<std::uint32_t> previous;  ///< By active cell: which of the previous normals is its.
+  std::vector<std::uint32_t> plane;     ///< By active cell: its plane, the last of two.
+  std::vector<std::uint32_t> next_cell;
+};
+
 /// One plane per segment of `rings`, in their order. `previous` are the cell normals of the frame
 /// before (State::normals); `next` receives those of this one, sorted the same way.
 /// Orientation: by the previous normal of the cell where there is one and parameters ask for it,
@@ -44,7 +52,7 @@ inline constexpr double kWeakGradientSquare = 1e-3;
 void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
                      const RingTopology& rings, const PointField& field,
                      const ReconstructionParameters& parameters,
-                     std::span<const CellNormal> previous, std::vector<CellPlane>& planes,
-                     std::vector<CellNormal>& next);
+                     std::span<const CellNormal> previous, NormalScratch& scratch,
+                     std::vector<CellPlane>& planes, std::vector<CellNormal>& next);
 
 }  // namespace partiemc

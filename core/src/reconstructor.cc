@@ -143,7 +143,7 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
     const StageScope scope(observer, Stage::kNormals);
     b.point_field.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale));
     EstimateNormals(b.bins, b.crossings, b.topology, b.point_field, parameters, previous.normals,
-                    b.planes, b.next_normals);
+                    b.normal_scratch, b.planes, b.next_normals);
   }
   {
     const StageScope scope(observer, Stage::kVertices);

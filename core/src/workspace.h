@@ -27,6 +27,7 @@ struct Workspace::Buffers {
   RingScratch ring_scratch;
   RingTopology topology;
   PointField point_field;
+  NormalScratch normal_scratch;
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;
   PlacedVertices placed;

@@ -88,7 +88,8 @@ void Stages::Trace() {
 
 void Stages::RunFromRings(std::span<const CellNormal> previous) {
   field.Build(bins, crossings, scale, scale.kernel_radius + 1);
-  EstimateNormals(bins, crossings, topology, field, parameters, previous, planes, next_normals);
+  EstimateNormals(bins, crossings, topology, field, parameters, previous, normal_scratch, planes,
+                  next_normals);
   const Frame frame = particles.AsFrame();
   std::optional<double> area_offset;
   PlaceVertices({frame, bins, level_set, crossings, topology, field, planes, parameters, scale},

@@ -34,6 +34,7 @@ struct Stages {
   RingScratch ring_scratch;
   RingTopology topology;
   PointField field;
+  NormalScratch normal_scratch;
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;
   PlacedVertices placed;
