@@ -29,8 +29,8 @@ double TileMargin(const Scale& scale) {
 // cache.
 constexpr std::size_t kBlockParticles = 256;
 
-// The homes met last, by the low bits of their coordinates: a body of up to 64 x 64 tiles finds all
-// of its homes here, without a probe of the directory that would have to be guessed.
+// The homes met last, by the low bits of their coordinates: a body of up to 128 x 128 tiles finds
+// all of its homes here, without a probe of the directory that would have to be guessed.
 class RecentHomes {
  public:
   explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNoTile); }
@@ -46,7 +46,7 @@ class RecentHomes {
   }
 
  private:
-  static constexpr int kBits = 6;
+  static constexpr int kBits = 7;
   BinStretch& stretch_;
   std::array<std::uint32_t, 1 << 2 * kBits> index_;
 };
