@@ -356,7 +356,12 @@ int Replay(const ReplayFlags& flags) {
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
   const auto stream = OpenStream(flags, *parameters, outputs->WantsNormals());
-  if (!stream.ok()) return ComplainOfServer(stream.status());
+  if (!stream.ok()) {
+    // This verb can do without a server.
+    const std::string why = OneLine(stream.status());
+    if (!why.starts_with("no server")) return ComplainOfServer(stream.status());
+    return Complain(kServer, why + ", or use --local");
+  }
 
   Progress::Options progress_options = Progress::ForStandardError();
   progress_options.quiet = flags.quiet;

@@ -118,7 +118,7 @@ absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::s
   }
   return absl::UnavailableError(absl::StrCat("no server at ", address, " (", reason,
                                              "): start one with `partiemc-server --address ",
-                                             address, "`, or use --local"));
+                                             address, "`"));
 }
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(

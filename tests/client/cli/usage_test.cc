@@ -99,12 +99,16 @@ TEST(Usage, SelectTakesOneWordSoThatTheInputMayFollow) {
 TEST(Usage, NoServerThereIsExitCodeFour) {
   for (const auto& arguments : std::vector<std::vector<std::string>>{
            {"replay", kDamBreak, "--server", "unix:/nonexistent/socket"},
-           {"info", "--server", "unix:/nonexistent/socket"}}) {
+           {"info", "--server", "unix:/nonexistent/socket"},
+           {"streams", "--server", "unix:/nonexistent/socket"},
+           {"watch", "dam", "--server", "unix:/nonexistent/socket"}}) {
     const Ran ran = RunPartiemc(arguments);
     EXPECT_EQ(ran.exit_code, 4);
     ExpectOneLine(ran);
     EXPECT_THAT(ran.error, HasSubstr("no server at unix:/nonexistent/socket"));
     EXPECT_THAT(ran.error, HasSubstr("start one with `partiemc-server --address"));
+    // The only one that can do without.
+    EXPECT_EQ(ran.error.find("--local") != std::string::npos, arguments.front() == "replay");
   }
 }
 

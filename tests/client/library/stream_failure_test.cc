@@ -67,7 +67,7 @@ TEST(StreamFailure, NoServerThereIsOneLineThatSaysWhatToDo) {
   EXPECT_EQ(stream.status().message(),
             "no server at " + port.address() +
                 " (Connection refused): start one with `partiemc-server --address " +
-                port.address() + "`, or use --local");
+                port.address() + "`");
   EXPECT_EQ(GetServerInfo(port.address(), kShort).status(), stream.status());
 }
 
