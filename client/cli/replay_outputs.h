@@ -3,14 +3,14 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "cli/frame_outputs.h"
 #include "cli/replay.h"
 #include "output/frame_record.h"
-#include "output/frame_writer.h"
 #include "output/report.h"
-#include "output/statistics_writer.h"
 #include "output/summary.h"
 #include "partiemc/client/frame_stream.h"
 
@@ -27,19 +27,18 @@ class ReplayOutputs {
   bool WantsNormals() const;
 
   absl::Status Write(const FrameRecord& frame);
-  void AddRefused() { summary_.AddRefused(); }
+  void AddRefused() { frames_.AddRefused(); }
 
   /// Completes statistics and report, which do not exist before.
   absl::Status Finish(double wall_seconds);
 
-  const Summary& summary() const { return summary_; }
+  const Summary& summary() const { return frames_.summary(); }
 
  private:
-  std::optional<FrameWriter> frames_;
-  bool frames_show_normals_ = false;
-  std::optional<StatisticsWriter> statistics_;
+  explicit ReplayOutputs(FrameOutputs frames) : frames_(std::move(frames)) {}
+
+  FrameOutputs frames_;
   std::optional<ReportWriter> report_;
-  Summary summary_;
 };
 
 }  // namespace partiemc::client

@@ -3,15 +3,12 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include "cli/console.h"
+#include "cli/frame_outputs.h"
 #include "client/input/text.h"
-#include "output/frame_writer.h"
 #include "output/progress.h"
-#include "output/statistics_writer.h"
-#include "output/summary.h"
 #include "output/text.h"
 #include "partiemc/client/watcher.h"
 
@@ -28,52 +25,16 @@ std::chrono::milliseconds Milliseconds(double seconds) {
       std::chrono::duration<double>(seconds));
 }
 
-// What a watch leaves behind.
-class WatchOutputs {
- public:
-  static absl::StatusOr<WatchOutputs> Create(const WatchFlags& flags) {
-    WatchOutputs outputs;
-    if (!flags.output_dir.empty()) {
-      auto formats = ParseFrameFormats(flags.format);
-      if (!formats.ok()) return formats.status();
-      auto frames =
-          FrameWriter::Create({.directory = flags.output_dir, .formats = *std::move(formats)});
-      if (!frames.ok()) return frames.status();
-      outputs.frames_ = *std::move(frames);
-    }
-    if (!flags.stats.empty()) {
-      auto statistics = StatisticsWriter::Create(flags.stats);
-      if (!statistics.ok()) return statistics.status();
-      outputs.statistics_.emplace(*std::move(statistics));
-    }
-    return outputs;
-  }
-
-  absl::Status Write(const WatchedFrame& frame) {
-    const FrameRecord record{.index = frame.sequence - 1,  // As a replay numbers its files.
-                             .time = frame.time,
-                             .result = frame.frame.result,
-                             .particles = frame.particles,
-                             .stages_ms = frame.frame.times.stages_ms,
-                             .total_ms = frame.frame.times.total_ms,
-                             .rings_digest = frame.frame.rings_digest,
-                             .mesh_digest = frame.frame.mesh_digest};
-    summary_.Add(record);
-    absl::Status status;
-    if (frames_) status = frames_->Write(record);
-    if (status.ok() && statistics_) status = statistics_->Add(record);
-    return status;
-  }
-
-  absl::Status Finish() { return statistics_ ? statistics_->Finish() : absl::OkStatus(); }
-
-  const Summary& summary() const { return summary_; }
-
- private:
-  std::optional<FrameWriter> frames_;
-  std::optional<StatisticsWriter> statistics_;
-  Summary summary_;
-};
+FrameRecord RecordOf(const WatchedFrame& frame) {
+  return {.index = frame.sequence - 1,  // As a replay numbers its files.
+          .time = frame.time,
+          .result = frame.frame.result,
+          .particles = frame.particles,
+          .stages_ms = frame.frame.times.stages_ms,
+          .total_ms = frame.frame.times.total_ms,
+          .rings_digest = frame.frame.rings_digest,
+          .mesh_digest = frame.frame.mesh_digest};
+}
 
 // How a watch ended.
 struct Ended {
@@ -98,7 +59,7 @@ std::string Detail(const WatchedFrame& frame, std::uint64_t dropped) {
   return detail;
 }
 
-Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, WatchOutputs& outputs,
+Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& outputs,
                  Progress& progress) {
   Ended ended;
   WatchedFrame frame;
@@ -123,7 +84,7 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, WatchOutputs& output
       progress.Note(Concat("partiemc: ", OneLine(frame.rejoined), "; missed: at most ",
                            Plural(frame.gap, "frame")));
     }
-    const absl::Status status = outputs.Write(frame);
+    const absl::Status status = outputs.Write(RecordOf(frame));
     if (!status.ok()) return ended.With(kFailed, OneLine(status));
     progress.Update(++count, Detail(frame, ended.dropped));
   }
@@ -189,7 +150,8 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
 
 int Watch(const WatchFlags& flags) {
   CatchInterrupts();  // Before there are temporary files to take away.
-  auto outputs = WatchOutputs::Create(flags);
+  auto outputs = FrameOutputs::Create(
+      {.output_dir = flags.output_dir, .format = flags.format, .stats = flags.stats});
   if (!outputs.ok()) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());

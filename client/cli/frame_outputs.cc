@@ -1,0 +1,39 @@
+#include "cli/frame_outputs.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace partiemc::client {
+
+absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
+  FrameOutputs outputs;
+  if (!places.output_dir.empty()) {
+    auto formats = ParseFrameFormats(places.format);
+    if (!formats.ok()) return formats.status();
+    outputs.show_normals_ = std::ranges::count(*formats, FrameFormat::kCsv) > 0;
+    auto frames =
+        FrameWriter::Create({.directory = places.output_dir, .formats = *std::move(formats)});
+    if (!frames.ok()) return frames.status();
+    outputs.frames_ = *std::move(frames);
+  }
+  if (!places.stats.empty()) {
+    auto statistics = StatisticsWriter::Create(places.stats);
+    if (!statistics.ok()) return statistics.status();
+    outputs.statistics_.emplace(*std::move(statistics));
+  }
+  return outputs;
+}
+
+absl::Status FrameOutputs::Write(const FrameRecord& frame) {
+  summary_.Add(frame);
+  absl::Status status;
+  if (frames_) status = frames_->Write(frame);
+  if (status.ok() && statistics_) status = statistics_->Add(frame);
+  return status;
+}
+
+absl::Status FrameOutputs::Finish() {
+  return statistics_ ? statistics_->Finish() : absl::OkStatus();
+}
+
+}  // namespace partiemc::client
