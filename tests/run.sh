@@ -109,9 +109,10 @@ step_recordings() {
     --partiemc build/release/bin/partiemc
 }
 
-# Core and sessions, one room after the other, so that nothing else is compiled with sanitizers.
+# Core and server, one room after the other, so that nothing else is compiled with sanitizers but
+# what the fuzzers attack, in the next step but one: it is the same build.
 step_sanitized() {
-  check "sanitized: configure" cmake --preset asan -DPARTIEMC_VTK=OFF || return
+  check "sanitized: configure" cmake --preset asan || return
   local room
   for room in core server; do
     check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
@@ -126,8 +127,8 @@ step_threads() {
 }
 
 step_fuzz() {
-  check "fuzz: configure" cmake --preset fuzz &&
-    check "fuzz: build" cmake --build --preset fuzz -j "$jobs" &&
+  check "fuzz: configure" cmake --preset asan &&
+    check "fuzz: build" cmake --build build/asan -j "$jobs" --target partiemc_fuzz &&
     check "fuzz" tests/fuzz/run.sh --seconds 60
 }
 
@@ -154,7 +155,8 @@ if $install; then
   fi
 fi
 jobs=$(build_jobs)
-readonly jobs test_jobs=2
+# As many again as there are processors: a dozen tests mostly wait.
+readonly jobs test_jobs=$((2 * $(nproc)))
 for step in "${steps[@]}"; do
   headline "$step"
   "step_$step"

@@ -10,13 +10,13 @@ usage: tests/fuzz/run.sh [--seconds N | --executions N] [--keep] [TARGET...]
   --seconds N      N seconds in all, the same for each target (60 if nothing is said)
   --executions N   rounds of 30 seconds for each target until there were N executions in all
   --keep           afterwards, add what reaches new code to tests/fuzz/corpus, if it is small
-Built before: cmake --preset fuzz && cmake --build --preset fuzz. What is learned stays in
-build/fuzz/learned, so that a later run goes on from there. The seed of each run is printed.
+Built before: cmake --preset asan && cmake --build build/asan --target partiemc_fuzz. What is learned
+stays in build/asan/learned, so that a later run goes on from there. The seed of each run is printed.
 USAGE
 }
 
-readonly program=build/fuzz/bin/partiemc_fuzz corpus=tests/fuzz/corpus
-readonly learned=build/fuzz/learned findings=build/fuzz/findings
+readonly program=build/asan/bin/partiemc_fuzz corpus=tests/fuzz/corpus
+readonly learned=build/asan/learned findings=build/asan/findings
 readonly round_seconds=30
 # Inputs stay small: what they break is rarely a matter of size, and small ones are fast. Those that
 # are kept are as many and as large as a repository bears.
