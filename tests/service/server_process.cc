@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -92,6 +93,15 @@ double ServerProcess::ResidentMib() const { return StatusNumber("VmRSS:") / 1024
 
 std::size_t ServerProcess::ThreadCount() const {
   return static_cast<std::size_t>(StatusNumber("Threads:"));
+}
+
+std::size_t ServerProcess::ThreadCount(std::string_view name) const {
+  const std::filesystem::directory_iterator tasks("/proc/" + std::to_string(process_) + "/task");
+  return static_cast<std::size_t>(
+      std::count_if(begin(tasks), end(tasks), [&](const std::filesystem::directory_entry& task) {
+        std::string own;
+        return std::getline(std::ifstream(task.path() / "comm"), own) && own == name;
+      }));
 }
 
 std::size_t ServerProcess::OpenFileCount() const {

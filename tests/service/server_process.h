@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace partiemc::server {
@@ -36,6 +37,7 @@ class ServerProcess {
   // While it runs:
   double ResidentMib() const;
   std::size_t ThreadCount() const;
+  std::size_t ThreadCount(std::string_view name) const;  // As the kernel cuts it: 15 characters.
   std::size_t OpenFileCount() const;
 
  private:
