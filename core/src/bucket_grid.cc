@@ -1,6 +1,7 @@
 #include "bucket_grid.h"
 
 #include <bit>
+#include <cstddef>
 
 #include "coordinate_block.h"
 #include "lattice.h"
@@ -24,15 +25,18 @@ void FindBuckets(double margin, double per_cell, int all, const BucketBox& box,
   const hn::Rebind<float, decltype(d)> d_float;
   const hn::Rebind<std::int32_t, decltype(d)> d_int;
   const auto step = static_cast<int>(hn::Lanes(d));
-  const auto along = [&](const float* coordinates) HWY_ATTR {
-    const auto from_margin =
-        hn::Add(hn::PromoteTo(d, hn::LoadU(d_float, coordinates)), hn::Set(d, margin));
+  // Lanes behind the last entry hold anything, even what no integer can: they count as 0.
+  const auto along = [&](const float* coordinates, std::size_t count) HWY_ATTR {
+    const auto is_entry = hn::FirstN(d_float, count);
+    const auto coordinate = hn::IfThenElseZero(is_entry, hn::LoadU(d_float, coordinates));
+    const auto from_margin = hn::Add(hn::PromoteTo(d, coordinate), hn::Set(d, margin));
     const auto index = hn::DemoteTo(d_int, hn::Mul(from_margin, hn::Set(d, per_cell)));
     return hn::Min(hn::Max(index, hn::Zero(d_int)), hn::Set(d_int, all - 1));
   };
   for (int k = 0; k < near.count; k += step) {
-    const auto row = hn::Sub(along(near.y.data() + k), hn::Set(d_int, box.row));
-    const auto column = hn::Sub(along(near.x.data() + k), hn::Set(d_int, box.column));
+    const auto rest = static_cast<std::size_t>(near.count - k);
+    const auto row = hn::Sub(along(near.y.data() + k, rest), hn::Set(d_int, box.row));
+    const auto column = hn::Sub(along(near.x.data() + k, rest), hn::Set(d_int, box.column));
     hn::StoreU(hn::Add(hn::Mul(row, hn::Set(d_int, box.columns)), column), d_int, buckets + k);
   }
 }
