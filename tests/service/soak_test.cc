@@ -39,9 +39,11 @@ constexpr std::size_t kFrames = 8;          // Different ones, over and over.
 constexpr Seconds kWarmUp(15);
 // Below this the slope is noise; then memory may vary by this much.
 constexpr double kMinutesForSlope = 10;
-// gRPC's own pool takes another thread whenever more than two callbacks wait for one of its
-// threads, up to two for each processor (src/core/lib/iomgr/executor.cc), and gives none back.
-constexpr std::string_view kPoolThread = "default-executo";
+// gRPC's own threads, whose number follows how much was going on at once and which it never gives
+// back. For callbacks: another whenever more than two wait for one of them, up to two for each
+// processor (src/core/lib/iomgr/executor.cc). For timers: one more than were ever busy at the same
+// time (timer_manager.cc), which takes as many processors but for a thread that is interrupted.
+constexpr std::string_view kCallbackThread = "default-executo", kTimerThread = "grpc_global_tim";
 constexpr double kMaxSlopeMibPerHour = 1, kMaxGrowthMib = 8;
 
 std::shared_ptr<grpc::Channel> NewChannel(const std::string& address) {
@@ -193,7 +195,7 @@ double Median(std::vector<Sample>::const_iterator begin, std::vector<Sample>::co
 class Soak : public ::testing::Test {
  protected:
   struct Holds {
-    std::size_t files = 0, pool_threads = 0, other_threads = 0;
+    std::size_t files = 0, callback_threads = 0, timer_threads = 0, other_threads = 0;
   };
 
   // When all clients have gone, which the server may notice a moment later than they do.
@@ -202,9 +204,10 @@ class Soak : public ::testing::Test {
     while (server_.process().OpenFileCount() > expected_files && Clock::now() < give_up) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    const std::size_t pool_threads = server_.process().ThreadCount(kPoolThread);
-    return {server_.process().OpenFileCount(), pool_threads,
-            server_.process().ThreadCount() - pool_threads};
+    const ServerProcess& process = server_.process();
+    const std::size_t callbacks = process.ThreadCount(kCallbackThread);
+    const std::size_t timers = process.ThreadCount(kTimerThread);
+    return {process.OpenFileCount(), callbacks, timers, process.ThreadCount() - callbacks - timers};
   }
   void Spend(Seconds time) {
     std::this_thread::sleep_for(std::chrono::duration_cast<Clock::duration>(time));
@@ -250,18 +253,20 @@ TEST_F(Soak, NothingGrows) {
   const auto quarter = static_cast<std::ptrdiff_t>(samples.size() / 4);
   const double growth = Median(samples.end() - quarter, samples.end()) -
                         Median(samples.begin(), samples.begin() + quarter);
-  std::printf(
-      "memory: slope %.2f MiB/h, growth %.2f MiB; files %zu -> %zu; threads of gRPC's pool %zu -> "
-      "%zu, others %zu -> %zu\n",
-      SlopePerHour(samples), growth, before.files, after.files, before.pool_threads,
-      after.pool_threads, before.other_threads, after.other_threads);
+  std::printf("memory: slope %.2f MiB/h, growth %.2f MiB; files %zu -> %zu\n",
+              SlopePerHour(samples), growth, before.files, after.files);
+  std::printf("threads: %zu -> %zu; gRPC's for callbacks %zu -> %zu, for timers %zu -> %zu\n",
+              before.other_threads, after.other_threads, before.callback_threads,
+              after.callback_threads, before.timer_threads, after.timer_threads);
   EXPECT_LE(growth, kMaxGrowthMib);
   if (load.minutes >= kMinutesForSlope) {
     EXPECT_LE(SlopePerHour(samples), kMaxSlopeMibPerHour);
   }
   EXPECT_LE(after.files, before.files);
   EXPECT_LE(after.other_threads, before.other_threads);
-  EXPECT_LE(after.pool_threads, 2 * std::max(1u, std::thread::hardware_concurrency()));
+  const std::size_t processors = std::max(1u, std::thread::hardware_concurrency());
+  EXPECT_LE(after.callback_threads, 2 * processors);
+  EXPECT_LE(after.timer_threads, 2 * processors + 1);
 }
 
 }  // namespace
