@@ -39,11 +39,12 @@ constexpr std::size_t kFrames = 8;          // Different ones, over and over.
 constexpr Seconds kWarmUp(15);
 // Below this the slope is noise; then memory may vary by this much.
 constexpr double kMinutesForSlope = 10;
-// gRPC's own threads, whose number follows how much was going on at once and which it never gives
-// back. For callbacks: another whenever more than two wait for one of them, up to two for each
-// processor (src/core/lib/iomgr/executor.cc). For timers: one more than were ever busy at the same
-// time (timer_manager.cc), which takes as many processors but for a thread that is interrupted.
-constexpr std::string_view kCallbackThread = "default-executo", kTimerThread = "grpc_global_tim";
+// gRPC's pools, by the names of their threads. They grow with how much goes on at once: two of
+// callbacks to two threads for each processor (src/core/lib/iomgr/executor.cc), that of timers to
+// one more than are busy together (timer_manager.cc), that of its events to what waits for it; but
+// for the last, which shrinks to one for each processor, they keep their threads.
+constexpr std::array<std::string_view, 4> kPools = {"default-executo", "resolver-execut",
+                                                    "grpc_global_tim", "event_engine"};
 constexpr double kMaxSlopeMibPerHour = 1, kMaxGrowthMib = 8;
 
 std::shared_ptr<grpc::Channel> NewChannel(const std::string& address) {
@@ -195,7 +196,8 @@ double Median(std::vector<Sample>::const_iterator begin, std::vector<Sample>::co
 class Soak : public ::testing::Test {
  protected:
   struct Holds {
-    std::size_t files = 0, callback_threads = 0, timer_threads = 0, other_threads = 0;
+    std::size_t files = 0, other_threads = 0;
+    std::array<std::size_t, kPools.size()> pool_threads = {};
   };
 
   // When all clients have gone, which the server may notice a moment later than they do.
@@ -205,9 +207,12 @@ class Soak : public ::testing::Test {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     const ServerProcess& process = server_.process();
-    const std::size_t callbacks = process.ThreadCount(kCallbackThread);
-    const std::size_t timers = process.ThreadCount(kTimerThread);
-    return {process.OpenFileCount(), callbacks, timers, process.ThreadCount() - callbacks - timers};
+    Holds holds{.files = process.OpenFileCount(), .other_threads = process.ThreadCount()};
+    for (std::size_t k = 0; k < kPools.size(); ++k) {
+      holds.pool_threads[k] = process.ThreadCount(kPools[k]);
+      holds.other_threads -= holds.pool_threads[k];
+    }
+    return holds;
   }
   void Spend(Seconds time) {
     std::this_thread::sleep_for(std::chrono::duration_cast<Clock::duration>(time));
@@ -255,9 +260,11 @@ TEST_F(Soak, NothingGrows) {
                         Median(samples.begin(), samples.begin() + quarter);
   std::printf("memory: slope %.2f MiB/h, growth %.2f MiB; files %zu -> %zu\n",
               SlopePerHour(samples), growth, before.files, after.files);
-  std::printf("threads: %zu -> %zu; gRPC's for callbacks %zu -> %zu, for timers %zu -> %zu\n",
-              before.other_threads, after.other_threads, before.callback_threads,
-              after.callback_threads, before.timer_threads, after.timer_threads);
+  std::printf("threads: %zu -> %zu;", before.other_threads, after.other_threads);
+  for (std::size_t k = 0; k < kPools.size(); ++k) {
+    std::printf(" %s %zu -> %zu", kPools[k].data(), before.pool_threads[k], after.pool_threads[k]);
+  }
+  std::printf("\n");
   EXPECT_LE(growth, kMaxGrowthMib);
   if (load.minutes >= kMinutesForSlope) {
     EXPECT_LE(SlopePerHour(samples), kMaxSlopeMibPerHour);
@@ -265,8 +272,7 @@ TEST_F(Soak, NothingGrows) {
   EXPECT_LE(after.files, before.files);
   EXPECT_LE(after.other_threads, before.other_threads);
   const std::size_t processors = std::max(1u, std::thread::hardware_concurrency());
-  EXPECT_LE(after.callback_threads, 2 * processors);
-  EXPECT_LE(after.timer_threads, 2 * processors + 1);
+  for (const std::size_t threads : after.pool_threads) EXPECT_LE(threads, 2 * processors + 1);
 }
 
 }  // namespace
