@@ -32,17 +32,6 @@ v1::OpenStream OpenMessage(const StreamOptions& options) {
   return open;
 }
 
-std::string Seconds(std::chrono::nanoseconds duration) {
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(duration);
-  return absl::StrCat(static_cast<double>(ms.count()) / 1000, " s");
-}
-
-absl::Status NotAccepted(const std::string& address, std::chrono::milliseconds time) {
-  return absl::DeadlineExceededError(
-      absl::StrCat("the server at ", address, " did not accept the stream within ", Seconds(time),
-                   ": it may be overloaded; try again later"));
-}
-
 absl::Status NotOpened(const std::string& address) {
   return absl::DataLossError(absl::StrCat(
       "the server at ", address, " did not begin with StreamOpened: it breaks the protocol"));
@@ -88,7 +77,7 @@ absl::StatusOr<CallOpener::Opened> CallOpener::OpenNewAt(Lock& lock, Clock::time
   if (!attempt_->done()) {
     mendable = false;
     Drop(lock, std::move(attempt_));
-    return NotAccepted(address(), options_.deadline);
+    return NotAccepted(address(), "stream", options_.deadline);
   }
   Loss loss = LossOf(*attempt_, resuming_);
   mendable = loss.mendable;
@@ -134,7 +123,7 @@ absl::StatusOr<std::optional<CallOpener::Opened>> CallOpener::OpenAgain(
       }
       if (now >= attempt_until_) {
         Drop(lock, std::move(attempt_));
-        TryNext(NotAccepted(address(), options_.connect_timeout));
+        TryNext(NotAccepted(address(), "stream", options_.connect_timeout));
         continue;
       }
     } else if (now >= give_up_at) {

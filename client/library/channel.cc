@@ -131,6 +131,18 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(
   return channel;
 }
 
+std::string Seconds(std::chrono::nanoseconds duration) {
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(duration);
+  return absl::StrCat(static_cast<double>(ms.count()) / 1000, " s");
+}
+
+absl::Status NotAccepted(const std::string& address, const char* call,
+                         std::chrono::milliseconds time) {
+  return absl::DeadlineExceededError(absl::StrCat("the server at ", address, " did not accept the ",
+                                                  call, " within ", Seconds(time),
+                                                  ": it may be overloaded; try again later"));
+}
+
 absl::Status FromGrpc(const grpc::Status& status, const std::string& address) {
   if (status.ok()) return absl::OkStatus();
   const auto code = static_cast<absl::StatusCode>(status.error_code());

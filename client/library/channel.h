@@ -31,6 +31,13 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(const std::strin
                                                                 const Credentials& credentials,
                                                                 std::chrono::milliseconds deadline);
 
+/// "0.25 s", as texts of this library tell times: to the millisecond.
+std::string Seconds(std::chrono::nanoseconds duration);
+
+/// What is said when a server that was reached did not accept `call` ("stream", "watcher") in time.
+absl::Status NotAccepted(const std::string& address, const char* call,
+                         std::chrono::milliseconds time);
+
 /// Why a call has failed, in the system's words, which gRPC's end in:
 /// "...: Failed to connect to remote host: Connection refused".
 std::string Reason(const grpc::Status& status);

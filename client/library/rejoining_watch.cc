@@ -8,21 +8,6 @@
 #include "library/channel.h"
 
 namespace partiemc::client {
-namespace {
-
-std::string Seconds(std::chrono::nanoseconds duration) {
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(duration);
-  return absl::StrCat(static_cast<double>(ms.count()) / 1000, " s");
-}
-
-absl::Status NotAccepted(const std::string& address, std::chrono::milliseconds time) {
-  return absl::DeadlineExceededError(
-      absl::StrCat("the server at ", address, " did not accept the watcher within ", Seconds(time),
-                   ": it may be overloaded; try again later"));
-}
-
-}  // namespace
-
 RejoiningWatch::RejoiningWatch(std::vector<std::string> addresses, std::string_view stream_name,
                                const WatcherOptions& options)
     : addresses_(std::move(addresses)), stream_name_(stream_name), options_(options) {}
@@ -49,7 +34,7 @@ absl::Status RejoiningWatch::OpenAt(std::chrono::milliseconds connect_timeout) {
   call_->Start(stream_name_, options_);
   const auto opened = call_->WaitUntilOpened(Clock::now() + options_.deadline);
   if (!opened.ok()) return opened.status();
-  if (!*opened) return NotAccepted(address(), options_.deadline);
+  if (!*opened) return NotAccepted(address(), "watcher", options_.deadline);
   stream_ = call_->stream();
   lineage_ = call_->lineage();
   joined_ = true;
@@ -188,7 +173,7 @@ absl::StatusOr<bool> RejoiningWatch::TryAttempt(Clock::time_point until) {
     if (!passes && !call_->lost()) return opened.status();
     TryNext(opened.status());
   } else if (Clock::now() >= loss_->attempt_until) {
-    TryNext(NotAccepted(address(), options_.connect_timeout));
+    TryNext(NotAccepted(address(), "watcher", options_.connect_timeout));
   }
   return false;
 }

@@ -15,10 +15,6 @@ namespace {
 // A server may announce any window; this one bounds the memory of this side.
 constexpr std::size_t kMaxFramesInFlight = 64;
 
-std::string Seconds(std::chrono::milliseconds duration) {
-  return absl::StrCat(static_cast<double>(duration.count()) / 1000, " s");
-}
-
 absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
   auto parameters = wire::DecodeParameters(opened.parameters());
   if (!parameters.ok()) return parameters.status();
