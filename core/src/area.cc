@@ -15,7 +15,8 @@ constexpr std::uint64_t kMinPooledParticles = 30;
 // Volumes of recordings are 1-4 % off: more than this is not theirs to decide. In spacings. A
 // larger one leaves less area behind on the tuning set, and costs the drum's calm.
 constexpr double kMaxOffset = 0.15;
-// Wishes beyond the first number fade, beyond the second they are ignored. In spacings.
+// Frames whose wish is beyond the first number are believed less, beyond the second not at all. In
+// spacings.
 constexpr double kFadeFrom = 0.8;
 constexpr double kFadeTo = 1.6;
 
@@ -41,8 +42,14 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
-// The offset that this frame alone would ask for, in world units; nothing without large components.
-std::optional<double> WantedOffset(const VertexInput& input, const Rings& rings, double spacing) {
+// What a frame alone would ask for.
+struct Wish {
+  double offset;  // In spacings.
+  double trust;   // From 0, not believed, to 1.
+};
+
+// Nothing without large components.
+std::optional<Wish> WishOf(const VertexInput& input, const Rings& rings, double spacing) {
   const double cell_area = input.scale.cell_size * input.scale.cell_size;
   double volume = 0, area = 0, perimeter = 0;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
@@ -55,9 +62,9 @@ std::optional<double> WantedOffset(const VertexInput& input, const Rings& rings,
     perimeter += measures.perimeter;
   }
   if (perimeter <= 0) return std::nullopt;
-  const double wanted = (volume - area) / perimeter;
-  const double trust = 1 - Smoothstep(kFadeFrom * spacing, kFadeTo * spacing, std::abs(wanted));
-  return std::clamp(wanted, -kMaxOffset * spacing, kMaxOffset * spacing) * trust;
+  const double wanted = (volume - area) / perimeter / spacing;
+  return Wish{.offset = std::clamp(wanted, -kMaxOffset, kMaxOffset),
+              .trust = 1 - Smoothstep(kFadeFrom, kFadeTo, std::abs(wanted))};
 }
 
 // Moves the points of one ring outward by `offset` along the mitres of their segments.
@@ -94,10 +101,11 @@ void MatchArea(const VertexInput& input, std::vector<double>& scratch,
   const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
   if (!is_known || !input.parameters.steps.area) return;
   const double spacing = input.scale.spacing * input.scale.cell_size;
-  const std::optional<double> wanted = WantedOffset(input, rings, spacing);
-  if (wanted) {
-    const double wish = *wanted / spacing;
-    offset = offset ? *offset + kFollow * (wish - *offset) : wish;
+  if (const std::optional<Wish> wish = WishOf(input, rings, spacing)) {
+    // A frame that is not believed leaves the offset as it is: were it to fade, still outlines
+    // would move.
+    offset = offset ? *offset + kFollow * wish->trust * (wish->offset - *offset)
+                    : wish->trust * wish->offset;
   }
   if (!offset) return;
   scratch.resize(rings.points.size());

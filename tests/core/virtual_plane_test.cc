@@ -137,6 +137,29 @@ TEST(VirtualPlane, DoesNotMoveTheOutlineByMoreThanItsLimitForAnyVolume) {
   EXPECT_LE(std::abs(*state.area_offset), 0.15);
 }
 
+TEST(VirtualPlane, KeepsItsAreaOffsetThroughFramesThatAreNotBelieved) {
+  const std::vector<double> positions = Disc(12, 0.05, 5);
+  const auto reconstructor = Reconstructor::Create({.spacing = 1.0});
+  Workspace workspace;
+  Result result;
+  const auto offset_after = [&](float volume, double offset) {
+    const std::vector<float> volumes(positions.size() / 2, volume);
+    State state{.cell_size = 1, .spacing = 1, .area_offset = offset};
+    EXPECT_TRUE(
+        reconstructor
+            ->Reconstruct({.positions = std::span<const double>(positions), .volumes = volumes},
+                          state, workspace, result)
+            .ok());
+    return *state.area_offset;
+  };
+  // Half as much again, over a disc of 12 spacings, asks for about 3 spacings all round.
+  EXPECT_EQ(offset_after(1.5f, 0.05), 0.05);
+  EXPECT_EQ(offset_after(1.5f, -0.05), -0.05);
+  // About one spacing is believed in part: less than the nine tenths of the way to the limit.
+  EXPECT_GT(offset_after(1.2f, 0.05), 0.05);
+  EXPECT_LT(offset_after(1.2f, 0.05), 0.05 + 0.85 * (0.15 - 0.05));
+}
+
 // Vertices on an axis, which such an offset would move to 1e-300, where no product of two
 // coordinates is told from 0.
 TEST(VirtualPlane, LeavesVerticesOnAnAxisWhenTheOffsetHasDecayedToNextToNothing) {
