@@ -1,6 +1,7 @@
 #include "loop_groups.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "parallel.h"
 
@@ -24,49 +25,73 @@ void LoopGroups::EndLoop(std::uint32_t group, bool reversed) {
   groups_.push_back(group);
 }
 
-// Deals the loops to batches; returns how many there are.
-std::size_t LoopGroups::FillBatches() {
-  const auto group_count = groups_.empty() ? 0 : *std::max_element(groups_.begin(), groups_.end());
-  batch_of_group_.assign(group_count + 1, 0);
-  for (std::size_t loop = 0; loop < groups_.size(); ++loop) {
-    batch_of_group_[groups_[loop]] += offsets_[loop + 1] - offsets_[loop];
+// Sorts the loops by group, those of a group in the order in which they came.
+void LoopGroups::SortLoops() {
+  const std::size_t group_count =
+      groups_.empty() ? 0 : std::size_t{*std::max_element(groups_.begin(), groups_.end())} + 1;
+  // Counted one place too far, so that after the sums each group's start is where its end belongs,
+  // and gets there as its loops are dealt.
+  loop_offsets_.assign(group_count + 2, 0);
+  for (const std::uint32_t group : groups_) ++loop_offsets_[group + 2];
+  std::partial_sum(loop_offsets_.begin(), loop_offsets_.end(), loop_offsets_.begin());
+  loops_.resize(groups_.size());
+  for (std::uint32_t loop = 0; loop < groups_.size(); ++loop) {
+    loops_[loop_offsets_[groups_[loop] + 1]++] = loop;
   }
-  std::size_t points_before = 0;
-  for (std::uint32_t& batch : batch_of_group_) {
-    const std::size_t count = batch;
-    batch = static_cast<std::uint32_t>(points_before / kBatchPoints);
-    points_before += count;
+  loop_offsets_.pop_back();
+}
+
+// Deals the groups to batches; returns how many there are.
+std::size_t LoopGroups::MakeBatches() {
+  std::size_t count = 0;
+  std::size_t points = kBatchPoints;  // Of the last batch.
+  for (std::size_t group = 0; group + 1 < loop_offsets_.size(); ++group) {
+    if (points >= kBatchPoints) {
+      if (count == batches_.size()) batches_.emplace_back();
+      batches_[count++].first_group = group;
+      points = 0;
+    }
+    batches_[count - 1].last_group = group + 1;
+    for (const std::uint32_t loop : LoopsOf(group)) points += PointsOf(loop).size();
   }
-  const std::size_t batch_count = std::size_t{batch_of_group_.back()} + 1;
-  if (batches_.size() < batch_count) batches_.resize(batch_count);
-  for (std::size_t k = 0; k < batch_count; ++k) {
-    batches_[k].points.clear();
-    batches_[k].offsets.assign(1, 0);
+  return count;
+}
+
+bool LoopGroups::TriangulateGroup(std::span<const double> points, std::size_t group,
+                                  Batch& batch) const {
+  const std::span<const std::uint32_t> loops = LoopsOf(group);
+  if (loops.size() == 2 &&
+      batch.strip.Triangulate(points, PointsOf(loops[0]), PointsOf(loops[1]), batch.triangles)) {
+    return true;
   }
-  for (std::size_t loop = 0; loop < groups_.size(); ++loop) {
-    Batch& batch = batches_[batch_of_group_[groups_[loop]]];
-    batch.points.insert(batch.points.end(), points_.begin() + offsets_[loop],
-                        points_.begin() + offsets_[loop + 1]);
+  batch.points.clear();
+  batch.offsets.assign(1, 0);
+  for (const std::uint32_t loop : loops) {
+    const std::span<const std::uint32_t> loop_points = PointsOf(loop);
+    batch.points.insert(batch.points.end(), loop_points.begin(), loop_points.end());
     batch.offsets.push_back(static_cast<std::uint32_t>(batch.points.size()));
   }
-  return batch_count;
+  return batch.triangulator.Triangulate(points, batch.points, batch.offsets, batch.triangles);
 }
 
 bool LoopGroups::Triangulate(std::span<const double> points,
                              std::vector<std::uint32_t>& triangles) {
-  const std::size_t batch_count = FillBatches();
-  Clear();
+  SortLoops();
+  const std::size_t batch_count = MakeBatches();
   ParallelFor(batch_count, [&](std::size_t k) {
     Batch& batch = batches_[k];
     batch.triangles.clear();
-    batch.is_done =
-        batch.triangulator.Triangulate(points, batch.points, batch.offsets, batch.triangles);
+    batch.is_done = true;
+    for (std::size_t group = batch.first_group; group < batch.last_group; ++group) {
+      batch.is_done = batch.is_done && TriangulateGroup(points, group, batch);
+    }
   });
   bool is_done = true;
   for (std::size_t k = 0; k < batch_count; ++k) {
     is_done = is_done && batches_[k].is_done;
     triangles.insert(triangles.end(), batches_[k].triangles.begin(), batches_[k].triangles.end());
   }
+  Clear();
   return is_done;
 }
 

@@ -1,0 +1,186 @@
+#include "loop_strip.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "region_cover.h"
+#include "region_shapes.h"
+
+namespace partiemc {
+namespace {
+
+using testing::ExpectCover;
+using testing::Random;
+using testing::Rectangle;
+using testing::Region;
+using testing::Reversed;
+using testing::Uniform;
+
+std::optional<std::vector<std::uint32_t>> Strip(const Region& region, LoopStrip& strip) {
+  EXPECT_EQ(region.LoopCount(), 2u);
+  const auto loop = [&](std::size_t k) {
+    return std::span(region.loop_points)
+        .subspan(region.loop_offsets[k], region.loop_offsets[k + 1] - region.loop_offsets[k]);
+  };
+  std::vector<std::uint32_t> triangles{7, 8, 9};
+  if (!strip.Triangulate(region.points, loop(0), loop(1), triangles)) {
+    EXPECT_EQ(triangles, (std::vector<std::uint32_t>{7, 8, 9}));
+    return std::nullopt;
+  }
+  EXPECT_EQ(triangles.size(), 3 + 3 * region.loop_points.size());
+  triangles.erase(triangles.begin(), triangles.begin() + 3);
+  return triangles;
+}
+
+std::optional<std::vector<std::uint32_t>> Strip(const Region& region) {
+  LoopStrip strip;
+  return Strip(region, strip);
+}
+
+void ExpectStrip(const Region& region) {
+  const auto triangles = Strip(region);
+  ASSERT_TRUE(triangles.has_value());
+  ExpectCover(region, *triangles);
+}
+
+Region RegionOf(const std::vector<Point>& loop, const std::vector<Point>& other) {
+  Region region;
+  region.AddLoop(loop);
+  region.AddLoop(other);
+  return region;
+}
+
+/// A loop round the origin whose distance from it is `radius` times 1 plus waves of a random shape.
+std::vector<Point> Wobbly(Random& random, double radius, std::size_t count) {
+  constexpr double kTurn = 6.283185307179586;
+  const double depth = Uniform(random, 0, 0.1);
+  const double waves = std::floor(Uniform(random, 2, 9));
+  std::vector<Point> loop;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double angle = kTurn * static_cast<double>(k) / static_cast<double>(count);
+    const double distance =
+        radius * (1 + depth * std::sin(waves * angle) + Uniform(random, 0, .01));
+    loop.push_back({distance * std::cos(angle), distance * std::sin(angle)});
+  }
+  return loop;
+}
+
+TEST(LoopStrip, AFrameBetweenTwoSquaresHasATriangleForEachPoint) {
+  ExpectStrip(RegionOf(Rectangle(0, 0, 4, 4), Reversed(Rectangle(1, 1, 3, 3))));
+  ExpectStrip(RegionOf(Reversed(Rectangle(1, 1, 3, 3)), Rectangle(0, 0, 4, 4)));
+}
+
+TEST(LoopStrip, ManyPointsOnOneSideAndFewOnTheOther) {
+  Random random(3);
+  std::vector<Point> fine;
+  for (int k = 0; k < 40; ++k) fine.push_back({0.1 * k, 0});
+  for (int k = 0; k < 40; ++k) fine.push_back({4, 0.1 * k});
+  for (int k = 40; k > 0; --k) fine.push_back({0.1 * k, 4});
+  for (int k = 40; k > 0; --k) fine.push_back({0, 0.1 * k});
+  ExpectStrip(RegionOf(fine, Reversed(Rectangle(1, 1, 3, 3))));
+  ExpectStrip(RegionOf(Wobbly(random, 10, 300), Reversed(Rectangle(-1, -1, 1, 1))));
+}
+
+TEST(LoopStrip, WobblyRingsAreCoveredAtAnyScaleAndPlace) {
+  Random random(4);
+  for (int round = 0; round < 100; ++round) {
+    SCOPED_TRACE("seed 4, round " + std::to_string(round));
+    const auto count = [&] { return static_cast<std::size_t>(Uniform(random, 30, 200)); };
+    const Region region =
+        RegionOf(Wobbly(random, 10, count()), Reversed(Wobbly(random, 7, count())));
+    ExpectStrip(region);
+    ExpectStrip(region.Transformed(1e-30, 0));
+    ExpectStrip(region.Transformed(1e30, 0));
+    ExpectStrip(region.Transformed(0.01, 1e4));
+  }
+}
+
+TEST(LoopStrip, ARingThatTouchesItsStaircaseIsCoveredOrRefused) {
+  Region region;
+  region.AddLoop(Rectangle(0, 0, 4, 4));
+  region.AddLoop({0, region.AddPoint({1, 3}), region.AddPoint({3, 3}), region.AddPoint({3, 1})});
+  if (const auto triangles = Strip(region)) ExpectCover(region, *triangles);
+}
+
+TEST(LoopStrip, WhatIsTakenOfBandsBetweenContoursAndStaircasesIsCovered) {
+  std::size_t strips = 0, bands = 0;
+  for (std::uint64_t seed = 0; seed < 600; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const Region band = testing::RandomBand(random, 8 + seed % 12);
+    if (band.LoopCount() != 2) continue;
+    ++bands;
+    if (const auto triangles = Strip(band)) {
+      ++strips;
+      ExpectCover(band, *triangles);
+    }
+  }
+  EXPECT_GT(bands, 20u);
+  EXPECT_GT(strips, bands / 2);
+}
+
+// Whatever the loops are: triangles turn counter-clockwise, and their sides are the loops.
+TEST(LoopStrip, WhateverIsTakenOfRandomLoopsHasTheirSides) {
+  Random random(5);
+  LoopStrip strip;
+  std::size_t taken = 0;
+  for (int round = 0; round < 200'000; ++round) {
+    const Region region = testing::RandomGarbage(random, 3 + round % 3, 2, 3 + round % 6);
+    if (region.LoopCount() != 2) continue;
+    const auto triangles = Strip(region, strip);
+    if (!triangles.has_value()) continue;
+    ++taken;
+    ExpectCover(region, *triangles);
+    ASSERT_FALSE(HasFailure()) << "seed 5, round " << round;
+  }
+  EXPECT_GT(taken, 5u);
+}
+
+TEST(LoopStrip, ARingWithOnePointMovedIsTakenRightOrRefused) {
+  Random random(9);
+  std::size_t taken = 0;
+  for (int round = 0; round < 2'000; ++round) {
+    SCOPED_TRACE("seed 9, round " + std::to_string(round));
+    Region region = RegionOf(Wobbly(random, 10, 30), Reversed(Wobbly(random, 7, 25)));
+    region.points[random() % region.points.size()] += Uniform(random, -6, 6);
+    if (const auto triangles = Strip(region)) {
+      ++taken;
+      ExpectCover(region, *triangles);
+    }
+  }
+  EXPECT_GT(taken, 500u);
+  EXPECT_LT(taken, 2'000u);
+}
+
+TEST(LoopStrip, WhatIsNoRingIsRefused) {
+  const auto square = Rectangle(0, 0, 4, 4);
+  EXPECT_FALSE(Strip(RegionOf(square, Rectangle(1, 1, 3, 3)))) << "the same way round";
+  EXPECT_FALSE(Strip(RegionOf(square, Reversed(Rectangle(-1, -1, 5, 5))))) << "inside out";
+  EXPECT_FALSE(Strip(RegionOf(square, Reversed(square)))) << "no region between them";
+  EXPECT_FALSE(Strip(RegionOf(square, Rectangle(9, 9, 10, 10)))) << "beside each other";
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
+                           std::numeric_limits<double>::infinity(), 1e200, 1e-200}) {
+    EXPECT_FALSE(Strip(RegionOf(square, {{1, 1}, {1, 3}, {3, bad}}))) << bad;
+    EXPECT_FALSE(Strip(RegionOf({{0, 0}, {4, bad}, {4, 4}}, {{1, 1}, {1, 3}, {3, 3}}))) << bad;
+  }
+}
+
+TEST(LoopStrip, TheResultDoesNotDependOnWhatWasTriangulatedBefore) {
+  Random random(6);
+  LoopStrip warm;
+  for (int round = 0; round < 20; ++round) {
+    const Region region =
+        RegionOf(Wobbly(random, 10, 20 + random() % 200), Reversed(Wobbly(random, 7, 100)));
+    EXPECT_EQ(Strip(region, warm), Strip(region)) << "seed 6, round " << round;
+  }
+}
+
+}  // namespace
+}  // namespace partiemc
