@@ -7,7 +7,7 @@
 
 #include "cli/console.h"
 #include "cli/input_source.h"
-#include "cli/replay_flags.h"
+#include "cli/replay_parameters.h"
 #include "output/progress.h"
 #include "output/text.h"
 #include "recording/recording.h"

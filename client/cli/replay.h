@@ -1,54 +1,10 @@
 // `partiemc replay`: a recorded sequence through a server, or through the core in this process.
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "CLI/CLI.hpp"
-#include "cli/server_flags.h"
-#include "client/input/sequence.h"
-#include "partiemc/parameters.h"
+#include "cli/replay_flags.h"
 
 namespace partiemc::client {
-
-/// The flags, as text where CLI11 has nothing to check.
-struct ReplayFlags {
-  std::string input;
-  SequenceOptions sequence;
-
-  ServerFlags server;
-  bool local = false;
-  std::uint32_t checkpoint_interval = 4;
-  int threads = 0;  ///< 0: one for each processor.
-  double deadline_seconds = 30;
-  std::string name;  ///< Of the stream; empty: the server makes one up.
-  bool echo_particles = false;
-
-  std::string placement = "virtual-plane";
-  std::string fill = "greedy";
-  std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: as the input says.
-  double kernel_radius = 3;
-  double cell_size = 1;
-  std::optional<double> reference_radius;
-  double surface_offset = 0;
-  bool no_normal_memory = false;
-  std::string clean = "auto";
-  double min_area = 0;
-  std::uint64_t min_particles = 0;
-
-  std::string rate = "max";
-  std::string policy = "block";
-  bool check = false;
-  bool keep_going = false;
-  bool quiet = false;
-
-  std::string output_dir;
-  std::string format = "geojson";
-  std::string stats;
-  std::string report;
-};
 
 /// Adds the verb to `app`; its flags go to `flags`, which must outlive the parsing.
 CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags);

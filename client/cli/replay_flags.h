@@ -1,24 +1,55 @@
-// What the flags of `partiemc replay` mean.
+// The flags of `partiemc replay`.
 #pragma once
 
+#include <cstdint>
 #include <optional>
-#include <string_view>
+#include <string>
 
-#include "absl/status/statusor.h"
-#include "cli/replay.h"
+#include "CLI/CLI.hpp"
+#include "cli/server_flags.h"
+#include "client/input/sequence.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc::client {
 
-/// `recorded_spacing` is used where the flags name none.
-/// Errors: INVALID_ARGUMENT, one line that names the flag.
-absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
-                                                      std::optional<double> recorded_spacing);
+/// The flags, as text where CLI11 has nothing to check.
+struct ReplayFlags {
+  std::string input;
+  SequenceOptions sequence;
 
-/// Frames per second of `--rate`; absent for "max". Errors: INVALID_ARGUMENT.
-absl::StatusOr<std::optional<double>> RateOf(std::string_view text);
+  ServerFlags server;
+  bool local = false;
+  std::uint32_t checkpoint_interval = 4;
+  int threads = 0;  ///< 0: one for each processor.
+  double deadline_seconds = 30;
+  std::string name;  ///< Of the stream; empty: the server makes one up.
+  bool echo_particles = false;
 
-/// A positive, finite number and nothing else.
-std::optional<double> PositiveNumber(std::string_view text);
+  std::string placement = "virtual-plane";
+  std::string fill = "greedy";
+  std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: as the input says.
+  double kernel_radius = 3;
+  double cell_size = 1;
+  std::optional<double> reference_radius;
+  double surface_offset = 0;
+  bool no_normal_memory = false;
+  std::string clean = "auto";
+  double min_area = 0;
+  std::uint64_t min_particles = 0;
+
+  std::string rate = "max";
+  std::string policy = "block";
+  bool check = false;
+  bool keep_going = false;
+  bool quiet = false;
+
+  std::string output_dir;
+  std::string format = "geojson";
+  std::string stats;
+  std::string report;
+};
+
+/// Adds the flags to the verb `app`; they go to `flags`, which must outlive the parsing.
+void AddReplayFlags(CLI::App& app, ReplayFlags& flags);
 
 }  // namespace partiemc::client

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/replay_flags.h"
+#include "cli/replay_parameters.h"
 #include "client/input/columns.h"
 #include "client/input/frame_range.h"
 #include "client/input/number_text.h"

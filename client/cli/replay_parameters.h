@@ -1,0 +1,24 @@
+// What the flags of `partiemc replay` mean.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "cli/replay_flags.h"
+#include "partiemc/parameters.h"
+
+namespace partiemc::client {
+
+/// `recorded_spacing` is used where the flags name none.
+/// Errors: INVALID_ARGUMENT, one line that names the flag.
+absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
+                                                      std::optional<double> recorded_spacing);
+
+/// Frames per second of `--rate`; absent for "max". Errors: INVALID_ARGUMENT.
+absl::StatusOr<std::optional<double>> RateOf(std::string_view text);
+
+/// A positive, finite number and nothing else.
+std::optional<double> PositiveNumber(std::string_view text);
+
+}  // namespace partiemc::client
