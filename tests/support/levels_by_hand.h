@@ -1,0 +1,32 @@
+// Level sets by hand over two by two tiles, for tests of what becomes of them.
+#pragma once
+
+#include <cmath>
+#include <initializer_list>
+#include <utility>
+
+#include "lattice.h"
+#include "partiemc/parameters.h"
+#include "support/particles.h"
+
+namespace partiemc::support {
+
+/// Distance to a circle, negative inside.
+inline double Circle(double x, double y, double cx, double cy, double radius) {
+  return std::hypot(x - cx, y - cy) - radius;
+}
+
+inline Particles At(std::initializer_list<std::pair<double, double>> positions) {
+  Particles particles;
+  for (const auto& [x, y] : positions) particles.Add(x, y);
+  return particles;
+}
+
+inline ReconstructionParameters Plain(bool clean) {
+  return {.placement = Placement::kMarchingSquares, .spacing = 1.0, .clean = clean};
+}
+
+/// The tiles that these level sets fill.
+inline constexpr TileCoordinate kLow{0, 0}, kHigh{1, 1};
+
+}  // namespace partiemc::support
