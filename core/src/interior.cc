@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -61,9 +60,9 @@ void TraceLoop(const TileDirectory& directory, const std::vector<TileBits>& tile
 
 // Takes the free cells of row j from (tile, i) eastward into `span`, across tiles; returns their
 // number.
-std::int64_t TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t tile,
-                     int i, int j) {
-  std::int64_t width = 0;
+int TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t tile, int i,
+            int j) {
+  int width = 0;
   scratch.span.clear();
   while (true) {
     const std::uint32_t row = scratch.free[tile][j] >> i;
@@ -128,6 +127,36 @@ struct CellBox {
     y0 = std::min(y0, y);
     y1 = std::max(y1, y);
   }
+  CellBox With(const CellBox& other) const {
+    CellBox box;
+    box.x0 = std::min(x0, other.x0);
+    box.x1 = std::max(x1, other.x1);
+    box.y0 = std::min(y0, other.y0);
+    box.y1 = std::max(y1, other.y1);
+    return box;
+  }
+};
+
+// The largest integer that is not above `coordinate`; std::floor is a call on old processors.
+std::int64_t Floor(double coordinate) {
+  const auto whole = static_cast<std::int64_t>(coordinate);
+  return whole - (coordinate < static_cast<double>(whole) ? 1 : 0);
+}
+
+// Finds tiles; that of the last call, which is the next one's as a rule, without looking for it.
+class TileFinder {
+ public:
+  explicit TileFinder(const TileDirectory& directory) : directory_(directory) {}
+
+  std::uint32_t Find(std::int64_t x, std::int64_t y) {
+    const TileCoordinate wanted{static_cast<std::int32_t>(y), static_cast<std::int32_t>(x)};
+    if (found_ == kNoTile || wanted != directory_[found_]) found_ = directory_.Find(wanted);
+    return found_;
+  }
+
+ private:
+  const TileDirectory& directory_;
+  std::uint32_t found_ = kNoTile;
 };
 
 // Takes the cells of one tile that lie in `columns` and rows [first, last] of it out. Several tasks
@@ -141,14 +170,11 @@ void ExcludeFromTile(BitRows& interior, std::uint32_t columns, int first, int la
   }
 }
 
-void ExcludeBox(const TileDirectory& directory, const CellBox& box, std::vector<TileBits>& tiles) {
-  const auto cell = [](double coordinate) {
-    return static_cast<std::int64_t>(std::floor(coordinate));
-  };
-  const std::int64_t x0 = cell(box.x0 - kTouchMargin);
-  const std::int64_t x1 = cell(box.x1 + kTouchMargin);
-  const std::int64_t y0 = cell(box.y0 - kTouchMargin);
-  const std::int64_t y1 = cell(box.y1 + kTouchMargin);
+void ExcludeBox(const CellBox& box, TileFinder& finder, std::vector<TileBits>& tiles) {
+  const std::int64_t x0 = Floor(box.x0 - kTouchMargin);
+  const std::int64_t x1 = Floor(box.x1 + kTouchMargin);
+  const std::int64_t y0 = Floor(box.y0 - kTouchMargin);
+  const std::int64_t y1 = Floor(box.y1 + kTouchMargin);
   // The part of [first, last] in the k-th stretch of kTileSize, relative to its start.
   const auto part = [](std::int64_t k, std::int64_t first, std::int64_t last) {
     const std::int64_t start = k << kTileShift;
@@ -157,8 +183,7 @@ void ExcludeBox(const TileDirectory& directory, const CellBox& box, std::vector<
   };
   for (std::int64_t row = y0 >> kTileShift; row <= y1 >> kTileShift; ++row) {
     for (std::int64_t column = x0 >> kTileShift; column <= x1 >> kTileShift; ++column) {
-      const std::uint32_t tile =
-          directory.Find({static_cast<std::int32_t>(row), static_cast<std::int32_t>(column)});
+      const std::uint32_t tile = finder.Find(column, row);
       if (tile == kNoTile) continue;
       const auto [left, right] = part(column, x0, x1);
       const auto [first, last] = part(row, y0, y1);
@@ -174,16 +199,23 @@ void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double>
                          std::span<const std::uint32_t> offsets, std::span<const double> roots,
                          double cell_size, std::vector<TileBits>& tiles) {
   ParallelForRanges(points.size() / 2, kExcludeGrain, [&](std::size_t first, std::size_t last) {
-    auto after = std::upper_bound(offsets.begin(), offsets.end(), first);
-    for (std::size_t k = first; k < last; ++k) {
-      while (k == *after) ++after;
-      const std::size_t next = k + 1 == *after ? *(after - 1) : k + 1;
+    TileFinder finder(directory);
+    const auto box_of = [&](std::size_t point) {
       CellBox box;
-      for (const std::size_t end : {k, next}) {
-        box.Add(points.data() + 2 * end, cell_size);
-        box.Add(roots.data() + 2 * end, cell_size);
+      box.Add(points.data() + 2 * point, cell_size);
+      box.Add(roots.data() + 2 * point, cell_size);
+      return box;
+    };
+    auto after = std::upper_bound(offsets.begin(), offsets.end(), first);
+    CellBox box = box_of(first);
+    for (std::size_t k = first; k < last; ++k) {
+      if (k == *after) {
+        while (k == *after) ++after;
+        box = box_of(k);
       }
-      ExcludeBox(directory, box, tiles);
+      const CellBox next = box_of(k + 1 == *after ? *(after - 1) : k + 1);
+      ExcludeBox(box.With(next), finder, tiles);
+      box = next;
     }
   });
 }
@@ -220,12 +252,9 @@ void MergeCells(const TileDirectory& directory, const std::vector<TileBits>& til
       for (std::uint32_t tile = first; tile < last; ++tile) {
         while (scratch.free[tile][j] != 0) {
           const int i = std::countr_zero(scratch.free[tile][j]);
-          CellRectangle rectangle;
-          rectangle.x0 = (std::int64_t{directory[tile].x} << kTileShift) + i;
-          rectangle.y0 = (std::int64_t{directory[tile].y} << kTileShift) + j;
-          rectangle.x1 = rectangle.x0 + TakeRow(directory, scratch, tile, i, j);
-          rectangle.y1 = rectangle.y0 + TakeRowsAbove(directory, scratch, j + 1) - j;
-          rectangles.push_back(rectangle);
+          const int width = TakeRow(directory, scratch, tile, i, j);
+          const int height = TakeRowsAbove(directory, scratch, j + 1) - j;
+          rectangles.push_back({{tile, i, j}, width, height});
         }
       }
     }

@@ -33,9 +33,10 @@ struct Staircases {
 void TraceStaircases(const TileDirectory& directory, const std::vector<TileBits>& tiles,
                      Staircases& staircases);
 
-/// Cells [x0, x1) x [y0, y1), in cells from the world's origin.
+/// `width` x `height` cells from the cell `corner` on, to the right and upwards.
 struct CellRectangle {
-  std::int64_t x0, y0, x1, y1;
+  TilePlace corner;
+  int width, height;
 };
 
 /// Warm buffers of MergeCells.

@@ -11,8 +11,6 @@
 namespace partiemc {
 namespace {
 
-constexpr std::uint32_t kUnset = 0xffffffff;
-
 // Builds one mesh. Points of the connectivity: the points of the rings (for `farthest-particle`:
 // the middles of all segments), then lattice nodes as they are needed.
 class MeshBuilder {
@@ -25,23 +23,21 @@ class MeshBuilder {
  private:
   bool MovesVertices() const { return input_.parameters.placement == Placement::kFarthestParticle; }
   void CollectRingPoints();
-  std::uint32_t Vertex(const TilePlace& node);
-  std::uint32_t Vertex(std::int64_t x, std::int64_t y);
+  std::array<TilePlace, 4> CornersOf(const CellRectangle& rectangle) const;
+  template <typename Visit>
+  void ForEachRectangle(Visit visit) const;
+  void FindShapes();
+  void AddNodes();
   void AddRingLoops();
   void AddStaircaseLoops(bool reversed);
   std::uint32_t OuterRingAt(const TilePlace& inside_node) const;
   absl::Status TriangulateLoops(TriangleClass triangle_class);
-  void AddTriangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, TriangleClass triangle_class);
-  void AddRectangle(const CellRectangle& rectangle);
-  absl::Status FillBand();
-  void FillGrid();
-  void FillGreedy();
+  void FillRectangles();
   absl::Status FillInterior();
   void MoveVertices();
   std::uint64_t CountInteriorCells() const;
   std::uint64_t ExpectedBandTriangles() const;
   std::uint64_t CountFolded() const;
-  void Reset();
 
   const MeshInput& input_;
   MeshScratch& scratch_;
@@ -61,29 +57,6 @@ void MeshBuilder::CollectRingPoints() {
     }
   }
   ring_points_ = mesh_.PointCount();
-}
-
-std::uint32_t MeshBuilder::Vertex(const TilePlace& node) {
-  const std::uint32_t key = node.tile * kTileNodes + node.j * kTileSize + node.i;
-  std::uint32_t& vertex = scratch_.vertex_of_node[key];
-  if (vertex != kUnset) return vertex;
-  vertex = static_cast<std::uint32_t>(mesh_.PointCount());
-  scratch_.touched_nodes.push_back(key);
-  const TileCoordinate& tile = input_.directory[node.tile];
-  const auto world = [this](std::int32_t origin, int offset) {
-    return static_cast<double>((std::int64_t{origin} << kTileShift) + offset) *
-           input_.scale.cell_size;
-  };
-  mesh_.points.push_back(world(tile.x, node.i));
-  mesh_.points.push_back(world(tile.y, node.j));
-  return vertex;
-}
-
-std::uint32_t MeshBuilder::Vertex(std::int64_t x, std::int64_t y) {
-  const std::uint32_t tile = input_.directory.Find(
-      {static_cast<std::int32_t>(y >> kTileShift), static_cast<std::int32_t>(x >> kTileShift)});
-  return Vertex(TilePlace{tile, static_cast<int>(x & (kTileSize - 1)),
-                          static_cast<int>(y & (kTileSize - 1))});
 }
 
 // Loops are grouped by components, each named by its outer ring.
@@ -106,7 +79,7 @@ void MeshBuilder::AddStaircaseLoops(bool reversed) {
   const Staircases& staircases = scratch_.staircases;
   for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
     for (std::uint32_t k = staircases.offsets[loop]; k < staircases.offsets[loop + 1]; ++k) {
-      scratch_.loops.AddPoint(Vertex(staircases.corners[k]));
+      scratch_.loops.AddPoint(scratch_.nodes.At(staircases.corners[k]));
     }
     // The corners of interior cells are inside, in one component: cells stay on their side of every
     // ring, or were excluded.
@@ -122,69 +95,83 @@ absl::Status MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
   return absl::OkStatus();
 }
 
-void MeshBuilder::AddTriangle(std::uint32_t a, std::uint32_t b, std::uint32_t c,
-                              TriangleClass triangle_class) {
-  mesh_.triangles.insert(mesh_.triangles.end(), {a, b, c});
-  mesh_.classes.push_back(triangle_class);
+// The corners of a rectangle, counter-clockwise from the lower left one. They are inside, so that
+// there are tiles all along its sides.
+std::array<TilePlace, 4> MeshBuilder::CornersOf(const CellRectangle& rectangle) const {
+  const auto moved = [this](TilePlace place, int right, int up) {
+    for (place.i += right; place.i >= kTileSize; place.i -= kTileSize) {
+      place.tile = input_.directory.neighbours(place.tile)[5];
+    }
+    for (place.j += up; place.j >= kTileSize; place.j -= kTileSize) {
+      place.tile = input_.directory.neighbours(place.tile)[7];
+    }
+    return place;
+  };
+  const TilePlace& corner = rectangle.corner;
+  const TilePlace right = moved(corner, rectangle.width, 0);
+  return {corner, right, moved(right, 0, rectangle.height), moved(corner, 0, rectangle.height)};
 }
 
-void MeshBuilder::AddRectangle(const CellRectangle& rectangle) {
-  const std::uint32_t a = Vertex(rectangle.x0, rectangle.y0);
-  const std::uint32_t b = Vertex(rectangle.x1, rectangle.y0);
-  const std::uint32_t c = Vertex(rectangle.x1, rectangle.y1);
-  const std::uint32_t d = Vertex(rectangle.x0, rectangle.y1);
-  AddTriangle(a, b, c, TriangleClass::kInterior);
-  AddTriangle(a, c, d, TriangleClass::kInterior);
-}
-
-void MeshBuilder::FillGrid() {
+// Calls visit(CellRectangle) for each rectangle of the fill; `grid` has one for every cell.
+template <typename Visit>
+void MeshBuilder::ForEachRectangle(Visit visit) const {
+  for (const CellRectangle& rectangle : scratch_.rectangles) visit(rectangle);
+  if (input_.parameters.fill != Fill::kGrid) return;
   for (std::uint32_t tile = 0; tile < input_.directory.size(); ++tile) {
-    const TileCoordinate& origin = input_.directory[tile];
     for (int j = 0; j < kTileSize; ++j) {
       for (std::uint32_t row = input_.crossings.tiles[tile].interior[j]; row != 0; row &= row - 1) {
-        const std::int64_t x = (std::int64_t{origin.x} << kTileShift) + std::countr_zero(row);
-        const std::int64_t y = (std::int64_t{origin.y} << kTileShift) + j;
-        AddRectangle({x, y, x + 1, y + 1});
+        visit(CellRectangle{{tile, std::countr_zero(row), j}, 1, 1});
       }
     }
   }
 }
 
-void MeshBuilder::FillGreedy() {
-  for (const CellRectangle& rectangle : scratch_.rectangles) AddRectangle(rectangle);
+// Finds the shapes of the interior.
+void MeshBuilder::FindShapes() {
+  const std::vector<TileBits>& tiles = input_.crossings.tiles;
+  scratch_.rectangles.clear();
+  ParallelInvoke([&] { TraceStaircases(input_.directory, tiles, scratch_.staircases); },
+                 [&] {
+                   if (input_.parameters.fill != Fill::kGreedy) return;
+                   MergeCells(input_.directory, tiles, scratch_.merge, scratch_.rectangles);
+                 });
+}
+
+// Adds the nodes that the triangles will have to the points.
+void MeshBuilder::AddNodes() {
+  NodeVertices& nodes = scratch_.nodes;
+  nodes.Clear(input_.directory.size());
+  for (const TilePlace& corner : scratch_.staircases.corners) nodes.Add(corner);
+  ForEachRectangle([&](const CellRectangle& rectangle) {
+    for (const TilePlace& corner : CornersOf(rectangle)) nodes.Add(corner);
+  });
+  nodes.Number(input_.directory, input_.scale.cell_size, mesh_.points);
+}
+
+// Two triangles for each rectangle.
+void MeshBuilder::FillRectangles() {
+  const std::size_t count =
+      input_.parameters.fill == Fill::kGrid ? CountInteriorCells() : scratch_.rectangles.size();
+  const std::size_t first = mesh_.triangles.size();
+  mesh_.triangles.resize(first + 6 * count);
+  mesh_.classes.resize(mesh_.triangles.size() / 3, TriangleClass::kInterior);
+  std::uint32_t* next = mesh_.triangles.data() + first;
+  ForEachRectangle([&](const CellRectangle& rectangle) {
+    std::array<std::uint32_t, 4> corners;
+    std::ranges::transform(CornersOf(rectangle), corners.begin(),
+                           [this](const TilePlace& node) { return scratch_.nodes.At(node); });
+    for (const int corner : {0, 1, 2, 0, 2, 3}) *next++ = corners[corner];
+  });
 }
 
 absl::Status MeshBuilder::FillInterior() {
-  switch (input_.parameters.fill) {
-    case Fill::kGrid:
-      FillGrid();
-      break;
-    case Fill::kGreedy:
-      FillGreedy();
-      break;
-    case Fill::kConforming:
-      // The corners of the staircases are the only points that the band has there.
-      AddStaircaseLoops(false);
-      return TriangulateLoops(TriangleClass::kInterior);
-    case Fill::kNone:
-    case Fill::kPolygon:
-      break;
+  if (input_.parameters.fill == Fill::kConforming) {
+    // The corners of the staircases are the only points that the band has there.
+    AddStaircaseLoops(false);
+    return TriangulateLoops(TriangleClass::kInterior);
   }
+  FillRectangles();
   return absl::OkStatus();
-}
-
-// Triangulates the loops of the band, and meanwhile finds the rectangles of the interior, which do
-// not depend on it.
-absl::Status MeshBuilder::FillBand() {
-  absl::Status status;
-  ParallelInvoke([&] { status = TriangulateLoops(TriangleClass::kBoundary); },
-                 [&] {
-                   if (input_.parameters.fill != Fill::kGreedy) return;
-                   scratch_.rectangles.clear();
-                   MergeCells(input_.directory, input_.crossings.tiles, scratch_.merge,
-                              scratch_.rectangles);
-                 });
-  return status;
 }
 
 // Replaces the middles of the segments by the vertices of the rings. A triangle of which two
@@ -266,36 +253,33 @@ std::uint64_t MeshBuilder::CountFolded() const {
   return count;
 }
 
-void MeshBuilder::Reset() {
-  mesh_.Clear();
-  scratch_.loops.Clear();
-  for (const std::uint32_t key : scratch_.touched_nodes) scratch_.vertex_of_node[key] = kUnset;
-  scratch_.touched_nodes.clear();
-  const std::size_t nodes = input_.directory.size() * kTileNodes;
-  if (scratch_.vertex_of_node.size() < nodes) scratch_.vertex_of_node.resize(nodes, kUnset);
-}
-
 absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
-  Reset();
+  mesh_.Clear();
   if (input_.parameters.placement == Placement::kVirtualPlane) {
     ExcludeTouchedCells(input_.directory, input_.rings.points, input_.rings.offsets,
                         input_.placed.roots, input_.scale.cell_size, input_.crossings.tiles);
   }
-  TraceStaircases(input_.directory, input_.crossings.tiles, scratch_.staircases);
-  std::uint64_t band_triangles = ExpectedBandTriangles();
+  FindShapes();
   const Fill fill = input_.parameters.fill;
+  const bool has_band = fill != Fill::kNone && fill != Fill::kPolygon;
   if (fill != Fill::kNone) {
+    scratch_.loops.Clear();
     CollectRingPoints();
     AddRingLoops();
-    if (fill != Fill::kPolygon) AddStaircaseLoops(true);
-    if (absl::Status status = FillBand(); !status.ok()) return status;
+    if (has_band) {
+      AddNodes();
+      AddStaircaseLoops(true);
+    }
+    if (absl::Status status = TriangulateLoops(TriangleClass::kBoundary); !status.ok()) {
+      return status;
+    }
     if (absl::Status status = FillInterior(); !status.ok()) return status;
     if (MovesVertices()) MoveVertices();
-    if (fill != Fill::kPolygon) {
-      band_triangles = static_cast<std::uint64_t>(
-          std::count(mesh_.classes.begin(), mesh_.classes.end(), TriangleClass::kBoundary));
-    }
   }
+  const auto band_triangles =
+      has_band ? static_cast<std::uint64_t>(std::count(mesh_.classes.begin(), mesh_.classes.end(),
+                                                       TriangleClass::kBoundary))
+               : ExpectedBandTriangles();
   statistics.triangles = mesh_.TriangleCount();
   statistics.triangles_grid = 2 * CountInteriorCells() + band_triangles;
   statistics.folded_triangles = MovesVertices() ? CountFolded() : 0;

@@ -8,6 +8,7 @@
 #include "crossings.h"
 #include "interior.h"
 #include "loop_groups.h"
+#include "node_vertices.h"
 #include "normals.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
@@ -22,8 +23,7 @@ struct MeshScratch {
   MergeScratch merge;
   std::vector<CellRectangle> rectangles;
   LoopGroups loops;
-  std::vector<std::uint32_t> vertex_of_node;  // By tile * 1024 + node; only touched ones are set.
-  std::vector<std::uint32_t> touched_nodes;
+  NodeVertices nodes;
   std::vector<double> points;  // Of a connectivity that is not yet the mesh's.
 };
 

@@ -184,10 +184,13 @@ TEST_P(GreedyRectangles, AreDisjointAndCoverTheInteriorCellsExactly) {
   MergeCells(directory, tiles, scratch, rectangles);
   std::map<std::pair<std::int64_t, std::int64_t>, int> covered;
   for (const CellRectangle& r : rectangles) {
-    ASSERT_LT(r.x0, r.x1);
-    ASSERT_LT(r.y0, r.y1);
-    for (std::int64_t y = r.y0; y < r.y1; ++y) {
-      for (std::int64_t x = r.x0; x < r.x1; ++x) ++covered[{x, y}];
+    ASSERT_GT(r.width, 0);
+    ASSERT_GT(r.height, 0);
+    const TileCoordinate& tile = directory[r.corner.tile];
+    for (int y = 0; y < r.height; ++y) {
+      for (int x = 0; x < r.width; ++x) {
+        ++covered[{32 * tile.x + r.corner.i + x, 32 * tile.y + r.corner.j + y}];
+      }
     }
   }
   std::size_t interior = 0;
@@ -227,10 +230,11 @@ TEST(Mesh, ARectangleOfCellsIsOneRectangleHoweverTilesCutIt) {
   std::vector<CellRectangle> rectangles;
   MergeCells(directory, tiles, scratch, rectangles);
   ASSERT_EQ(rectangles.size(), 1u);
-  EXPECT_EQ(rectangles[0].x0, 20);
-  EXPECT_EQ(rectangles[0].x1, 70);
-  EXPECT_EQ(rectangles[0].y0, 10);
-  EXPECT_EQ(rectangles[0].y1, 80);
+  EXPECT_EQ(directory[rectangles[0].corner.tile], (TileCoordinate{0, 0}));
+  EXPECT_EQ(rectangles[0].corner.i, 20);
+  EXPECT_EQ(rectangles[0].corner.j, 10);
+  EXPECT_EQ(rectangles[0].width, 50);
+  EXPECT_EQ(rectangles[0].height, 70);
   Staircases staircases;
   TraceStaircases(directory, tiles, staircases);
   EXPECT_EQ(staircases.corners.size(), 4u);
