@@ -44,26 +44,26 @@ void SetNormal(double x, double y, CellPlane& plane) {
   plane.normal_y = y / length;
 }
 
-// The middle of a segment.
-FieldPoint MiddleOf(const TileDirectory& directory, const ActiveCell& cell, CellPlane& plane) {
+// Samples F at the middle of a segment, with `at_entry` at its entry, too.
+void SampleAtMiddle(const TileDirectory& directory, const PointField& field, const ActiveCell& cell,
+                    bool at_entry, CellPlane& plane) {
   plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
   const LatticePoint origin = CellOrigin(directory, cell);
-  return {cell.tile, plane.point.x - origin.x + cell.i, plane.point.y - origin.y + cell.j};
-}
-
-// Samples F at the middle of one segment or of two.
-void SampleAtMiddles(const TileDirectory& directory, const PointField& field,
-                     std::span<const ActiveCell* const> cells, std::span<CellPlane> planes) {
-  std::array<FieldPoint, 2> points;
-  for (std::size_t k = 0; k < planes.size(); ++k) {
-    points[k] = MiddleOf(directory, *cells[k], planes[k]);
-  }
-  const std::array<FieldSample, 2> samples = field.SampleTwo(points[0], points[1]);
-  for (std::size_t k = 0; k < planes.size(); ++k) {
-    planes[k].value = samples[k].value;
-    planes[k].gradient_x = samples[k].gradient_x;
-    planes[k].gradient_y = samples[k].gradient_y;
-  }
+  const auto in_tile = [&](const LatticePoint& point) {
+    return LatticePoint{point.x - origin.x + cell.i, point.y - origin.y + cell.j};
+  };
+  const LatticePoint middle = in_tile(plane.point);
+  const auto set_middle = [&plane](const FieldSample& sample) {
+    plane.value = sample.value;
+    plane.gradient_x = sample.gradient_x;
+    plane.gradient_y = sample.gradient_y;
+  };
+  if (!at_entry) return set_middle(field.Sample(cell.tile, middle.x, middle.y));
+  const auto samples = field.SampleTwo(cell.tile, {middle, in_tile(plane.entry)});
+  set_middle(samples[0]);
+  plane.entry_value = samples[1].value;
+  plane.entry_gradient_x = samples[1].gradient_x;
+  plane.entry_gradient_y = samples[1].gradient_y;
 }
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
@@ -161,26 +161,21 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
     return index == kNone ? nullptr : &previous[index];
   };
   planes.resize(rings.segments.size());
-  const auto cell_of = [&](std::size_t k) {
-    return &crossings.cells[crossings.segments[rings.segments[k]].cell];
-  };
-  // One plane or two, which are successive.
-  const auto estimate = [&](std::size_t first, std::size_t count) {
-    const std::span<CellPlane> some = std::span(planes).subspan(first, count);
-    const std::array<const ActiveCell*, 2> cells{cell_of(first), cell_of(first + count - 1)};
+  const auto estimate = [&](std::size_t k) {
+    CellPlane& plane = planes[k];
+    const std::uint32_t segment = rings.segments[k];
+    const ActiveCell& cell = crossings.cells[crossings.segments[segment].cell];
     if (parameters.placement == Placement::kFarthestParticle) {
-      for (std::size_t k = 0; k < count; ++k) SampleAtMean(bins.tiles, field, *cells[k], some[k]);
+      SampleAtMean(bins.tiles, field, cell, plane);
     } else {
-      SampleAtMiddles(bins.tiles, field, cells, some);
+      const bool at_entry = parameters.placement == Placement::kVirtualPlane;
+      SampleAtMiddle(bins.tiles, field, cell, at_entry, plane);
     }
-    for (std::size_t k = 0; k < count; ++k) {
-      CellPlane& plane = some[k];
-      plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
-                      kWeakGradientSquare;
-      if (plane.is_weak) continue;
-      SetNormal(plane.gradient_x, plane.gradient_y, plane);
-      Orient(previous_of(rings.segments[first + k]), plane);
-    }
+    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
+                    kWeakGradientSquare;
+    if (plane.is_weak) return;
+    SetNormal(plane.gradient_x, plane.gradient_y, plane);
+    Orient(previous_of(segment), plane);
   };
   ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t first, std::size_t last) {
     auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
@@ -188,8 +183,8 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       if (k == *end) ++end;
       planes[k].entry = rings.entries[k];
       planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
+      estimate(k);
     }
-    for (std::size_t k = first; k < last; k += 2) estimate(k, std::min<std::size_t>(2, last - k));
   });
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::size_t first = rings.offsets[ring];

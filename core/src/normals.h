@@ -23,13 +23,16 @@ struct CellPlane {
   double gradient_x = 0, gradient_y = 0;  ///< Of F; of phi for `farthest-particle`.
   double normal_x = 0, normal_y = 0;      ///< Unit, oriented (Eq. 11).
   bool is_weak = false;                   ///< The gradient was too small; the normal is a fallback.
+  /// `virtual-plane` only: F and its gradient at `entry`.
+  double entry_value = 0;
+  double entry_gradient_x = 0, entry_gradient_y = 0;
 
   /// Outward direction of the segment itself, not normalised: the inside lies on its left.
   double OutwardX() const { return exit.y - entry.y; }
   double OutwardY() const { return entry.x - exit.x; }
 };
 
-/// Segments of a task: enough to be sampled by twos.
+/// Segments of a task.
 inline constexpr std::size_t kSegmentsAtOnce = 64;
 
 /// Below this squared length a gradient of F or phi says nothing about direction (METHOD, 14).

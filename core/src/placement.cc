@@ -64,12 +64,11 @@ LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossi
   return {origin.x + u, origin.y + v};
 }
 
-LatticePoint NewtonStep(LatticePoint point, const FieldSample& sample, double max_step) {
-  const double square =
-      sample.gradient_x * sample.gradient_x + sample.gradient_y * sample.gradient_y;
+LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
+  const double square = gradient.x * gradient.x + gradient.y * gradient.y;
   if (square < kWeakGradientSquare) return point;
-  double step_x = -sample.value * sample.gradient_x / square;
-  double step_y = -sample.value * sample.gradient_y / square;
+  double step_x = -value * gradient.x / square;
+  double step_y = -value * gradient.y / square;
   const double length = std::sqrt(step_x * step_x + step_y * step_y);
   if (length > max_step) {
     step_x *= max_step / length;
@@ -80,11 +79,7 @@ LatticePoint NewtonStep(LatticePoint point, const FieldSample& sample, double ma
 
 LatticePoint VirtualPlaneVertex(const CellPlane& plane) {
   if (plane.is_weak) return plane.point;
-  FieldSample sample;
-  sample.value = plane.value;
-  sample.gradient_x = plane.gradient_x;
-  sample.gradient_y = plane.gradient_y;
-  return NewtonStep(plane.point, sample, kMaxNewtonStep);
+  return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, kMaxNewtonStep);
 }
 
 LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane) {

@@ -10,9 +10,9 @@ namespace partiemc {
 LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossings,
                          std::uint32_t segment, LatticePoint point);
 
-/// `point` moved by one Newton step along the gradient of F towards F = 0, of at most `max_step`
-/// cells; `point` itself where the gradient is weak.
-LatticePoint NewtonStep(LatticePoint point, const FieldSample& sample, double max_step);
+/// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
+/// `max_step` cells; `point` itself where the gradient is weak.
+LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step);
 
 /// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
 /// most half a cell; none where the gradient is weak. In lattice coordinates.

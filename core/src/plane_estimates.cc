@@ -1,6 +1,7 @@
 #include "plane_estimates.h"
 
 #include <algorithm>
+#include <array>
 
 namespace partiemc {
 namespace {
@@ -44,11 +45,6 @@ PlaneEstimator::PlaneEstimator(const PointField& field, const Scale& scale)
             .depth = kStripDepth * unit};
 }
 
-SupportQuery PlaneEstimator::QueryAt(std::uint32_t tile, const BentPlane& plane) const {
-  const double radius = std::max(support_.radius, strip_.radius);
-  return {field_.RowsNear(tile, plane.x, plane.y, radius), plane};
-}
-
 PlaneEstimates PlaneEstimator::EstimatesOf(const SupportSums& sums) const {
   const double h = scale_.spacing;
   const auto limited = [h](double shift) {
@@ -63,22 +59,15 @@ PlaneEstimates PlaneEstimator::EstimatesOf(const SupportSums& sums) const {
           .strip = limited(volume / width - kHalfBump * strip_.depth)};
 }
 
-PlaneEstimates PlaneEstimator::Estimate(std::uint32_t tile, const BentPlane& plane) const {
-  return EstimatesOf(SumSupport(QueryAt(tile, plane), support_, strip_));
-}
-
-std::array<PlaneEstimates, 2> PlaneEstimator::EstimateTwo(
-    const std::array<std::uint32_t, 2>& tiles, const std::array<BentPlane, 2>& planes) const {
-  if (tiles[0] != kNoTile && tiles[1] != kNoTile) {
-    const auto sums = SumTwoSupports(QueryAt(tiles[0], planes[0]), QueryAt(tiles[1], planes[1]),
-                                     support_, strip_);
-    return {EstimatesOf(sums[0]), EstimatesOf(sums[1])};
-  }
-  std::array<PlaneEstimates, 2> estimates;
-  for (int k = 0; k < 2; ++k) {
-    if (tiles[k] != kNoTile) estimates[k] = Estimate(tiles[k], planes[k]);
-  }
-  return estimates;
+void PlaneEstimator::Estimate(std::uint32_t tile, std::span<const BentPlane> planes,
+                              std::span<PlaneEstimates> estimates) const {
+  std::array<SupportSums, kPointsAtOnce> sums;
+  std::array<LatticePoint, kPointsAtOnce> points;
+  for (std::size_t k = 0; k < planes.size(); ++k) points[k] = {planes[k].x, planes[k].y};
+  const double radius = std::max(support_.radius, strip_.radius);
+  SumSupports(field_.RowsNear(tile, std::span(points).first(planes.size()), radius), planes,
+              support_, strip_, sums);
+  for (std::size_t k = 0; k < planes.size(); ++k) estimates[k] = EstimatesOf(sums[k]);
 }
 
 }  // namespace partiemc

@@ -2,8 +2,8 @@
 // placement", 3).
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <span>
 
 #include "plane_support.h"
 #include "point_field.h"
@@ -23,17 +23,13 @@ class PlaneEstimator {
  public:
   PlaneEstimator(const PointField& field, const Scale& scale);
 
-  /// `plane` in cells relative to `tile`. Cost: the particles within three spacings.
-  /// Requires: field.Covers(tile, plane.x, plane.y).
-  PlaneEstimates Estimate(std::uint32_t tile, const BentPlane& plane) const;
-
-  /// Two neighbours at once, which costs less than one after the other. Either may be in no tile,
-  /// kNoTile: nothing tells where it belongs.
-  std::array<PlaneEstimates, 2> EstimateTwo(const std::array<std::uint32_t, 2>& tiles,
-                                            const std::array<BentPlane, 2>& planes) const;
+  /// Of planes at points of one tile, in cells relative to it, neighbours at best. Cost: the
+  /// particles within three spacings of any.
+  /// Requires: field.Covers(tile, x, y) of each; planes and estimates are as many.
+  void Estimate(std::uint32_t tile, std::span<const BentPlane> planes,
+                std::span<PlaneEstimates> estimates) const;
 
  private:
-  SupportQuery QueryAt(std::uint32_t tile, const BentPlane& plane) const;
   PlaneEstimates EstimatesOf(const SupportSums& sums) const;
 
   const PointField& field_;

@@ -2,9 +2,9 @@
 // at hand.
 #pragma once
 
-#include <array>
+#include <span>
 
-#include "point_field.h"
+#include "near_rows.h"
 
 namespace partiemc {
 
@@ -36,16 +36,9 @@ struct SupportSums {
   double volume;
 };
 
-/// A plane and the particles around its point: at least those in both discs.
-struct SupportQuery : NearRows {
-  BentPlane plane;
-};
-
-/// Same bits for any processor, as SumAtPoint.
-SupportSums SumSupport(const SupportQuery& query, const SupportShape& support,
-                       const StripShape& strip);
-/// The same of two planes of one field, as SumAtTwoPoints.
-std::array<SupportSums, 2> SumTwoSupports(const SupportQuery& first, const SupportQuery& second,
-                                          const SupportShape& support, const StripShape& strip);
+/// sums[k] are those of planes[k], at most kPointsAtOnce. `near` has at least the particles in both
+/// discs of each plane. In floats, with the same bits for any processor, as SumAtPoints.
+void SumSupports(const NearRows& near, std::span<const BentPlane> planes,
+                 const SupportShape& support, const StripShape& strip, std::span<SupportSums> sums);
 
 }  // namespace partiemc

@@ -60,10 +60,10 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
   for (std::uint32_t tile = 0; tile < tiles; ++tile) {
     if (IsIndexed(tile)) entry_count += std::exchange(first_entry_[tile], entry_count);
   }
-  x_.resize(entry_count + kPointPadding);
-  y_.resize(entry_count + kPointPadding);
+  x_.resize(entry_count + kRowPadding);
+  y_.resize(entry_count + kRowPadding);
   source_.resize(entry_count);
-  weight_.resize(bins.weight.empty() ? 0 : entry_count + kPointPadding);
+  weight_.resize(bins.weight.empty() ? 0 : entry_count + kRowPadding);
   for_each_indexed([&](std::uint32_t tile) { FillEntries(bins, tile); });
 }
 
@@ -120,19 +120,9 @@ void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
   offsets.front() = first_entry_[tile];
 }
 
-PointQuery PointField::QueryAt(std::uint32_t tile, double x, double y) const {
-  const NearRows near = RowsNear(tile, x, y, scale_.kernel_radius);
-  return {.x = x,
-          .y = y,
-          .inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius),
-          .uniform_weight = scale_.uniform_weight,
-          .entry_x = near.x,
-          .entry_y = near.y,
-          .weight = near.weight,
-          .offsets = near.offsets,
-          .rows = near.rows,
-          .columns = near.columns,
-          .row_stride = near.row_stride};
+PointQuery PointField::QueryNear(std::uint32_t tile, std::span<const LatticePoint> points) const {
+  return {RowsNear(tile, points, scale_.kernel_radius),
+          1 / (scale_.kernel_radius * scale_.kernel_radius), scale_.uniform_weight};
 }
 
 namespace {
@@ -175,25 +165,23 @@ class Spread {
 }  // namespace
 
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
-  const PointQuery query = QueryAt(tile, x, y);
-  return SampleOf(query, SumAtPoint(query));
+  const LatticePoint point{x, y};
+  const PointQuery query = QueryNear(tile, {&point, 1});
+  PointSums sums;
+  SumAtPoints(query, {&point, 1}, {&sums, 1});
+  return SampleOf(query, point, sums);
 }
 
-std::array<FieldSample, 2> PointField::SampleTwo(const FieldPoint& first,
-                                                 const FieldPoint& second) const {
-  if (first.tile != kNoTile && second.tile != kNoTile) {
-    const PointQuery queries[2] = {QueryAt(first.tile, first.x, first.y),
-                                   QueryAt(second.tile, second.x, second.y)};
-    const std::array<PointSums, 2> sums = SumAtTwoPoints(queries[0], queries[1]);
-    return {SampleOf(queries[0], sums[0]), SampleOf(queries[1], sums[1])};
-  }
-  const auto sample = [this](const FieldPoint& point) {
-    return point.tile == kNoTile ? FieldSample{} : Sample(point.tile, point.x, point.y);
-  };
-  return {sample(first), sample(second)};
+std::array<FieldSample, 2> PointField::SampleTwo(std::uint32_t tile,
+                                                 const std::array<LatticePoint, 2>& points) const {
+  const PointQuery query = QueryNear(tile, points);
+  std::array<PointSums, 2> sums;
+  SumAtPoints(query, points, sums);
+  return {SampleOf(query, points[0], sums[0]), SampleOf(query, points[1], sums[1])};
 }
 
-FieldSample PointField::SampleOf(const PointQuery& query, const PointSums& sums) const {
+FieldSample PointField::SampleOf(const PointQuery& query, const LatticePoint& point,
+                                 const PointSums& sums) const {
   FieldSample sample;
   if (sums.kernel <= 0) {
     sample.phi = scale_.kernel_radius - scale_.reference_radius;
@@ -202,18 +190,21 @@ FieldSample PointField::SampleOf(const PointQuery& query, const PointSums& sums)
   }
   sample.has_support = true;
   sample.density = sums.density;
-  sample.mean_x = sums.moment_x / sums.kernel;
-  sample.mean_y = sums.moment_y / sums.kernel;
+  const double share = 1 / sums.kernel;
+  sample.mean_x = sums.moment_x * share;
+  sample.mean_y = sums.moment_y * share;
   const double distance = std::sqrt(sample.mean_x * sample.mean_x + sample.mean_y * sample.mean_y);
   sample.phi = distance - scale_.reference_radius;
   if (distance > 0) {
     // grad |v| with v = x - xbar = -mean and d xbar_a / dx_b = (sum k_b (d_a - mean_a)) / sum k.
-    const double jxx = (sums.xx - sample.mean_x * sums.slope_x) / sums.kernel;
-    const double jxy = (sums.xy - sample.mean_x * sums.slope_y) / sums.kernel;
-    const double jyx = (sums.xy - sample.mean_y * sums.slope_x) / sums.kernel;
-    const double jyy = (sums.yy - sample.mean_y * sums.slope_y) / sums.kernel;
-    sample.phi_x = (sample.mean_x * jxx + sample.mean_y * jyx - sample.mean_x) / distance;
-    sample.phi_y = (sample.mean_x * jxy + sample.mean_y * jyy - sample.mean_y) / distance;
+    const double jxx = (sums.xx - sample.mean_x * sums.slope_x) * share;
+    const double jxy = (sums.xy - sample.mean_x * sums.slope_y) * share;
+    const double jyx = (sums.xy - sample.mean_y * sums.slope_x) * share;
+    const double jyy = (sums.yy - sample.mean_y * sums.slope_y) * share;
+    const double unit_x = sample.mean_x / distance;
+    const double unit_y = sample.mean_y / distance;
+    sample.phi_x = unit_x * jxx + unit_y * jyx - unit_x;
+    sample.phi_y = unit_x * jxy + unit_y * jyy - unit_y;
   }
   const LevelSetFormula<double> formula(scale_);
   const Spread spread(sums, query.inverse_square);
@@ -223,7 +214,7 @@ FieldSample PointField::SampleOf(const PointQuery& query, const PointSums& sums)
     sample.gradient_x = sample.phi_x;
     sample.gradient_y = sample.phi_y;
   } else if (sample.value == formula.Gap(sample.spread)) {
-    const LatticePoint gradient = spread.Gradient(ThirdSumsAtPoint(query));
+    const LatticePoint gradient = spread.Gradient(ThirdSumsAtPoint(query, point));
     sample.gradient_x = gradient.x * scale_.gap_slope;
     sample.gradient_y = gradient.y * scale_.gap_slope;
   } else {

@@ -35,16 +35,6 @@ struct FieldPoint {
   double x = 0, y = 0;
 };
 
-/// Entries around a point in memory: row after row of buckets, each a contiguous span. Vectors may
-/// read up to kPointPadding entries past the end of a row.
-struct NearRows {
-  const float *x, *y;            ///< By entry, in cells relative to the tile.
-  const float* weight;           ///< By entry; null where all weigh Scale::uniform_weight.
-  const std::uint32_t* offsets;  ///< First bucket of the first row.
-  int rows, columns;             ///< Buckets to look at.
-  int row_stride;                ///< Buckets from one row to the next.
-};
-
 /// Particles near the isoline, sorted into buckets of about a cell, so that a point
 /// looks at its surroundings instead of its whole tile.
 class PointField {
@@ -56,13 +46,14 @@ class PointField {
 
   /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
   /// Requires: the tile is indexed. Particles miss where Covers is false.
-  /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoint).
+  /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoints).
   /// Cost: the particles within a kernel radius and a bucket.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// The same of two points, neighbours at best, for less than one after the other. Either may be
-  /// in no tile: its sample is empty.
-  std::array<FieldSample, 2> SampleTwo(const FieldPoint& first, const FieldPoint& second) const;
+  /// The same of two points of one tile, neighbours at best, for less than one after the other:
+  /// they look at the same particles.
+  std::array<FieldSample, 2> SampleTwo(std::uint32_t tile,
+                                       const std::array<LatticePoint, 2>& points) const;
 
   /// Whether particles weigh each their own.
   bool HasWeights() const { return !weight_.empty(); }
@@ -72,8 +63,9 @@ class PointField {
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// The same particles for a kernel of vectors.
-  NearRows RowsNear(std::uint32_t tile, double x, double y, double radius) const;
+  /// The particles within `radius` of any of some points, for a kernel of vectors. All of
+  /// `points` in cells relative to the tile.
+  NearRows RowsNear(std::uint32_t tile, std::span<const LatticePoint> points, double radius) const;
 
   /// Index in the frame of the particle of an entry.
   std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
@@ -86,8 +78,9 @@ class PointField {
   }
 
  private:
-  // The buckets of a tile within `radius` of a point, as far as they have entries.
-  BucketBox BucketsNear(std::uint32_t tile, double x, double y, double radius) const;
+  // The buckets of a tile within `radius` of a box, as far as they have entries.
+  BucketBox BucketsNear(std::uint32_t tile, const LatticePoint& low, const LatticePoint& high,
+                        double radius) const;
   // The first bucket of a row of such a box.
   const std::uint32_t* RowOf(std::uint32_t tile, const BucketBox& near, int row) const {
     const BucketBox& box = boxes_[tile];
@@ -95,8 +88,9 @@ class PointField {
            near.column - box.column;
   }
 
-  PointQuery QueryAt(std::uint32_t tile, double x, double y) const;
-  FieldSample SampleOf(const PointQuery& query, const PointSums& sums) const;
+  PointQuery QueryNear(std::uint32_t tile, std::span<const LatticePoint> points) const;
+  FieldSample SampleOf(const PointQuery& query, const LatticePoint& point,
+                       const PointSums& sums) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
   bool HasMasks() const { return Reach() < kMaskMargin; }
@@ -116,35 +110,43 @@ class PointField {
   std::vector<std::uint32_t> source_;
 };
 
-inline BucketBox PointField::BucketsNear(std::uint32_t tile, double x, double y,
-                                         double radius) const {
+inline BucketBox PointField::BucketsNear(std::uint32_t tile, const LatticePoint& low,
+                                         const LatticePoint& high, double radius) const {
   const BucketBox& box = boxes_[tile];
   BucketBox near;
-  const auto clip = [&](double centre, int begin, int count, int& first, int& size) {
-    first = std::max(grid_.Along(centre - radius), begin);
-    size = std::min(grid_.Along(centre + radius), begin + count - 1) - first + 1;
+  const auto clip = [&](double from, double to, int begin, int count, int& first, int& size) {
+    first = std::max(grid_.Along(from - radius), begin);
+    size = std::min(grid_.Along(to + radius), begin + count - 1) - first + 1;
   };
-  clip(x, box.column, box.columns, near.column, near.columns);
-  clip(y, box.row, box.rows, near.row, near.rows);
+  clip(low.x, high.x, box.column, box.columns, near.column, near.columns);
+  clip(low.y, high.y, box.row, box.rows, near.row, near.rows);
   const bool any = near.columns > 0 && near.rows > 0;
   return any ? near : BucketBox{.column = box.column, .row = box.row};
 }
 
-inline NearRows PointField::RowsNear(std::uint32_t tile, double x, double y, double radius) const {
-  const BucketBox near = BucketsNear(tile, x, y, radius);
+inline NearRows PointField::RowsNear(std::uint32_t tile, std::span<const LatticePoint> points,
+                                     double radius) const {
+  LatticePoint low = points.front(), high = points.front();
+  for (const LatticePoint& point : points.subspan(1)) {
+    low = {std::min(low.x, point.x), std::min(low.y, point.y)};
+    high = {std::max(high.x, point.x), std::max(high.y, point.y)};
+  }
+  const BucketBox near = BucketsNear(tile, low, high, radius);
   return {.x = x_.data(),
           .y = y_.data(),
           .weight = weight_.empty() ? nullptr : weight_.data(),
           .offsets = RowOf(tile, near, 0),
           .rows = near.rows,
           .columns = near.columns,
-          .row_stride = boxes_[tile].columns};
+          .row_stride = boxes_[tile].columns,
+          .origin_x = static_cast<float>(static_cast<int>(low.x)),
+          .origin_y = static_cast<float>(static_cast<int>(low.y))};
 }
 
 template <typename Visit>
 void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radius,
                              Visit visit) const {
-  const BucketBox near = BucketsNear(tile, x, y, radius);
+  const BucketBox near = BucketsNear(tile, {x, y}, {x, y}, radius);
   for (int row = 0; row < near.rows; ++row) {
     const std::uint32_t* offsets = RowOf(tile, near, row);
     for (std::uint32_t e = offsets[0]; e < offsets[near.columns]; ++e) {

@@ -1,18 +1,21 @@
 #include "point_kernels.h"
 
+#include <cstddef>
+
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "point_kernels.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "point_lanes-inl.h"
+#include "near_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-// sum w k etc. follow from the others where all weights are the same.
+// With t = 1 - d^2 / R^2: k = t^3 and dk / da = 6 t^2 d_a / R^2, whose factor comes last. Sums over
+// w k etc. follow from the others where all weights are the same.
 enum Channel {
   kKernel,
   kMomentX,
@@ -30,41 +33,45 @@ enum Channel {
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
 enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
 
-// What particles contribute: d, k and dk / da, 0 beyond the row and beyond the kernel.
-template <typename Vector>
+// What particles contribute: d, t and t^2; t is 0 beyond the kernel.
 struct Terms {
-  Vector dx, dy, kernel, slope_x, slope_y;
+  Vector dx, dy, t, t2;
 };
 
-// Each adds to the channels of one partial sum; `Points` is OnePoint or TwoPoints.
+template <int kChannels>
+HWY_INLINE void Add(Vector (&sums)[kChannels], int channel, Vector term) {
+  sums[channel] = hn::Add(sums[channel], term);
+}
+
 template <bool kWeighted>
 struct AddSums {
   static constexpr int kChannels = kWeighted ? int{kWeightedSums} : int{kSums};
 
-  template <typename Points, typename Vector>
-  HWY_INLINE void operator()(const Points& points, const float* weight, const Terms<Vector>& terms,
-                             Vector* sums) const {
-    const auto& [dx, dy, k, kx, ky] = terms;
-    const auto add = [&](int channel, Vector term)
-                         HWY_ATTR { sums[channel] = hn::Add(sums[channel], term); };
-    add(kKernel, k);
-    const Vector moment_x = hn::Mul(k, dx);
-    const Vector moment_y = hn::Mul(k, dy);
-    add(kMomentX, moment_x);
-    add(kMomentY, moment_y);
-    add(kSlopeX, kx);
-    add(kSlopeY, ky);
-    add(kKxx, hn::Mul(moment_x, dx));
-    add(kKxy, hn::Mul(moment_x, dy));
-    add(kKyy, hn::Mul(moment_y, dy));
-    add(kXx, hn::Mul(kx, dx));
-    add(kXy, hn::Mul(kx, dy));
-    add(kYy, hn::Mul(ky, dy));
+  HWY_INLINE void operator()([[maybe_unused]] const float* weight, const Terms& terms,
+                             Vector (&sums)[kChannels]) const {
+    const auto& [dx, dy, t, t2] = terms;
+    const Vector k = hn::Mul(t2, t);
+    Add(sums, kKernel, k);
+    const Vector slope_x = hn::Mul(t2, dx);
+    const Vector slope_y = hn::Mul(t2, dy);
+    Add(sums, kSlopeX, slope_x);
+    Add(sums, kSlopeY, slope_y);
+    Add(sums, kMomentX, hn::Mul(k, dx));
+    Add(sums, kMomentY, hn::Mul(k, dy));
+    const Vector xx = hn::Mul(slope_x, dx);
+    const Vector xy = hn::Mul(slope_x, dy);
+    const Vector yy = hn::Mul(slope_y, dy);
+    Add(sums, kXx, xx);
+    Add(sums, kXy, xy);
+    Add(sums, kYy, yy);
+    Add(sums, kKxx, hn::Mul(t, xx));
+    Add(sums, kKxy, hn::Mul(t, xy));
+    Add(sums, kKyy, hn::Mul(t, yy));
     if constexpr (kWeighted) {
-      const Vector w = points.Load(weight);
-      add(kDensity, hn::Mul(w, k));
-      add(kDensityX, hn::Mul(w, kx));
-      add(kDensityY, hn::Mul(w, ky));
+      const Vector w = hn::LoadU(Lanes(), weight);
+      Add(sums, kDensity, hn::Mul(w, k));
+      Add(sums, kDensityX, hn::Mul(w, slope_x));
+      Add(sums, kDensityY, hn::Mul(w, slope_y));
     }
   }
 };
@@ -72,116 +79,83 @@ struct AddSums {
 struct AddThirdSums {
   static constexpr int kChannels = kThirdSums;
 
-  template <typename Points, typename Vector>
-  HWY_INLINE void operator()(const Points&, const float*, const Terms<Vector>& terms,
-                             Vector* sums) const {
-    const auto& [dx, dy, k, kx, ky] = terms;
-    const auto add = [&](int channel, Vector term)
-                         HWY_ATTR { sums[channel] = hn::Add(sums[channel], term); };
-    const Vector xx = hn::Mul(kx, dx);
-    const Vector yy = hn::Mul(ky, dy);
-    add(kXxx, hn::Mul(xx, dx));
-    add(kXxy, hn::Mul(hn::Mul(kx, dy), dx));
-    add(kXyy, hn::Mul(yy, dx));
-    add(kYyy, hn::Mul(yy, dy));
+  HWY_INLINE void operator()(const float*, const Terms& terms, Vector (&sums)[kChannels]) const {
+    const auto& [dx, dy, t, t2] = terms;
+    const Vector xx = hn::Mul(hn::Mul(t2, dx), dx);
+    const Vector yy = hn::Mul(hn::Mul(t2, dy), dy);
+    Add(sums, kXxx, hn::Mul(xx, dx));
+    Add(sums, kXxy, hn::Mul(xx, dy));
+    Add(sums, kXyy, hn::Mul(yy, dx));
+    Add(sums, kYyy, hn::Mul(yy, dy));
   }
 };
 
-// Sums over the entries of `points`, all in the arrays of `entries`: totals[p] are those of point
-// p.
-template <typename Points, typename Add>
-HWY_INLINE void Sum(const PointQuery& entries, Points points, Add add,
-                    double (&totals)[Points::kPoints][Add::kChannels]) {
-  using D = typename Points::D;
-  using Vector = typename Points::Vector;
-  constexpr int kParts = Points::kParts;
-  const D d;
-  Vector sums[kParts][Add::kChannels];
-  for (auto& part : sums) {
-    for (Vector& sum : part) sum = hn::Zero(d);
-  }
-  const Vector x = points.PerPoint([](const PointQuery& query) { return query.x; });
-  const Vector y = points.PerPoint([](const PointQuery& query) { return query.y; });
-  const Vector inverse_square = hn::Set(d, entries.inverse_square);
-  points.ForEachVector([&](int part) HWY_ATTR {
-    const Vector dx = hn::Sub(points.Load(entries.entry_x), x);
-    const Vector dy = hn::Sub(points.Load(entries.entry_y), y);
-    const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
-    Vector t = hn::Sub(hn::Set(d, 1.0), hn::Mul(square, inverse_square));
-    t = hn::IfThenElseZero(points.IsEntry(), hn::Max(hn::Zero(d), t));
-    const Vector t2 = hn::Mul(t, t);
-    const Vector slope = hn::Mul(hn::Mul(hn::Set(d, 6.0), t2), inverse_square);
-    add(points, entries.weight,
-        Terms<Vector>{dx, dy, hn::Mul(t2, t), hn::Mul(slope, dx), hn::Mul(slope, dy)}, sums[part]);
-  });
-  for (int channel = 0; channel < Add::kChannels; channel += 2) {
-    const bool has_next = channel + 1 < Add::kChannels;
-    Vector first[kParts], second[kParts];
-    for (int part = 0; part < kParts; ++part) {
-      first[part] = sums[part][channel];
-      second[part] = has_next ? sums[part][channel + 1] : hn::Zero(d);
-    }
-    HWY_ALIGN double both[Points::kPoints * kPointPadding];
-    StoreTotals(d, first, second, both);
-    for (int point = 0; point < Points::kPoints; ++point) {
-      totals[point][channel] = both[point * kPointPadding];
-      if (has_next) totals[point][channel + 1] = both[point * kPointPadding + 1];
-    }
-  }
+// Adds a chunk's particles to the sums at a point.
+template <typename AddTerms>
+HWY_INLINE void SumChunk(const PointQuery& query, const NearChunk& chunk, const LatticePoint& point,
+                         double (&totals)[AddTerms::kChannels]) {
+  const Lanes d;
+  const Vector x = hn::Set(d, static_cast<float>(point.x - query.origin_x));
+  const Vector y = hn::Set(d, static_cast<float>(point.y - query.origin_y));
+  const Vector inverse_square = hn::Set(d, static_cast<float>(query.inverse_square));
+  PartialSums<AddTerms::kChannels> sums(
+      chunk, [&](int k, Vector(&channels)[AddTerms::kChannels]) HWY_ATTR {
+        const Vector dx = hn::Sub(hn::Load(d, chunk.x + k), x);
+        const Vector dy = hn::Sub(hn::Load(d, chunk.y + k), y);
+        const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+        const Vector t =
+            hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0f), hn::Mul(square, inverse_square)));
+        AddTerms()(chunk.weight + k, Terms{dx, dy, t, hn::Mul(t, t)}, channels);
+      });
+  sums.AddTo(totals);
 }
 
 template <bool kWeighted>
 PointSums Named(const PointQuery& query, const double* totals) {
-  const auto weighted = [&](WeightedChannel channel, Channel plain) {
-    return kWeighted ? totals[channel] : query.uniform_weight * totals[plain];
-  };
+  const double slope = 6 * query.inverse_square;
+  const double w = query.uniform_weight;
   return {.kernel = totals[kKernel],
           .moment_x = totals[kMomentX],
           .moment_y = totals[kMomentY],
-          .slope_x = totals[kSlopeX],
-          .slope_y = totals[kSlopeY],
+          .slope_x = slope * totals[kSlopeX],
+          .slope_y = slope * totals[kSlopeY],
           .kxx = totals[kKxx],
           .kxy = totals[kKxy],
           .kyy = totals[kKyy],
-          .xx = totals[kXx],
-          .xy = totals[kXy],
-          .yy = totals[kYy],
-          .density = weighted(kDensity, kKernel),
-          .density_x = weighted(kDensityX, kSlopeX),
-          .density_y = weighted(kDensityY, kSlopeY)};
+          .xx = slope * totals[kXx],
+          .xy = slope * totals[kXy],
+          .yy = slope * totals[kYy],
+          .density = kWeighted ? totals[kDensity] : w * totals[kKernel],
+          .density_x = slope * (kWeighted ? totals[kDensityX] : w * totals[kSlopeX]),
+          .density_y = slope * (kWeighted ? totals[kDensityY] : w * totals[kSlopeY])};
 }
 
 template <bool kWeighted>
-PointSums SumOne(const PointQuery& query) {
-  double totals[1][AddSums<kWeighted>::kChannels];
-  Sum(query, OnePoint(query), AddSums<kWeighted>(), totals);
-  return Named<kWeighted>(query, totals[0]);
+HWY_INLINE void Sum(const PointQuery& query, std::span<const LatticePoint> points,
+                    std::span<PointSums> sums) {
+  double totals[kPointsAtOnce][AddSums<kWeighted>::kChannels] = {};
+  ForEachChunk<kWeighted>(query, [&](const NearChunk& chunk) HWY_ATTR {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      SumChunk<AddSums<kWeighted>>(query, chunk, points[k], totals[k]);
+    }
+  });
+  for (std::size_t k = 0; k < points.size(); ++k) sums[k] = Named<kWeighted>(query, totals[k]);
 }
 
-template <bool kWeighted>
-std::array<PointSums, 2> SumTwo(const PointQuery& first, const PointQuery& second) {
-#if PARTIEMC_TWO_POINTS_FIT
-  double totals[2][AddSums<kWeighted>::kChannels];
-  Sum(first, TwoPoints(first, second), AddSums<kWeighted>(), totals);
-  return {Named<kWeighted>(first, totals[0]), Named<kWeighted>(second, totals[1])};
-#else
-  return {SumOne<kWeighted>(first), SumOne<kWeighted>(second)};
-#endif
+void SumAtPoints(const PointQuery& query, std::span<const LatticePoint> points,
+                 std::span<PointSums> sums) {
+  query.weight != nullptr ? Sum<true>(query, points, sums) : Sum<false>(query, points, sums);
 }
 
-PointSums SumAtPoint(const PointQuery& query) {
-  return query.weight != nullptr ? SumOne<true>(query) : SumOne<false>(query);
-}
-
-std::array<PointSums, 2> SumAtTwoPoints(const PointQuery& first, const PointQuery& second) {
-  return first.weight != nullptr ? SumTwo<true>(first, second) : SumTwo<false>(first, second);
-}
-
-PointThirdSums ThirdSumsAtPoint(const PointQuery& query) {
-  double totals[1][kThirdSums];
-  Sum(query, OnePoint(query), AddThirdSums(), totals);
-  const double* const sums = totals[0];
-  return {.xxx = sums[kXxx], .xxy = sums[kXxy], .xyy = sums[kXyy], .yyy = sums[kYyy]};
+PointThirdSums ThirdSumsAtPoint(const PointQuery& query, const LatticePoint& point) {
+  double totals[kThirdSums] = {};
+  ForEachChunk<false>(query, [&](const NearChunk& chunk)
+                                 HWY_ATTR { SumChunk<AddThirdSums>(query, chunk, point, totals); });
+  const double slope = 6 * query.inverse_square;
+  return {.xxx = slope * totals[kXxx],
+          .xxy = slope * totals[kXxy],
+          .xyy = slope * totals[kXyy],
+          .yyy = slope * totals[kYyy]};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -191,18 +165,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(SumAtPoint);
-HWY_EXPORT(SumAtTwoPoints);
+HWY_EXPORT(SumAtPoints);
 HWY_EXPORT(ThirdSumsAtPoint);
 
-PointSums SumAtPoint(const PointQuery& query) { return HWY_DYNAMIC_DISPATCH(SumAtPoint)(query); }
-
-std::array<PointSums, 2> SumAtTwoPoints(const PointQuery& first, const PointQuery& second) {
-  return HWY_DYNAMIC_DISPATCH(SumAtTwoPoints)(first, second);
+void SumAtPoints(const PointQuery& query, std::span<const LatticePoint> points,
+                 std::span<PointSums> sums) {
+  HWY_DYNAMIC_DISPATCH(SumAtPoints)(query, points, sums);
 }
 
-PointThirdSums ThirdSumsAtPoint(const PointQuery& query) {
-  return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(query);
+PointThirdSums ThirdSumsAtPoint(const PointQuery& query, const LatticePoint& point) {
+  return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(query, point);
 }
 
 }  // namespace partiemc

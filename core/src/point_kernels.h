@@ -1,22 +1,17 @@
 // The sums over particles behind PointField::Sample, in the vectors of the processor at hand.
 #pragma once
 
-#include <array>
-#include <cstdint>
+#include <span>
+
+#include "crossings.h"
+#include "near_rows.h"
 
 namespace partiemc {
 
-/// Entries in memory that one query looks at: row after row of buckets, each a contiguous span.
-struct PointQuery {
-  double x, y;            ///< The point.
+/// The particles around a few points, at least those within R of each.
+struct PointQuery : NearRows {
   double inverse_square;  ///< 1 / R^2
   double uniform_weight;  ///< w, where `weight` is null.
-  const float* entry_x;
-  const float* entry_y;
-  const float* weight;
-  const std::uint32_t* offsets;  ///< First bucket of the first row.
-  int rows, columns;             ///< Buckets to look at.
-  int row_stride;                ///< Buckets from one row to the next.
 };
 
 /// Sums over the particles within R of a point; d = x_i - x, a and b stand for x and y.
@@ -35,15 +30,12 @@ struct PointThirdSums {
   double xxx, xxy, xyy, yyy;
 };
 
-/// Entries are dealt to four partial sums by their place in their row, whatever the width of the
-/// processor's vectors, and the four are added in one order: the bits are the same everywhere.
-/// Reads up to kPointPadding entries past the end of a row.
-inline constexpr int kPointPadding = 4;
-PointSums SumAtPoint(const PointQuery& query);
-/// The same of two points that look at the same entries in memory, at once where vectors are wide
-/// enough: what their rows have in common in length costs once. Best for points that are
-/// neighbours.
-std::array<PointSums, 2> SumAtTwoPoints(const PointQuery& first, const PointQuery& second);
-PointThirdSums ThirdSumsAtPoint(const PointQuery& query);
+/// sums[k] are those at points[k], in cells relative to the tile; at most kPointsAtOnce. Terms are
+/// floats, and so are their sums over up to 256 particles: off by a few 1e-7 of the sum of their
+/// magnitudes. Same bits for any processor: particles are dealt to sixteen partial sums by their
+/// place among those of the query, and the sixteen are added up in one order (near_lanes-inl.h).
+void SumAtPoints(const PointQuery& query, std::span<const LatticePoint> points,
+                 std::span<PointSums> sums);
+PointThirdSums ThirdSumsAtPoint(const PointQuery& query, const LatticePoint& point);
 
 }  // namespace partiemc

@@ -17,6 +17,10 @@ namespace {
 // vertices of the cells beside it.
 constexpr double kMaxEdgeStep = 0.3;
 
+// Newton steps longer than this may cross from one branch of F to another, in cells: at corners and
+// where bodies are near each other. The gradient is asked for again at their ends.
+constexpr double kLongStep = 0.07;
+
 // Shorter rings stay at their roots: the windows below would meet their own ends.
 // Where drops form and vanish, refining short ones costs more calm than it gains shape.
 constexpr double kMinRefinedLength = 24;  // Spacings.
@@ -81,39 +85,32 @@ FieldPoint Locate(const VertexInput& input, std::size_t segment, const LatticePo
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
-// Step 1 of one segment: both vertices on the level set, by one Newton step each. `at_entry` is the
-// field at its entry.
-void FindRoots(const VertexInput& input, std::size_t segment, const FieldSample& at_entry,
-               RingVertices& v) {
+// Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
+// that of a distance stays the same: unless a step is long, normals are those of the points that it
+// begins at.
+void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   const CellPlane& plane = input.planes[segment];
   const std::size_t edge = 2 * segment;
   const std::size_t inner = edge + 1;
   v.root[edge] = plane.entry;
-  v.point[edge] = NewtonStep(plane.entry, at_entry, kMaxEdgeStep);
+  v.point[edge] = NewtonStep(plane.entry, plane.entry_value,
+                             {plane.entry_gradient_x, plane.entry_gradient_y}, kMaxEdgeStep);
   v.root[inner] = v.point[inner] =
       ClampToCell(input.bins.tiles, input.crossings, input.topology.segments[segment],
                   VirtualPlaneVertex(plane));
   const LatticePoint outward = UnitOr({plane.OutwardX(), plane.OutwardY()}, {1, 0});
-  const std::array<FieldSample, 2> samples = input.field.SampleTwo(
-      Locate(input, segment, v.point[edge]), Locate(input, segment, v.point[inner]));
-  for (const std::size_t i : {edge, inner}) {
-    const LatticePoint gradient{samples[i - edge].gradient_x, samples[i - edge].gradient_y};
+  const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
+    if (Distance(from, v.point[i]) > kLongStep) {
+      const FieldPoint at = Locate(input, segment, v.point[i]);
+      const FieldSample sample =
+          at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
+      gradient = {sample.gradient_x, sample.gradient_y};
+    }
     v.normal[i] =
         Dot(gradient, gradient) >= kWeakGradientSquare ? UnitOr(gradient, outward) : outward;
-  }
-}
-
-// Step 1 of a stretch of segments, by two of them where there are two.
-void FindRoots(const VertexInput& input, std::size_t first, std::size_t last, RingVertices& v) {
-  const auto entry = [&](std::size_t segment) {
-    if (segment >= last) return FieldPoint{};
-    return Locate(input, segment, input.planes[segment].entry);
   };
-  for (std::size_t segment = first; segment < last; segment += 2) {
-    const auto at_entries = input.field.SampleTwo(entry(segment), entry(segment + 1));
-    FindRoots(input, segment, at_entries[0], v);
-    if (segment + 1 < last) FindRoots(input, segment + 1, at_entries[1], v);
-  }
+  set_normal(edge, plane.entry, {plane.entry_gradient_x, plane.entry_gradient_y});
+  set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
 }
 
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
@@ -244,7 +241,15 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
         ring.shift[k + i] = strips[k + i] = 0;
       }
       if (!steps.support) continue;
-      const auto estimates = estimator.EstimateTwo(tiles, planes);
+      std::array<PlaneEstimates, 2> estimates;
+      if (tiles[0] == tiles[1] && tiles[0] != kNoTile) {
+        estimator.Estimate(tiles[0], planes, estimates);
+      } else {
+        for (int i = 0; i < 2; ++i) {
+          if (tiles[i] == kNoTile) continue;
+          estimator.Estimate(tiles[i], {&planes[i], 1}, {&estimates[i], 1});
+        }
+      }
       for (int i = 0; i < 2; ++i) {
         ring.shift[k + i] = kSupportTrust * (estimates[i].support - ring.base[k + i]);
         strips[k + i] = kStripTrust * (estimates[i].strip - ring.base[k + i]);
@@ -303,9 +308,10 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size());
-  ParallelForRanges(
-      topology.segments.size(), kSegmentsAtOnce,
-      [&](std::size_t first, std::size_t last) { FindRoots(input, first, last, vertices); });
+  ParallelForRanges(topology.segments.size(), kSegmentsAtOnce,
+                    [&](std::size_t first, std::size_t last) {
+                      for (std::size_t k = first; k < last; ++k) FindRoots(input, k, vertices);
+                    });
   UnrolledRings& unrolled = vertices.unrolled;
   unrolled.sizes().resize(topology.RingCount());
   ParallelFor(topology.RingCount(),

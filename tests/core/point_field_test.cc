@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "support/instruction_sets.h"
 #include "support/oracle.h"
@@ -165,39 +167,70 @@ void ExpectSameBits(const FieldSample& a, const FieldSample& b) {
   EXPECT_EQ(a.has_support, b.has_support);
 }
 
-TEST(PointField, TwoPointsAtOnceHaveTheBitsOfEachAloneOnEveryInstructionSet) {
+// A blob, in which one place has more particles than are summed at once.
+void RunCrowdedBlob(bool weighted, Stages& stages) {
+  support::Random random(8);
+  support::Particles particles = support::Blob(random, 20);
+  for (int k = 0; k < 600; ++k) particles.Add(random.Uniform(18, 20), random.Uniform(-1, 1));
+  for (std::size_t k = 0; weighted && k < particles.size(); ++k) {
+    particles.volumes.push_back(static_cast<float>(random.Uniform(0.5, 1.5)));
+  }
+  stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0});
+}
+
+struct TwoPoints {
+  std::uint32_t tile;
+  std::array<LatticePoint, 2> points;
+};
+
+std::vector<TwoPoints> NeighboursIn(const Stages& stages) {
+  support::Random random(9);
+  std::vector<TwoPoints> all;
+  while (all.size() < 300) {
+    const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
+    const LatticePoint first{random.Uniform(0, 32), random.Uniform(0, 32)};
+    const LatticePoint second{first.x + random.Uniform(-1, 1), first.y + random.Uniform(-1, 1)};
+    if (std::min(second.x, second.y) < 0 || std::max(second.x, second.y) >= 32) continue;
+    if (!stages.field.Covers(tile, first.x, first.y)) continue;
+    if (stages.field.Covers(tile, second.x, second.y)) all.push_back({tile, {first, second}});
+  }
+  return all;
+}
+
+TEST(PointField, SamplesHaveTheSameBitsOnEveryInstructionSet) {
   for (const bool weighted : {false, true}) {
-    support::Random random(8);
-    support::Particles particles = support::Blob(random, 20);
-    for (std::size_t k = 0; weighted && k < particles.size(); ++k) {
-      particles.volumes.push_back(static_cast<float>(random.Uniform(0.5, 1.5)));
-    }
     Stages stages;
-    stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0});
-    std::vector<FieldPoint> points;
-    while (points.size() < 300) {
-      const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
-      const FieldPoint point{tile, random.Uniform(0, 32), random.Uniform(0, 32)};
-      if (stages.field.Covers(tile, point.x, point.y)) points.push_back(point);
-      if (random.Chance(0.02)) points.push_back({});  // In no tile.
-    }
+    RunCrowdedBlob(weighted, stages);
+    const std::vector<TwoPoints> neighbours = NeighboursIn(stages);
     std::vector<FieldSample> first;
     support::ForEachInstructionSet([&] {
       std::vector<FieldSample> samples;
-      for (std::size_t k = 0; k + 1 < points.size(); ++k) {
-        const auto both = stages.field.SampleTwo(points[k], points[k + 1]);
-        for (std::size_t i = 0; i < 2; ++i) {
-          const FieldPoint& point = points[k + i];
-          const FieldSample alone = point.tile == kNoTile
-                                        ? FieldSample{}
-                                        : stages.field.Sample(point.tile, point.x, point.y);
-          ExpectSameBits(both[i], alone);
-        }
-        samples.push_back(both[0]);
+      for (const auto& [tile, points] : neighbours) {
+        const auto both = stages.field.SampleTwo(tile, points);
+        samples.insert(samples.end(), both.begin(), both.end());
+        samples.push_back(stages.field.Sample(tile, points[0].x, points[0].y));
       }
       if (first.empty()) first = samples;
       for (std::size_t k = 0; k < samples.size(); ++k) ExpectSameBits(samples[k], first[k]);
     });
+  }
+}
+
+TEST(PointField, TwoPointsAtOnceAgreeWithEachAlone) {
+  for (const bool weighted : {false, true}) {
+    Stages stages;
+    RunCrowdedBlob(weighted, stages);
+    for (const auto& [tile, points] : NeighboursIn(stages)) {
+      const auto both = stages.field.SampleTwo(tile, points);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const FieldSample alone = stages.field.Sample(tile, points[k].x, points[k].y);
+        // They sum the same particles in another order.
+        EXPECT_NEAR(both[k].density, alone.density, 1e-6 * std::max(1.0, alone.density));
+        EXPECT_NEAR(both[k].mean_x, alone.mean_x, 1e-5);
+        EXPECT_NEAR(both[k].mean_y, alone.mean_y, 1e-5);
+        EXPECT_EQ(both[k].has_support, alone.has_support);
+      }
+    }
   }
 }
 

@@ -1,0 +1,173 @@
+// Sums over the particles near a point, in vectors of floats. Particles are copied together first,
+// so that the sums of all points of a cell run over one short array. Entry k of that array goes to
+// partial sum k modulo sixteen, and the sixteen are added up in one tree, however wide the vectors
+// of the processor are: the bits are the same everywhere. Compiled once for each target, hence the
+// guard that each of them turns.
+#if defined(PARTIEMC_NEAR_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef PARTIEMC_NEAR_LANES_INL_H
+#undef PARTIEMC_NEAR_LANES_INL_H
+#else
+#define PARTIEMC_NEAR_LANES_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "near_rows.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kPartialSums = kRowPadding;
+
+using Lanes = hn::CappedTag<float, kPartialSums>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+constexpr int kParts = kPartialSums / kLanes;
+
+// Particles beside each other, in coordinates relative to NearRows' origin, then at least
+// kPartialSums that are far from everything.
+struct NearChunk {
+  static constexpr int kCapacity = 256;
+  static constexpr float kFar = 1e6f;
+  static constexpr int kRoom = kCapacity + kPartialSums;
+
+  HWY_ALIGN float x[kRoom];
+  HWY_ALIGN float y[kRoom];
+  HWY_ALIGN float weight[kRoom];
+  int count = 0;
+};
+
+// Appends entries [first, first + count), for which there is room. A vector's worth is always
+// copied: rows are short, and nobody could guess which are empty.
+template <bool kWeighted>
+HWY_INLINE void Append(const NearRows& near, std::uint32_t first, int count, NearChunk& chunk) {
+  const Lanes d;
+  const auto origin_x = hn::Set(d, near.origin_x);
+  const auto origin_y = hn::Set(d, near.origin_y);
+  int k = 0;
+  do {
+    for (int part = 0; part < kParts; ++part, k += kLanes) {
+      const int to = chunk.count + k;
+      hn::StoreU(hn::Sub(hn::LoadU(d, near.x + first + k), origin_x), d, chunk.x + to);
+      hn::StoreU(hn::Sub(hn::LoadU(d, near.y + first + k), origin_y), d, chunk.y + to);
+      if constexpr (kWeighted) {
+        hn::StoreU(hn::LoadU(d, near.weight + first + k), d, chunk.weight + to);
+      }
+    }
+  } while (k < count);
+  chunk.count += count;
+}
+
+// Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
+template <bool kWeighted, typename Visit>
+HWY_INLINE void ForEachChunk(const NearRows& near, Visit visit) {
+  const Lanes d;
+  NearChunk chunk;
+  const auto close = [&]() HWY_ATTR {
+    for (int part = 0; part < kParts; ++part) {
+      const int to = chunk.count + part * kLanes;
+      hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.x + to);
+      hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.y + to);
+      if constexpr (kWeighted) hn::StoreU(hn::Zero(d), d, chunk.weight + to);
+    }
+    visit(std::as_const(chunk));
+  };
+  for (int row = 0; row < near.rows; ++row) {
+    const std::uint32_t* const offsets = near.offsets + row * near.row_stride;
+    std::uint32_t first = offsets[0];
+    const std::uint32_t last = offsets[near.columns];
+    while (HWY_UNLIKELY(chunk.count + (last - first) > NearChunk::kCapacity)) {
+      const int room = NearChunk::kCapacity - chunk.count;
+      Append<kWeighted>(near, first, room, chunk);
+      first += room;
+      close();
+      chunk.count = 0;
+    }
+    Append<kWeighted>(near, first, static_cast<int>(last - first), chunk);
+  }
+  if (chunk.count > 0) close();
+}
+
+// Sixteen partial sums of each of several channels.
+template <int kChannels>
+class PartialSums {
+ public:
+  // Calls add(k, sums) for each vector of a chunk, k its first entry and sums its channels.
+  template <typename Add>
+  HWY_INLINE PartialSums(const NearChunk& chunk, Add add) {
+    for (int part = 0; part < kParts; ++part) {
+      Vector sums[kChannels];
+      for (Vector& sum : sums) sum = hn::Zero(Lanes());
+      for (int k = part * kLanes; k < chunk.count; k += kPartialSums) add(k, sums);
+      for (int channel = 0; channel < kChannels; ++channel) parts_[channel][part] = sums[channel];
+    }
+  }
+
+  // Adds the channels' totals to `totals`.
+  HWY_INLINE void AddTo(double (&totals)[kChannels]) {
+    HWY_ALIGN float sums[kGroups * kGroup];
+    for (int group = 0; group < kGroups; ++group) Total(group * kGroup, sums + group * kGroup);
+    for (int channel = 0; channel < kChannels; ++channel) totals[channel] += sums[channel];
+  }
+
+ private:
+  static constexpr int kGroup = 4;  // Channels that are added up at once.
+  static constexpr int kGroups = (kChannels + kGroup - 1) / kGroup;
+  using Group = hn::CappedTag<float, kGroup>;
+
+  // Partial sums i and i + 8, then i and i + 4.
+  HWY_INLINE hn::Vec<Group> Fold(int channel) {
+    if (channel >= kChannels) return hn::Zero(Group());
+    for (int count = kParts / 2; count > 0; count /= 2) {
+      for (int part = 0; part < count; ++part) {
+        parts_[channel][part] = hn::Add(parts_[channel][part], parts_[channel][part + count]);
+      }
+    }
+    return FoldLanes(Lanes(), parts_[channel][0]);
+  }
+  template <class D>
+  static HWY_INLINE hn::Vec<Group> FoldLanes([[maybe_unused]] D d, hn::Vec<D> sums) {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (hn::MaxLanes(D()) > kGroup) {
+      const hn::Half<D> half;
+      return FoldLanes(half, hn::Add(hn::LowerHalf(half, sums), hn::UpperHalf(half, sums)));
+    } else
+#endif
+      return sums;
+  }
+
+  // The totals of four channels: partial sums i and i + 2, then both of them.
+  HWY_INLINE void Total(int channel, float* totals) {
+    const Group d;
+    hn::Vec<Group> sums[kGroup];
+    for (int k = 0; k < kGroup; ++k) sums[k] = Fold(channel + k);
+#if HWY_TARGET == HWY_SCALAR
+    for (int k = 0; k < kGroup; ++k) hn::Store(sums[k], d, totals + k);
+#else
+    const auto pair = [&](int k) HWY_ATTR {
+      return hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
+                     hn::InterleaveUpper(d, sums[k], sums[k + 1]));
+    };
+    const auto first = pair(0);
+    const auto second = pair(2);
+    hn::Store(
+        hn::Add(hn::ConcatLowerLower(d, second, first), hn::ConcatUpperUpper(d, second, first)), d,
+        totals);
+#endif
+  }
+
+  Vector parts_[kChannels][kParts];
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#endif  // the guard

@@ -1,0 +1,26 @@
+// The particles around a few points, as they lie in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace partiemc {
+
+/// Vectors may read so many entries past the end of a row.
+inline constexpr int kRowPadding = 16;
+
+/// Sums run at up to so many points at once, which costs less than one after the other.
+inline constexpr std::size_t kPointsAtOnce = 2;
+
+/// Entries around points of a tile: row after row of buckets, each row a contiguous span.
+struct NearRows {
+  const float *x, *y;            ///< By entry, in cells relative to the tile.
+  const float* weight;           ///< By entry; null where all weigh Scale::uniform_weight.
+  const std::uint32_t* offsets;  ///< First bucket of the first row.
+  int rows, columns;             ///< Buckets to look at.
+  int row_stride;                ///< Buckets from one row to the next.
+  /// The corner of a cell near the points: sums run in floats, in coordinates relative to it.
+  float origin_x, origin_y;
+};
+
+}  // namespace partiemc
