@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <span>
 #include <string>
@@ -12,6 +11,7 @@
 #include "coordinate_block.h"
 #include "parallel.h"
 #include "partiemc/status.h"
+#include "reached_tiles.h"
 
 namespace partiemc {
 namespace {
@@ -77,25 +77,35 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
   return true;
 }
 
-// Joins the homes of all stretches in `tiles`, sorted. Returns false if they are more than
-// `max_tiles`.
-bool JoinHomes(const BinScratch& scratch, std::size_t max_tiles, TileDirectory& tiles) {
-  for (const BinStretch& stretch : scratch.stretches) {
-    for (const TileCoordinate& home : stretch.homes.tiles()) tiles.Insert(home);
+// Joins the homes of all stretches in `tiles`, sorted, and tells the stretches where theirs are.
+// Returns false if they are more than `max_tiles`.
+bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles) {
+  for (BinStretch& stretch : scratch.stretches) {
+    stretch.joined.clear();
+    for (const TileCoordinate& home : stretch.homes.tiles()) {
+      stretch.joined.push_back(tiles.Insert(home));
+    }
     if (tiles.size() > max_tiles) return false;
   }
+  scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
   tiles.Sort();
+  // One look-up for each home, not for each of each stretch.
+  scratch.next.clear();
+  for (const TileCoordinate& home : scratch.homes) scratch.next.push_back(tiles.Find(home));
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::uint32_t& joined : stretch.joined) joined = scratch.next[joined];
+  }
+  scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
   return true;
 }
 
 // Turns the counts of all stretches into the places of their first entries: a tile's list has the
 // entries of the first stretch, then those of the second. Returns how many entries there are.
-std::uint32_t PlaceEntries(const TileDirectory& homes, BinScratch& scratch) {
-  scratch.homes.assign(homes.tiles().begin(), homes.tiles().end());
-  scratch.next.assign(homes.size(), 0);
-  for (BinStretch& stretch : scratch.stretches) {
+std::uint32_t PlaceEntries(BinScratch& scratch) {
+  scratch.next.assign(scratch.homes.size(), 0);
+  for (const BinStretch& stretch : scratch.stretches) {
     for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
-      scratch.next[homes.Find(stretch.homes[k])] += stretch.entries[k];
+      scratch.next[stretch.joined[k]] += stretch.entries[k];
     }
   }
   std::uint32_t total = 0;
@@ -107,7 +117,7 @@ std::uint32_t PlaceEntries(const TileDirectory& homes, BinScratch& scratch) {
   scratch.offsets = scratch.next;
   for (BinStretch& stretch : scratch.stretches) {
     for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
-      std::uint32_t& next = scratch.next[homes.Find(stretch.homes[k])];
+      std::uint32_t& next = scratch.next[stretch.joined[k]];
       const std::uint32_t count = stretch.entries[k];
       stretch.entries[k] = next;
       next += count;
@@ -136,67 +146,6 @@ void FillEntries(std::size_t first, std::size_t last, std::span<const float> vol
     bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
   }
 }
-
-// Which tiles must exist because of particles in one tile: bit 5 (dy + 2) + dx + 2 stands for the
-// one at (dx, dy) from it.
-class ReachedTiles {
- public:
-  // `reach`: how far from a particle tiles exist, in cells, less than two tiles.
-  explicit ReachedTiles(float reach)
-      : reach_(reach),
-        near_(reach <= kSize),
-        all_(Box(near_ ? 0b01110 : 0b11111, near_ ? 0b01110 : 0b11111)) {}
-
-  std::uint32_t Of(std::span<const BinEntry> entries) const {
-    std::uint32_t reached = 0;
-    for (const BinEntry& entry : entries) {
-      reached |= Box(Along(entry.x), Along(entry.y));
-      if (reached == all_) break;
-    }
-    return reached;
-  }
-
-  // Whether they are the eight neighbours at most.
-  bool AreNeighbours() const { return near_; }
-
-  // Calls visit(tile) for each.
-  template <typename Visit>
-  static void ForEach(TileCoordinate home, std::uint32_t reached, Visit visit) {
-    for (; reached != 0; reached &= reached - 1) {
-      const int place = std::countr_zero(reached);
-      visit(TileCoordinate{home.y + place / 5 - 2, home.x + place % 5 - 2});
-    }
-  }
-
- private:
-  static constexpr auto kSize = static_cast<float>(kTileSize);
-
-  // Five bits, moved five places apart: times the bits of a row, the bits of a box.
-  static constexpr std::array<std::uint32_t, 32> SpreadBits() {
-    std::array<std::uint32_t, 32> spread{};
-    for (unsigned bits = 0; bits < 32; ++bits) {
-      for (int k = 0; k < 5; ++k) spread[bits] |= (bits >> k & 1) << 5 * k;
-    }
-    return spread;
-  }
-
-  static std::uint32_t Box(std::uint32_t columns, std::uint32_t rows) {
-    static constexpr std::array<std::uint32_t, 32> kSpreadBits = SpreadBits();
-    return columns * kSpreadBits[rows];
-  }
-
-  // Bit d + 2: the tile d from this one along an axis.
-  std::uint32_t Along(float at) const {
-    return static_cast<std::uint32_t>(at < reach_ - kSize) |
-           static_cast<std::uint32_t>(at < reach_) << 1 | 1u << 2 |
-           static_cast<std::uint32_t>(at >= kSize - reach_) << 3 |
-           static_cast<std::uint32_t>(at >= 2 * kSize - reach_) << 4;
-  }
-
-  float reach_;
-  bool near_;
-  std::uint32_t all_;
-};
 
 // Whether the eight neighbours of a tile are in the directory.
 bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
@@ -307,10 +256,10 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
       }
     });
   });
-  if (!found || !JoinHomes(scratch, limits.max_tiles, bins.tiles)) {
+  if (!found || !JoinHomes(limits.max_tiles, scratch, bins.tiles)) {
     return Refusal(frame, plane, scale, limits.max_tiles);
   }
-  const std::uint32_t entries = PlaceEntries(bins.tiles, scratch);
+  const std::uint32_t entries = PlaceEntries(scratch);
   bins.entries.resize(entries);
   bins.weight.resize(frame.volumes.empty() ? 0 : entries);
   const double weight_per_world_volume =
