@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <utility>
 
 #include "lattice.h"
 
@@ -35,6 +36,24 @@ inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
                                                    : bits >> kMaskMargin);
   }
   return cells;
+}
+
+/// In which of a tile's neighbours a mask has cells: bit `place` (Neighbourhood).
+inline unsigned NeighboursWithCells(const CellMask& mask) {
+  constexpr std::uint64_t kSide = (std::uint64_t{1} << kMaskMargin) - 1;
+  constexpr std::uint64_t kLeft = kSide, kRight = kSide << (kTileSize + kMaskMargin);
+  unsigned places = 0;
+  int row = 0;
+  for (const auto& [end, first_place] :
+       {std::pair(kMaskMargin, 0), std::pair(kMaskMargin + kTileSize, 3),
+        std::pair(kTileSize + 2 * kMaskMargin, 6)}) {
+    std::uint64_t any = 0;
+    for (; row < end; ++row) any |= mask[row];
+    const unsigned left = (any & kLeft) != 0, right = (any & kRight) != 0;
+    const unsigned middle = (any & ~(kLeft | kRight)) != 0;
+    places |= (left | middle << 1 | right << 2) << first_place;
+  }
+  return places;
 }
 
 /// The cells (i + di, j + dj), -before <= di, dj <= after, of every bit (i, j) of `rows`.

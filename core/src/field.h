@@ -15,15 +15,14 @@ namespace partiemc {
 /// j * 32 + i.
 ///
 /// Values are exact at both ends of every lattice edge that the isoline crosses. Anywhere else only
-/// the sign is F's: where the density alone decides the side, of a node and of its four neighbours,
-/// the value is the branch that does.
+/// the sign is F's: where the density alone decides the side, the value is the branch that does.
 struct LevelSet {
   std::vector<std::array<float, kTileNodes>> tiles;
   std::vector<BitRows> inside;  ///< By tile: the nodes at which F < 0.
   float void_value = 0;         ///< F where no particle reaches, hence in tiles that do not exist.
 
   // Scratch.
-  std::vector<BitRows> sure_inside, sure_outside;  ///< By tile: the density decides.
+  std::vector<BitRows> open;  ///< By tile: the nodes that the density does not decide.
   SumRims rims;
 
   /// F at the node (i, j) of `tile`, 0 <= i, j <= 32: the last row and column are the neighbours'.
@@ -34,12 +33,12 @@ struct LevelSet {
   }
 };
 
-/// Samples F at the nodes of every tile of `bins`: the density everywhere, the weighted mean only
-/// where the density leaves the side of a node or of one of its neighbours open.
+/// Samples F at the nodes of every tile of `bins`: the density everywhere, the moments only where
+/// the density leaves the side of a node open, and at the other end of an edge that is crossed.
 /// Accuracy: 1e-5 relative to f = 1 for f, for nodes and particles as rounded by the bins.
-/// Deterministic: sums run in the order of the frame where values count, whatever the tiles, the
-/// threads and the instruction set; elsewhere over the lists of a node's tile and its neighbours in
-/// one order. Parallel over tiles.
+/// Deterministic: sums run over the lists of a node's tile and of its neighbours in one order,
+/// whatever the threads and the instruction set; each list is in the order of the frame. Parallel
+/// over tiles.
 /// Cost: linear in the particles, times the square of the kernel radius in cells.
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 

@@ -159,18 +159,20 @@ HWY_EXPORT(ChooseEntries);
 NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask)
     : entries_(bins.entries) {
   const Neighbourhood& neighbours = bins.tiles.neighbours(tile);
+  const unsigned places = mask != nullptr ? NeighboursWithCells(*mask) : ~0u;
   for (int place = 0; place < kMaxLists; ++place) {
     const std::uint32_t from = neighbours[place];
-    if (from == kNoTile || bins.CountOf(from) == 0) continue;
-    List& list = lists_[list_count_];
-    list.cells.fill(~std::uint32_t{0});
-    if (mask != nullptr) list.cells = CellsOfNeighbour(*mask, place);
-    if (IsEmpty(list.cells)) continue;
+    if ((places >> place & 1) == 0 || from == kNoTile || bins.CountOf(from) == 0) continue;
+    List& list = lists_[list_count_++];
+    if (mask != nullptr) {
+      list.cells = CellsOfNeighbour(*mask, place);
+    } else {
+      list.cells.fill(~std::uint32_t{0});
+    }
     list.next = bins.offsets[from];
     list.end = bins.offsets[from + 1];
     list.shift_x = static_cast<float>((place % 3 - 1) * kTileSize);
     list.shift_y = static_cast<float>((place / 3 - 1) * kTileSize);
-    ++list_count_;
   }
 }
 

@@ -1,6 +1,7 @@
 #include "sum_rims.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 
@@ -14,6 +15,23 @@ void AddRows(const float* from, int stride, int rows, float* to) {
   }
 }
 
+// Copies `count` rows of kColumns values each. Returns whether any is not 0.
+template <int kColumns>
+bool CopyRows(const float* from, int stride, int rows, float* to) {
+  std::uint32_t any = 0;
+  for (int row = 0; row < rows; ++row, from += stride) {
+    for (int column = 0; column < kColumns; ++column) {
+      any |= std::bit_cast<std::uint32_t>(from[column]);
+    }
+  }
+  if (any == 0) return false;
+  from -= rows * stride;
+  for (int row = 0; row < rows; ++row, from += stride, to += kColumns) {
+    std::copy_n(from, kColumns, to);
+  }
+  return true;
+}
+
 }  // namespace
 
 void SumRims::Prepare(const ParticleBins& bins, float radius) {
@@ -23,20 +41,24 @@ void SumRims::Prepare(const ParticleBins& bins, float radius) {
   for (std::size_t tile = 0; tile < rim_.size(); ++tile) {
     rim_[tile] = bins.CountOf(tile) > 0 ? rims++ : kNoTile;
   }
+  parts_.resize(rims);
   values_.resize(std::size_t{rims} * Size());
 }
 
 void SumRims::Keep(std::uint32_t tile, const NodeSums& sums) {
   float* const rim = values_.data() + std::size_t{rim_[tile]} * Size();
-  const int row_values = rows_ * kSumColumns;
-  std::copy_n(sums.data() + SumIndex(-kSumMargin, -rows_), row_values, rim);
-  std::copy_n(sums.data() + SumIndex(-kSumMargin, kTileSize), row_values, rim + UpperRows());
-  for (int j = 0; j < kTileSize; ++j) {
-    std::copy_n(sums.data() + SumIndex(-kSumMargin, j), kSumMargin,
-                rim + LeftSide() + j * kSumMargin);
-    std::copy_n(sums.data() + SumIndex(kTileSize, j), kSumMargin,
-                rim + RightSide() + j * kSumMargin);
-  }
+  const auto keep_rows = [&](int first, float* to) {
+    return CopyRows<kSumColumns>(sums.data() + SumIndex(-kSumMargin, first), kSumColumns, rows_,
+                                 to);
+  };
+  const auto keep_side = [&](int first, float* to) {
+    return CopyRows<kSumMargin>(sums.data() + SumIndex(first, 0), kSumColumns, kTileSize, to);
+  };
+  parts_[rim_[tile]] =
+      static_cast<std::uint8_t>((keep_rows(-rows_, rim) ? kLower : 0) |
+                                (keep_rows(kTileSize, rim + UpperRows()) ? kUpper : 0) |
+                                (keep_side(-kSumMargin, rim + LeftSide()) ? kLeft : 0) |
+                                (keep_side(kTileSize, rim + RightSide()) ? kRight : 0));
 }
 
 void SumRims::AddTo(const TileDirectory& directory, std::uint32_t tile, float* values) const {
@@ -46,6 +68,8 @@ void SumRims::AddTo(const TileDirectory& directory, std::uint32_t tile, float* v
     const int dy = place / 3 - 1;
     const std::uint32_t from = neighbours[place];
     if ((dx == 0 && dy == 0) || from == kNoTile || rim_[from] == kNoTile) continue;
+    const std::uint8_t part = dy < 0 ? kUpper : dy > 0 ? kLower : dx < 0 ? kRight : kLeft;
+    if ((parts_[rim_[from]] & part) == 0) continue;
     const float* const rim = values_.data() + std::size_t{rim_[from]} * Size();
     float* const to = values + (dy > 0 ? (kTileSize - rows_) * kTileSize : 0) +
                       (dx > 0 ? kTileSize - kSumMargin : 0);

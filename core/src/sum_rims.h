@@ -16,6 +16,8 @@ namespace partiemc {
 ///   llll tile rrrr
 ///   llll      rrrr
 ///   uuuuuuuuuuuuuu
+///
+/// A part that no kernel of the tile reaches is left out.
 class SumRims {
  public:
   /// Makes room for kernels of a radius of at most kSumMargin.
@@ -35,8 +37,12 @@ class SumRims {
   int RightSide() const { return LeftSide() + kTileSize * kSumMargin; }
   int Size() const { return RightSide() + kTileSize * kSumMargin; }
 
+  // Bits of the parts of a rim.
+  enum Part : std::uint8_t { kLower = 1, kUpper = 2, kLeft = 4, kRight = 8 };
+
   int rows_ = 0;
-  std::vector<std::uint32_t> rim_;  // By tile: which of the rims below, or kNoTile.
+  std::vector<std::uint32_t> rim_;   // By tile: which of the rims below, or kNoTile.
+  std::vector<std::uint8_t> parts_;  // By rim: those that are kept.
   std::vector<float> values_;
 };
 

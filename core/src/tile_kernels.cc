@@ -16,22 +16,34 @@ HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-HWY_INLINE NodeRange NodesReached(float centre, float radius) {
-  return {std::max(NodeAfter(centre - radius), 0),
-          std::min(NodeAfter(centre + radius) - 1, kTileSize - 1)};
+// The nodes of `among` that a kernel reaches.
+HWY_INLINE NodeRange NodesReached(float centre, float radius, NodeRange among) {
+  return {std::max(NodeAfter(centre - radius), among.first),
+          std::min(NodeAfter(centre + radius) - 1, among.last)};
+}
+
+constexpr NodeRange kAllNodes = {0, kTileSize - 1};
+
+// From the first row of a tile that has asked nodes to the last. Requires: there are some.
+NodeRange RowsOf(const AskedNodes& asked) {
+  NodeRange rows = kAllNodes;
+  while (asked.rows[rows.first] == 0) ++rows.first;
+  while (asked.rows[rows.last] == 0) --rows.last;
+  return rows;
 }
 
 // Calls visit(index among the near ones, column, row, terms of the columns from there, term of the
-// row) for each vector of the tile's nodes that a kernel reaches.
+// row) for each vector of the nodes of these rows that a kernel reaches.
 template <typename Visit>
-HWY_INLINE void ForEachReached(const NearEntries& near, float radius, Visit visit) {
+HWY_INLINE void ForEachReached(const NearEntries& near, float radius, NodeRange rows_asked,
+                               Visit visit) {
   const float inverse_square = 1 / (radius * radius);
   alignas(64) RowTerms row_terms;
   for (int e = 0; e < near.count; ++e) {
     const float x = near.x[e];
     const float y = near.y[e];
-    const NodeRange columns = NodesReached(x, radius);
-    const NodeRange rows = NodesReached(y, radius);
+    const NodeRange columns = NodesReached(x, radius, kAllNodes);
+    const NodeRange rows = NodesReached(y, radius, rows_asked);
     if (rows.last < rows.first) continue;
     SetRowTerms(y, rows, inverse_square, row_terms);
     for (int column = columns.first; column <= columns.last; column += kLanes) {
@@ -47,7 +59,7 @@ template <bool kWeighted>
 void ScatterNearKernelsOf(const NearEntries& near, const float* weight, float radius,
                           NodeSums& sums) {
   ForEachReached(
-      near, radius,
+      near, radius, kAllNodes,
       [&](int e, int column, int row, const ColumnTerms& terms, float row_term) HWY_ATTR {
         AddRow<kWeighted>(row_term, terms.term, kWeighted ? weight[near.entry[e]] : 1.0f,
                           sums.data() + SumIndex(column, row));
@@ -60,66 +72,151 @@ void ScatterNearKernels(const NearEntries& near, const float* weight, float radi
                     : ScatterNearKernelsOf<false>(near, weight, radius, sums);
 }
 
-template <bool kWeighted>
-void ScatterNearMomentsOf(const NearEntries& near, const float* weight, float radius,
-                          MomentSums& sums) {
+template <bool kKernel>
+void ScatterNearMomentsOf(const NearEntries& near, float radius, NodeRange rows, MomentSums& sums) {
   const Lanes d;
-  ForEachReached(
-      near, radius,
-      [&](int e, int column, int row, const ColumnTerms& terms, float row_term) HWY_ATTR {
-        const Vector k = KernelAt(row_term, terms.term);
-        const Vector dy = hn::Set(d, near.y[e] - static_cast<float>(row));
-        const int at = SumIndex(column, row);
-        AddTo(sums.kernel.data() + at, k);
-        const Vector kx = hn::Mul(k, terms.dx);
-        const Vector ky = hn::Mul(k, dy);
-        AddTo(sums.moment_x.data() + at, kx);
-        AddTo(sums.moment_y.data() + at, ky);
-        AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
-        AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
-        AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
-        if constexpr (kWeighted) {
-          AddTo(sums.weighted.data() + at, hn::Mul(k, hn::Set(d, weight[near.entry[e]])));
-        }
-      });
+  ForEachReached(near, radius, rows,
+                 [&](int e, int column, int row, const ColumnTerms& terms, float row_term)
+                     HWY_ATTR {
+                       const Vector k = KernelAt(row_term, terms.term);
+                       const Vector dy = hn::Set(d, near.y[e] - static_cast<float>(row));
+                       const int at = SumIndex(column, row);
+                       if constexpr (kKernel) AddTo(sums.kernel.data() + at, k);
+                       const Vector kx = hn::Mul(k, terms.dx);
+                       const Vector ky = hn::Mul(k, dy);
+                       AddTo(sums.moment_x.data() + at, kx);
+                       AddTo(sums.moment_y.data() + at, ky);
+                       AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
+                       AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
+                       AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
+                     });
 }
 
-void ScatterNearMoments(const NearEntries& near, const float* weight, float radius,
+void ScatterNearMoments(const NearEntries& near, float radius, const AskedNodes& asked,
                         MomentSums& sums) {
-  weight != nullptr ? ScatterNearMomentsOf<true>(near, weight, radius, sums)
-                    : ScatterNearMomentsOf<false>(near, weight, radius, sums);
+  const NodeRange rows = RowsOf(asked);
+  asked.has_kernel_sums ? ScatterNearMomentsOf<false>(near, radius, rows, sums)
+                        : ScatterNearMomentsOf<true>(near, radius, rows, sums);
 }
 
-void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& sure_inside,
-                   BitRows& sure_outside) {
+HWY_INLINE std::uint32_t BitsOf(hn::Mask<Lanes> mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(Lanes(), mask, bytes);
+  return bytes[0];
+}
+
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside,
+                   BitRows& open) {
   const Lanes d;
   const Vector guard = hn::Set(d, static_cast<float>(scale.guard));
   const Vector saturation = hn::Set(d, static_cast<float>(scale.saturation));
-  const Vector surely = hn::Set(d, static_cast<float>((1 + kSumTolerance) * scale.saturation));
-  const Vector surely_not = hn::Set(d, static_cast<float>((1 - kSumTolerance) * scale.guard));
   const Vector slope = hn::Set(d, static_cast<float>(scale.guard_slope));
   const Vector void_value = hn::Set(d, static_cast<float>(scale.VoidValue()));
   for (int j = 0; j < kTileSize; ++j) {
-    std::uint32_t inside_row = 0, outside_row = 0;
+    std::uint32_t inside_row = 0, open_row = 0;
     for (int i = 0; i < kTileSize; i += kLanes) {
-      const Vector f = hn::Mul(hn::Set(d, weight), hn::LoadU(d, values + j * kTileSize + i));
-      const auto inside = hn::Gt(f, surely);
-      const auto outside = hn::Le(f, surely_not);
-      const auto bits = [&](auto mask) {
-        std::uint8_t bytes[8] = {};
-        hn::StoreMaskBits(d, mask, bytes);
-        return std::uint32_t{bytes[0]} << i;
-      };
-      inside_row |= bits(inside);
-      outside_row |= bits(outside);
-      const Vector branch = hn::IfThenElse(inside, saturation, guard);
+      const Vector sum = hn::LoadU(d, values + j * kTileSize + i);
+      const Vector f = hn::Mul(hn::Set(d, weight), sum);
+      const auto is_inside = hn::Gt(f, saturation);
+      const auto is_open = hn::AndNot(is_inside, hn::Gt(f, guard));
+      inside_row |= BitsOf(is_inside) << i;
+      open_row |= BitsOf(is_open) << i;
+      const Vector branch = hn::IfThenElse(is_inside, saturation, guard);
       const Vector value = hn::Mul(hn::Sub(branch, f), slope);
-      hn::StoreU(hn::IfThenElse(hn::Eq(f, hn::Zero(d)), void_value, value), d,
-                 values + j * kTileSize + i);
+      const Vector decided = hn::IfThenElse(hn::Eq(f, hn::Zero(d)), void_value, value);
+      hn::StoreU(hn::IfThenElse(is_open, sum, decided), d, values + j * kTileSize + i);
     }
-    sure_inside[j] = inside_row;
-    sure_outside[j] = outside_row;
+    inside[j] = inside_row;
+    open[j] = open_row;
   }
+}
+
+// The branches of F that the density decides.
+struct DensityBranches {
+  Vector guard, saturation;
+};
+
+// LevelSetFormula in vectors, of what is known of nodes.
+class NodeFormula {
+ public:
+  HWY_INLINE NodeFormula(const AskedNodes& asked, float weight, const Scale& scale)
+      : asked_(asked),
+        weight_(hn::Set(d_, weight)),
+        guard_(Constant(scale.guard)),
+        saturation_(Constant(scale.saturation)),
+        slope_(Constant(scale.guard_slope)),
+        gap_spread_(Constant(scale.gap_spread)),
+        gap_slope_(Constant(scale.gap_slope)),
+        reference_radius_(Constant(scale.reference_radius)),
+        void_value_(Constant(scale.VoidValue())),
+        inverse_square_(Constant(1 / (scale.kernel_radius * scale.kernel_radius))) {}
+
+  // F at the nodes from `at` on in the sums, which have `value` so far.
+  HWY_INLINE Vector operator()(Vector value, const MomentSums& sums, int at) const {
+    const auto load = [&](const NodeSums& of) HWY_ATTR { return hn::LoadU(d_, of.data() + at); };
+    const Vector k = asked_.has_kernel_sums ? value : load(sums.kernel);
+    const Vector mean_x = hn::Div(load(sums.moment_x), k);
+    const Vector mean_y = hn::Div(load(sums.moment_y), k);
+    const Vector phi = hn::Sub(Length(mean_x, mean_y), reference_radius_);
+    const Vector share = hn::Div(inverse_square_, k);
+    const Vector xx = hn::Mul(load(sums.xx), share);
+    const Vector xy = hn::Mul(load(sums.xy), share);
+    const Vector yy = hn::Mul(load(sums.yy), share);
+    const Vector half = Constant(0.5);
+    const Vector spread =
+        hn::Add(hn::Mul(hn::Add(xx, yy), half), Length(hn::Mul(hn::Sub(xx, yy), half), xy));
+    const Vector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
+    const DensityBranches branches = BranchesOf(value);
+    const Vector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
+    // No kernel reaches the node.
+    return hn::IfThenElse(hn::Gt(k, hn::Zero(d_)), f, asked_.is_open ? void_value_ : value);
+  }
+
+ private:
+  static HWY_INLINE Vector Constant(double value) {
+    return hn::Set(Lanes(), static_cast<float>(value));
+  }
+
+  static HWY_INLINE Vector Length(Vector x, Vector y) {
+    return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
+  }
+
+  HWY_INLINE DensityBranches BranchesOf(Vector value) const {
+    if (asked_.is_open) {
+      const Vector f = hn::Mul(weight_, value);
+      return {hn::Mul(hn::Sub(guard_, f), slope_), hn::Mul(hn::Sub(saturation_, f), slope_)};
+    }
+    // The value is the one that has decided the side, which the other then cannot change.
+    const Vector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
+    const auto is_inside = hn::Lt(value, hn::Zero(d_));
+    return {hn::IfThenElse(is_inside, hn::Sub(value, between), value),
+            hn::IfThenElse(is_inside, value, hn::Add(value, between))};
+  }
+
+  const Lanes d_;
+  const AskedNodes& asked_;
+  const Vector weight_, guard_, saturation_, slope_, gap_spread_, gap_slope_, reference_radius_,
+      void_value_, inverse_square_;
+};
+
+BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
+                      const Scale& scale, float* values) {
+  const Lanes d;
+  const NodeFormula formula(asked, weight, scale);
+  BitRows inside{};
+  for (int j = 0; j < kTileSize; ++j) {
+    for (int i = 0; i < kTileSize; i += kLanes) {
+      const auto bits = static_cast<std::uint8_t>(asked.rows[j] >> i & ((1u << kLanes) - 1));
+      if (bits == 0) continue;
+      float* const at = values + j * kTileSize + i;
+      const Vector before = hn::LoadU(d, at);
+      const Vector value = formula(before, sums, SumIndex(i, j));
+      const std::uint8_t bytes[8] = {bits};
+      hn::StoreU(hn::IfThenElse(hn::LoadMaskBits(d, bytes), value, before), d, at);
+      inside[j] |= (BitsOf(hn::Lt(value, hn::Zero(d))) & bits) << i;
+    }
+  }
+  return inside;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -132,20 +229,40 @@ namespace partiemc {
 HWY_EXPORT(ScatterNearKernels);
 HWY_EXPORT(ScatterNearMoments);
 HWY_EXPORT(ClassifyNodes);
+HWY_EXPORT(EvaluateNodes);
 
 void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
                         NodeSums& sums) {
   HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
 }
 
-void ScatterNearMoments(const NearEntries& near, const float* weight, float radius,
+void ScatterNearMoments(const NearEntries& near, float radius, const AskedNodes& asked,
                         MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, weight, radius, sums);
+  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, radius, asked, sums);
 }
 
-void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& sure_inside,
-                   BitRows& sure_outside) {
-  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, values, sure_inside, sure_outside);
+void ClearMoments(const AskedNodes& asked, MomentSums& sums) {
+  int first = 0, last = kTileSize - 1;
+  while (asked.rows[first] == 0) ++first;
+  while (asked.rows[last] == 0) --last;
+  const auto clear = [&](NodeSums& channel) {
+    // Vectors that begin in the tile end before its next row does.
+    std::fill(channel.begin() + SumIndex(0, first), channel.begin() + SumIndex(0, last + 1), 0.0f);
+  };
+  if (!asked.has_kernel_sums) clear(sums.kernel);
+  for (NodeSums* const channel : {&sums.moment_x, &sums.moment_y, &sums.xx, &sums.xy, &sums.yy}) {
+    clear(*channel);
+  }
+}
+
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside,
+                   BitRows& open) {
+  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, values, inside, open);
+}
+
+BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
+                      const Scale& scale, float* values) {
+  return HWY_DYNAMIC_DISPATCH(EvaluateNodes)(asked, sums, weight, scale, values);
 }
 
 }  // namespace partiemc

@@ -30,13 +30,19 @@ using NodeSums = std::array<float, (kTileSize + 2 * kSumMargin + 2) * kSumColumn
 /// Kernel sums at the nodes of one tile. The moments are relative to the node, so that the mean
 /// loses no digits where the tile's corner is far.
 struct alignas(64) MomentSums {
-  NodeSums kernel;    ///< sum k
+  NodeSums kernel;    ///< sum k; only where the density does not tell it.
   NodeSums moment_x;  ///< sum k (x_i - x)
   NodeSums moment_y;
   NodeSums xx;  ///< sum k (x_i - x)^2, and so on.
   NodeSums xy;
   NodeSums yy;
-  NodeSums weighted;  ///< sum w k; only where weights differ from particle to particle.
+};
+
+/// The nodes of a tile of which moments are asked.
+struct AskedNodes {
+  BitRows rows;
+  bool is_open;          ///< Whether the density left their sides open, else it has decided them.
+  bool has_kernel_sums;  ///< Whether their values so far are sum k (ClassifyNodes).
 };
 
 /// The list of one tile. `weight` is null where weights are uniform.
@@ -54,17 +60,20 @@ void ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums);
 /// by entry of the bins, is null where weights are uniform.
 void ScatterNearKernels(const NearEntries& near, const float* weight, float radius, NodeSums& sums);
 
-/// Adds to all sums of the tile's nodes.
-void ScatterNearMoments(const NearEntries& near, const float* weight, float radius,
+/// Adds to the moments at the asked nodes; those at other nodes of the tile are anything. The sums
+/// must be cleared first. `sum k` is added up unless it is known.
+void ScatterNearMoments(const NearEntries& near, float radius, const AskedNodes& asked,
                         MomentSums& sums);
+void ClearMoments(const AskedNodes& asked, MomentSums& sums);
 
-/// The sums of two orders of the same particles are closer than this share of either: nodes whose
-/// density is so close to a bound are left open, and decided by sums in the order of the frame.
-inline constexpr double kSumTolerance = 1e-4;
+/// What the density f = weight * sum says of a tile's nodes: those that are inside, those that it
+/// leaves open, and, but for the latter, in place of the sums the branch of F that decides them;
+/// where f = 0, F itself.
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside, BitRows& open);
 
-/// What the density f = weight * sum says of a tile's nodes: their sides, and in place of the sums
-/// the branch of F that decides them; where f = 0, F itself.
-void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& sure_inside,
-                   BitRows& sure_outside);
+/// Sets the values of the asked nodes, as ClassifyNodes has left them, to F. Returns those of them
+/// that are inside.
+BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
+                      const Scale& scale, float* values);
 
 }  // namespace partiemc

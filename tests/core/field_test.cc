@@ -198,44 +198,71 @@ TEST(Field, HasTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-// Sampled node by node: tiles differ where the shift is not one of whole tiles. Where values count,
-// at the ends of crossed edges, sums do not know of tiles.
-TEST(Field, AShiftByWholeCellsShiftsItBitForBitWhereTheIsolineCrossesAnEdge) {
+// F at a node of the plane.
+float ValueAt(const Stages& stages, int column, int row) {
+  const std::uint32_t tile = stages.bins.tiles.Find({row >> kTileShift, column >> kTileShift});
+  if (tile == kNoTile) return stages.level_set.void_value;
+  return stages.level_set.At(stages.bins.tiles, tile, column & 31, row & 31);
+}
+
+// Whether a neighbour of the node is on the other side.
+bool IsEndOfCrossedEdge(const Stages& stages, int column, int row) {
+  const bool is_inside = ValueAt(stages, column, row) < 0;
+  constexpr std::pair<int, int> kNeighbours[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
+  return std::any_of(std::begin(kNeighbours), std::end(kNeighbours), [&](const auto& to) {
+    return (ValueAt(stages, column + to.first, row + to.second) < 0) != is_inside;
+  });
+}
+
+// Sums run tile by tile, so that a shift by whole tiles changes no bit, and one by whole cells the
+// last ones only.
+TEST(Field, AShiftByWholeCellsShiftsItWhereTheIsolineCrossesAnEdge) {
   support::Random random(4);
   const support::Particles particles = support::Snapped(support::Blob(random, 8), 1.0);
-  constexpr std::pair<int, int> kNeighbours[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
   Stages here;
   here.Run(particles, {.spacing = 1.0});
-  int ends = 0;
   for (const auto& [dx, dy] :
-       {std::pair(1, 0), std::pair(-7, 19), std::pair(1'000'003, -999'983)}) {
+       {std::pair(32, 0), std::pair(-64, 96), std::pair(32'000'032, -3200), std::pair(1, 0),
+        std::pair(-7, 19), std::pair(1'000'003, -999'983)}) {
+    const bool by_tiles = dx % kTileSize == 0 && dy % kTileSize == 0;
     Stages there;
     there.Run(support::Shifted(particles, dx, dy), {.spacing = 1.0});
+    int ends = 0;
     for (int y = -15; y <= 15; ++y) {
       for (int x = -15; x <= 15; ++x) {
-        const auto value = [](const Stages& stages, int column, int row) {
-          const std::uint32_t tile =
-              stages.bins.tiles.Find({row >> kTileShift, column >> kTileShift});
-          if (tile == kNoTile) return stages.level_set.void_value;
-          return stages.level_set.At(stages.bins.tiles, tile, column & 31, row & 31);
-        };
-        const float expected = value(here, x, y);
-        const bool is_end =
-            std::any_of(std::begin(kNeighbours), std::end(kNeighbours), [&](const auto& to) {
-              return (value(here, x + to.first, y + to.second) < 0) != (expected < 0);
-            });
-        const float shifted = value(there, x + dx, y + dy);
+        const float expected = ValueAt(here, x, y);
+        const float shifted = ValueAt(there, x + dx, y + dy);
         EXPECT_EQ(shifted < 0, expected < 0) << x << ", " << y;
-        if (is_end) {
-          EXPECT_EQ(shifted, expected) << x << ", " << y;
-        } else {
-          EXPECT_NEAR(shifted, expected, 1e-5) << x << ", " << y;
-        }
-        ends += is_end;
+        EXPECT_NEAR(shifted, expected, by_tiles ? 0 : 1e-5) << x << ", " << y;
+        ends += IsEndOfCrossedEdge(here, x, y);
+      }
+    }
+    EXPECT_GT(ends, 100);
+  }
+}
+
+// Where particles are few, the isoline passes between nodes of which the density has decided one.
+TEST(Field, EndsOfCrossedEdgesThatTheDensityDecidesHaveTheValueOfTheEquations) {
+  support::Random random(5);
+  int checked = 0;
+  for (const double radius : {1.5, 2.0, 3.0}) {
+    Stages stages;
+    stages.Run(support::Snapped(support::Noise(random, 60, 14), 1.0),
+               {.spacing = 1.0, .kernel_radius = radius});
+    const support::FieldOracle oracle(stages.particles, stages.parameters, 1.0);
+    for (int y = -16; y <= 16; ++y) {
+      for (int x = -16; x <= 16; ++x) {
+        const std::uint32_t tile = stages.bins.tiles.Find({y >> kTileShift, x >> kTileShift});
+        if (tile == kNoTile || !IsEndOfCrossedEdge(stages, x, y)) continue;
+        const bool is_open = (stages.level_set.open[tile][y & 31] >> (x & 31) & 1) != 0;
+        const support::Vector at{double(x), double(y)};
+        if (is_open || oracle.KernelSum(at) < 1e-3) continue;
+        ASSERT_NEAR(ValueAt(stages, x, y), oracle.Value(at), 1e-5 * radius) << x << ", " << y;
+        ++checked;
       }
     }
   }
-  EXPECT_GT(ends, 100);
+  EXPECT_GT(checked, 10);
 }
 
 // Two half-planes of particles, a gap between their boundaries: the mean of the particles alone

@@ -108,7 +108,7 @@ TEST_P(Metamorphic, AShiftByWholeCellsShiftsTheRings) {
     EXPECT_EQ(there.mesh.TriangleCount(), here.mesh.TriangleCount());
     EXPECT_NEAR(there.statistics.area, here.statistics.area, 1e-5);
   }
-  // By any number of cells the order may change, the set of rings may not.
+  // By any number of cells the order may change, of sums as well, the set of rings may not.
   for (const auto& [dx, dy] : {std::pair(1.0, 0.0), {17.0, -5.0}}) {
     const Result there = ReconstructOnce(parameters, support::Shifted(particles, dx, dy));
     EXPECT_EQ(there.rings.RingCount(), here.rings.RingCount());
