@@ -24,12 +24,6 @@ const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_al
 
 using Digests = std::pair<std::uint64_t, std::uint64_t>;
 
-ReconstructionParameters BlobParameters() {
-  ReconstructionParameters parameters;
-  parameters.spacing = kBlobSpacing;
-  return parameters;
-}
-
 std::string ReasonOf(const absl::Status& status) {
   const auto violation = FindViolation(status);
   return violation ? violation->reason : status.ToString();

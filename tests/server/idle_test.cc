@@ -22,12 +22,6 @@ using std::chrono::steady_clock;
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 constexpr IdleLimits kIdle{.opening = minutes(1), .streaming = minutes(10)};
 
-ReconstructionParameters BlobParameters() {
-  ReconstructionParameters parameters;
-  parameters.spacing = kBlobSpacing;
-  return parameters;
-}
-
 class Idle : public ::testing::Test {
  protected:
   // Of the flow, as if that much time had passed.

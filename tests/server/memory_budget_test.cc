@@ -85,12 +85,6 @@ TEST(MemoryBudget, WhoeverWaitsNoMoreOrHasGoneStandsInNobodysWay) {
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 constexpr std::size_t kWindow = 4;
 
-ReconstructionParameters BlobParameters() {
-  ReconstructionParameters parameters;
-  parameters.spacing = kBlobSpacing;
-  return parameters;
-}
-
 std::uint64_t FrameBytes() { return MovingBlob(1, 0).size() * sizeof(double); }
 
 void SendAll(MemoryDoor& door, std::uint64_t frames) {

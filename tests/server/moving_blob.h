@@ -6,9 +6,17 @@
 #include <random>
 #include <vector>
 
+#include "partiemc/parameters.h"
+
 namespace partiemc::server {
 
 inline constexpr double kBlobSpacing = 0.05;
+
+inline ReconstructionParameters BlobParameters() {
+  ReconstructionParameters parameters;
+  parameters.spacing = kBlobSpacing;
+  return parameters;
+}
 
 /// Interleaved x, y of frame `index` of the sequence that `seed` names; about 1,200 particles.
 inline std::vector<double> MovingBlob(unsigned seed, std::uint64_t index) {

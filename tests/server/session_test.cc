@@ -26,12 +26,6 @@ constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 
 using Digests = std::pair<std::uint64_t, std::uint64_t>;
 
-ReconstructionParameters BlobParameters() {
-  ReconstructionParameters parameters;
-  parameters.spacing = kBlobSpacing;
-  return parameters;
-}
-
 Frame FrameOf(const std::vector<double>& positions) {
   Frame frame;
   frame.positions = std::span<const double>(positions);

@@ -28,12 +28,6 @@ using ::testing::ElementsAre;
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 constexpr std::size_t kWindow = 4;
 
-ReconstructionParameters BlobParameters() {
-  ReconstructionParameters parameters;
-  parameters.spacing = kBlobSpacing;
-  return parameters;
-}
-
 // Holds up a pool's only thread until it is let go.
 class Gate {
  public:

@@ -15,12 +15,6 @@ namespace {
 // Far beyond what any call takes, below CTest's own limit.
 constexpr std::chrono::seconds kDeadline{120};
 
-ReconstructionParameters BlobParameters() {
-  ReconstructionParameters parameters;
-  parameters.spacing = kBlobSpacing;
-  return parameters;
-}
-
 Frame FrameOf(const std::vector<double>& positions) {
   Frame frame;
   frame.positions = std::span<const double>(positions);
