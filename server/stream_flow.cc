@@ -208,15 +208,17 @@ void StreamFlow::Compute(std::size_t slot, Worker& worker) {
 }
 
 void StreamFlow::Computed() {
+  // Taken before any other frame can be computed.
+  const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
   On([&] {
     computing_ = false;
     ++computed_;
-    const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
     if (!answered) return;
     SetSlotBytes(computed_ - 1, answered->bytes);
     ++(answered->is_result ? counts_.frames : counts_.frame_errors);
     counts_.last_sequence = answered->last_sequence;
   });
+  if (answered && answered->afterwards) answered->afterwards();
 }
 
 void StreamFlow::End(absl::Status status) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -39,6 +40,9 @@ struct Answered {
   bool is_result = false;           ///< Or a frame error.
   std::uint64_t last_sequence = 0;  ///< The last number that the stream has used up.
   std::uint64_t bytes = 0;          ///< Of the answer.
+  /// Run by the worker once the answer is on its way, or waits for one before it. The door may be
+  /// gone by then. Empty: nothing is left to do.
+  std::function<void()> afterwards = {};
 };
 
 /// Where a stream's messages come in and go out. It has `window` slots, each a request and the

@@ -160,6 +160,7 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
 
 Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
   std::unique_ptr<FrameMessages> messages = TakeMessages(worker);
+  Answered answered;
   const absl::Status parsed = ParseFrame(requests_[slot], messages->request);
   if (!outputs_.echo_particles) requests_[slot].Clear();
   const v1::ParticleFrame& request = messages->request.frame();
@@ -179,7 +180,8 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
       result.clear_checkpoint();
     }
     answers_[slot] = wire::ToBytes(messages->result);
-    ShowWatchers(slot, result, request);
+    if (ShowWatchers(slot, result, request))
+      answered.afterwards = [hub = hub_] { hub->Announce(); };
   } else {
     v1::ReconstructResponse error;
     wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
@@ -190,17 +192,18 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
   }
   requests_[slot].Clear();
   worker.door_buffers = std::move(messages);
-  return {.is_result = status.ok(),
-          .last_sequence = session_->next_sequence() - 1,
-          .bytes = answers_[slot].Length()};
+  answered.is_result = status.ok();
+  answered.last_sequence = session_->next_sequence() - 1;
+  answered.bytes = answers_[slot].Length();
+  return answered;
 }
 
 // They share the bytes of the answer, and of the request where particles are echoed.
-void StreamMessages::ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
+bool StreamMessages::ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
                                   const v1::ParticleFrame& request) {
   wire::WatchedBytes bytes(answers_[slot], result);
   if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
-  hub_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
+  return hub_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
 }
 
 }  // namespace partiemc::server

@@ -58,7 +58,8 @@ class StreamMessages {
 
  private:
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
-  void ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
+  // True if somebody watches and is to be told.
+  bool ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
                     const v1::ParticleFrame& request);
 
   const ServerLimits& limits_;

@@ -21,7 +21,14 @@ long Sleeps() {
 WatchHub::WatchHub(WatchPump& pump, const Limits& limits)
     : pump_(pump), limits_(limits), tap_(limits.tap_bytes) {}
 
-void WatchHub::Publish(std::shared_ptr<const WatchFrame> frame) {
+template <typename Action>
+void WatchHub::CountWaits(Action action) {
+  const long sleeps = Sleeps();
+  action();
+  if (Sleeps() != sleeps) ++producer_waits_;
+}
+
+bool WatchHub::Publish(std::shared_ptr<const WatchFrame> frame) {
   ++published_;
   if (watcher_count_ == 0) {
     if (frame->bytes() <= limits_.kept_bytes) {
@@ -30,13 +37,14 @@ void WatchHub::Publish(std::shared_ptr<const WatchFrame> frame) {
       tap_.Clear();
     }
     // Who has joined meanwhile may have found the tap empty.
-    if (watcher_count_ != 0) pump_.Wake(*this);
-    return;
+    return watcher_count_ != 0;
   }
-  const long sleeps = Sleeps();
-  tap_.Put({std::move(frame), published_}, /*keep_older=*/true);
-  pump_.Wake(*this);
-  if (Sleeps() != sleeps) ++producer_waits_;
+  CountWaits([&] { tap_.Put({std::move(frame), published_}, /*keep_older=*/true); });
+  return true;
+}
+
+void WatchHub::Announce() {
+  CountWaits([&] { pump_.Wake(*this); });
 }
 
 void WatchHub::End(WatchEnd end) {

@@ -15,8 +15,8 @@
 
 namespace partiemc::server {
 
-/// Publish comes from one thread at a time and never waits, whatever watchers do; everything else
-/// comes from any thread. Held by shared_ptr only.
+/// Publish comes from one thread at a time; it and Announce never wait, whatever watchers do.
+/// Everything else comes from any thread. Held by shared_ptr only.
 class WatchHub final : public Pumped {
  public:
   struct Limits {
@@ -30,8 +30,12 @@ class WatchHub final : public Pumped {
   /// `pump` lives longer.
   WatchHub(WatchPump& pump, const Limits& limits);
 
-  /// A result of the stream. Wait-free; while nobody watches no thread is woken.
-  void Publish(std::shared_ptr<const WatchFrame> frame);
+  /// A result of the stream. Wait-free. True if somebody watches: then Announce is to follow.
+  [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame);
+  /// Has watchers served with what was published. From any thread; wakes the pump's, without
+  /// waiting for it. Apart from Publish, so that a producer's own answer is on its way before the
+  /// pump writes to watchers: their writes take the same locks of gRPC.
+  void Announce();
   /// The stream has ended. Watchers get what was published, then this.
   void End(WatchEnd end);
 
@@ -41,7 +45,8 @@ class WatchHub final : public Pumped {
   void Leave(const WatchFlow& watcher);
 
   std::uint32_t watcher_count() const { return watcher_count_; }
-  /// Frames in whose publishing the producer's thread had to sleep, as the system counts it.
+  /// How often the producer's thread had to sleep to publish or to announce, as the system counts
+  /// it.
   std::uint64_t producer_waits() const { return producer_waits_; }
 
  private:
@@ -52,6 +57,8 @@ class WatchHub final : public Pumped {
 
   void Serve() override;
   void TakeNews();  // With the lock held.
+  template <typename Action>
+  void CountWaits(Action action);
 
   WatchPump& pump_;
   const Limits limits_;

@@ -71,7 +71,8 @@ Answered ScriptedDoor::Answer(std::size_t slot, Worker& worker) {
   Meanwhile();
   return {.is_result = answers_[slot].reason.empty(),
           .last_sequence = session_->next_sequence() - 1,
-          .bytes = 0};
+          .bytes = 0,
+          .afterwards = afterwards};
 }
 
 void ScriptedDoor::Cut() {

@@ -63,6 +63,8 @@ class ScriptedDoor final : private StreamDoor {
 
   /// Called in the middle of opening or answering, once.
   std::function<void()> meanwhile;
+  /// What each answer leaves to do.
+  std::function<void()> afterwards;
 
   StreamFlow& flow() { return *flow_; }
 

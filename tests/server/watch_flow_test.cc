@@ -34,7 +34,7 @@ class WatchTest : public ::testing::Test {
  protected:
   // Frame `number` of the stream.
   void Publish(std::uint64_t number, std::size_t bytes = kFrameBytes) {
-    hub_->Publish(std::make_shared<NumberedFrame>(number, bytes));
+    if (hub_->Publish(std::make_shared<NumberedFrame>(number, bytes))) hub_->Announce();
   }
   std::unique_ptr<MemoryWatcher> Join(WatchMode mode, std::uint64_t credit) {
     return std::make_unique<MemoryWatcher>(hub_, mode, credit, kMaxBytes);

@@ -1,8 +1,10 @@
 // What watching costs who is watched, with a process for everybody: a server, a producer, readers,
 // a watcher that is stopped by SIGSTOP, and one that never reads. Runs with and without watchers
-// take turns. Processor times are printed and not judged: they are the machine's too. A short form
-// by default; `--pairs 5 --seconds 6 --rate 25 --particles 200000 --large-rate 5` is what
-// tests/PROMISES.md tells of.
+// take turns. With `--beside` there is a third run, of two servers with a producer each, one of
+// them watched: both have the machine as the watchers leave it, so that what their costs differ by
+// is what being watched costs, whatever twenty more processes on the machine cost. Processor times
+// are printed and not judged: they are the machine's too. A short form by default; the options of
+// the long ones are in tests/PROMISES.md.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -13,13 +15,14 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <regex>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "client/cli/program.h"
-#include "client/recording/recording.h"
+#include "service/load_recordings.h"
 #include "service/process_clocks.h"
 #include "service/server_process.h"
 #include "service/service_testing.h"
@@ -31,6 +34,7 @@ using client::Program;
 
 struct Load {
   unsigned pairs = 1, readers = 18;
+  bool beside = false;
   double seconds = 1;                 // Of each run that are measured.
   double rate = 75, large_rate = 25;  // Frames per second; the dam break has 75.
   std::uint64_t particles = 20'000;   // Of a large frame.
@@ -44,44 +48,6 @@ constexpr std::chrono::seconds kPatience(60);
 // For watchers to come, while the producer goes on.
 constexpr double kLeadSeconds = 20;
 constexpr int kInterrupted = 130, kStreamEnded = 4;  // Exit codes of `partiemc`.
-
-// The frames of the bundled dam break, over and over.
-void RecordDamBreak(const std::string& path, std::uint64_t count) {
-  const auto reader = client::RecordingReader::Open(client::kDamBreak, "");
-  ASSERT_TRUE(reader.ok()) << reader.status();
-  std::vector<client::RecordedFrame> frames(*(*reader)->FrameCount());
-  for (client::RecordedFrame& frame : frames) ASSERT_TRUE((*reader)->Next(frame).value_or(false));
-  const auto writer = client::RecordingWriter::Create(path, (*reader)->header(), {});
-  ASSERT_TRUE(writer.ok()) << writer.status();
-  for (std::uint64_t k = 0; k < count; ++k) {
-    client::RecordedFrame& frame = frames[k % frames.size()];
-    frame.time = 0.01 * static_cast<double>(k);
-    ASSERT_TRUE((*writer)->Add(frame).ok());
-  }
-  ASSERT_TRUE((*writer)->Finish().ok());
-}
-
-// A square of fluid whose surface waves.
-void RecordSquare(const std::string& path, std::uint64_t count) {
-  const auto writer = client::RecordingWriter::Create(path, {.spacing = 1}, {});
-  ASSERT_TRUE(writer.ok()) << writer.status();
-  const auto side = static_cast<std::uint64_t>(std::sqrt(static_cast<double>(load.particles)));
-  client::RecordedFrame frame;
-  for (std::uint64_t k = 0; k < count; ++k) {
-    frame.positions.clear();
-    frame.time = 0.01 * static_cast<double>(k);
-    for (std::uint64_t row = 0; row < side; ++row) {
-      for (std::uint64_t column = 0; column < side; ++column) {
-        const auto x = static_cast<double>(column), y = static_cast<double>(row);
-        const double wave = std::sin(0.05 * x + 0.3 * static_cast<double>(k));
-        frame.positions.insert(frame.positions.end(),
-                               {x, std::round(64 * y * (1 + 0.02 * wave)) / 64});
-      }
-    }
-    ASSERT_TRUE((*writer)->Add(frame).ok());
-  }
-  ASSERT_TRUE((*writer)->Finish().ok());
-}
 
 double Median(std::vector<double> values) {
   if (values.empty()) return NAN;
@@ -118,40 +84,46 @@ std::vector<std::uint64_t> NumbersIn(const std::string& text, const std::string&
   return numbers;
 }
 
-class WatchLoad : public ::testing::Test {
- protected:
-  struct Sequence {
-    std::string path;
-    double rate = 0;
-    std::vector<std::string> flags;  // Of the replay.
-  };
+struct Sequence {
+  std::string path;
+  double rate = 0;
+  std::vector<std::string> flags;  // Of the replay.
+};
 
-  void Compare(const Sequence& sequence);
-
- private:
-  struct Run {
-    Costs costs;
-    double before_mib = 0, most_mib = 0;
-  };
-
-  Run RunOnce(const Sequence& sequence, const std::string& name, bool watched);
-  void ExpectToldWhatWasCounted(std::vector<std::unique_ptr<Program>>& watchers,
-                                const std::string& name);
+// A server, and the producer of its only stream.
+class Served {
+ public:
+  void StartProducer(const Sequence& sequence, const std::string& name);
   // The stream as ListStreams has it; without a name while it is not there.
   v1::StreamSummary Listed();
-  Clocks Look(const Program& producer, std::uint64_t frames) const {
-    return {.frames = frames,
-            .producer = ProcessCpuMs(producer.id()),
-            .computing = ThreadsCpuMs(server_.process().process(), "compute"),
-            .server = ProcessCpuMs(server_.process().process())};
-  }
+  // Waits; a failure is one of the test.
+  template <typename Ready>
+  void WaitUntil(Ready ready, const char* what);
+  Clocks Look();
+  Clocks LookAfterMoreThan(std::uint64_t frames);
+  void Interrupt();
 
+  const std::string& address() const { return server_.address(); }
+  const ServerProcess& process() const { return server_.process(); }
+
+ private:
   ServingProcess server_{{"--threads", "1"}};
   std::unique_ptr<v1::ReconstructionService::Stub> stub_ = v1::ReconstructionService::NewStub(
       grpc::CreateChannel(server_.address(), grpc::InsecureChannelCredentials()));
+  std::unique_ptr<Program> producer_;
 };
 
-v1::StreamSummary WatchLoad::Listed() {
+void Served::StartProducer(const Sequence& sequence, const std::string& name) {
+  std::vector<std::string> arguments = {
+      "replay", sequence.path, "--server", address(),
+      "--name", name,          "--rate",   std::to_string(sequence.rate),
+      "--quiet"};
+  arguments.insert(arguments.end(), sequence.flags.begin(), sequence.flags.end());
+  producer_ = std::make_unique<Program>(PARTIEMC_PROGRAM, arguments);
+  WaitUntil([&] { return Listed().stream_name() == name; }, "stream");
+}
+
+v1::StreamSummary Served::Listed() {
   grpc::ClientContext context;
   SetDeadline(context);
   v1::ListStreamsResponse streams;
@@ -159,125 +131,193 @@ v1::StreamSummary WatchLoad::Listed() {
   return streams.streams_size() == 1 ? streams.streams(0) : v1::StreamSummary();
 }
 
-WatchLoad::Run WatchLoad::RunOnce(const Sequence& sequence, const std::string& name, bool watched) {
-  Run run{.before_mib = server_.process().ResidentMib()};
-  std::vector<std::string> arguments = {
-      "replay", sequence.path, "--server", server_.address(),
-      "--name", name,          "--rate",   std::to_string(sequence.rate),
-      "--quiet"};
-  arguments.insert(arguments.end(), sequence.flags.begin(), sequence.flags.end());
-  Program producer(PARTIEMC_PROGRAM, arguments);
-  const auto wait_until = [&](auto ready, const char* what) {
-    const auto give_up = std::chrono::steady_clock::now() + kPatience;
-    while (!ready()) {
-      ASSERT_TRUE(producer.Running())
-          << "the producer has ended before " << what << ": " << producer.Error();
-      ASSERT_LT(std::chrono::steady_clock::now(), give_up) << "no " << what;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  };
-  wait_until([&] { return Listed().stream_name() == name; }, "stream");
-
-  std::vector<std::unique_ptr<Program>> watchers;
-  if (watched) {
-    const std::vector<std::string> watch = {"watch",           name,       "--server",
-                                            server_.address(), "--rejoin", "0"};
-    for (unsigned k = 0; k < load.readers + 1; ++k) {
-      watchers.push_back(std::make_unique<Program>(PARTIEMC_PROGRAM, watch));
-    }
-    watchers.push_back(std::make_unique<Program>(
-        PARTIEMC_MUTE_WATCHER, std::vector<std::string>{server_.address(), name}));
-    wait_until([&] { return Listed().watchers() == watchers.size(); }, "watchers");
-    watchers.front()->Signal(SIGSTOP);
+template <typename Ready>
+void Served::WaitUntil(Ready ready, const char* what) {
+  const auto give_up = std::chrono::steady_clock::now() + kPatience;
+  while (!ready()) {
+    ASSERT_TRUE(producer_->Running())
+        << "the producer has ended before " << what << ": " << producer_->Error();
+    ASSERT_LT(std::chrono::steady_clock::now(), give_up) << "no " << what;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-
-  Clocks before = Look(producer, Listed().frames());
-  const auto frames = static_cast<std::uint64_t>(load.seconds * sequence.rate);
-  for (const std::uint64_t end = before.frames + frames; before.frames < end;) {
-    std::this_thread::sleep_for(std::chrono::duration<double>(kFramesPerLook / sequence.rate));
-    Clocks now;
-    wait_until([&] { return (now = Look(producer, Listed().frames())).frames > before.frames; },
-               "frames");
-    if (HasFatalFailure()) return run;
-    now.AddSince(before, run.costs);
-    before = now;
-    run.most_mib = std::max(run.most_mib, server_.process().ResidentMib());
-  }
-  producer.Signal(SIGINT);
-  EXPECT_EQ(producer.Wait(), kInterrupted) << producer.Error();
-  if (watched) ExpectToldWhatWasCounted(watchers, name);
-  return run;
 }
 
-void WatchLoad::ExpectToldWhatWasCounted(std::vector<std::unique_ptr<Program>>& watchers,
-                                         const std::string& name) {
-  watchers.front()->Signal(SIGCONT);
-  watchers.back()->Signal(SIGTERM);
+Clocks Served::Look() {
+  const std::uint64_t frames = Listed().frames();
+  return {.frames = frames,
+          .producer = ProcessCpuMs(producer_->id()),
+          .computing = ThreadsCpuMs(process().process(), "compute"),
+          .server = ProcessCpuMs(process().process())};
+}
+
+Clocks Served::LookAfterMoreThan(std::uint64_t frames) {
+  Clocks now;
+  WaitUntil([&] { return (now = Look()).frames > frames; }, "frames");
+  return now;
+}
+
+void Served::Interrupt() {
+  producer_->Signal(SIGINT);
+  EXPECT_EQ(producer_->Wait(), kInterrupted) << producer_->Error();
+}
+
+// Those who read, of which the first is stopped, and one that never reads.
+class Audience {
+ public:
+  Audience(Served& served, const std::string& name);
+  // Once the stream is over.
+  void ExpectToldWhatWasCounted();
+
+ private:
+  Served& served_;
+  const std::string name_;
+  std::vector<std::unique_ptr<Program>> watchers_;
+};
+
+Audience::Audience(Served& served, const std::string& name) : served_(served), name_(name) {
+  const std::vector<std::string> watch = {"watch",          name,       "--server",
+                                          served.address(), "--rejoin", "0"};
+  for (unsigned k = 0; k < load.readers + 1; ++k) {
+    watchers_.push_back(std::make_unique<Program>(PARTIEMC_PROGRAM, watch));
+  }
+  watchers_.push_back(std::make_unique<Program>(PARTIEMC_MUTE_WATCHER,
+                                                std::vector<std::string>{served.address(), name}));
+  served.WaitUntil([&] { return served.Listed().watchers() == watchers_.size(); }, "watchers");
+  watchers_.front()->Signal(SIGSTOP);
+}
+
+void Audience::ExpectToldWhatWasCounted() {
+  watchers_.front()->Signal(SIGCONT);
+  watchers_.back()->Signal(SIGTERM);
   std::string told;
-  for (const auto& watcher : watchers) {
-    EXPECT_EQ(watcher->Wait(), watcher == watchers.back() ? 0 : kStreamEnded) << watcher->Error();
+  for (const auto& watcher : watchers_) {
+    EXPECT_EQ(watcher->Wait(), watcher == watchers_.back() ? 0 : kStreamEnded) << watcher->Error();
     told += watcher->Out();
   }
   const auto drops_told = NumbersIn(told, "dropped frames: ([0-9]+)");
-  const std::string closed = "watch closed stream=[^ ]+ name=" + name + " ";
+  const std::string closed = "watch closed stream=[^ ]+ name=" + name_ + " ";
   std::vector<std::uint64_t> drops_counted;
   const auto give_up = std::chrono::steady_clock::now() + kPatience;
   do {  // The last line of the log may come a moment after its watcher has heard the end.
     drops_counted =
-        NumbersIn(server_.process().Output(), closed + "frames=[0-9]+ dropped=([0-9]+)");
-  } while (drops_counted.size() < watchers.size() && std::chrono::steady_clock::now() < give_up);
+        NumbersIn(served_.process().Output(), closed + "frames=[0-9]+ dropped=([0-9]+)");
+  } while (drops_counted.size() < watchers_.size() && std::chrono::steady_clock::now() < give_up);
   EXPECT_EQ(drops_told, drops_counted);
-  EXPECT_EQ(drops_told.size(), watchers.size());
+  EXPECT_EQ(drops_told.size(), watchers_.size());
   std::uint64_t sum = 0;
   for (const std::uint64_t drops : drops_told) sum += drops;
   std::printf("  %llu frames dropped, as told and as counted\n",
               static_cast<unsigned long long>(sum));
 }
 
-void WatchLoad::Compare(const Sequence& sequence) {
-  const auto print = [](const char* what, const std::vector<double>& alone,
-                        const std::vector<double>& watched) {
-    const double a = Median(alone), w = Median(watched);
-    std::printf("  processor time a frame, %s: alone %.3f ms, watched %.3f ms, ratio %.3f\n", what,
-                a, w, w / a);
-    return w / a;
-  };
+struct Run {
+  Costs costs, beside;
+  double before_mib = 0, most_mib = 0;
+};
+
+// Measures `served`, and `beside` in the same moments if there is one; that is never watched.
+Run RunOnce(Served& served, Served* beside, const Sequence& sequence, const std::string& name,
+            bool watched) {
+  Run run{.before_mib = served.process().ResidentMib()};
+  served.StartProducer(sequence, name);
+  if (beside != nullptr) beside->StartProducer(sequence, name);
+  std::optional<Audience> audience;
+  if (watched && !::testing::Test::HasFatalFailure()) audience.emplace(served, name);
+  if (::testing::Test::HasFatalFailure()) return run;
+
+  Clocks before = served.Look();
+  Clocks beside_before = beside != nullptr ? beside->Look() : Clocks();
+  const auto frames = static_cast<std::uint64_t>(load.seconds * sequence.rate);
+  for (const std::uint64_t end = before.frames + frames; before.frames < end;) {
+    std::this_thread::sleep_for(std::chrono::duration<double>(kFramesPerLook / sequence.rate));
+    const auto look = [](Served& at, Clocks& last, Costs& costs) {
+      const Clocks now = at.LookAfterMoreThan(last.frames);
+      now.AddSince(last, costs);
+      last = now;
+    };
+    look(served, before, run.costs);
+    if (beside != nullptr) look(*beside, beside_before, run.beside);
+    if (::testing::Test::HasFatalFailure()) return run;
+    run.most_mib = std::max(run.most_mib, served.process().ResidentMib());
+  }
+  served.Interrupt();
+  if (beside != nullptr) beside->Interrupt();
+  if (audience) audience->ExpectToldWhatWasCounted();
+  return run;
+}
+
+// The ratios of all pairs.
+struct Ratios {
   std::vector<double> producer, computing, server;
+
+  void Add(const char* otherwise, const Costs& other, const Costs& watched) {
+    const auto add = [&](const char* what, std::vector<double>& ratios,
+                         const std::vector<double>& others, const std::vector<double>& values) {
+      const double o = Median(others), w = Median(values);
+      ratios.push_back(w / o);
+      std::printf("  processor time a frame, %s: %s %.3f ms, watched %.3f ms, ratio %.3f\n", what,
+                  otherwise, o, w, w / o);
+    };
+    add("process of the producer", producer, other.producer, watched.producer);
+    add("computing thread of the server", computing, other.computing, watched.computing);
+    add("process of the server", server, other.server, watched.server);
+  }
+  void PrintMedians(const char* of) const {
+    std::printf("medians of the ratios%s: producer %.3f, computing thread %.3f, server %.3f\n", of,
+                Median(producer), Median(computing), Median(server));
+  }
+};
+
+void ExpectNoWaits(const Served& served, std::size_t streams) {
+  const auto waits = NumbersIn(served.process().Output(), "stream closed .* watch_waits=([0-9]+)");
+  ASSERT_EQ(waits.size(), streams);
+  EXPECT_EQ(waits.back(), 0u) << "frames of a producer waited for watchers";
+}
+
+void Compare(const Sequence& sequence) {
+  Served served;
+  std::optional<Served> other;
+  if (load.beside) other.emplace();
+  Ratios in_turns, beside;
   for (unsigned pair = 1; pair <= load.pairs; ++pair) {
     std::printf("pair %u\n", pair);
-    const Run alone = RunOnce(sequence, "alone-" + std::to_string(pair), false);
-    const Run watched = RunOnce(sequence, "watched-" + std::to_string(pair), true);
-    if (HasFatalFailure()) return;
-    producer.push_back(
-        print("process of the producer", alone.costs.producer, watched.costs.producer));
-    computing.push_back(
-        print("computing thread of the server", alone.costs.computing, watched.costs.computing));
-    server.push_back(print("process of the server", alone.costs.server, watched.costs.server));
+    const std::string number = std::to_string(pair);
+    const Run alone = RunOnce(served, nullptr, sequence, "alone-" + number, false);
+    const Run watched = RunOnce(served, nullptr, sequence, "watched-" + number, true);
+    if (::testing::Test::HasFatalFailure()) return;
+    in_turns.Add("alone", alone.costs, watched.costs);
     std::printf("  memory of the server: %.1f MiB, alone %.1f, watched %.1f MiB\n",
                 alone.before_mib, alone.most_mib, watched.most_mib);
-    std::fflush(stdout);
     EXPECT_LE(watched.most_mib - watched.before_mib, kMaxMibPerWatcher * (load.readers + 2));
+    if (other) {  // In turns, as no two processes have the same luck with their memory.
+      Served* const two[] = {&served, &*other};
+      const Run both =
+          RunOnce(*two[pair % 2], two[1 - pair % 2], sequence, "beside-" + number, true);
+      if (::testing::Test::HasFatalFailure()) return;
+      beside.Add("beside", both.beside, both.costs);
+    }
+    std::fflush(stdout);
   }
-  std::printf("medians of the ratios: producer %.3f, computing thread %.3f, server %.3f\n",
-              Median(producer), Median(computing), Median(server));
-  const auto waits = NumbersIn(server_.process().Output(), "stream closed .* watch_waits=([0-9]+)");
-  ASSERT_EQ(waits.size(), 2 * load.pairs);
-  EXPECT_EQ(waits.back(), 0u) << "frames of a producer waited for watchers";
+  in_turns.PrintMedians("");
+  if (other) beside.PrintMedians(" to a stream beside");
+  ExpectNoWaits(served, (load.beside ? 3 : 2) * load.pairs);
+  if (other) ExpectNoWaits(*other, load.pairs);
 }
 
 std::uint64_t Enough(double rate) {
   return static_cast<std::uint64_t>((kLeadSeconds + load.seconds) * rate);
 }
 
-TEST_F(WatchLoad, OfASmallDamBreakIsCountedAndBoundedAndDelaysNoFrame) {
+TEST(WatchLoad, OfASmallDamBreakIsCountedAndBoundedAndDelaysNoFrame) {
   const client::TemporaryDirectory folder;
   ASSERT_NO_FATAL_FAILURE(RecordDamBreak(folder.Path("dam.pemc"), Enough(load.rate)));
   Compare({.path = folder.Path("dam.pemc"), .rate = load.rate});
 }
 
-TEST_F(WatchLoad, OfLargeResultsIsCountedAndBoundedAndDelaysNoFrame) {
+TEST(WatchLoad, OfLargeResultsIsCountedAndBoundedAndDelaysNoFrame) {
   const client::TemporaryDirectory folder;
-  ASSERT_NO_FATAL_FAILURE(RecordSquare(folder.Path("square.pemc"), Enough(load.large_rate)));
+  ASSERT_NO_FATAL_FAILURE(
+      RecordSquare(folder.Path("square.pemc"), load.particles, Enough(load.large_rate)));
   // The fill with the largest results: 40 bytes a particle.
   Compare(
       {.path = folder.Path("square.pemc"), .rate = load.large_rate, .flags = {"--fill", "grid"}});
@@ -292,6 +332,7 @@ int main(int argc, char** argv) {
   CLI::App app("What watching costs who is watched.");
   app.add_option("--pairs", load.pairs, "Runs alone, and as many watched")->capture_default_str();
   app.add_option("--readers", load.readers, "Watchers that read")->capture_default_str();
+  app.add_flag("--beside", load.beside, "Also compares with a stream that nobody watches, at once");
   app.add_option("--seconds", load.seconds, "Of each run, measured")->capture_default_str();
   app.add_option("--particles", load.particles, "Of a large frame")->capture_default_str();
   app.add_option("--rate", load.rate, "Small frames per second")->capture_default_str();

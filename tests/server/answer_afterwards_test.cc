@@ -1,0 +1,80 @@
+// When the worker does what an answer leaves to do: telling watchers, whose writes must not come
+// before the producer's own.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "server/memory_budget.h"
+#include "server/moving_blob.h"
+#include "server/scripted_door.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
+
+class AnswerAfterwards : public ::testing::Test {
+ protected:
+  // What was being written when the worker came to what an answer had left.
+  struct Moment {
+    std::optional<Outgoing> what;
+    std::uint64_t sequence = 0;
+  };
+
+  void SetUp() override {
+    door_.afterwards = [this] {
+      const auto& writing = door_.writing();
+      moments_.push_back(writing ? Moment{writing->what, writing->sequence} : Moment{});
+    };
+    door_.BringRequest({.kind = RequestKind::kOpen, .positions = {}});
+  }
+  void SendFrame(std::uint64_t sequence) {
+    door_.BringRequest(
+        {.kind = RequestKind::kFrame, .sequence = sequence, .positions = MovingBlob(1, sequence)});
+  }
+
+  SteppedPool pool_;
+  MemoryBudget budget_{std::uint64_t{1} << 30};
+  ScriptedDoor door_{pool_, budget_, 4, BlobParameters(), kLimits};
+  std::vector<Moment> moments_;
+};
+
+TEST_F(AnswerAfterwards, ComesOnceTheAnswerIsOnItsWay) {
+  door_.EndWrite(true);  // `opened`.
+  for (std::uint64_t k = 1; k <= 3; ++k) {
+    SendFrame(k);
+    pool_.Step();
+    ASSERT_EQ(moments_.size(), k);
+    EXPECT_EQ(moments_.back().what, Outgoing::kAnswer);
+    EXPECT_EQ(moments_.back().sequence, k);
+    door_.EndWrite(true);
+  }
+}
+
+TEST_F(AnswerAfterwards, DoesNotWaitForAClientThatTakesNoAnswers) {
+  ASSERT_EQ(door_.writing()->what, Outgoing::kOpened);  // And stays so.
+  for (std::uint64_t k = 1; k <= 4; ++k) {
+    SendFrame(k);
+    pool_.Step();
+    ASSERT_EQ(moments_.size(), k);
+    EXPECT_EQ(moments_.back().what, Outgoing::kOpened);
+  }
+}
+
+TEST_F(AnswerAfterwards, ComesForAFrameWhoseStreamEndsWhileItIsComputed) {
+  door_.EndWrite(true);
+  SendFrame(1);
+  door_.meanwhile = [this] {
+    door_.EndReads();
+    door_.flow().Cancelled();
+  };
+  pool_.Step();
+  EXPECT_TRUE(door_.finished());
+  ASSERT_EQ(moments_.size(), 1u);
+  EXPECT_EQ(moments_.back().what, std::nullopt);
+}
+
+}  // namespace
+}  // namespace partiemc::server
