@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "hwy/cache_control.h"
 #include "parallel.h"
 #include "partiemc/result.h"
 
@@ -17,6 +18,9 @@ static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into 
 
 // Segments that a task takes at least.
 constexpr std::size_t kSegmentGrain = 512;
+
+// How many segments before its turn a cell's values are asked for: as long as memory takes.
+constexpr std::size_t kFetchedAhead = 16;
 
 // What follows each segment is found in parallel; what is left to do in order is to walk.
 void Trace(const TileDirectory& directory, const Crossings& crossings,
@@ -60,15 +64,26 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
   return {node(here.entry), node((here.entry + 1) & 3)};
 }
 
+// Asks for the values of the level set at a cell's corners, which are far apart in memory from
+// those of the cells before. The next tile's are left out.
+void FetchCorners(const LevelSet& level_set, const ActiveCell& cell) {
+  const float* lower = level_set.tiles[cell.tile].data() + cell.j * kTileSize + cell.i;
+  hwy::Prefetch(lower);
+  if (cell.j + 1 < kTileSize) hwy::Prefetch(lower + kTileSize);
+}
+
 void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
                  const Crossings& crossings, RingTopology& rings) {
   const std::size_t count = rings.segments.size();
   rings.entries.resize(count);
   ParallelForRanges(count, kSegmentGrain, [&](std::size_t first, std::size_t last) {
+    const auto cell_of = [&](std::size_t k) -> const ActiveCell& {
+      return crossings.cells[crossings.segments[rings.segments[k]].cell];
+    };
     for (std::size_t k = first; k < last; ++k) {
-      const Segment& segment = crossings.segments[rings.segments[k]];
-      rings.entries[k] =
-          EdgeCrossing(directory, level_set, crossings.cells[segment.cell], segment.entry);
+      if (k + kFetchedAhead < last) FetchCorners(level_set, cell_of(k + kFetchedAhead));
+      rings.entries[k] = EdgeCrossing(directory, level_set, cell_of(k),
+                                      crossings.segments[rings.segments[k]].entry);
     }
   });
 }
