@@ -60,10 +60,12 @@ std::size_t LoopGroups::MakeBatches() {
 bool LoopGroups::TriangulateGroup(std::span<const double> points, std::size_t group,
                                   Batch& batch) const {
   const std::span<const std::uint32_t> loops = LoopsOf(group);
-  if (loops.size() == 2 &&
-      batch.strip.Triangulate(points, PointsOf(loops[0]), PointsOf(loops[1]), batch.triangles)) {
-    return true;
-  }
+  const auto strip = [&](std::uint32_t loop, std::uint32_t other) {
+    return batch.strip.Triangulate(points, PointsOf(loop), PointsOf(other), batch.triangles);
+  };
+  // The walkers go the other way round when the loops change places: what stops them one way, such
+  // as a pocket of the ring, hardly ever does the other way, while it always does from elsewhere.
+  if (loops.size() == 2 && (strip(loops[0], loops[1]) || strip(loops[1], loops[0]))) return true;
   batch.points.clear();
   batch.offsets.assign(1, 0);
   for (const std::uint32_t loop : loops) {

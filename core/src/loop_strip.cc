@@ -53,10 +53,28 @@ bool LoopStrip::Collect(std::span<const double> points, std::span<const std::uin
   return in_domain;
 }
 
+/// How often a loop turns round itself, counter-clockwise: how often it comes to head right on its
+/// way from down to up, less how often on its way from up to down.
+int LoopStrip::Turns(std::span<const Vertex> vertices) {
+  int turns = 0;
+  for (std::size_t k = 1; k < vertices.size(); ++k) {
+    const Point& before = vertices[k - 1].point;
+    const Point& point = vertices[k].point;
+    const Point& after = vertices[k + 1 < vertices.size() ? k + 1 : 1].point;
+    const bool came_down = SweepsBefore(point, before);
+    if (came_down != SweepsBefore(point, after)) continue;
+    const int turn = Orientation(before, point, after);
+    if ((turn > 0) == came_down) turns += turn;
+  }
+  return turns;
+}
+
 bool LoopStrip::Triangulate(std::span<const double> points, std::span<const std::uint32_t> loop,
                             std::span<const std::uint32_t> other,
                             std::vector<std::uint32_t>& triangles) {
   if (!Collect(points, loop, other)) return false;
+  const int turns = Turns(loop_);
+  if ((turns != 1 && turns != -1) || Turns(other_) != turns) return false;
   const std::size_t size_before = triangles.size();
   // Every point joins the front and every triangle takes one from it, which never has less than
   // two: there are not more triangles than points.

@@ -29,8 +29,10 @@ class LoopStrip {
  public:
   /// Appends as many triangles as the loops have points together, all strictly counter-clockwise by
   /// Orientation. Or returns false, with `triangles` as it was: then nothing is known of the loops.
-  /// Requires, beside what is checked: indices in range, no empty loop, and loops as Triangulator
-  /// wants them, which is not: of two loops that cross, triangles may overlap.
+  /// Refuses loops that do not turn once each, one of them clockwise, whatever they bound, and
+  /// coordinates out of the domain of predicates.h.
+  /// Requires: indices in range, no empty loop, and loops that bound a region as Triangulator wants
+  /// them. That is not checked: of loops that run into themselves, triangles may overlap.
   /// Cost: linear in the points, with two or three Orientations and two distances for each.
   [[nodiscard]] bool Triangulate(std::span<const double> points,
                                  std::span<const std::uint32_t> loop,
@@ -43,6 +45,7 @@ class LoopStrip {
     std::uint32_t index = 0;
   };
 
+  static int Turns(std::span<const Vertex> vertices);
   bool Collect(std::span<const double> points, std::span<const std::uint32_t> loop,
                std::span<const std::uint32_t> other);
 
