@@ -109,7 +109,7 @@ int TakeRowsAbove(const TileDirectory& directory, MergeScratch& scratch, int row
 }
 
 // Cells are taken out this much beyond a box, in cells: a vertex on a lattice line touches the
-// cells on both of its sides, and dividing by the cell size rounds.
+// cells on both of its sides, and the way from world units rounds.
 constexpr double kTouchMargin = 1.0 / 1024;
 
 // Points that a task takes at least.
@@ -119,9 +119,9 @@ constexpr std::size_t kExcludeGrain = 256;
 struct CellBox {
   double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
 
-  void Add(const double* point, double cell_size) {
-    const double x = point[0] / cell_size;
-    const double y = point[1] / cell_size;
+  void Add(const double* point, double cells_per_unit) {
+    const double x = point[0] * cells_per_unit;
+    const double y = point[1] * cells_per_unit;
     x0 = std::min(x0, x);
     x1 = std::max(x1, x);
     y0 = std::min(y0, y);
@@ -198,12 +198,13 @@ void ExcludeBox(const CellBox& box, TileFinder& finder, std::vector<TileBits>& t
 void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
                          std::span<const std::uint32_t> offsets, std::span<const double> roots,
                          double cell_size, std::vector<TileBits>& tiles) {
+  const double cells_per_unit = 1 / cell_size;
   ParallelForRanges(points.size() / 2, kExcludeGrain, [&](std::size_t first, std::size_t last) {
     TileFinder finder(directory);
     const auto box_of = [&](std::size_t point) {
       CellBox box;
-      box.Add(points.data() + 2 * point, cell_size);
-      box.Add(roots.data() + 2 * point, cell_size);
+      box.Add(points.data() + 2 * point, cells_per_unit);
+      box.Add(roots.data() + 2 * point, cells_per_unit);
       return box;
     };
     auto after = std::upper_bound(offsets.begin(), offsets.end(), first);
