@@ -9,6 +9,7 @@
 #include "monotone_pieces.h"
 #include "point.h"
 #include "predicates.h"
+#include "sweep_corners.h"
 
 namespace partiemc {
 namespace {
@@ -23,13 +24,7 @@ struct Edge {
   int SideOf(const Point& point) const { return Orientation(lower, upper, point); }
 };
 
-/// One passage of a loop through a point.
-struct Corner {
-  Point point;
-  std::uint32_t index, previous, next;  // Of points.
-
-  MonotonePieces::Vertex AsVertex() const { return {point, index}; }
-};
+MonotonePieces::Vertex VertexOf(const Corner& corner) { return {corner.point, corner.index}; }
 
 /// An edge that begins at the point in hand and rises from it.
 struct RisingEdge {
@@ -55,11 +50,6 @@ struct Surroundings {
   IntervalOrder::Cursor cursor;  // At `right`, if there is one; where new intervals go, if not.
 };
 
-bool CornerComesFirst(const Corner& a, const Corner& b) {
-  if (a.point == b.point) return a.index < b.index;
-  return SweepsBefore(a.point, b.point);
-}
-
 }  // namespace
 
 class Triangulator::Sweep {
@@ -72,8 +62,6 @@ class Triangulator::Sweep {
     return {points_[2 * std::size_t{index}], points_[2 * std::size_t{index} + 1]};
   }
 
-  bool CollectCorners(std::span<const std::uint32_t> loop_points,
-                      std::span<const std::uint32_t> loop_offsets);
   bool Visit(std::span<const Corner> corners);
   std::optional<std::size_t> SplitEdges(std::span<const Corner> corners);
   bool RisingEdgesAlternate(const Point& point) const;
@@ -90,7 +78,7 @@ class Triangulator::Sweep {
   std::uint32_t NewInterval();
 
   std::span<const double> points_;
-  std::vector<Corner> corners_;
+  SweepCorners corners_;
   std::vector<RisingEdge> rising_;
   std::vector<Interval> intervals_;
   std::vector<std::uint32_t> unused_intervals_;
@@ -104,16 +92,15 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
                               std::vector<std::uint32_t>& triangles) {
   points_ = points;
   const std::size_t size_before = triangles.size();
-  corners_.clear();
   intervals_.clear();
   unused_intervals_.clear();
   pieces_.Clear(triangles);
   order_.Clear();
 
-  if (!CollectCorners(loop_points, loop_offsets)) return false;
-  std::sort(corners_.begin(), corners_.end(), CornerComesFirst);
-  for (auto begin = corners_.cbegin(); begin != corners_.cend();) {
-    const auto end = std::find_if(begin + 1, corners_.cend(), [&](const Corner& corner) {
+  if (!corners_.Collect(points, loop_points, loop_offsets)) return false;
+  const std::span<const Corner> corners = corners_.corners();
+  for (auto begin = corners.begin(); begin != corners.end();) {
+    const auto end = std::find_if(begin + 1, corners.end(), [&](const Corner& corner) {
       return corner.point != begin->point;
     });
     if (!Visit(std::span(begin, end))) {
@@ -121,27 +108,6 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
       return false;
     }
     begin = end;
-  }
-  return true;
-}
-
-bool Triangulator::Sweep::CollectCorners(std::span<const std::uint32_t> loop_points,
-                                         std::span<const std::uint32_t> loop_offsets) {
-  if (loop_offsets.empty()) return loop_points.empty();
-  if (loop_offsets.front() != 0 || loop_offsets.back() != loop_points.size()) return false;
-  for (std::size_t loop = 0; loop + 1 < loop_offsets.size(); ++loop) {
-    const std::size_t begin = loop_offsets[loop];
-    const std::size_t end = loop_offsets[loop + 1];
-    // A decrease is seen here before an offset beyond the last is used.
-    if (end > loop_points.size() || end < begin + 3) return false;
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t index = loop_points[i];
-      if (index >= points_.size() / 2) return false;
-      const Point point = PointAt(index);
-      if (!InPredicateDomain(point.x) || !InPredicateDomain(point.y)) return false;
-      corners_.push_back({point, index, loop_points[i == begin ? end - 1 : i - 1],
-                          loop_points[i + 1 == end ? begin : i + 1]});
-    }
   }
   return true;
 }
@@ -289,7 +255,7 @@ IntervalOrder::Cursor Triangulator::Sweep::Start(const Corner& vertex,
     Interval& interval = intervals_[id];
     interval.left = {vertex.point, edges[i].upper};
     interval.right = {vertex.point, edges[i + 1].upper};
-    interval.left_piece = pieces_.Start(vertex.AsVertex());
+    interval.left_piece = pieces_.Start(VertexOf(vertex));
     cursor = order_.Insert(cursor, id);
   }
   return cursor;
@@ -314,29 +280,29 @@ std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const Corner&
     right.left_piece = fresh;
     if (left.left_piece.is_left_chain) std::swap(left.left_piece, right.left_piece);
   }
-  pieces_.AddToRightChain(left.left_piece, vertex.AsVertex());
-  pieces_.AddToLeftChain(right.left_piece, vertex.AsVertex());
+  pieces_.AddToRightChain(left.left_piece, VertexOf(vertex));
+  pieces_.AddToLeftChain(right.left_piece, VertexOf(vertex));
   return right_id;
 }
 
 void Triangulator::Sweep::AddToLeftChain(Interval& interval, const Corner& vertex) {
   if (interval.IsMerged()) {
-    pieces_.Finish(interval.left_piece, vertex.AsVertex());
+    pieces_.Finish(interval.left_piece, VertexOf(vertex));
     interval.left_piece = interval.right_piece;
     interval.right_piece = {};
   }
-  pieces_.AddToLeftChain(interval.left_piece, vertex.AsVertex());
+  pieces_.AddToLeftChain(interval.left_piece, VertexOf(vertex));
 }
 
 void Triangulator::Sweep::AddToRightChain(Interval& interval, const Corner& vertex) {
-  if (interval.IsMerged()) pieces_.Finish(interval.right_piece, vertex.AsVertex());
-  pieces_.AddToRightChain(interval.left_piece, vertex.AsVertex());
+  if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
+  pieces_.AddToRightChain(interval.left_piece, VertexOf(vertex));
 }
 
 void Triangulator::Sweep::Close(std::uint32_t id, const Corner& vertex) {
   Interval& interval = intervals_[id];
-  if (interval.IsMerged()) pieces_.Finish(interval.right_piece, vertex.AsVertex());
-  pieces_.Finish(interval.left_piece, vertex.AsVertex());
+  if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
+  pieces_.Finish(interval.left_piece, VertexOf(vertex));
   unused_intervals_.push_back(id);
 }
 

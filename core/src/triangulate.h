@@ -52,8 +52,9 @@ class Triangulator {
   ///   - of several points at one place, the triangles name the one of lowest index.
   /// Otherwise `triangles` is as it was.
   ///
-  /// Cost: n log n for the sort and the searches, plus n times the square root of the number of
-  /// edges that a line meets, with a tiny factor. Memory: about 100 bytes per point on the loops.
+  /// Cost: n log n for the searches, and for the sort where heights crowd, plus n times the square
+  /// root of the number of edges that a line meets, with a tiny factor. Memory: about 150 bytes per
+  /// point on the loops.
   [[nodiscard]] bool Triangulate(std::span<const double> points,
                                  std::span<const std::uint32_t> loop_points,
                                  std::span<const std::uint32_t> loop_offsets,
