@@ -1,8 +1,9 @@
 #!/bin/bash
 # Builds the image from the Dockerfile without a container engine and tries it: the server answers
-# its health check and a replay, runs as a non-root user, and leaves within 5 s of SIGTERM with
-# exit code 0. Needs root; installs debootstrap and buildah where they are missing. The base system
-# is kept in build/image; every container and image is removed at the end.
+# its health check and a replay, in the clear and as compose.tls.yaml has it, runs as a non-root
+# user, and leaves within 5 s of SIGTERM with exit code 0. Needs root; installs the packages of the
+# set `image` where they are missing. The base system is kept in build/image; every container and
+# image is removed at the end.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -112,8 +113,19 @@ stop_server() {
 }
 
 replay() {
-  in_container partiemc replay /usr/local/share/partiemc/recordings/dam_break.pemc \
-    --server 127.0.0.1:50051 --quiet "$@"
+  in_container partiemc replay /usr/local/share/partiemc/recordings/dam_break.pemc --quiet "$@"
+}
+
+# What docker/compose.tls.yaml says of a service: its environment, or its command; one a line.
+composed() {
+  /usr/bin/python3 - "$@" <<'PYTHON'
+import sys, yaml
+
+key, service = sys.argv[1:]
+value = yaml.safe_load(open("docker/compose.tls.yaml"))["services"][service][key]
+for line in value if key == "command" else (f"{name}={text}" for name, text in value.items()):
+    print(line)
+PYTHON
 }
 
 trap cleanup EXIT
@@ -126,8 +138,9 @@ root=$("${buildah[@]}" mount "$container")
 user=$(configured '{{.Docker.Config.User}}')
 lines='{{range .}}{{println .}}{{end}}'
 mapfile -t environment < <(configured "{{with .Docker.Config.Env}}$lines{{end}}")
-mapfile -t command < <(configured "{{with .Docker.Config.Entrypoint}}$lines{{end}}" \
-  && configured "{{with .Docker.Config.Cmd}}$lines{{end}}")
+mapfile -t entry_point < <(configured "{{with .Docker.Config.Entrypoint}}$lines{{end}}")
+mapfile -t arguments < <(configured "{{with .Docker.Config.Cmd}}$lines{{end}}")
+command=("${entry_point[@]}" "${arguments[@]}")
 mapfile -t check < <(configured "{{with .Docker.Config.Healthcheck.Test}}$lines{{end}}")
 [[ -n $user ]] || fail "the image names no user"
 [[ ${check[0]:-} == CMD ]] || fail "the image has no health check"
@@ -145,17 +158,38 @@ uid=$(in_container id -u)
 [[ $(awk '/^Uid:/ { print $2 $3 $4 $5 }' "/proc/$server/status") == "$uid$uid$uid$uid" ]] ||
   fail "the server does not run as user $uid"
 echo "server and commands run as user $uid"
-replay --output-dir /data/frames --format geojson
+clear=(--server 127.0.0.1:50051)
+replay "${clear[@]}" --output-dir /data/frames --format geojson
 frames=$(in_container find /data/frames -name '*.geojson' -size +0 | wc -l)
 ((frames > 0)) || fail "the replay left no frames"
 echo "replay: $frames frames"
 stop_server "when idle"
 
 start_server
-replay --rate 2 >/dev/null 2>&1 &
+replay "${clear[@]}" --rate 2 >/dev/null 2>&1 &
 client=$!
 sleep 2
 kill -0 "$client" 2>/dev/null || fail "the replay at two frames a second is over too early"
 stop_server "under an open stream"
 wait "$client" || true
+
+# As docker/compose.tls.yaml has it.
+docker/try_tls.sh "$root/tls"
+echo "127.0.0.1 server" >>"$root/etc/hosts"
+image_environment=("${environment[@]}")
+mapfile -t composed < <(composed environment server)
+environment=("${image_environment[@]}" "${composed[@]}")
+mapfile -t arguments < <(composed command server)
+command=("${entry_point[@]}" "${arguments[@]}")
+start_server
+echo "healthy over TLS"
+environment=("${image_environment[@]}")
+! replay "${clear[@]}" 2>/dev/null || fail "a server with TLS takes a replay in the clear"
+mapfile -t composed < <(composed environment replay)
+environment+=("${composed[@]}")
+replay --server server:50051
+! in_container env -u PARTIEMC_TOKEN_FILE partiemc info --server server:50051 >/dev/null 2>&1 ||
+  fail "a server with tokens answers who has none"
+echo "replay over TLS, with a token"
+stop_server "over TLS"
 echo "test_image.sh: passed"
