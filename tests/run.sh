@@ -13,8 +13,9 @@ Steps, all of them by default:
   layout      every source file is laid out as .clang-format says
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
-  sanitized   core and sessions under AddressSanitizer and UndefinedBehaviorSanitizer
-  threads     the same under ThreadSanitizer, as far as threads meet in them
+  sanitized   core, sessions and client streams under AddressSanitizer and
+              UndefinedBehaviorSanitizer
+  threads     core and sessions under ThreadSanitizer, as far as threads meet in them
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
   core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
@@ -109,8 +110,9 @@ step_recordings() {
     --partiemc build/release/bin/partiemc
 }
 
-# Core and server, one room after the other, so that nothing else is compiled with sanitizers but
-# what the fuzzers attack, in the next step but one: it is the same build.
+# Core and server, one room after the other, then of the client what goes on in the background, so
+# that nothing else is compiled with sanitizers but what the fuzzers attack, in the next step but
+# one: it is the same build.
 step_sanitized() {
   check "sanitized: configure" cmake --preset asan || return
   local room
@@ -118,6 +120,9 @@ step_sanitized() {
     check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
       run_ctest "sanitized $room" "build/asan/tests/$room"
   done
+  check "sanitized: build client" cmake --build build/asan -j "$jobs" \
+    --target partiemc_sanitized_tests &&
+    run_ctest "sanitized client" build/asan/tests/client/library -L sanitized
 }
 
 step_threads() {
