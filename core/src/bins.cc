@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <string>
 
@@ -29,26 +30,28 @@ double TileMargin(const Scale& scale) {
 // cache.
 constexpr std::size_t kBlockParticles = 256;
 
-// The homes met last, by the low bits of their coordinates: a body of up to 128 x 128 tiles finds
-// all of its homes here, without a probe of the directory that would have to be guessed.
+// The homes met last, by the low bits of their coordinates: a body of up to 256 x 128 tiles finds
+// all of its homes here, and thousands of scattered tiles most of theirs, without a probe of the
+// directory that would have to be guessed. Homes whose index is too large are not remembered.
 class RecentHomes {
  public:
-  explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNoTile); }
+  explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNone); }
 
   std::uint32_t Find(TileCoordinate tile) {
-    constexpr int kMask = (1 << kBits) - 1;
-    std::uint32_t& index = index_[(tile.y & kMask) << kBits | (tile.x & kMask)];
-    if (index == kNoTile || stretch_.homes[index] != tile) {
-      index = stretch_.homes.Insert(tile);
-      if (index == stretch_.entries.size()) stretch_.entries.push_back(0);
-    }
+    constexpr int kColumns = (1 << kColumnBits) - 1, kRows = (1 << kRowBits) - 1;
+    std::uint16_t& recent = index_[(tile.y & kRows) << kColumnBits | (tile.x & kColumns)];
+    if (recent != kNone && stretch_.homes[recent] == tile) return recent;
+    const std::uint32_t index = stretch_.homes.Insert(tile);
+    if (index == stretch_.entries.size()) stretch_.entries.push_back(0);
+    recent = static_cast<std::uint16_t>(std::min<std::uint32_t>(index, kNone));
     return index;
   }
 
  private:
-  static constexpr int kBits = 7;
+  static constexpr int kColumnBits = 8, kRowBits = 7;
+  static constexpr std::uint16_t kNone = std::numeric_limits<std::uint16_t>::max();
   BinStretch& stretch_;
-  std::array<std::uint32_t, 1 << 2 * kBits> index_;
+  std::array<std::uint16_t, 1 << (kColumnBits + kRowBits)> index_;
 };
 
 // First pass over a stretch: finds home tiles and counts. Returns false if a particle is too far
