@@ -83,11 +83,6 @@ BucketBox BucketGrid::Around(const CellMask& mask) const {
           .rows = last_of(last_row) - box.row + 1};
 }
 
-bool BucketGrid::KeepsTilesApart() const {
-  const auto parts = [&](double side) { return Along(side - kStep) < Along(side); };
-  return parts(0) && parts(kTileSize);
-}
-
 void BucketGrid::Find(const NearEntries& near, const BucketBox& box, Buckets& buckets) const {
   HWY_DYNAMIC_DISPATCH(FindBuckets)(margin_, per_cell_, columns_, box, near, buckets.data());
 }

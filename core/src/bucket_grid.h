@@ -38,9 +38,6 @@ class BucketGrid {
   /// The smallest box with all that lies in cells of a mask, which has some.
   BucketBox Around(const CellMask& mask) const;
 
-  /// Whether no bucket has particles of two tiles.
-  bool KeepsTilesApart() const;
-
   /// By entry: its bucket, row after row of a box that has them all. Vectors may write a few more.
   using Buckets = std::array<std::int32_t, NearEntries::kCapacity + NearEntries::kPadding>;
   void Find(const NearEntries& near, const BucketBox& box, Buckets& buckets) const;

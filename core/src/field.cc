@@ -42,7 +42,7 @@ void SumTile(const ParticleBins& bins, float radius, std::uint32_t tile, LevelSe
     ScatterKernels(EntriesOf(bins, tile), radius, sums);
     level_set.rims.Keep(tile, sums);
   } else {
-    NearWalk(bins, tile, nullptr).InAnyOrder([&](const NearEntries& near) {
+    NearWalk(bins, tile, nullptr, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
       ScatterNearKernels(near, WeightsOf(bins), radius, sums);
     });
   }
@@ -70,13 +70,15 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   const bool masked = reach < kMaskMargin;
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) mask = Widened(asked.rows, reach, reach - 1);
-  NearWalk(bins, tile, masked ? &mask : nullptr).InAnyOrder([&](const NearEntries& near) {
-    ScatterNearMoments(near, static_cast<float>(scale.kernel_radius), asked, sums);
-  });
+  NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)
+      .ForEachBlock([&](const NearEntries& near) {
+        ScatterNearMoments(near, static_cast<float>(scale.kernel_radius), asked, sums);
+      });
   return EvaluateNodes(asked, sums, WeightOf(bins, scale), scale, level_set.tiles[tile].data());
 }
 
-// Third pass: F where the density leaves the side of a node open.
+// Still second pass, while the sums are in the nearest cache: F where the density leaves the side
+// of a node open.
 void SampleOpenNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                      LevelSet& level_set) {
   const BitRows& open = level_set.open[tile];
@@ -106,7 +108,7 @@ BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level
   return ends;
 }
 
-// Fourth pass: F where the density has decided the side, but the isoline crosses an edge.
+// Third pass: F where the density has decided the side, but the isoline crosses an edge.
 void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   BitRows ends = EndsOfCrossedEdges(bins.tiles, level_set, tile);
@@ -130,8 +132,10 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   const auto radius = static_cast<float>(scale.kernel_radius);
   if (radius <= kSumMargin) level_set.rims.Prepare(bins, radius);
   ForEachTile(bins, [&](std::uint32_t tile) { SumTile(bins, radius, tile, level_set); });
-  ForEachTile(bins, [&](std::uint32_t tile) { ClassifyTile(bins, scale, tile, level_set); });
-  ForEachTile(bins, [&](std::uint32_t tile) { SampleOpenNodes(bins, scale, tile, level_set); });
+  ForEachTile(bins, [&](std::uint32_t tile) {
+    ClassifyTile(bins, scale, tile, level_set);
+    SampleOpenNodes(bins, scale, tile, level_set);
+  });
   ForEachTile(bins, [&](std::uint32_t tile) { SampleDecidedEnds(bins, scale, tile, level_set); });
 }
 

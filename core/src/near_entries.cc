@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #ifndef PARTIEMC_NEAR_ENTRIES_ONCE
 #define PARTIEMC_NEAR_ENTRIES_ONCE
@@ -22,6 +21,15 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> ChosenLanes() {
 }
 
 constexpr auto kChosenLanes = ChosenLanes();
+
+// The entries [first, last) of a tile, those in `cells` of it; relative to another tile they are
+// shifted.
+struct ListPart {
+  std::span<const BinEntry> entries;
+  std::uint32_t first, last;
+  const BitRows& cells;
+  float shift_x, shift_y;
+};
 
 }  // namespace
 }  // namespace partiemc
@@ -109,16 +117,17 @@ class Compressor {
 #endif
 };
 
-// Sets `near` to those of the entries [first, last) that lie in `cells` of their tile.
-// Reads whole vectors, if need be of the entries behind them.
-void ChooseEntries(std::span<const BinEntry> entries, std::uint32_t first, std::uint32_t last,
-                   const BitRows& cells, float shift_x, float shift_y, NearEntries& near) {
+// Sets `near` to the chosen entries. Reads whole vectors, if need be of the entries behind them.
+template <NearFields kFields>
+void ChooseFields(const ListPart& part, NearEntries& near) {
   const Lanes d;
   const Bits d_bits;
   const Indices d_index;
   const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
-  const RowTable rows(cells);
+  const RowTable rows(part.cells);
   const auto lane = hn::Iota(d_index, 0);
+  const auto [entries, start, last, cells, shift_x, shift_y] = part;
+  std::uint32_t first = start;
   int chosen = 0;
   for (; first < last && first + lanes <= entries.size(); first += lanes) {
     hn::Vec<Lanes> x, y, source;
@@ -130,10 +139,12 @@ void ChooseEntries(std::span<const BinEntry> entries, std::uint32_t first, std::
     const Compressor compress(is_in);
     hn::StoreU(compress(d, hn::Add(x, hn::Set(d, shift_x))), d, near.x.data() + chosen);
     hn::StoreU(compress(d, hn::Add(y, hn::Set(d, shift_y))), d, near.y.data() + chosen);
-    hn::StoreU(compress(d_index, hn::BitCast(d_index, source)), d_index,
-               near.source.data() + chosen);
-    hn::StoreU(compress(d_index, hn::Add(hn::Set(d_index, first), lane)), d_index,
-               near.entry.data() + chosen);
+    if constexpr (kFields == NearFields::kAll) {
+      hn::StoreU(compress(d_index, hn::BitCast(d_index, source)), d_index,
+                 near.source.data() + chosen);
+      hn::StoreU(compress(d_index, hn::Add(hn::Set(d_index, first), lane)), d_index,
+                 near.entry.data() + chosen);
+    }
     chosen += static_cast<int>(hn::CountTrue(d_bits, is_in));
   }
   for (; first < last; ++first) {
@@ -147,6 +158,11 @@ void ChooseEntries(std::span<const BinEntry> entries, std::uint32_t first, std::
   near.count = chosen;
 }
 
+void ChooseEntries(const ListPart& part, NearFields fields, NearEntries& near) {
+  fields == NearFields::kAll ? ChooseFields<NearFields::kAll>(part, near)
+                             : ChooseFields<NearFields::kPositions>(part, near);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc
 HWY_AFTER_NAMESPACE();
@@ -156,8 +172,9 @@ namespace partiemc {
 
 HWY_EXPORT(ChooseEntries);
 
-NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask)
-    : entries_(bins.entries) {
+NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask,
+                   NearFields fields)
+    : entries_(bins.entries), fields_(fields) {
   const Neighbourhood& neighbours = bins.tiles.neighbours(tile);
   const unsigned places = mask != nullptr ? NeighboursWithCells(*mask) : ~0u;
   for (int place = 0; place < kMaxLists; ++place) {
@@ -177,56 +194,16 @@ NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask*
 }
 
 // Chooses the next of a list's entries. Returns false if there are no more.
-bool NearWalk::ChooseMore(List& list) const {
-  list.chosen.count = 0;
-  while (list.chosen.count == 0 && list.next < list.end) {
+bool NearWalk::ChooseMore(List& list) {
+  chosen_.count = 0;
+  while (chosen_.count == 0 && list.next < list.end) {
     const std::uint32_t last =
         list.next + std::min<std::uint32_t>(NearEntries::kCapacity, list.end - list.next);
-    HWY_DYNAMIC_DISPATCH(ChooseEntries)
-    (entries_, list.next, last, list.cells, list.shift_x, list.shift_y, list.chosen);
+    const ListPart part{entries_, list.next, last, list.cells, list.shift_x, list.shift_y};
+    HWY_DYNAMIC_DISPATCH(ChooseEntries)(part, fields_, chosen_);
     list.next = last;
   }
-  return list.chosen.count > 0;
-}
-
-// Heads compare as their particles' indices in the frame; nothing comes after the end.
-void NearWalk::SetHead(int list) {
-  List& of = lists_[list];
-  if (of.merged == of.chosen.count) {
-    of.merged = 0;
-    if (!ChooseMore(of)) {
-      heads_[list] = std::numeric_limits<std::uint64_t>::max();
-      return;
-    }
-  }
-  heads_[list] = std::uint64_t{of.chosen.source[of.merged]} << 32 | static_cast<unsigned>(list);
-}
-
-void NearWalk::StartMerging() {
-  for (int k = 0; k < list_count_; ++k) {
-    lists_[k].merged = lists_[k].chosen.count = 0;
-    SetHead(k);
-  }
-}
-
-bool NearWalk::MergeNext(NearEntries& near) {
-  near.count = 0;
-  while (near.count < NearEntries::kCapacity) {
-    // Without a branch on what comes first, which nobody could guess.
-    std::uint64_t first = std::numeric_limits<std::uint64_t>::max();
-    for (int k = 0; k < list_count_; ++k) first = std::min(first, heads_[k]);
-    if (first == std::numeric_limits<std::uint64_t>::max()) break;
-    const auto list = static_cast<int>(first & 0xff);
-    List& of = lists_[list];
-    near.x[near.count] = of.chosen.x[of.merged];
-    near.y[near.count] = of.chosen.y[of.merged];
-    near.entry[near.count] = of.chosen.entry[of.merged];
-    near.source[near.count] = of.chosen.source[of.merged];
-    ++near.count;
-    ++of.merged;
-    SetHead(list);
-  }
-  return near.count > 0;
+  return chosen_.count > 0;
 }
 
 }  // namespace partiemc

@@ -27,49 +27,40 @@ struct NearEntries {
   int count = 0;
 };
 
+/// What a walk tells of particles.
+enum class NearFields { kPositions, kAll };
+
 /// A walk over the particles in cells of `mask`, or over all of a tile and its neighbours where it
 /// is null. Cost: linear in the lists of those tiles in which the mask has cells.
 class NearWalk {
  public:
-  NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask);
+  NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask, NearFields fields);
 
-  /// Calls visit(const NearEntries&) for all in the order of the frame: a sum over them does not
-  /// know of tiles.
+  /// Calls visit(const NearEntries&) for all, a block after the other: tile after tile in the order
+  /// of Neighbourhood, those of each in the order of the frame.
   template <typename Visit>
-  void InOrder(Visit visit) {
-    if (list_count_ == 1) return InAnyOrder(visit);
-    NearEntries near;
-    for (StartMerging(); MergeNext(near);) visit(std::as_const(near));
-  }
-
-  /// The same in the order of the lists, which is cheaper.
-  template <typename Visit>
-  void InAnyOrder(Visit visit) {
+  void ForEachBlock(Visit visit) {
     for (int k = 0; k < list_count_; ++k) {
-      while (ChooseMore(lists_[k])) visit(std::as_const(lists_[k].chosen));
+      while (ChooseMore(lists_[k])) visit(std::as_const(chosen_));
     }
   }
 
  private:
-  // A tile's list, and those of it that are chosen and not yet merged.
+  // What is left of a tile's list.
   struct List {
     std::uint32_t next, end;
     BitRows cells;
     float shift_x, shift_y;
-    NearEntries chosen;
-    int merged;
   };
   static constexpr int kMaxLists = std::tuple_size_v<Neighbourhood>;
 
-  bool ChooseMore(List& list) const;
-  void StartMerging();
-  bool MergeNext(NearEntries& near);
-  void SetHead(int list);
+  bool ChooseMore(List& list);
 
   std::span<const BinEntry> entries_;
+  NearFields fields_;
   std::array<List, kMaxLists> lists_;
   int list_count_ = 0;
-  std::array<std::uint64_t, kMaxLists> heads_;  // By list: source and list of the next to merge.
+  NearEntries chosen_;
 };
 
 }  // namespace partiemc

@@ -72,10 +72,10 @@ std::span<std::uint32_t> PointField::OffsetsOf(std::uint32_t tile) {
 }
 
 // The particles within reach of a point that may be asked for.
-NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile) const {
-  if (!HasMasks()) return NearWalk(bins, tile, nullptr);
+NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile, NearFields fields) const {
+  if (!HasMasks()) return NearWalk(bins, tile, nullptr, fields);
   const CellMask mask = Widened(asked_[tile], Reach(), Reach());
-  return NearWalk(bins, tile, &mask);
+  return NearWalk(bins, tile, &mask, fields);
 }
 
 // Counts the particles in each bucket of a tile. Returns how many they are.
@@ -84,7 +84,7 @@ std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t t
   std::fill(offsets.begin(), offsets.end(), 0);
   BucketGrid::Buckets buckets;
   std::uint32_t count = 0;
-  Near(bins, tile).InAnyOrder([&](const NearEntries& near) {
+  Near(bins, tile, NearFields::kPositions).ForEachBlock([&](const NearEntries& near) {
     grid_.Find(near, boxes_[tile], buckets);
     for (int k = 0; k < near.count; ++k) ++offsets[buckets[k]];
     count += static_cast<std::uint32_t>(near.count);
@@ -102,7 +102,7 @@ void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
     next += in_bucket;
   }
   BucketGrid::Buckets buckets;
-  const auto fill = [&](const NearEntries& near) {
+  Near(bins, tile, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
     grid_.Find(near, boxes_[tile], buckets);
     for (int k = 0; k < near.count; ++k) {
       const std::uint32_t to = offsets[buckets[k]]++;
@@ -111,10 +111,7 @@ void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
       source_[to] = near.source[k];
       if (!bins.weight.empty()) weight_[to] = bins.weight[near.entry[k]];
     }
-  };
-  // Each bucket in the order of the frame: that of a tile's list, unless it has entries of two.
-  NearWalk walk = Near(bins, tile);
-  grid_.KeepsTilesApart() ? walk.InAnyOrder(fill) : walk.InOrder(fill);
+  });
   // Filling moved every offset to the start of the next bucket.
   std::copy_backward(offsets.begin(), offsets.end() - 1, offsets.end());
   offsets.front() = first_entry_[tile];

@@ -95,7 +95,7 @@ class PointField {
   std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
   bool HasMasks() const { return Reach() < kMaskMargin; }
   int Reach() const { return static_cast<int>(std::ceil(scale_.kernel_radius)); }
-  NearWalk Near(const ParticleBins& bins, std::uint32_t tile) const;
+  NearWalk Near(const ParticleBins& bins, std::uint32_t tile, NearFields fields) const;
   std::uint32_t CountEntries(const ParticleBins& bins, std::uint32_t tile);
   void FillEntries(const ParticleBins& bins, std::uint32_t tile);
 

@@ -155,10 +155,11 @@ class NodeFormula {
   HWY_INLINE Vector operator()(Vector value, const MomentSums& sums, int at) const {
     const auto load = [&](const NodeSums& of) HWY_ATTR { return hn::LoadU(d_, of.data() + at); };
     const Vector k = asked_.has_kernel_sums ? value : load(sums.kernel);
-    const Vector mean_x = hn::Div(load(sums.moment_x), k);
-    const Vector mean_y = hn::Div(load(sums.moment_y), k);
+    const Vector inverse = hn::Div(hn::Set(d_, 1.0f), k);
+    const Vector mean_x = hn::Mul(load(sums.moment_x), inverse);
+    const Vector mean_y = hn::Mul(load(sums.moment_y), inverse);
     const Vector phi = hn::Sub(Length(mean_x, mean_y), reference_radius_);
-    const Vector share = hn::Div(inverse_square_, k);
+    const Vector share = hn::Mul(inverse_square_, inverse);
     const Vector xx = hn::Mul(load(sums.xx), share);
     const Vector xy = hn::Mul(load(sums.xy), share);
     const Vector yy = hn::Mul(load(sums.yy), share);

@@ -85,14 +85,5 @@ TEST(BucketGrid, ABucketReachesNoFartherThanAQuarterOfAKernelOrACell) {
   }
 }
 
-TEST(BucketGrid, KeepsTilesApartWhereNoBucketReachesAcrossTheirSides) {
-  EXPECT_TRUE(BucketGrid(2).KeepsTilesApart());
-  EXPECT_TRUE(BucketGrid(3).KeepsTilesApart());
-  EXPECT_TRUE(BucketGrid(8).KeepsTilesApart());  // Buckets of two cells.
-  EXPECT_FALSE(BucketGrid(2.5).KeepsTilesApart());
-  EXPECT_FALSE(BucketGrid(std::nextafter(3.0, 2.0)).KeepsTilesApart());  // By less than a step.
-  EXPECT_FALSE(BucketGrid(7).KeepsTilesApart());
-}
-
 }  // namespace
 }  // namespace partiemc

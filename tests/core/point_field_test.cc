@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "support/instruction_sets.h"
@@ -235,27 +237,39 @@ TEST(PointField, TwoPointsAtOnceAgreeWithEachAlone) {
 }
 
 // Sums over particles have the same bits however these were sorted only if their order is one.
-TEST(PointField, ListsParticlesOfABucketInTheOrderOfTheFrame) {
+TEST(PointField, ListsParticlesOfABucketTileByTileInTheOrderOfTheFrame) {
   for (const double radius : {3.0, 2.6}) {  // Buckets within tiles, and across their sides.
     support::Random random(7);
     support::Particles particles = support::Blob(random, 20);
     for (int k = 0; k < 2000; ++k) particles.Add(random.Uniform(-1, 1), random.Uniform(-25, 25));
     Stages stages;
     stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0, .kernel_radius = radius});
-    int pairs = 0;
+    std::vector<std::uint32_t> tile_of(stages.bins.entries.size());
+    for (std::uint32_t tile = 0; tile < stages.bins.tiles.size(); ++tile) {
+      for (std::uint32_t e = stages.bins.offsets[tile]; e < stages.bins.offsets[tile + 1]; ++e) {
+        tile_of[stages.bins.entries[e].source] = tile;
+      }
+    }
+    int pairs = 0, pairs_of_tiles = 0;
     for (int k = 0; k < 500; ++k) {
       const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
       const double x = random.Chance(0.5) ? 31.999 : random.Uniform(0, 32);
       const double y = random.Uniform(0, 32);
       if (!stages.field.Covers(tile, x, y)) continue;
-      std::uint32_t last = 0;
+      std::optional<std::pair<std::uint32_t, std::uint32_t>> last;
       stages.field.ForEachNear(tile, x, y, 0, [&](double, double, std::uint32_t entry) {
-        EXPECT_LE(last, stages.field.SourceOf(entry));
-        pairs += last > 0;
-        last = stages.field.SourceOf(entry);
+        const std::uint32_t source = stages.field.SourceOf(entry);
+        const std::pair here(tile_of[source], source);
+        if (last) {
+          EXPECT_LT(*last, here);
+          ++pairs;
+          pairs_of_tiles += last->first != here.first;
+        }
+        last = here;
       });
     }
     EXPECT_GT(pairs, 100);
+    EXPECT_EQ(pairs_of_tiles > 0, radius != 3.0);
   }
 }
 
