@@ -3,7 +3,6 @@
 #include <bit>
 #include <cstddef>
 
-#include "coordinate_block.h"
 #include "lattice.h"
 
 // Highway compiles the rest of this file once for each target.
@@ -53,9 +52,6 @@ HWY_EXPORT(FindBuckets);
 
 // Wide kernels get wider buckets: a query then still looks at about ten rows of them.
 constexpr double kBucketsPerRadius = 4;
-
-// Positions are so far apart at least.
-constexpr double kStep = 1.0 / (1 << kFractionBits);
 
 }  // namespace
 

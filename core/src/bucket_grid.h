@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "cell_mask.h"
+#include "coordinate_block.h"
 #include "near_entries.h"
 
 namespace partiemc {
@@ -22,6 +23,9 @@ struct BucketBox {
 /// outermost ones.
 class BucketGrid {
  public:
+  /// Positions are multiples of it.
+  static constexpr double kStep = 1.0 / (1 << kFractionBits);
+
   BucketGrid() = default;
   /// For queries within `radius` cells of points of the tile.
   explicit BucketGrid(double radius);

@@ -13,7 +13,9 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 
 #include "near_rows.h"
@@ -34,14 +36,14 @@ constexpr int kParts = kPartialSums / kLanes;
 // Particles beside each other, in coordinates relative to NearRows' origin, then at least
 // kPartialSums that are far from everything.
 struct NearChunk {
-  static constexpr int kCapacity = 256;
+  static constexpr int kCapacity = 128;
   static constexpr float kFar = 1e6f;
   static constexpr int kRoom = kCapacity + kPartialSums;
 
   HWY_ALIGN float x[kRoom];
   HWY_ALIGN float y[kRoom];
   HWY_ALIGN float weight[kRoom];
-  int count = 0;
+  int count;
 };
 
 // Appends entries [first, first + count), for which there is room. A vector's worth is always
@@ -65,34 +67,74 @@ HWY_INLINE void Append(const NearRows& near, std::uint32_t first, int count, Nea
   chunk.count += count;
 }
 
+// Ends a chunk with particles that are far from everything.
+template <bool kWeighted>
+HWY_INLINE void Close(NearChunk& chunk) {
+  const Lanes d;
+  for (int part = 0; part < kParts; ++part) {
+    const int to = chunk.count + part * kLanes;
+    hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.x + to);
+    hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.y + to);
+    if constexpr (kWeighted) hn::StoreU(hn::Zero(d), d, chunk.weight + to);
+  }
+}
+
 // Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
 template <bool kWeighted, typename Visit>
-HWY_INLINE void ForEachChunk(const NearRows& near, Visit visit) {
-  const Lanes d;
-  NearChunk chunk;
-  const auto close = [&]() HWY_ATTR {
-    for (int part = 0; part < kParts; ++part) {
-      const int to = chunk.count + part * kLanes;
-      hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.x + to);
-      hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.y + to);
-      if constexpr (kWeighted) hn::StoreU(hn::Zero(d), d, chunk.weight + to);
-    }
-    visit(std::as_const(chunk));
-  };
+HWY_INLINE void ForEachChunk(const NearRows& near, NearChunk& chunk, Visit visit) {
+  chunk.count = 0;
   for (int row = 0; row < near.rows; ++row) {
     const std::uint32_t* const offsets = near.offsets + row * near.row_stride;
     std::uint32_t first = offsets[0];
     const std::uint32_t last = offsets[near.columns];
-    while (HWY_UNLIKELY(chunk.count + (last - first) > NearChunk::kCapacity)) {
+    while (chunk.count + (last - first) > NearChunk::kCapacity) {
       const int room = NearChunk::kCapacity - chunk.count;
       Append<kWeighted>(near, first, room, chunk);
       first += room;
-      close();
+      Close<kWeighted>(chunk);
+      visit(std::as_const(chunk));
       chunk.count = 0;
     }
     Append<kWeighted>(near, first, static_cast<int>(last - first), chunk);
   }
-  if (chunk.count > 0) close();
+  if (chunk.count == 0) return;
+  Close<kWeighted>(chunk);
+  visit(std::as_const(chunk));
+}
+
+// The particles of `near` in one chunk. Returns false if they do not fit.
+template <bool kWeighted>
+HWY_INLINE bool Gather(const NearRows& near, NearChunk& chunk) {
+  chunk.count = 0;
+  for (int row = 0; row < near.rows; ++row) {
+    const std::uint32_t* const offsets = near.offsets + row * near.row_stride;
+    const std::uint32_t first = offsets[0];
+    const std::uint32_t count = offsets[near.columns] - first;
+    if (HWY_UNLIKELY(chunk.count + count > NearChunk::kCapacity)) return false;
+    Append<kWeighted>(near, first, static_cast<int>(count), chunk);
+  }
+  Close<kWeighted>(chunk);
+  return true;
+}
+
+// Calls visit(query, chunk) for the particles of each of a few queries, as many at a time as a
+// chunk holds. First copies those of all queries, so that the sums of one need not wait for what is
+// looked up for it.
+template <bool kWeighted, typename Query, typename Visit>
+HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
+  NearChunk chunks[kQueriesAtOnce];
+  bool fits[kQueriesAtOnce];
+  for (std::size_t k = 0; k < queries.size(); ++k) {
+    fits[k] = Gather<kWeighted>(queries[k], chunks[k]);
+  }
+  for (std::size_t k = 0; k < queries.size(); ++k) {
+    if (HWY_LIKELY(fits[k])) {
+      visit(k, chunks[k]);
+    } else {
+      ForEachChunk<kWeighted>(queries[k], chunks[k],
+                              [&](const NearChunk& chunk) HWY_ATTR { visit(k, chunk); });
+    }
+  }
 }
 
 // Sixteen partial sums of each of several channels.

@@ -9,8 +9,10 @@ namespace partiemc {
 /// Vectors may read so many entries past the end of a row.
 inline constexpr int kRowPadding = 16;
 
-/// Sums run at up to so many points at once, which costs less than one after the other.
+/// A query asks for sums at up to so many points: neighbours, which look at the same particles.
 inline constexpr std::size_t kPointsAtOnce = 2;
+/// So many queries run at once: none waits for what is looked up for another.
+inline constexpr std::size_t kQueriesAtOnce = 8;
 
 /// Entries around points of a tile: row after row of buckets, each row a contiguous span.
 struct NearRows {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <tuple>
 
@@ -44,26 +45,33 @@ void SetNormal(double x, double y, CellPlane& plane) {
   plane.normal_y = y / length;
 }
 
-// Samples F at the middle of a segment, with `at_entry` at its entry, too.
-void SampleAtMiddle(const TileDirectory& directory, const PointField& field, const ActiveCell& cell,
-                    bool at_entry, CellPlane& plane) {
-  plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
-  const LatticePoint origin = CellOrigin(directory, cell);
-  const auto in_tile = [&](const LatticePoint& point) {
-    return LatticePoint{point.x - origin.x + cell.i, point.y - origin.y + cell.j};
-  };
-  const LatticePoint middle = in_tile(plane.point);
-  const auto set_middle = [&plane](const FieldSample& sample) {
-    plane.value = sample.value;
-    plane.gradient_x = sample.gradient_x;
-    plane.gradient_y = sample.gradient_y;
-  };
-  if (!at_entry) return set_middle(field.Sample(cell.tile, middle.x, middle.y));
-  const auto samples = field.SampleTwo(cell.tile, {middle, in_tile(plane.entry)});
-  set_middle(samples[0]);
-  plane.entry_value = samples[1].value;
-  plane.entry_gradient_x = samples[1].gradient_x;
-  plane.entry_gradient_y = samples[1].gradient_y;
+// Samples F at the middles of up to kQueriesAtOnce segments, with `at_entries` at their entries,
+// too.
+void SampleAtMiddles(const TileDirectory& directory, const PointField& field,
+                     std::span<const ActiveCell* const> cells, bool at_entries,
+                     std::span<CellPlane> planes) {
+  std::array<FieldPoints, kQueriesAtOnce> places;
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    const ActiveCell& cell = *cells[k];
+    CellPlane& plane = planes[k];
+    plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
+    const LatticePoint origin = CellOrigin(directory, cell);
+    const auto in_tile = [&](const LatticePoint& point) {
+      return LatticePoint{point.x - origin.x + cell.i, point.y - origin.y + cell.j};
+    };
+    places[k] = {cell.tile, {in_tile(plane.point), in_tile(plane.entry)}, at_entries ? 2u : 1u};
+  }
+  std::array<FieldSamples, kQueriesAtOnce> samples;
+  field.Sample(std::span(places).first(planes.size()), samples);
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    const auto& [middle, entry] = samples[k];
+    planes[k].value = middle.value;
+    planes[k].gradient_x = middle.gradient_x;
+    planes[k].gradient_y = middle.gradient_y;
+    planes[k].entry_value = entry.value;
+    planes[k].entry_gradient_x = entry.gradient_x;
+    planes[k].entry_gradient_y = entry.gradient_y;
+  }
 }
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
@@ -124,21 +132,23 @@ void MendWeakNormals(std::span<const std::uint32_t> segments, PreviousOf previou
   }
 }
 
-// The cell normals to remember, one for each cell with one segment.
-void Remember(const TileDirectory& directory, const Crossings& crossings, const RingTopology& rings,
-              std::span<const CellPlane> planes, NormalScratch& scratch,
-              std::vector<CellNormal>& next) {
-  scratch.plane.assign(crossings.cells.size(), kNone);
-  for (std::size_t k = 0; k < planes.size(); ++k) {
-    scratch.plane[crossings.segments[rings.segments[k]].cell] = static_cast<std::uint32_t>(k);
-  }
+// Keeps a normal for the next frame, unless its cell has two.
+void Keep(const ActiveCell& cell, std::uint32_t index, const CellPlane& plane,
+          NormalScratch& scratch) {
+  if (cell.IsSaddle()) return;
+  scratch.normal[index] = {static_cast<float>(plane.normal_x), static_cast<float>(plane.normal_y)};
+}
+
+// The cell normals to remember, in the order of rows.
+void Remember(const TileDirectory& directory, const Crossings& crossings,
+              const NormalScratch& scratch, std::vector<CellNormal>& next) {
   next.clear();
   for (const std::uint32_t index : scratch.order) {
-    const std::uint32_t plane = scratch.plane[index];
-    if (plane == kNone || crossings.cells[index].IsSaddle()) continue;
+    const auto& [x, y] = scratch.normal[index];
+    if (x == 0 && y == 0) continue;
     CellNormal normal = KeyOf(directory, crossings.cells[index]);
-    normal.x = static_cast<float>(planes[plane].normal_x);
-    normal.y = static_cast<float>(planes[plane].normal_y);
+    normal.x = x;
+    normal.y = y;
     next.push_back(normal);
   }
 }
@@ -161,21 +171,34 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
     return index == kNone ? nullptr : &previous[index];
   };
   planes.resize(rings.segments.size());
-  const auto estimate = [&](std::size_t k) {
-    CellPlane& plane = planes[k];
-    const std::uint32_t segment = rings.segments[k];
-    const ActiveCell& cell = crossings.cells[crossings.segments[segment].cell];
-    if (parameters.placement == Placement::kFarthestParticle) {
-      SampleAtMean(bins.tiles, field, cell, plane);
-    } else {
-      const bool at_entry = parameters.placement == Placement::kVirtualPlane;
-      SampleAtMiddle(bins.tiles, field, cell, at_entry, plane);
+  scratch.normal.assign(crossings.cells.size(), {0, 0});
+  std::atomic<bool> any_is_weak = false;
+  // A few successive planes.
+  const auto estimate = [&](std::size_t first, std::size_t count) {
+    const std::span<CellPlane> some = std::span(planes).subspan(first, count);
+    std::array<const ActiveCell*, kQueriesAtOnce> cells;
+    for (std::size_t k = 0; k < count; ++k) {
+      cells[k] = &crossings.cells[crossings.segments[rings.segments[first + k]].cell];
     }
-    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
-                    kWeakGradientSquare;
-    if (plane.is_weak) return;
-    SetNormal(plane.gradient_x, plane.gradient_y, plane);
-    Orient(previous_of(segment), plane);
+    if (parameters.placement == Placement::kFarthestParticle) {
+      for (std::size_t k = 0; k < count; ++k) SampleAtMean(bins.tiles, field, *cells[k], some[k]);
+    } else {
+      const bool at_entries = parameters.placement == Placement::kVirtualPlane;
+      SampleAtMiddles(bins.tiles, field, cells, at_entries, some);
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      CellPlane& plane = some[k];
+      const std::uint32_t segment = rings.segments[first + k];
+      plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
+                      kWeakGradientSquare;
+      if (plane.is_weak) {
+        any_is_weak.store(true, std::memory_order_relaxed);
+        continue;
+      }
+      SetNormal(plane.gradient_x, plane.gradient_y, plane);
+      Orient(previous_of(segment), plane);
+      Keep(*cells[k], crossings.segments[segment].cell, plane, scratch);
+    }
   };
   ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t first, std::size_t last) {
     auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
@@ -183,16 +206,25 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       if (k == *end) ++end;
       planes[k].entry = rings.entries[k];
       planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
-      estimate(k);
+    }
+    for (std::size_t k = first; k < last; k += kQueriesAtOnce) {
+      estimate(k, std::min(kQueriesAtOnce, last - k));
     }
   });
-  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-    const std::size_t first = rings.offsets[ring];
-    const std::size_t count = rings.offsets[ring + 1] - first;
-    MendWeakNormals(std::span(rings.segments).subspan(first, count), previous_of,
-                    std::span(planes).subspan(first, count));
+  if (any_is_weak) {
+    for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+      const std::size_t first = rings.offsets[ring];
+      const std::size_t count = rings.offsets[ring + 1] - first;
+      MendWeakNormals(std::span(rings.segments).subspan(first, count), previous_of,
+                      std::span(planes).subspan(first, count));
+    }
+    for (std::size_t k = 0; k < planes.size(); ++k) {
+      if (!planes[k].is_weak) continue;
+      const std::uint32_t index = crossings.segments[rings.segments[k]].cell;
+      Keep(crossings.cells[index], index, planes[k], scratch);
+    }
   }
-  Remember(bins.tiles, crossings, rings, planes, scratch, next);
+  Remember(bins.tiles, crossings, scratch, next);
 }
 
 }  // namespace partiemc

@@ -1,6 +1,7 @@
 // Stage 5 of 7: segments -> stabilised cell normals (paper, Eq. 9-11).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,7 +43,8 @@ inline constexpr double kWeakGradientSquare = 1e-3;
 struct NormalScratch {
   std::vector<std::uint32_t> order;     ///< Active cells in the order of State::normals.
   std::vector<std::uint32_t> previous;  ///< By active cell: which of the previous normals is its.
-  std::vector<std::uint32_t> plane;     ///< By active cell: its plane, the last of two.
+  /// By active cell: its normal to remember; 0 where it has none.
+  std::vector<std::array<float, 2>> normal;
   std::vector<std::uint32_t> next_cell;
 };
 

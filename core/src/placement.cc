@@ -67,14 +67,12 @@ LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossi
 LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
   const double square = gradient.x * gradient.x + gradient.y * gradient.y;
   if (square < kWeakGradientSquare) return point;
-  double step_x = -value * gradient.x / square;
-  double step_y = -value * gradient.y / square;
-  const double length = std::sqrt(step_x * step_x + step_y * step_y);
-  if (length > max_step) {
-    step_x *= max_step / length;
-    step_y *= max_step / length;
+  double step = -value / square;
+  // Its length is that of the gradient times as much.
+  if (step * step * square > max_step * max_step) {
+    step = std::copysign(max_step / std::sqrt(square), step);
   }
-  return {point.x + step_x, point.y + step_y};
+  return {point.x + step * gradient.x, point.y + step * gradient.y};
 }
 
 LatticePoint VirtualPlaneVertex(const CellPlane& plane) {

@@ -59,15 +59,22 @@ PlaneEstimates PlaneEstimator::EstimatesOf(const SupportSums& sums) const {
           .strip = limited(volume / width - kHalfBump * strip_.depth)};
 }
 
-void PlaneEstimator::Estimate(std::uint32_t tile, std::span<const BentPlane> planes,
-                              std::span<PlaneEstimates> estimates) const {
-  std::array<SupportSums, kPointsAtOnce> sums;
-  std::array<LatticePoint, kPointsAtOnce> points;
-  for (std::size_t k = 0; k < planes.size(); ++k) points[k] = {planes[k].x, planes[k].y};
+void PlaneEstimator::Estimate(std::span<const Planes> planes,
+                              std::span<Estimates> estimates) const {
   const double radius = std::max(support_.radius, strip_.radius);
-  SumSupports(field_.RowsNear(tile, std::span(points).first(planes.size()), radius), planes,
-              support_, strip_, sums);
-  for (std::size_t k = 0; k < planes.size(); ++k) estimates[k] = EstimatesOf(sums[k]);
+  std::array<SupportQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < planes.size(); ++q) {
+    const Planes& of = planes[q];
+    std::array<LatticePoint, kPointsAtOnce> points;
+    for (std::size_t k = 0; k < of.count; ++k) points[k] = {of.planes[k].x, of.planes[k].y};
+    queries[q] = {field_.RowsNear(of.tile, std::span(points).first(of.count), radius), of.planes,
+                  of.count};
+  }
+  std::array<QuerySupports, kQueriesAtOnce> sums;
+  SumSupports(std::span(queries).first(planes.size()), support_, strip_, sums);
+  for (std::size_t q = 0; q < planes.size(); ++q) {
+    for (std::size_t k = 0; k < planes[q].count; ++k) estimates[q][k] = EstimatesOf(sums[q][k]);
+  }
 }
 
 }  // namespace partiemc

@@ -2,6 +2,8 @@
 // placement", 3).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -23,11 +25,17 @@ class PlaneEstimator {
  public:
   PlaneEstimator(const PointField& field, const Scale& scale);
 
-  /// Of planes at points of one tile, in cells relative to it, neighbours at best. Cost: the
-  /// particles within three spacings of any.
+  /// Planes at one or two points of a tile, in cells relative to it, neighbours at best.
+  struct Planes {
+    std::uint32_t tile = kNoTile;
+    std::array<BentPlane, kPointsAtOnce> planes;
+    std::size_t count = 0;
+  };
+  using Estimates = std::array<PlaneEstimates, kPointsAtOnce>;
+
+  /// Of at most kQueriesAtOnce. Cost: the particles within three spacings of each.
   /// Requires: field.Covers(tile, x, y) of each; planes and estimates are as many.
-  void Estimate(std::uint32_t tile, std::span<const BentPlane> planes,
-                std::span<PlaneEstimates> estimates) const;
+  void Estimate(std::span<const Planes> planes, std::span<Estimates> estimates) const;
 
  private:
   PlaneEstimates EstimatesOf(const SupportSums& sums) const;

@@ -75,25 +75,27 @@ HWY_INLINE void SumChunk(const NearRows& near, const NearChunk& chunk, const Ben
 }
 
 template <bool kWeighted>
-HWY_INLINE void Sum(const NearRows& near, std::span<const BentPlane> planes,
-                    const SupportShape& support, const StripShape& strip,
-                    std::span<SupportSums> sums) {
-  double totals[kPointsAtOnce][kSupportSums] = {};
-  ForEachChunk<kWeighted>(near, [&](const NearChunk& chunk) HWY_ATTR {
-    for (std::size_t k = 0; k < planes.size(); ++k) {
-      SumChunk<kWeighted>(near, chunk, planes[k], support, strip, totals[k]);
+HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& support,
+                    const StripShape& strip, std::span<QuerySupports> sums) {
+  double totals[kQueriesAtOnce][kPointsAtOnce][kSupportSums] = {};
+  ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk) HWY_ATTR {
+    const SupportQuery& query = queries[q];
+    for (std::size_t k = 0; k < query.count; ++k) {
+      SumChunk<kWeighted>(query, chunk, query.planes[k], support, strip, totals[q][k]);
     }
   });
-  for (std::size_t k = 0; k < planes.size(); ++k) {
-    sums[k] = {totals[k][kDistance], totals[k][kWeight], totals[k][kVolume]};
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    for (std::size_t k = 0; k < queries[q].count; ++k) {
+      const auto& of = totals[q][k];
+      sums[q][k] = {of[kDistance], of[kWeight], of[kVolume]};
+    }
   }
 }
 
-void SumSupports(const NearRows& near, std::span<const BentPlane> planes,
-                 const SupportShape& support, const StripShape& strip,
-                 std::span<SupportSums> sums) {
-  near.weight != nullptr ? Sum<true>(near, planes, support, strip, sums)
-                         : Sum<false>(near, planes, support, strip, sums);
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 const StripShape& strip, std::span<QuerySupports> sums) {
+  queries.front().weight != nullptr ? Sum<true>(queries, support, strip, sums)
+                                    : Sum<false>(queries, support, strip, sums);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -105,10 +107,9 @@ namespace partiemc {
 
 HWY_EXPORT(SumSupports);
 
-void SumSupports(const NearRows& near, std::span<const BentPlane> planes,
-                 const SupportShape& support, const StripShape& strip,
-                 std::span<SupportSums> sums) {
-  HWY_DYNAMIC_DISPATCH(SumSupports)(near, planes, support, strip, sums);
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 const StripShape& strip, std::span<QuerySupports> sums) {
+  HWY_DYNAMIC_DISPATCH(SumSupports)(queries, support, strip, sums);
 }
 
 }  // namespace partiemc

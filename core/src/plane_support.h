@@ -2,6 +2,8 @@
 // at hand.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 
 #include "near_rows.h"
@@ -36,9 +38,16 @@ struct SupportSums {
   double volume;
 };
 
-/// sums[k] are those of planes[k], at most kPointsAtOnce. `near` has at least the particles in both
-/// discs of each plane. In floats, with the same bits for any processor, as SumAtPoints.
-void SumSupports(const NearRows& near, std::span<const BentPlane> planes,
-                 const SupportShape& support, const StripShape& strip, std::span<SupportSums> sums);
+/// Up to kPointsAtOnce planes, and at least the particles in both discs of each.
+struct SupportQuery : NearRows {
+  std::array<BentPlane, kPointsAtOnce> planes;
+  std::size_t count;  ///< Of planes.
+};
+
+/// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce, all or none of them
+/// with weights. In floats, with the same bits for any processor, as SumAtPoints.
+using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 const StripShape& strip, std::span<QuerySupports> sums);
 
 }  // namespace partiemc

@@ -46,7 +46,7 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
   first_bucket_.resize(tiles);
   for (std::uint32_t tile = 0; tile < tiles; ++tile) {
     first_bucket_[tile] = bucket_count;
-    if (IsIndexed(tile)) bucket_count += boxes_[tile].count() + 1;
+    if (IsIndexed(tile)) bucket_count += boxes_[tile].count() + 2;
   }
   bucket_offsets_.resize(bucket_count);
   const auto for_each_indexed = [&](auto visit) {
@@ -68,7 +68,7 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
 }
 
 std::span<std::uint32_t> PointField::OffsetsOf(std::uint32_t tile) {
-  return {bucket_offsets_.data() + first_bucket_[tile], std::size_t{boxes_[tile].count()} + 1};
+  return {bucket_offsets_.data() + first_bucket_[tile], std::size_t{boxes_[tile].count()} + 2};
 }
 
 // The particles within reach of a point that may be asked for.
@@ -78,7 +78,7 @@ NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile, NearFiel
   return NearWalk(bins, tile, &mask, fields);
 }
 
-// Counts the particles in each bucket of a tile. Returns how many they are.
+// Counts the particles in each bucket of a tile, two places behind it. Returns how many they are.
 std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t tile) {
   const std::span<std::uint32_t> offsets = OffsetsOf(tile);
   std::fill(offsets.begin(), offsets.end(), 0);
@@ -86,7 +86,7 @@ std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t t
   std::uint32_t count = 0;
   Near(bins, tile, NearFields::kPositions).ForEachBlock([&](const NearEntries& near) {
     grid_.Find(near, boxes_[tile], buckets);
-    for (int k = 0; k < near.count; ++k) ++offsets[buckets[k]];
+    for (int k = 0; k < near.count; ++k) ++offsets[buckets[k] + 2];
     count += static_cast<std::uint32_t>(near.count);
   });
   return count;
@@ -94,32 +94,22 @@ std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t t
 
 // Turns the counts of a tile's buckets into offsets, and fills the buckets.
 void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
+  // Where the next entry of a bucket goes stands one place behind it, and in the end is where the
+  // next bucket starts.
   const std::span<std::uint32_t> offsets = OffsetsOf(tile);
   std::uint32_t next = first_entry_[tile];
-  for (std::uint32_t& offset : offsets) {
-    const std::uint32_t in_bucket = offset;
-    offset = next;
-    next += in_bucket;
-  }
+  for (std::uint32_t& offset : offsets) offset = next += offset;
   BucketGrid::Buckets buckets;
   Near(bins, tile, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
     grid_.Find(near, boxes_[tile], buckets);
     for (int k = 0; k < near.count; ++k) {
-      const std::uint32_t to = offsets[buckets[k]]++;
+      const std::uint32_t to = offsets[buckets[k] + 1]++;
       x_[to] = near.x[k];
       y_[to] = near.y[k];
       source_[to] = near.source[k];
       if (!bins.weight.empty()) weight_[to] = bins.weight[near.entry[k]];
     }
   });
-  // Filling moved every offset to the start of the next bucket.
-  std::copy_backward(offsets.begin(), offsets.end() - 1, offsets.end());
-  offsets.front() = first_entry_[tile];
-}
-
-PointQuery PointField::QueryNear(std::uint32_t tile, std::span<const LatticePoint> points) const {
-  return {RowsNear(tile, points, scale_.kernel_radius),
-          1 / (scale_.kernel_radius * scale_.kernel_radius), scale_.uniform_weight};
 }
 
 namespace {
@@ -163,21 +153,30 @@ class Spread {
 
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
   const LatticePoint point{x, y};
-  const PointQuery query = QueryNear(tile, {&point, 1});
-  PointSums sums;
-  SumAtPoints(query, {&point, 1}, {&sums, 1});
-  return SampleOf(query, point, sums);
+  const PointQuery query{RowsNear(tile, {&point, 1}, scale_.kernel_radius), {point}, 1};
+  QuerySums sums;
+  SumAtPoints(Kernel(), {&query, 1}, {&sums, 1});
+  return SampleOf(query, point, sums[0]);
 }
 
-std::array<FieldSample, 2> PointField::SampleTwo(std::uint32_t tile,
-                                                 const std::array<LatticePoint, 2>& points) const {
-  const PointQuery query = QueryNear(tile, points);
-  std::array<PointSums, 2> sums;
-  SumAtPoints(query, points, sums);
-  return {SampleOf(query, points[0], sums[0]), SampleOf(query, points[1], sums[1])};
+void PointField::Sample(std::span<const FieldPoints> places,
+                        std::span<FieldSamples> samples) const {
+  std::array<PointQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < places.size(); ++q) {
+    const auto& [tile, points, count] = places[q];
+    const NearRows near = RowsNear(tile, std::span(points).first(count), scale_.kernel_radius);
+    queries[q] = {near, points, count};
+  }
+  std::array<QuerySums, kQueriesAtOnce> sums;
+  SumAtPoints(Kernel(), std::span(queries).first(places.size()), sums);
+  for (std::size_t q = 0; q < places.size(); ++q) {
+    for (std::size_t k = 0; k < places[q].count; ++k) {
+      samples[q][k] = SampleOf(queries[q], places[q].points[k], sums[q][k]);
+    }
+  }
 }
 
-FieldSample PointField::SampleOf(const PointQuery& query, const LatticePoint& point,
+FieldSample PointField::SampleOf(const NearRows& near, const LatticePoint& point,
                                  const PointSums& sums) const {
   FieldSample sample;
   if (sums.kernel <= 0) {
@@ -204,14 +203,14 @@ FieldSample PointField::SampleOf(const PointQuery& query, const LatticePoint& po
     sample.phi_y = unit_x * jxy + unit_y * jyy - unit_y;
   }
   const LevelSetFormula<double> formula(scale_);
-  const Spread spread(sums, query.inverse_square);
+  const Spread spread(sums, Kernel().inverse_square);
   sample.spread = spread.value();
   sample.value = formula.Value(sums.density, sample.phi, sample.spread);
   if (sample.value == sample.phi) {
     sample.gradient_x = sample.phi_x;
     sample.gradient_y = sample.phi_y;
   } else if (sample.value == formula.Gap(sample.spread)) {
-    const LatticePoint gradient = spread.Gradient(ThirdSumsAtPoint(query, point));
+    const LatticePoint gradient = spread.Gradient(ThirdSumsAtPoint(Kernel(), near, point));
     sample.gradient_x = gradient.x * scale_.gap_slope;
     sample.gradient_y = gradient.y * scale_.gap_slope;
   } else {

@@ -35,6 +35,14 @@ struct FieldPoint {
   double x = 0, y = 0;
 };
 
+/// One or two points of a tile, in cells relative to it, and what the field is there.
+struct FieldPoints {
+  std::uint32_t tile = kNoTile;
+  std::array<LatticePoint, kPointsAtOnce> points;
+  std::size_t count = 0;
+};
+using FieldSamples = std::array<FieldSample, kPointsAtOnce>;
+
 /// Particles near the isoline, sorted into buckets of about a cell, so that a point
 /// looks at its surroundings instead of its whole tile.
 class PointField {
@@ -50,10 +58,9 @@ class PointField {
   /// Cost: the particles within a kernel radius and a bucket.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// The same of two points of one tile, neighbours at best, for less than one after the other:
-  /// they look at the same particles.
-  std::array<FieldSample, 2> SampleTwo(std::uint32_t tile,
-                                       const std::array<LatticePoint, 2>& points) const;
+  /// The same of points of at most kQueriesAtOnce places, for less than one after the other. Those
+  /// of a place look at the same particles: neighbours at best.
+  void Sample(std::span<const FieldPoints> places, std::span<FieldSamples> samples) const;
 
   /// Whether particles weigh each their own.
   bool HasWeights() const { return !weight_.empty(); }
@@ -88,8 +95,10 @@ class PointField {
            near.column - box.column;
   }
 
-  PointQuery QueryNear(std::uint32_t tile, std::span<const LatticePoint> points) const;
-  FieldSample SampleOf(const PointQuery& query, const LatticePoint& point,
+  PointKernel Kernel() const {
+    return {1 / (scale_.kernel_radius * scale_.kernel_radius), scale_.uniform_weight};
+  }
+  FieldSample SampleOf(const NearRows& near, const LatticePoint& point,
                        const PointSums& sums) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
@@ -131,7 +140,8 @@ inline NearRows PointField::RowsNear(std::uint32_t tile, std::span<const Lattice
     low = {std::min(low.x, point.x), std::min(low.y, point.y)};
     high = {std::max(high.x, point.x), std::max(high.y, point.y)};
   }
-  const BucketBox near = BucketsNear(tile, low, high, radius);
+  // What lies on the rim, or nearer to it than positions are to each other, adds nothing to a sum.
+  const BucketBox near = BucketsNear(tile, low, high, radius - BucketGrid::kStep / 2);
   return {.x = x_.data(),
           .y = y_.data(),
           .weight = weight_.empty() ? nullptr : weight_.data(),

@@ -92,12 +92,12 @@ struct AddThirdSums {
 
 // Adds a chunk's particles to the sums at a point.
 template <typename AddTerms>
-HWY_INLINE void SumChunk(const PointQuery& query, const NearChunk& chunk, const LatticePoint& point,
-                         double (&totals)[AddTerms::kChannels]) {
+HWY_INLINE void SumChunk(const PointKernel& kernel, const NearRows& near, const NearChunk& chunk,
+                         const LatticePoint& point, double (&totals)[AddTerms::kChannels]) {
   const Lanes d;
-  const Vector x = hn::Set(d, static_cast<float>(point.x - query.origin_x));
-  const Vector y = hn::Set(d, static_cast<float>(point.y - query.origin_y));
-  const Vector inverse_square = hn::Set(d, static_cast<float>(query.inverse_square));
+  const Vector x = hn::Set(d, static_cast<float>(point.x - near.origin_x));
+  const Vector y = hn::Set(d, static_cast<float>(point.y - near.origin_y));
+  const Vector inverse_square = hn::Set(d, static_cast<float>(kernel.inverse_square));
   PartialSums<AddTerms::kChannels> sums(
       chunk, [&](int k, Vector(&channels)[AddTerms::kChannels]) HWY_ATTR {
         const Vector dx = hn::Sub(hn::Load(d, chunk.x + k), x);
@@ -111,9 +111,9 @@ HWY_INLINE void SumChunk(const PointQuery& query, const NearChunk& chunk, const 
 }
 
 template <bool kWeighted>
-PointSums Named(const PointQuery& query, const double* totals) {
-  const double slope = 6 * query.inverse_square;
-  const double w = query.uniform_weight;
+PointSums Named(const PointKernel& kernel, const double* totals) {
+  const double slope = 6 * kernel.inverse_square;
+  const double w = kernel.uniform_weight;
   return {.kernel = totals[kKernel],
           .moment_x = totals[kMomentX],
           .moment_y = totals[kMomentY],
@@ -131,27 +131,36 @@ PointSums Named(const PointQuery& query, const double* totals) {
 }
 
 template <bool kWeighted>
-HWY_INLINE void Sum(const PointQuery& query, std::span<const LatticePoint> points,
-                    std::span<PointSums> sums) {
-  double totals[kPointsAtOnce][AddSums<kWeighted>::kChannels] = {};
-  ForEachChunk<kWeighted>(query, [&](const NearChunk& chunk) HWY_ATTR {
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      SumChunk<AddSums<kWeighted>>(query, chunk, points[k], totals[k]);
+HWY_INLINE void Sum(const PointKernel& kernel, std::span<const PointQuery> queries,
+                    std::span<QuerySums> sums) {
+  double totals[kQueriesAtOnce][kPointsAtOnce][AddSums<kWeighted>::kChannels] = {};
+  ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk) HWY_ATTR {
+    const PointQuery& query = queries[q];
+    for (std::size_t k = 0; k < query.count; ++k) {
+      SumChunk<AddSums<kWeighted>>(kernel, query, chunk, query.points[k], totals[q][k]);
     }
   });
-  for (std::size_t k = 0; k < points.size(); ++k) sums[k] = Named<kWeighted>(query, totals[k]);
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    for (std::size_t k = 0; k < queries[q].count; ++k) {
+      sums[q][k] = Named<kWeighted>(kernel, totals[q][k]);
+    }
+  }
 }
 
-void SumAtPoints(const PointQuery& query, std::span<const LatticePoint> points,
-                 std::span<PointSums> sums) {
-  query.weight != nullptr ? Sum<true>(query, points, sums) : Sum<false>(query, points, sums);
+void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
+                 std::span<QuerySums> sums) {
+  queries.front().weight != nullptr ? Sum<true>(kernel, queries, sums)
+                                    : Sum<false>(kernel, queries, sums);
 }
 
-PointThirdSums ThirdSumsAtPoint(const PointQuery& query, const LatticePoint& point) {
+PointThirdSums ThirdSumsAtPoint(const PointKernel& kernel, const NearRows& near,
+                                const LatticePoint& point) {
   double totals[kThirdSums] = {};
-  ForEachChunk<false>(query, [&](const NearChunk& chunk)
-                                 HWY_ATTR { SumChunk<AddThirdSums>(query, chunk, point, totals); });
-  const double slope = 6 * query.inverse_square;
+  NearChunk room;
+  ForEachChunk<false>(near, room, [&](const NearChunk& chunk) HWY_ATTR {
+    SumChunk<AddThirdSums>(kernel, near, chunk, point, totals);
+  });
+  const double slope = 6 * kernel.inverse_square;
   return {.xxx = slope * totals[kXxx],
           .xxy = slope * totals[kXxy],
           .xyy = slope * totals[kXyy],
@@ -168,13 +177,14 @@ namespace partiemc {
 HWY_EXPORT(SumAtPoints);
 HWY_EXPORT(ThirdSumsAtPoint);
 
-void SumAtPoints(const PointQuery& query, std::span<const LatticePoint> points,
-                 std::span<PointSums> sums) {
-  HWY_DYNAMIC_DISPATCH(SumAtPoints)(query, points, sums);
+void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
+                 std::span<QuerySums> sums) {
+  HWY_DYNAMIC_DISPATCH(SumAtPoints)(kernel, queries, sums);
 }
 
-PointThirdSums ThirdSumsAtPoint(const PointQuery& query, const LatticePoint& point) {
-  return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(query, point);
+PointThirdSums ThirdSumsAtPoint(const PointKernel& kernel, const NearRows& near,
+                                const LatticePoint& point) {
+  return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(kernel, near, point);
 }
 
 }  // namespace partiemc

@@ -1,6 +1,8 @@
 // The sums over particles behind PointField::Sample, in the vectors of the processor at hand.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 
 #include "crossings.h"
@@ -8,10 +10,17 @@
 
 namespace partiemc {
 
-/// The particles around a few points, at least those within R of each.
+/// Up to kPointsAtOnce points, in cells relative to the tile, and the particles around them, at
+/// least those within R of each.
 struct PointQuery : NearRows {
+  std::array<LatticePoint, kPointsAtOnce> points;
+  std::size_t count;  ///< Of points.
+};
+
+/// What all queries have in common.
+struct PointKernel {
   double inverse_square;  ///< 1 / R^2
-  double uniform_weight;  ///< w, where `weight` is null.
+  double uniform_weight;  ///< w, where particles have no weights of their own.
 };
 
 /// Sums over the particles within R of a point; d = x_i - x, a and b stand for x and y.
@@ -30,12 +39,15 @@ struct PointThirdSums {
   double xxx, xxy, xyy, yyy;
 };
 
-/// sums[k] are those at points[k], in cells relative to the tile; at most kPointsAtOnce. Terms are
-/// floats, and so are their sums over up to 256 particles: off by a few 1e-7 of the sum of their
-/// magnitudes. Same bits for any processor: particles are dealt to sixteen partial sums by their
-/// place among those of the query, and the sixteen are added up in one order (near_lanes-inl.h).
-void SumAtPoints(const PointQuery& query, std::span<const LatticePoint> points,
-                 std::span<PointSums> sums);
-PointThirdSums ThirdSumsAtPoint(const PointQuery& query, const LatticePoint& point);
+/// sums[k][i] are those at points[i] of queries[k], at most kQueriesAtOnce, all or none of them
+/// with weights. Terms are floats, and so are their sums over up to 128 particles: off by a few
+/// 1e-7 of the sum of their magnitudes. Same bits for any processor, whatever is asked at once: a
+/// query's particles are dealt to sixteen partial sums by their place among them, and the sixteen
+/// are added up in one order (near_lanes-inl.h).
+using QuerySums = std::array<PointSums, kPointsAtOnce>;
+void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
+                 std::span<QuerySums> sums);
+PointThirdSums ThirdSumsAtPoint(const PointKernel& kernel, const NearRows& near,
+                                const LatticePoint& point);
 
 }  // namespace partiemc

@@ -26,19 +26,8 @@ void UnrolledRings::Allocate() {
 }
 
 UnrolledRing UnrolledRings::operator[](std::size_t ring) {
-  const auto at = [&](int array) { return arrays_[array].data() + starts_[ring]; };
-  return {.count = sizes_[ring].count,
-          .margin = sizes_[ring].margin,
-          .x = at(0),
-          .y = at(1),
-          .normal_x = at(2),
-          .normal_y = at(3),
-          .next_x = at(4),
-          .next_y = at(5),
-          .arc = at(6),
-          .weight = at(7),
-          .base = at(8),
-          .shift = at(9)};
+  return UnrolledRing::In(sizes_[ring],
+                          [&](int array) { return arrays_[array].data() + starts_[ring]; });
 }
 
 }  // namespace partiemc

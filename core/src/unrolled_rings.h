@@ -7,9 +7,33 @@
 
 namespace partiemc {
 
+/// Numbers of a ring's vertices and of those that repeat it beyond each end.
+struct UnrolledRingSize {
+  std::uint32_t count = 0, margin = 0;
+};
+
 /// One ring. Arrays are by vertex, 0 <= k < count, and go on beyond both ends by `margin` vertices
 /// that repeat the ring, so that a window is a contiguous stretch of them.
 struct UnrolledRing {
+  static constexpr int kArrays = 10;
+
+  /// With arrays of which at(k) tells where the first vertex is.
+  template <typename At>
+  static UnrolledRing In(const UnrolledRingSize& size, At at) {
+    return {.count = size.count,
+            .margin = size.margin,
+            .x = at(0),
+            .y = at(1),
+            .normal_x = at(2),
+            .normal_y = at(3),
+            .next_x = at(4),
+            .next_y = at(5),
+            .arc = at(6),
+            .weight = at(7),
+            .base = at(8),
+            .shift = at(9)};
+  }
+
   std::ptrdiff_t count, margin;
   double *x, *y;                ///< Lattice coordinates of the world, in cells.
   double *normal_x, *normal_y;  ///< Unit, outward.
@@ -24,14 +48,28 @@ struct UnrolledRing {
   void Repeat(double* values, std::ptrdiff_t begin, std::ptrdiff_t end) const;
 };
 
+/// Memory of one ring that is short enough for the stack.
+class ShortRing {
+ public:
+  static bool Holds(const UnrolledRingSize& size) {
+    return std::size_t{size.count} + 2 * std::size_t{size.margin} <= kRoom;
+  }
+  /// Requires: Holds(size). Valid as long as this object; elements have no values yet.
+  UnrolledRing Of(const UnrolledRingSize& size) {
+    return UnrolledRing::In(size, [&](int array) { return arrays_[array] + size.margin; });
+  }
+
+ private:
+  static constexpr std::size_t kRoom = 768;
+  double arrays_[UnrolledRing::kArrays][kRoom];
+};
+
 /// Memory of the rings of a frame, kept warm from frame to frame.
 class UnrolledRings {
  public:
   /// Makes room for rings of the given numbers of vertices and margins; 0 vertices for a ring that
-  /// is not unrolled. Elements keep no values.
-  struct Size {
-    std::uint32_t count = 0, margin = 0;
-  };
+  /// has none here. Elements keep no values.
+  using Size = UnrolledRingSize;
   std::vector<Size>& sizes() { return sizes_; }
   void Allocate();
 
@@ -41,7 +79,7 @@ class UnrolledRings {
  private:
   std::vector<Size> sizes_;
   std::vector<std::size_t> starts_;
-  std::vector<double> arrays_[10];
+  std::vector<double> arrays_[UnrolledRing::kArrays];
 };
 
 }  // namespace partiemc

@@ -64,8 +64,8 @@ double Distance(const LatticePoint& a, const LatticePoint& b) {
 LatticePoint UnitOr(const LatticePoint& v, const LatticePoint& fallback) {
   const double square = Dot(v, v);
   if (square < kWeakGradientSquare * kWeakGradientSquare) return fallback;
-  const double length = std::sqrt(square);
-  return {v.x / length, v.y / length};
+  const double inverse = 1 / std::sqrt(square);
+  return {v.x * inverse, v.y * inverse};
 }
 
 const ActiveCell& CellOf(const VertexInput& input, std::size_t segment) {
@@ -98,19 +98,30 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   v.root[inner] = v.point[inner] =
       ClampToCell(input.bins.tiles, input.crossings, input.topology.segments[segment],
                   VirtualPlaneVertex(plane));
-  const LatticePoint outward = UnitOr({plane.OutwardX(), plane.OutwardY()}, {1, 0});
   const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
-    if (Distance(from, v.point[i]) > kLongStep) {
+    const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
+    if (Dot(step, step) > kLongStep * kLongStep) {
       const FieldPoint at = Locate(input, segment, v.point[i]);
       const FieldSample sample =
           at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
       gradient = {sample.gradient_x, sample.gradient_y};
     }
-    v.normal[i] =
-        Dot(gradient, gradient) >= kWeakGradientSquare ? UnitOr(gradient, outward) : outward;
+    v.normal[i] = Dot(gradient, gradient) >= kWeakGradientSquare
+                      ? UnitOr(gradient, {1, 0})
+                      : UnitOr({plane.OutwardX(), plane.OutwardY()}, {1, 0});
   };
   set_normal(edge, plane.entry, {plane.entry_gradient_x, plane.entry_gradient_y});
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
+}
+
+// Step 1 of a ring.
+void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
+  const std::size_t begin = input.topology.offsets[ring];
+  const std::size_t count = input.topology.offsets[ring + 1] - begin;
+  const auto find = [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) FindRoots(input, begin + k, v);
+  };
+  count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
 }
 
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
@@ -213,6 +224,48 @@ double MeanOf(const UnrolledRing& ring, const double* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
+// Planes of successive vertices, to be estimated at once: two of a tile share the particles that
+// they look at.
+class PlaneQueries {
+ public:
+  explicit PlaneQueries(const PlaneEstimator& estimator) : estimator_(estimator) {}
+
+  // Whether there may be no room for two more.
+  bool IsFull() const { return count_ + 2 > kQueriesAtOnce; }
+
+  void Add(std::ptrdiff_t vertex, std::uint32_t tile, const BentPlane& plane) {
+    // The second vertex of a segment joins the first.
+    const bool joins = count_ > 0 && vertex % 2 == 1 && planes_[count_ - 1].tile == tile &&
+                       vertices_[count_ - 1] == vertex - 1;
+    if (!joins) {
+      planes_[count_] = {.tile = tile};
+      vertices_[count_++] = vertex;
+    }
+    PlaneEstimator::Planes& of = planes_[count_ - 1];
+    of.planes[of.count++] = plane;
+  }
+
+  // Calls visit(vertex, estimates) for all that were added, and forgets them.
+  template <typename Visit>
+  void Run(Visit visit) {
+    if (count_ == 0) return;
+    std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates{};
+    estimator_.Estimate(std::span(planes_).first(count_), estimates);
+    for (std::size_t q = 0; q < count_; ++q) {
+      for (std::size_t k = 0; k < planes_[q].count; ++k) {
+        visit(vertices_[q] + static_cast<std::ptrdiff_t>(k), estimates[q][k]);
+      }
+    }
+    count_ = 0;
+  }
+
+ private:
+  const PlaneEstimator& estimator_;
+  std::array<PlaneEstimator::Planes, kQueriesAtOnce> planes_;
+  std::array<std::ptrdiff_t, kQueriesAtOnce> vertices_;  // The first of each.
+  std::size_t count_ = 0;
+};
+
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
 // along the ring counts: their means depend on how the particles are arranged, not on the shape.
 // Where volumes are known, the mean of the strips is part of the truth.
@@ -224,35 +277,30 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
   double* strips = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, kCurvatureReach * h);
-    // By segments, which have two vertices each.
+    // By a few segments, which have two vertices each.
+    PlaneQueries queries(estimator);
     for (std::ptrdiff_t k = begin; k < end; k += 2) {
-      std::array<std::uint32_t, 2> tiles;
-      std::array<BentPlane, 2> planes;
-      for (int i = 0; i < 2; ++i) {
-        const double curvature = std::clamp(ring.shift[k + i], -max_curvature, max_curvature);
-        ring.base[k + i] = steps.curvature ? RoundingOf(curvature, h) : 0;
-        const FieldPoint at = Locate(input, first_segment + k / 2, {ring.x[k + i], ring.y[k + i]});
-        tiles[i] = at.tile;
-        planes[i] = {.x = at.x,
+      for (std::ptrdiff_t i = k; i < k + 2; ++i) {
+        const double curvature = std::clamp(ring.shift[i], -max_curvature, max_curvature);
+        ring.base[i] = steps.curvature ? RoundingOf(curvature, h) : 0;
+        // What is kept where nothing tells where a plane belongs.
+        ring.shift[i] = steps.support ? -kSupportTrust * ring.base[i] : 0;
+        strips[i] = steps.support ? -kStripTrust * ring.base[i] : 0;
+        if (!steps.support) continue;
+        const FieldPoint at = Locate(input, first_segment + k / 2, {ring.x[i], ring.y[i]});
+        if (at.tile == kNoTile) continue;
+        queries.Add(i, at.tile,
+                    {.x = at.x,
                      .y = at.y,
-                     .normal_x = ring.normal_x[k + i],
-                     .normal_y = ring.normal_y[k + i],
-                     .curvature = curvature};
-        ring.shift[k + i] = strips[k + i] = 0;
+                     .normal_x = ring.normal_x[i],
+                     .normal_y = ring.normal_y[i],
+                     .curvature = curvature});
       }
-      if (!steps.support) continue;
-      std::array<PlaneEstimates, 2> estimates;
-      if (tiles[0] == tiles[1] && tiles[0] != kNoTile) {
-        estimator.Estimate(tiles[0], planes, estimates);
-      } else {
-        for (int i = 0; i < 2; ++i) {
-          if (tiles[i] == kNoTile) continue;
-          estimator.Estimate(tiles[i], {&planes[i], 1}, {&estimates[i], 1});
-        }
-      }
-      for (int i = 0; i < 2; ++i) {
-        ring.shift[k + i] = kSupportTrust * (estimates[i].support - ring.base[k + i]);
-        strips[k + i] = kStripTrust * (estimates[i].strip - ring.base[k + i]);
+      if (queries.IsFull() || k + 2 >= end) {
+        queries.Run([&](std::ptrdiff_t i, const PlaneEstimates& estimates) {
+          ring.shift[i] = kSupportTrust * (estimates.support - ring.base[i]);
+          strips[i] = kStripTrust * (estimates.strip - ring.base[i]);
+        });
       }
     }
   });
@@ -286,6 +334,15 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Unrolled
   });
 }
 
+// Steps 2 to 4 of a ring.
+void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, RingVertices& v) {
+  const std::size_t first_segment = input.topology.offsets[r];
+  Unroll(v, 2 * first_segment, ring);
+  if (input.parameters.steps.normals) SmoothNormals(input, ring);
+  ShiftPlanes(input, first_segment, ring);
+  SmoothPositions(input, 2 * first_segment, ring, v);
+}
+
 // Step 5: drops edge vertices that lie on the chord of the cell vertices beside them.
 void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const double min_distance = kThinningDistance * input.scale.spacing;
@@ -308,24 +365,27 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size());
-  ParallelForRanges(topology.segments.size(), kSegmentsAtOnce,
-                    [&](std::size_t first, std::size_t last) {
-                      for (std::size_t k = first; k < last; ++k) FindRoots(input, k, vertices);
-                    });
   UnrolledRings& unrolled = vertices.unrolled;
-  unrolled.sizes().resize(topology.RingCount());
-  ParallelFor(topology.RingCount(),
-              [&](std::size_t ring) { unrolled.sizes()[ring] = SizeOf(input, ring, vertices); });
-  unrolled.Allocate();
-  ParallelFor(topology.RingCount(), [&](std::size_t r) {
-    if (UnrolledRing ring = unrolled[r]; ring.count > 0) {
-      const std::size_t first_segment = topology.offsets[r];
-      Unroll(vertices, 2 * first_segment, ring);
-      if (input.parameters.steps.normals) SmoothNormals(input, ring);
-      ShiftPlanes(input, first_segment, ring);
-      SmoothPositions(input, 2 * first_segment, ring, vertices);
+  unrolled.sizes().assign(topology.RingCount(), {});
+  // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    FindRingRoots(input, ring, vertices);
+    const UnrolledRings::Size size = SizeOf(input, ring, vertices);
+    if (size.count > 0 && !ShortRing::Holds(size)) {
+      unrolled.sizes()[ring] = size;
+      return;
     }
-    Thin(input, r, vertices);
+    if (size.count > 0) {
+      ShortRing memory;
+      RefineRing(input, ring, memory.Of(size), vertices);
+    }
+    Thin(input, ring, vertices);
+  });
+  unrolled.Allocate();
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    if (unrolled.sizes()[ring].count == 0) return;
+    RefineRing(input, ring, unrolled[ring], vertices);
+    Thin(input, ring, vertices);
   });
 }
 

@@ -64,9 +64,10 @@ double Bump(double d, double reach) {
 
 SupportSums SumSupport(const NearRows& near, const BentPlane& plane, const SupportShape& support,
                        const StripShape& strip) {
-  SupportSums sums;
-  SumSupports(near, {&plane, 1}, support, strip, {&sums, 1});
-  return sums;
+  const SupportQuery query{near, {plane}, 1};
+  QuerySupports sums;
+  SumSupports({&query, 1}, support, strip, {&sums, 1});
+  return sums[0];
 }
 
 BentPlane RandomPlane(support::Random& random) {
@@ -152,20 +153,29 @@ TEST(PlaneSupport, TellsByTheVolumeOfAStripHowFarInsideOfTheBoundaryAPlaneIs) {
   }
 }
 
-TEST(PlaneSupport, OfTwoPlanesAtOnceHasTheBitsOfEachAlone) {
+TEST(PlaneSupport, OfManyPlanesAtOnceHasTheBitsOfEachAlone) {
   support::Random random(5);
-  for (int round = 0; round < 100; ++round) {
-    const Rows rows(random);
-    const NearRows near = rows.AsNear(round % 2 == 1);
-    const BentPlane planes[] = {RandomPlane(random), RandomPlane(random)};
+  for (int round = 0; round < 50; ++round) {
+    const bool weighted = round % 2 == 1;
+    std::vector<Rows> rows;
+    for (std::size_t q = 0; q < kQueriesAtOnce; ++q) rows.emplace_back(random);
+    std::vector<SupportQuery> queries;
+    for (const Rows& of : rows) {
+      queries.push_back({of.AsNear(weighted),
+                         {RandomPlane(random), RandomPlane(random)},
+                         1 + random.Below(kPointsAtOnce)});
+      queries.back().rows = static_cast<int>(random.Below(6));
+    }
     support::ForEachInstructionSet([&] {
-      SupportSums both[2];
-      SumSupports(near, planes, kShape, kStrip, both);
-      for (int k = 0; k < 2; ++k) {
-        const SupportSums alone = SumSupport(near, planes[k], kShape, kStrip);
-        EXPECT_EQ(both[k].distance, alone.distance);
-        EXPECT_EQ(both[k].weight, alone.weight);
-        EXPECT_EQ(both[k].volume, alone.volume);
+      std::vector<QuerySupports> all(queries.size());
+      SumSupports(queries, kShape, kStrip, all);
+      for (std::size_t q = 0; q < queries.size(); ++q) {
+        for (std::size_t k = 0; k < queries[q].count; ++k) {
+          const SupportSums alone = SumSupport(queries[q], queries[q].planes[k], kShape, kStrip);
+          EXPECT_EQ(all[q][k].distance, alone.distance);
+          EXPECT_EQ(all[q][k].weight, alone.weight);
+          EXPECT_EQ(all[q][k].volume, alone.volume);
+        }
       }
     });
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -180,57 +181,62 @@ void RunCrowdedBlob(bool weighted, Stages& stages) {
   stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0});
 }
 
-struct TwoPoints {
-  std::uint32_t tile;
-  std::array<LatticePoint, 2> points;
-};
-
-std::vector<TwoPoints> NeighboursIn(const Stages& stages) {
+std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   support::Random random(9);
-  std::vector<TwoPoints> all;
+  std::vector<FieldPoints> all;
   while (all.size() < 300) {
     const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
     const LatticePoint first{random.Uniform(0, 32), random.Uniform(0, 32)};
     const LatticePoint second{first.x + random.Uniform(-1, 1), first.y + random.Uniform(-1, 1)};
     if (std::min(second.x, second.y) < 0 || std::max(second.x, second.y) >= 32) continue;
     if (!stages.field.Covers(tile, first.x, first.y)) continue;
-    if (stages.field.Covers(tile, second.x, second.y)) all.push_back({tile, {first, second}});
+    if (!stages.field.Covers(tile, second.x, second.y)) continue;
+    all.push_back({tile, {first, second}, 1 + random.Below(2)});
   }
   return all;
 }
 
-TEST(PointField, SamplesHaveTheSameBitsOnEveryInstructionSet) {
+TEST(PointField, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAtOnce) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);
-    const std::vector<TwoPoints> neighbours = NeighboursIn(stages);
-    std::vector<FieldSample> first;
+    const std::vector<FieldPoints> places = NeighboursIn(stages);
+    std::vector<FieldSamples> alone(places.size());
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      stages.field.Sample({&places[k], 1}, {&alone[k], 1});
+    }
     support::ForEachInstructionSet([&] {
-      std::vector<FieldSample> samples;
-      for (const auto& [tile, points] : neighbours) {
-        const auto both = stages.field.SampleTwo(tile, points);
-        samples.insert(samples.end(), both.begin(), both.end());
-        samples.push_back(stages.field.Sample(tile, points[0].x, points[0].y));
+      for (std::size_t at_once = 1; at_once <= kQueriesAtOnce; ++at_once) {
+        for (std::size_t first = 0; first < places.size(); first += at_once) {
+          const std::size_t count = std::min(at_once, places.size() - first);
+          std::array<FieldSamples, kQueriesAtOnce> samples;
+          stages.field.Sample(std::span(places).subspan(first, count), samples);
+          for (std::size_t q = 0; q < count; ++q) {
+            for (std::size_t k = 0; k < places[first + q].count; ++k) {
+              ExpectSameBits(samples[q][k], alone[first + q][k]);
+            }
+          }
+        }
       }
-      if (first.empty()) first = samples;
-      for (std::size_t k = 0; k < samples.size(); ++k) ExpectSameBits(samples[k], first[k]);
     });
   }
 }
 
-TEST(PointField, TwoPointsAtOnceAgreeWithEachAlone) {
+TEST(PointField, TwoPointsOfAPlaceAgreeWithEachAlone) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);
-    for (const auto& [tile, points] : NeighboursIn(stages)) {
-      const auto both = stages.field.SampleTwo(tile, points);
-      for (std::size_t k = 0; k < 2; ++k) {
-        const FieldSample alone = stages.field.Sample(tile, points[k].x, points[k].y);
+    for (const FieldPoints& place : NeighboursIn(stages)) {
+      FieldSamples samples;
+      stages.field.Sample({&place, 1}, {&samples, 1});
+      for (std::size_t k = 0; k < place.count; ++k) {
+        const auto& [x, y] = place.points[k];
+        const FieldSample alone = stages.field.Sample(place.tile, x, y);
         // They sum the same particles in another order.
-        EXPECT_NEAR(both[k].density, alone.density, 1e-6 * std::max(1.0, alone.density));
-        EXPECT_NEAR(both[k].mean_x, alone.mean_x, 1e-5);
-        EXPECT_NEAR(both[k].mean_y, alone.mean_y, 1e-5);
-        EXPECT_EQ(both[k].has_support, alone.has_support);
+        EXPECT_NEAR(samples[k].density, alone.density, 1e-6 * std::max(1.0, alone.density));
+        EXPECT_NEAR(samples[k].mean_x, alone.mean_x, 1e-5);
+        EXPECT_NEAR(samples[k].mean_y, alone.mean_y, 1e-5);
+        EXPECT_EQ(samples[k].has_support, alone.has_support);
       }
     }
   }
