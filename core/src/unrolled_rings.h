@@ -48,7 +48,7 @@ struct UnrolledRing {
   void Repeat(double* values, std::ptrdiff_t begin, std::ptrdiff_t end) const;
 };
 
-/// Memory of one ring that is short enough for the stack.
+/// Memory of one ring that is short enough for the stack: it stays in the cache.
 class ShortRing {
  public:
   static bool Holds(const UnrolledRingSize& size) {
@@ -67,9 +67,10 @@ class ShortRing {
 /// Memory of the rings of a frame, kept warm from frame to frame.
 class UnrolledRings {
  public:
+  using Size = UnrolledRingSize;
+
   /// Makes room for rings of the given numbers of vertices and margins; 0 vertices for a ring that
   /// has none here. Elements keep no values.
-  using Size = UnrolledRingSize;
   std::vector<Size>& sizes() { return sizes_; }
   void Allocate();
 

@@ -224,48 +224,6 @@ double MeanOf(const UnrolledRing& ring, const double* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
-// Planes of successive vertices, to be estimated at once: two of a tile share the particles that
-// they look at.
-class PlaneQueries {
- public:
-  explicit PlaneQueries(const PlaneEstimator& estimator) : estimator_(estimator) {}
-
-  // Whether there may be no room for two more.
-  bool IsFull() const { return count_ + 2 > kQueriesAtOnce; }
-
-  void Add(std::ptrdiff_t vertex, std::uint32_t tile, const BentPlane& plane) {
-    // The second vertex of a segment joins the first.
-    const bool joins = count_ > 0 && vertex % 2 == 1 && planes_[count_ - 1].tile == tile &&
-                       vertices_[count_ - 1] == vertex - 1;
-    if (!joins) {
-      planes_[count_] = {.tile = tile};
-      vertices_[count_++] = vertex;
-    }
-    PlaneEstimator::Planes& of = planes_[count_ - 1];
-    of.planes[of.count++] = plane;
-  }
-
-  // Calls visit(vertex, estimates) for all that were added, and forgets them.
-  template <typename Visit>
-  void Run(Visit visit) {
-    if (count_ == 0) return;
-    std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates{};
-    estimator_.Estimate(std::span(planes_).first(count_), estimates);
-    for (std::size_t q = 0; q < count_; ++q) {
-      for (std::size_t k = 0; k < planes_[q].count; ++k) {
-        visit(vertices_[q] + static_cast<std::ptrdiff_t>(k), estimates[q][k]);
-      }
-    }
-    count_ = 0;
-  }
-
- private:
-  const PlaneEstimator& estimator_;
-  std::array<PlaneEstimator::Planes, kQueriesAtOnce> planes_;
-  std::array<std::ptrdiff_t, kQueriesAtOnce> vertices_;  // The first of each.
-  std::size_t count_ = 0;
-};
-
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
 // along the ring counts: their means depend on how the particles are arranged, not on the shape.
 // Where volumes are known, the mean of the strips is part of the truth.
