@@ -27,37 +27,61 @@ float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
 
-// First pass: the kernels of a tile's own particles, or of all around it where they reach too far
-// for the margin of the sums.
+// First pass: the kernels of a tile's own particles in the rows that they reach, or, where they
+// reach too far for the margin of the sums, of all around it in every row.
 void SumTile(const ParticleBins& bins, float radius, std::uint32_t tile, LevelSet& level_set) {
   std::array<float, kTileNodes>& values = level_set.tiles[tile];
   const bool fits = radius <= kSumMargin;
-  if (fits && bins.CountOf(tile) == 0) {
-    values.fill(0);
-    return;
-  }
+  if (fits && bins.CountOf(tile) == 0) return;
   alignas(64) NodeSums sums;
   sums.fill(0);
+  NodeRange rows = kAllNodes;
   if (fits) {
-    ScatterKernels(EntriesOf(bins, tile), radius, sums);
-    level_set.rims.Keep(tile, sums);
+    const NodeRange reached = ScatterKernels(EntriesOf(bins, tile), radius, sums);
+    level_set.rims.Keep(tile, sums, reached);
+    rows = level_set.rims.OwnRows(tile);
   } else {
     NearWalk(bins, tile, nullptr, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
       ScatterNearKernels(near, WeightsOf(bins), radius, sums);
     });
   }
-  for (int j = 0; j < kTileSize; ++j) {
+  for (int j = rows.first; j <= rows.last; ++j) {
     std::copy_n(sums.data() + SumIndex(0, j), kTileSize, values.data() + j * kTileSize);
   }
+}
+
+// Fills the rows of a tile's values that are among `rows` but not among `kept`, which is a part of
+// them.
+void FillRowsOf(float* values, NodeRange rows, NodeRange kept, float value) {
+  const auto fill = [&](int first, int end) {
+    std::fill(values + first * kTileSize, values + end * kTileSize, value);
+  };
+  if (kept.last < kept.first) {
+    if (rows.first <= rows.last) fill(rows.first, rows.last + 1);
+    return;
+  }
+  fill(rows.first, kept.first);
+  fill(kept.last + 1, rows.last + 1);
 }
 
 // Second pass: the density at every node, and what follows from it alone.
 void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                   LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
-  if (static_cast<float>(scale.kernel_radius) <= kSumMargin)
-    level_set.rims.AddTo(bins.tiles, tile, values);
-  ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
+  BitRows& inside = level_set.inside[tile];
+  BitRows& open = level_set.open[tile];
+  NodeRange rows = kAllNodes;
+  if (static_cast<float>(scale.kernel_radius) <= kSumMargin) {
+    const SumRims& rims = level_set.rims;
+    rows = rims.RowsReached(bins.tiles, tile);
+    const NodeRange own = rims.OwnRows(tile);
+    FillRowsOf(values, rows, own, 0);
+    rims.AddTo(bins.tiles, tile, values);
+    FillRowsOf(values, kAllNodes, rows, level_set.void_value);
+    inside.fill(0);
+    open.fill(0);
+  }
+  ClassifyNodes(WeightOf(bins, scale), scale, rows, values, inside, open);
 }
 
 // F at nodes of a tile, from the moments there. Returns those that are inside.

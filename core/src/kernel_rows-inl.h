@@ -31,11 +31,6 @@ HWY_INLINE int NodeAfter(float coordinate) {
   return static_cast<int>(coordinate + kOffset) - kOffset + 1;
 }
 
-// The nodes of a row or column of the tile that a kernel reaches: none if last < first.
-struct NodeRange {
-  int first, last;  // Inclusive.
-};
-
 // The kernel of one particle is a function of row term - column term: k = max(0, that)^3 with
 // 1 - dy^2 / R^2 and dx^2 / R^2.
 using RowTerms = std::array<float, kTileSize>;

@@ -26,8 +26,9 @@ struct KernelCorners {
   alignas(64) std::array<std::int32_t, kBlock> at;
 };
 
+// Widens `rows`, of first rows, by those of these particles.
 HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
-                            KernelCorners& corners) {
+                            KernelCorners& corners, NodeRange& rows) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> d_int;
   const auto step = static_cast<int>(hn::Lanes(d));
@@ -37,6 +38,8 @@ HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
     const auto shifted = hn::Add(coordinate, hn::Set(d, static_cast<float>(kOffset)));
     return hn::Add(hn::ConvertTo(d_int, shifted), hn::Set(d_int, 1 - kOffset));
   };
+  auto lowest = hn::Set(d_int, rows.first);
+  auto highest = hn::Set(d_int, rows.last);
   int k = 0;
   for (; k + step <= count; k += step) {
     hn::Vec<decltype(d)> x, y, source;
@@ -45,32 +48,40 @@ HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
     const auto row = node_after(hn::Sub(y, hn::Set(d, radius)));
     hn::StoreU(hn::Sub(x, hn::ConvertTo(d, column)), d, corners.x.data() + k);
     hn::StoreU(hn::Sub(y, hn::ConvertTo(d, row)), d, corners.y.data() + k);
+    lowest = hn::Min(lowest, row);
+    highest = hn::Max(highest, row);
     const auto in_row = hn::Add(column, hn::Set(d_int, SumIndex(0, 0)));
     hn::StoreU(hn::Add(hn::Mul(row, hn::Set(d_int, kSumColumns)), in_row), d_int,
                corners.at.data() + k);
   }
+  rows = {hn::GetLane(hn::MinOfLanes(d_int, lowest)), hn::GetLane(hn::MaxOfLanes(d_int, highest))};
   for (; k < count; ++k) {
     const int column = NodeAfter(entries[k].x - radius);
     const int row = NodeAfter(entries[k].y - radius);
     corners.x[k] = entries[k].x - static_cast<float>(column);
     corners.y[k] = entries[k].y - static_cast<float>(row);
     corners.at[k] = SumIndex(column, row);
+    rows = {std::min(rows.first, row), std::max(rows.last, row)};
   }
 }
 
 // Kernels that the margin has room for: every one covers the same number of rows and columns, so
-// that no branch depends on where a particle lies. add(x, y, weight, first sum) adds one.
+// that no branch depends on where a particle lies. add(x, y, index, first sum) adds one. Returns
+// the first rows of kernels, from the lowest to the highest.
 template <typename Add>
-HWY_INLINE void ForEachCorner(const TileEntries& entries, float radius, NodeSums& sums, Add add) {
+HWY_INLINE NodeRange ForEachCorner(const TileEntries& entries, float radius, NodeSums& sums,
+                                   Add add) {
   KernelCorners corners;
+  NodeRange rows = {2 * kTileSize, -2 * kTileSize};
   const auto count = static_cast<int>(entries.count);
   for (int first = 0; first < count; first += kBlock) {
     const int in_block = std::min(kBlock, count - first);
-    FindCorners(entries.entries + first, in_block, radius, corners);
+    FindCorners(entries.entries + first, in_block, radius, corners, rows);
     for (int k = 0; k < in_block; ++k) {
       add(corners.x[k], corners.y[k], first + k, sums.data() + corners.at[k]);
     }
   }
+  return rows;
 }
 
 // Narrow kernels in vectors of sixteen: two rows of eight nodes at a time, which takes the same
@@ -79,7 +90,7 @@ HWY_INLINE void ForEachCorner(const TileEntries& entries, float radius, NodeSums
 constexpr int kNarrowSpan = kLanes;
 
 template <bool kWeighted, int kPairs>
-void ScatterNarrow(const TileEntries& entries, float radius, int span, NodeSums& sums) {
+NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, NodeSums& sums) {
   const hn::CappedTag<float, 2 * kLanes> d;
   const Lanes d_row;
   const auto inverse_square = hn::Set(d, 1 / (radius * radius));
@@ -93,7 +104,7 @@ void ScatterNarrow(const TileEntries& entries, float radius, int span, NodeSums&
   const auto column = hn::Load(d, columns);
   const auto reached_row = hn::Lt(lane, hn::Set(d, static_cast<float>(span)));
   const auto reached_column = hn::Lt(column, hn::Set(d, static_cast<float>(span)));
-  ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
+  return ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
     const auto dx = hn::Sub(hn::Set(d, x), column);
     const auto dy = hn::Sub(hn::Set(d, y), lane);
     // Beyond the span terms that make k = 0, on every target alike.
@@ -113,26 +124,27 @@ void ScatterNarrow(const TileEntries& entries, float radius, int span, NodeSums&
 }
 
 template <bool kWeighted>
-void ScatterNarrowOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
+NodeRange ScatterNarrowOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
   const auto scatter = span <= 2   ? ScatterNarrow<kWeighted, 1>
                        : span <= 4 ? ScatterNarrow<kWeighted, 2>
                        : span <= 6 ? ScatterNarrow<kWeighted, 3>
                                    : ScatterNarrow<kWeighted, 4>;
-  scatter(entries, radius, span, sums);
+  return scatter(entries, radius, span, sums);
 }
 #else
 constexpr int kNarrowSpan = 0;
 template <bool kWeighted>
-void ScatterNarrowOf(const TileEntries&, float, int, NodeSums&) {}
+NodeRange ScatterNarrowOf(const TileEntries&, float, int, NodeSums&) {
+  return kNoNodes;
+}
 #endif
 
 template <bool kWeighted>
-void ScatterKernelsOf(const TileEntries& entries, float radius, NodeSums& sums) {
-  const int span = static_cast<int>(std::ceil(2 * radius));
+NodeRange ScatterKernelsOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
   if (span <= kNarrowSpan) return ScatterNarrowOf<kWeighted>(entries, radius, span, sums);
   const float inverse_square = 1 / (radius * radius);
   alignas(64) RowTerms row_terms;
-  ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
+  return ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
     SetRowTerms(y, {0, span - 1}, inverse_square, row_terms);
     const float weight = kWeighted ? entries.weight[k] : 1.0f;
     for (int v = 0; v < span; v += kLanes) {
@@ -144,9 +156,12 @@ void ScatterKernelsOf(const TileEntries& entries, float radius, NodeSums& sums) 
   });
 }
 
-void ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
-  entries.weight != nullptr ? ScatterKernelsOf<true>(entries, radius, sums)
-                            : ScatterKernelsOf<false>(entries, radius, sums);
+NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
+  const int span = static_cast<int>(std::ceil(2 * radius));
+  const NodeRange firsts = entries.weight != nullptr
+                               ? ScatterKernelsOf<true>(entries, radius, span, sums)
+                               : ScatterKernelsOf<false>(entries, radius, span, sums);
+  return {firsts.first, firsts.last + span - 1};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -158,8 +173,8 @@ namespace partiemc {
 
 HWY_EXPORT(ScatterKernels);
 
-void ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterKernels)(entries, radius, sums);
+NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
+  return HWY_DYNAMIC_DISPATCH(ScatterKernels)(entries, radius, sums);
 }
 
 }  // namespace partiemc

@@ -22,8 +22,6 @@ HWY_INLINE NodeRange NodesReached(float centre, float radius, NodeRange among) {
           std::min(NodeAfter(centre + radius) - 1, among.last)};
 }
 
-constexpr NodeRange kAllNodes = {0, kTileSize - 1};
-
 // From the first row of a tile that has asked nodes to the last. Requires: there are some.
 NodeRange RowsOf(const AskedNodes& asked) {
   NodeRange rows = kAllNodes;
@@ -105,14 +103,14 @@ HWY_INLINE std::uint32_t BitsOf(hn::Mask<Lanes> mask) {
   return bytes[0];
 }
 
-void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside,
+void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
                    BitRows& open) {
   const Lanes d;
   const Vector guard = hn::Set(d, static_cast<float>(scale.guard));
   const Vector saturation = hn::Set(d, static_cast<float>(scale.saturation));
   const Vector slope = hn::Set(d, static_cast<float>(scale.guard_slope));
   const Vector void_value = hn::Set(d, static_cast<float>(scale.VoidValue()));
-  for (int j = 0; j < kTileSize; ++j) {
+  for (int j = rows.first; j <= rows.last; ++j) {
     std::uint32_t inside_row = 0, open_row = 0;
     for (int i = 0; i < kTileSize; i += kLanes) {
       const Vector sum = hn::LoadU(d, values + j * kTileSize + i);
@@ -256,9 +254,9 @@ void ClearMoments(const AskedNodes& asked, MomentSums& sums) {
   }
 }
 
-void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside,
+void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
                    BitRows& open) {
-  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, values, inside, open);
+  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, rows, values, inside, open);
 }
 
 BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
