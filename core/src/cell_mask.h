@@ -21,6 +21,29 @@ inline bool IsEmpty(const BitRows& rows) {
   return any == 0;
 }
 
+/// Swaps the upper half of each group of 2 kHalf bits with the lower one of the row kHalf above.
+template <int kHalf>
+void SwapHalves(BitRows& rows) {
+  constexpr std::uint32_t kLower = ~std::uint32_t{0} / ((std::uint32_t{1} << kHalf) + 1);
+  for (int first = 0; first < kTileSize; first += 2 * kHalf) {
+    for (int j = first; j < first + kHalf; ++j) {
+      const std::uint32_t swapped = (rows[j] >> kHalf ^ rows[j + kHalf]) & kLower;
+      rows[j + kHalf] ^= swapped;
+      rows[j] ^= swapped << kHalf;
+    }
+  }
+}
+
+/// Bit i of row j becomes bit j of row i.
+inline BitRows Transposed(BitRows rows) {
+  SwapHalves<16>(rows);
+  SwapHalves<8>(rows);
+  SwapHalves<4>(rows);
+  SwapHalves<2>(rows);
+  SwapHalves<1>(rows);
+  return rows;
+}
+
 /// The cells of a mask that lie in the tile's neighbour at `place` (Neighbourhood), or in the tile
 /// itself.
 inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {

@@ -94,9 +94,11 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   const bool masked = reach < kMaskMargin;
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) mask = Widened(asked.rows, reach, reach - 1);
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  const AskedColumns columns = ColumnsOf(asked, radius);
   NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)
       .ForEachBlock([&](const NearEntries& near) {
-        ScatterNearMoments(near, static_cast<float>(scale.kernel_radius), asked, sums);
+        ScatterNearMoments(near, radius, columns, asked.has_kernel_sums, sums);
       });
   return EvaluateNodes(asked, sums, WeightOf(bins, scale), scale, level_set.tiles[tile].data());
 }

@@ -37,8 +37,7 @@ struct LevelSet {
 /// the density leaves the side of a node open, and at the other end of an edge that is crossed.
 /// Accuracy: 1e-5 relative to f = 1 for f, for nodes and particles as rounded by the bins.
 /// Deterministic: sums run over the lists of a node's tile and of its neighbours in one order,
-/// whatever the threads and the instruction set; each list is in the order of the frame. Parallel
-/// over tiles.
+/// whatever the threads and the instruction set. Parallel over tiles.
 /// Cost: linear in the particles, times the square of the kernel radius in cells.
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 

@@ -31,6 +31,15 @@ HWY_INLINE int NodeAfter(float coordinate) {
   return static_cast<int>(coordinate + kOffset) - kOffset + 1;
 }
 
+// The same of many coordinates at once.
+template <class D>
+HWY_INLINE hn::Vec<hn::RebindToSigned<D>> NodesAfter(D d, hn::Vec<D> coordinates) {
+  constexpr int kOffset = 2 * kTileSize;
+  const hn::RebindToSigned<D> d_int;
+  const auto shifted = hn::Add(coordinates, hn::Set(d, static_cast<float>(kOffset)));
+  return hn::Add(hn::ConvertTo(d_int, shifted), hn::Set(d_int, 1 - kOffset));
+}
+
 // The kernel of one particle is a function of row term - column term: k = max(0, that)^3 with
 // 1 - dy^2 / R^2 and dx^2 / R^2.
 using RowTerms = std::array<float, kTileSize>;
@@ -61,9 +70,8 @@ HWY_INLINE ColumnTerms ColumnTermsAt(float x, int column, int last, float invers
                              hn::Set(d, 2.0f))};
 }
 
-HWY_INLINE Vector KernelAt(float row_term, Vector column_term) {
-  const Lanes d;
-  const Vector t = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, row_term), column_term));
+HWY_INLINE Vector KernelAt(Vector row_term, Vector column_term) {
+  const Vector t = hn::Max(hn::Zero(Lanes()), hn::Sub(row_term, column_term));
   return hn::Mul(hn::Mul(t, t), t);
 }
 
@@ -73,7 +81,8 @@ HWY_INLINE void AddTo(float* HWY_RESTRICT sums, Vector term) {
 }
 
 template <bool kWeighted>
-HWY_INLINE void AddRow(float row_term, Vector column_term, float weight, float* HWY_RESTRICT sums) {
+HWY_INLINE void AddRow(Vector row_term, Vector column_term, float weight,
+                       float* HWY_RESTRICT sums) {
   Vector k = KernelAt(row_term, column_term);
   if constexpr (kWeighted) k = hn::Mul(k, hn::Set(Lanes(), weight));
   AddTo(sums, k);

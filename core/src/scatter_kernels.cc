@@ -32,20 +32,14 @@ HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> d_int;
   const auto step = static_cast<int>(hn::Lanes(d));
-  // As NodeAfter.
-  const auto node_after = [&](auto coordinate) HWY_ATTR {
-    constexpr int kOffset = 2 * kTileSize;
-    const auto shifted = hn::Add(coordinate, hn::Set(d, static_cast<float>(kOffset)));
-    return hn::Add(hn::ConvertTo(d_int, shifted), hn::Set(d_int, 1 - kOffset));
-  };
   auto lowest = hn::Set(d_int, rows.first);
   auto highest = hn::Set(d_int, rows.last);
   int k = 0;
   for (; k + step <= count; k += step) {
     hn::Vec<decltype(d)> x, y, source;
     hn::LoadInterleaved3(d, &entries[k].x, x, y, source);
-    const auto column = node_after(hn::Sub(x, hn::Set(d, radius)));
-    const auto row = node_after(hn::Sub(y, hn::Set(d, radius)));
+    const auto column = NodesAfter(d, hn::Sub(x, hn::Set(d, radius)));
+    const auto row = NodesAfter(d, hn::Sub(y, hn::Set(d, radius)));
     hn::StoreU(hn::Sub(x, hn::ConvertTo(d, column)), d, corners.x.data() + k);
     hn::StoreU(hn::Sub(y, hn::ConvertTo(d, row)), d, corners.y.data() + k);
     lowest = hn::Min(lowest, row);
@@ -150,7 +144,8 @@ NodeRange ScatterKernelsOf(const TileEntries& entries, float radius, int span, N
     for (int v = 0; v < span; v += kLanes) {
       const Vector column_term = ColumnTermsAt(x, v, span - 1, inverse_square).term;
       for (int row = 0; row < span; ++row) {
-        AddRow<kWeighted>(row_terms[row], column_term, weight, at + row * kSumColumns + v);
+        AddRow<kWeighted>(hn::Set(Lanes(), row_terms[row]), column_term, weight,
+                          at + row * kSumColumns + v);
       }
     }
   });

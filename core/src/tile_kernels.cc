@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+
+#include "cell_mask.h"
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
@@ -22,33 +25,21 @@ HWY_INLINE NodeRange NodesReached(float centre, float radius, NodeRange among) {
           std::min(NodeAfter(centre + radius) - 1, among.last)};
 }
 
-// From the first row of a tile that has asked nodes to the last. Requires: there are some.
-NodeRange RowsOf(const AskedNodes& asked) {
-  NodeRange rows = kAllNodes;
-  while (asked.rows[rows.first] == 0) ++rows.first;
-  while (asked.rows[rows.last] == 0) --rows.last;
-  return rows;
-}
-
-// Calls visit(index among the near ones, column, row, terms of the columns from there, term of the
-// row) for each vector of the nodes of these rows that a kernel reaches.
+// Calls visit(column, row, terms of the columns from there, dy, term of the row) for each vector of
+// these nodes of a kernel.
 template <typename Visit>
-HWY_INLINE void ForEachReached(const NearEntries& near, float radius, NodeRange rows_asked,
-                               Visit visit) {
-  const float inverse_square = 1 / (radius * radius);
-  alignas(64) RowTerms row_terms;
-  for (int e = 0; e < near.count; ++e) {
-    const float x = near.x[e];
-    const float y = near.y[e];
-    const NodeRange columns = NodesReached(x, radius, kAllNodes);
-    const NodeRange rows = NodesReached(y, radius, rows_asked);
-    if (rows.last < rows.first) continue;
-    SetRowTerms(y, rows, inverse_square, row_terms);
-    for (int column = columns.first; column <= columns.last; column += kLanes) {
-      const ColumnTerms terms = ColumnTermsAt(x, column, columns.last, inverse_square);
-      for (int row = rows.first; row <= rows.last; ++row) {
-        visit(e, column, row, terms, row_terms[row - rows.first]);
-      }
+HWY_INLINE void ForEachVector(float x, float y, NodeRange columns, NodeRange rows,
+                              float inverse_square, Visit visit) {
+  const Lanes d;
+  const Vector one = hn::Set(d, 1.0f);
+  const Vector first_dy = hn::Set(d, y - static_cast<float>(rows.first));
+  for (int column = columns.first; column <= columns.last; column += kLanes) {
+    const ColumnTerms terms = ColumnTermsAt(x, column, columns.last, inverse_square);
+    Vector dy = first_dy;
+    for (int row = rows.first; row <= rows.last; ++row) {
+      const Vector row_term = hn::Sub(one, hn::Mul(hn::Mul(dy, dy), hn::Set(d, inverse_square)));
+      visit(column, row, terms, dy, row_term);
+      dy = hn::Sub(dy, one);  // Exact, as positions in tiles are.
     }
   }
 }
@@ -56,12 +47,17 @@ HWY_INLINE void ForEachReached(const NearEntries& near, float radius, NodeRange 
 template <bool kWeighted>
 void ScatterNearKernelsOf(const NearEntries& near, const float* weight, float radius,
                           NodeSums& sums) {
-  ForEachReached(
-      near, radius, kAllNodes,
-      [&](int e, int column, int row, const ColumnTerms& terms, float row_term) HWY_ATTR {
-        AddRow<kWeighted>(row_term, terms.term, kWeighted ? weight[near.entry[e]] : 1.0f,
-                          sums.data() + SumIndex(column, row));
-      });
+  const float inverse_square = 1 / (radius * radius);
+  for (int e = 0; e < near.count; ++e) {
+    const NodeRange columns = NodesReached(near.x[e], radius, kAllNodes);
+    const NodeRange rows = NodesReached(near.y[e], radius, kAllNodes);
+    const float of = kWeighted ? weight[near.entry[e]] : 1.0f;
+    ForEachVector(
+        near.x[e], near.y[e], columns, rows, inverse_square,
+        [&](int column, int row, const ColumnTerms& terms, Vector, Vector row_term) HWY_ATTR {
+          AddRow<kWeighted>(row_term, terms.term, of, sums.data() + SumIndex(column, row));
+        });
+  }
 }
 
 void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
@@ -70,31 +66,74 @@ void ScatterNearKernels(const NearEntries& near, const float* weight, float radi
                     : ScatterNearKernelsOf<false>(near, weight, radius, sums);
 }
 
-template <bool kKernel>
-void ScatterNearMomentsOf(const NearEntries& near, float radius, NodeRange rows, MomentSums& sums) {
-  const Lanes d;
-  ForEachReached(near, radius, rows,
-                 [&](int e, int column, int row, const ColumnTerms& terms, float row_term)
-                     HWY_ATTR {
-                       const Vector k = KernelAt(row_term, terms.term);
-                       const Vector dy = hn::Set(d, near.y[e] - static_cast<float>(row));
-                       const int at = SumIndex(column, row);
-                       if constexpr (kKernel) AddTo(sums.kernel.data() + at, k);
-                       const Vector kx = hn::Mul(k, terms.dx);
-                       const Vector ky = hn::Mul(k, dy);
-                       AddTo(sums.moment_x.data() + at, kx);
-                       AddTo(sums.moment_y.data() + at, ky);
-                       AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
-                       AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
-                       AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
-                     });
+// Where kernels begin, and the rows in which they reach asked nodes. Those of as many rows are
+// listed together, so that the ends of loops over rows need not be guessed.
+struct ReachingKernels {
+  alignas(64) NearEntries::PerEntry<std::int32_t> column, row;
+  std::array<std::array<std::uint8_t, NearEntries::kCapacity>, kTileSize + 1> of_rows;
+  std::array<int, kTileSize + 1> count{};  // By number of rows: how many are listed.
+};
+static_assert(NearEntries::kCapacity <= 256, "places are bytes");
+
+void FindReaching(const NearEntries& near, float radius, const AskedColumns& asked,
+                  ReachingKernels& kernels) {
+  const hn::CappedTag<float, NearEntries::kPadding> d;
+  const hn::RebindToSigned<decltype(d)> d_int;
+  const auto step = static_cast<int>(hn::Lanes(d));
+  for (int e = 0; e < near.count; e += step) {
+    const auto first = [&](const float* centre) HWY_ATTR {
+      return NodesAfter(d, hn::Sub(hn::LoadU(d, centre + e), hn::Set(d, radius)));
+    };
+    hn::Store(first(near.x.data()), d_int, kernels.column.data() + e);
+    hn::Store(hn::Max(first(near.y.data()), hn::Set(d_int, -AskedColumns::kRowShift)), d_int,
+              kernels.row.data() + e);
+  }
+  for (int e = 0; e < near.count; ++e) {
+    const std::uint64_t column = asked.rows[std::clamp(kernels.column[e], 0, kTileSize)];
+    const std::uint64_t rows =
+        column >> std::min(kernels.row[e] + AskedColumns::kRowShift, 63) & asked.kernel_rows;
+    const int before = std::countr_zero(rows | std::uint64_t{1} << 63);
+    const int last = 63 - std::countl_zero(rows | 1);
+    const int count = rows != 0 ? last - before + 1 : 0;
+    kernels.row[e] += before;
+    kernels.of_rows[count][kernels.count[count]++] = static_cast<std::uint8_t>(e);
+  }
 }
 
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedNodes& asked,
-                        MomentSums& sums) {
-  const NodeRange rows = RowsOf(asked);
-  asked.has_kernel_sums ? ScatterNearMomentsOf<false>(near, radius, rows, sums)
-                        : ScatterNearMomentsOf<true>(near, radius, rows, sums);
+template <bool kKernel>
+void ScatterNearMomentsOf(const NearEntries& near, float radius, const AskedColumns& asked,
+                          MomentSums& sums) {
+  const float inverse_square = 1 / (radius * radius);
+  ReachingKernels kernels;
+  FindReaching(near, radius, asked, kernels);
+  for (int count = 1; count <= kTileSize; ++count) {
+    for (int n = 0; n < kernels.count[count]; ++n) {
+      const int e = kernels.of_rows[count][n];
+      const NodeRange columns = {std::max(kernels.column[e], 0),
+                                 std::min(kernels.column[e] + asked.span, kTileSize) - 1};
+      const NodeRange rows = {kernels.row[e], kernels.row[e] + count - 1};
+      ForEachVector(near.x[e], near.y[e], columns, rows, inverse_square,
+                    [&](int column, int row, const ColumnTerms& terms, Vector dy, Vector row_term)
+                        HWY_ATTR {
+                          const Vector k = KernelAt(row_term, terms.term);
+                          const int at = SumIndex(column, row);
+                          if constexpr (kKernel) AddTo(sums.kernel.data() + at, k);
+                          const Vector kx = hn::Mul(k, terms.dx);
+                          const Vector ky = hn::Mul(k, dy);
+                          AddTo(sums.moment_x.data() + at, kx);
+                          AddTo(sums.moment_y.data() + at, ky);
+                          AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
+                          AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
+                          AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
+                        });
+    }
+  }
+}
+
+void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
+                        bool has_kernel_sums, MomentSums& sums) {
+  has_kernel_sums ? ScatterNearMomentsOf<false>(near, radius, asked, sums)
+                  : ScatterNearMomentsOf<true>(near, radius, asked, sums);
 }
 
 HWY_INLINE std::uint32_t BitsOf(hn::Mask<Lanes> mask) {
@@ -235,9 +274,27 @@ void ScatterNearKernels(const NearEntries& near, const float* weight, float radi
   HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
 }
 
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedNodes& asked,
-                        MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, radius, asked, sums);
+void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
+                        bool has_kernel_sums, MomentSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, radius, asked, has_kernel_sums, sums);
+}
+
+AskedColumns ColumnsOf(const AskedNodes& asked, float radius) {
+  const int span = static_cast<int>(std::ceil(2 * radius));
+  AskedColumns columns{.span = span, .kernel_rows = ~std::uint64_t{0} >> std::max(64 - span, 0)};
+  // In place of each node all columns from which a kernel reaches it.
+  BitRows within = asked.rows;
+  const int width = std::min(span, kTileSize);
+  for (int reached = 1; reached < width;) {
+    const int step = std::min(reached, width - reached);
+    for (std::uint32_t& row : within) row |= row >> step;
+    reached += step;
+  }
+  within = Transposed(within);
+  for (int column = 0; column < kTileSize; ++column) {
+    columns.rows[column] = std::uint64_t{within[column]} << AskedColumns::kRowShift;
+  }
+  return columns;
 }
 
 void ClearMoments(const AskedNodes& asked, MomentSums& sums) {

@@ -45,6 +45,18 @@ struct AskedNodes {
   bool has_kernel_sums;  ///< Whether their values so far are sum k (ClassifyNodes).
 };
 
+/// In which rows of a tile kernels of a radius find asked nodes.
+struct AskedColumns {
+  /// Kernels that begin farther before the tile than this do not reach it.
+  static constexpr int kRowShift = kTileSize - 1;
+  /// By first column of a kernel, 0 for those before the tile: bit j + kRowShift for row j. None
+  /// beyond the tile.
+  std::array<std::uint64_t, kTileSize + 1> rows{};
+  int span;                   ///< Rows and columns of a kernel.
+  std::uint64_t kernel_rows;  ///< As many bits.
+};
+AskedColumns ColumnsOf(const AskedNodes& asked, float radius);
+
 /// The list of one tile. `weight` is null where weights are uniform.
 struct TileEntries {
   const BinEntry* entries;
@@ -62,9 +74,10 @@ NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sum
 void ScatterNearKernels(const NearEntries& near, const float* weight, float radius, NodeSums& sums);
 
 /// Adds to the moments at the asked nodes; those at other nodes of the tile are anything. The sums
-/// must be cleared first. `sum k` is added up unless it is known.
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedNodes& asked,
-                        MomentSums& sums);
+/// must be cleared first. `sum k` is added up unless it is known. Particles that reach asked nodes
+/// in fewer rows come first, those of as many in their order.
+void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
+                        bool has_kernel_sums, MomentSums& sums);
 void ClearMoments(const AskedNodes& asked, MomentSums& sums);
 
 /// What the density f = weight * sum says of the nodes in some rows of a tile: those that are

@@ -13,6 +13,7 @@
 #include "support/oracle.h"
 #include "support/particles.h"
 #include "support/stages.h"
+#include "tile_kernels.h"
 
 namespace partiemc {
 namespace {
@@ -157,10 +158,32 @@ TEST(Field, DensityInsideALatticeIsAboutOneSoThatOnlyTheBoundaryIsNearZero) {
   EXPECT_NEAR(stages.level_set.At(stages.bins.tiles, tile, 10, 10), (0.85 - 1) * 3 / 1.164, 0.01);
 }
 
+TEST(AskedColumns, HaveTheRowsInWhichAKernelThatBeginsThereMeetsAskedNodes) {
+  support::Random random(17);
+  for (const float radius : {0.5f, 1.5f, 3.0f, 11.2f, 20.0f, 31.5f}) {
+    AskedNodes asked{.rows = {}, .is_open = true, .has_kernel_sums = true};
+    for (std::uint32_t& row : asked.rows) {
+      for (std::size_t n = random.Below(3); n > 0; --n)
+        row |= std::uint32_t{1} << random.Below(kTileSize);
+    }
+    const AskedColumns columns = ColumnsOf(asked, radius);
+    EXPECT_EQ(columns.span, static_cast<int>(std::ceil(2 * radius)));
+    for (int first = 0; first <= kTileSize; ++first) {
+      std::uint64_t expected = 0;
+      for (int j = 0; j < kTileSize; ++j) {
+        for (int i = first; i < std::min(first + columns.span, kTileSize); ++i) {
+          expected |= std::uint64_t{asked.rows[j] >> i & 1} << (j + AskedColumns::kRowShift);
+        }
+      }
+      EXPECT_EQ(columns.rows[first], expected) << "radius " << radius << ", column " << first;
+    }
+  }
+}
+
 // Processors differ in their vectors: each kind that this one has must give the bits of all others.
 TEST(Field, HasTheSameBitsForAnyInstructionSet) {
   support::Random random(9);
-  for (const double radius : {1.5, 2.0, 3.0, 4.0, 5.7, 8.0}) {
+  for (const double radius : {1.5, 2.0, 3.0, 4.0, 5.7, 8.0, 20.0}) {
     support::Particles particles = SmallScene(random, 1.0, radius > 3);
     std::vector<LevelSet> results;
     support::ForEachInstructionSet([&] {
