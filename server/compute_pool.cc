@@ -18,7 +18,8 @@ ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
     : warm_time_(warm_time),
       observer_(observer),
       parallelism_(oneapi::tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)),
-      arena_(std::max(threads, 1u)) {
+      arena_(std::max(threads, 1u)),
+      busy_(warm_time) {
   runners_.reserve(std::max(threads, 1u));
   for (unsigned i = 0; i < std::max(threads, 1u); ++i) {
     runners_.emplace_back([this] { Run(); });
@@ -34,10 +35,10 @@ ComputePool::~ComputePool() {
   for (std::thread& runner : runners_) runner.join();
 }
 
-void ComputePool::Submit(Job job, Afterwards afterwards) {
+void ComputePool::Submit(Job job, Afterwards afterwards, BusyStreams::Mark* stream) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.push_back({std::move(job), std::move(afterwards)});
+    tasks_.push_back({std::move(job), std::move(afterwards), stream});
   }
   task_came_.notify_one();
 }
@@ -61,7 +62,7 @@ void ComputePool::Run() {
       lock.unlock();
       arena_.Execute([&] { task.job(*worker); });
       lock.lock();
-      idle_.push_back(std::move(worker));
+      PutBack(std::move(worker), task.stream);
       lock.unlock();
       task.afterwards();
     }
@@ -85,6 +86,7 @@ void ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
 }
 
 std::unique_ptr<Worker> ComputePool::TakeWorker() {
+  ++working_;
   if (idle_.empty()) {
     auto worker = std::make_unique<Worker>();
     worker->observer = observer_;
@@ -95,11 +97,24 @@ std::unique_ptr<Worker> ComputePool::TakeWorker() {
   return worker;
 }
 
+void ComputePool::PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream) {
+  const std::size_t particles = worker->particles.TakeLast();
+  if (stream != nullptr && particles > 0) {
+    busy_.Worked(*stream, particles, WarmSize::Clock::now());
+  }
+  idle_.push_back(std::move(worker));
+  --working_;
+}
+
 ComputePool::Workers ComputePool::TakeOutlived() {
   Workers outlived;
   const auto now = WarmSize::Clock::now();
+  std::size_t workers = working_ + idle_.size();
   std::erase_if(idle_, [&](std::unique_ptr<Worker>& worker) {
-    if (!worker->particles.Outlived(now, warm_time_)) return false;
+    const WarmSize& particles = worker->particles;
+    if (!particles.Outlived(now, warm_time_)) return false;
+    if (busy_.Count(WarmSize::LeastFor(particles.largest()), now) >= workers) return false;
+    --workers;
     outlived.push_back(std::move(worker));
     return true;
   });

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "partiemc/arena.h"
+#include "server/busy_streams.h"
 #include "server/worker.h"
 
 namespace partiemc::server {
@@ -29,7 +30,9 @@ inline constexpr std::chrono::seconds kWarmTime(10);
 /// Memory: a job gets the worker that was used last, so that one stream keeps one of them warm,
 /// however many threads there are. A worker that for `warm_time` has had no frame of at least a
 /// quarter of its largest is dropped with all of its buffers: after a large frame an idle server,
-/// or one with small frames, soon holds no more than it needs.
+/// or one with small frames, soon holds no more than it needs. It stays where as many streams as
+/// there are workers send such frames: how often these meet is luck, and may change by the minute,
+/// but they can at any time.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
@@ -46,9 +49,10 @@ class ComputePool {
   ComputePool& operator=(const ComputePool&) = delete;
 
   /// Runs `job`, then `afterwards`, which has no worker any more: what it submits gets the same
-  /// one. Never blocks on computing. Neither may throw. Safe from any thread, jobs included.
+  /// one. `stream` is of the stream whose frame it is, if any, and lives as long as `job`. Never
+  /// blocks on computing. Neither may throw. Safe from any thread, jobs included.
   void Submit(
-      Job job, Afterwards afterwards = [] {});
+      Job job, Afterwards afterwards = [] {}, BusyStreams::Mark* stream = nullptr);
 
   /// Jobs that have been submitted and not begun.
   std::size_t QueueLength() const;
@@ -59,6 +63,7 @@ class ComputePool {
   struct Task {
     Job job;
     Afterwards afterwards;
+    BusyStreams::Mark* stream;
   };
   using Workers = std::vector<std::unique_ptr<Worker>>;
 
@@ -66,6 +71,7 @@ class ComputePool {
   // With the lock held; those that get it let it go for a while:
   void WaitForTask(std::unique_lock<std::mutex>& lock);
   std::unique_ptr<Worker> TakeWorker();
+  void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream);
   Workers TakeOutlived();
   static void Drop(Workers workers, std::unique_lock<std::mutex>& lock);
 
@@ -75,9 +81,11 @@ class ComputePool {
   Arena arena_;
   mutable std::mutex mutex_;
   std::condition_variable task_came_;
-  std::deque<Task> tasks_;  // Guarded by mutex_.
-  Workers idle_;            // Guarded by mutex_. The one that was used last is the last.
-  bool stopping_ = false;   // Guarded by mutex_.
+  std::deque<Task> tasks_;   // Guarded by mutex_.
+  Workers idle_;             // Guarded by mutex_. The one that was used last is the last.
+  std::size_t working_ = 0;  // Guarded by mutex_. Workers that are not idle.
+  BusyStreams busy_;         // Guarded by mutex_.
+  bool stopping_ = false;    // Guarded by mutex_.
   std::vector<std::thread> runners_;
 };
 

@@ -324,7 +324,7 @@ void StreamFlow::Perform(Actions actions) {
     if (actions.give_back > 0) budget_.GiveBack(actions.give_back);
     if (actions.compute) {
       pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
-                   [self] { self->Computed(); });
+                   [self] { self->Computed(); }, &busy_mark_);
     }
     if (actions.write) door_.StartWrite(*actions.write, actions.write_slot);
     if (actions.cut) door_.Cut();

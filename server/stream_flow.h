@@ -166,6 +166,7 @@ class StreamFlow final : public MemoryBudget::Waiter,
   MemoryBudget& budget_;
   const std::size_t window_;
 
+  BusyStreams::Mark busy_mark_;       // The pool's.
   std::optional<Answered> answered_;  // From Compute to Computed, which it precedes.
 
   mutable std::mutex mutex_;  // Guards everything below.

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <utility>
 
 #include "partiemc/reconstructor.h"
 #include "partiemc/result.h"
@@ -20,15 +21,23 @@ class WarmSize {
   using Clock = std::chrono::steady_clock;
 
   void Used(std::size_t size, Clock::time_point now) {
+    last_ = size;
     largest_ = std::max(largest_, size);
-    if (size >= largest_ / 4) needed_ = now;
+    if (size >= LeastFor(largest_)) needed_ = now;
   }
   bool Outlived(Clock::time_point now, Clock::duration warm_time) const {
     return largest_ > 0 && now - needed_ >= warm_time;
   }
   bool used() const { return largest_ > 0; }
+  std::size_t largest() const { return largest_; }
+  /// Of the last use; 0 if there was none since this was asked.
+  std::size_t TakeLast() { return std::exchange(last_, 0); }
+
+  /// Of what is smaller, buffers for `largest` are too large.
+  static std::size_t LeastFor(std::size_t largest) { return largest / 4; }
 
  private:
+  std::size_t last_ = 0;
   std::size_t largest_ = 0;
   Clock::time_point needed_;
 };

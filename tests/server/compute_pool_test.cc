@@ -4,14 +4,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <future>
+#include <latch>
 #include <memory>
 #include <optional>
 #include <set>
 #include <thread>
 #include <utility>
+#include <vector>
 
 namespace partiemc::server {
 namespace {
@@ -143,6 +148,62 @@ TEST(ComputePool, AWorkerInUseIsKept) {
   while (!is_kept && WarmSize::Clock::now() < give_up) is_kept = IsKeptWhileInUse();
   EXPECT_EQ(is_kept, true);
 }
+
+// Has two workers work on large frames at once; each future is there when the buffers of one are
+// gone.
+std::array<std::future<void>, 2> WorkOnTwoLargeFramesAtOnce(ComputePool& pool) {
+  std::array<std::future<void>, 2> gone;
+  const auto begun = std::make_shared<std::latch>(2), done = std::make_shared<std::latch>(2);
+  for (std::future<void>& future : gone) {
+    std::promise<void> promise;
+    future = promise.get_future();
+    auto buffers = std::make_shared<std::unique_ptr<DoorBuffers>>(
+        std::make_unique<Mourned>(std::move(promise)));
+    pool.Submit(
+        [begun, buffers](Worker& worker) {
+          begun->arrive_and_wait();
+          worker.particles.Used(1'000'000, WarmSize::Clock::now());
+          worker.door_buffers = std::move(*buffers);
+        },
+        [done] { done->count_down(); });
+  }
+  done->wait();
+  return gone;
+}
+
+// Two workers are warm, then so many streams take turns, so that one is enough for all of them.
+// Returns how many workers are still warm after much longer than an idle one is kept; nothing if
+// the machine itself let them idle for so long that they had to go.
+std::optional<int> KeptWhileStreamsTakeTurns(std::size_t streams) {
+  std::vector<BusyStreams::Mark> marks(streams);
+  ComputePool pool(2, milliseconds(400));
+  const auto gone = WorkOnTwoLargeFramesAtOnce(pool);
+  TimePoint last = WarmSize::Clock::now();
+  const TimePoint until = last + milliseconds(1200);
+  for (std::size_t turn = 0; WarmSize::Clock::now() < until; ++turn) {
+    const auto done = std::make_shared<std::promise<void>>();
+    pool.Submit([](Worker& worker) { worker.particles.Used(300'000, WarmSize::Clock::now()); },
+                [done] { done->set_value(); }, &marks[turn % streams]);
+    done->get_future().wait();
+    if (WarmSize::Clock::now() - last > milliseconds(100)) return std::nullopt;
+    last = WarmSize::Clock::now();
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  return static_cast<int>(std::ranges::count_if(gone, [](const std::future<void>& future) {
+    return future.wait_for(seconds(0)) == std::future_status::timeout;
+  }));
+}
+
+class WorkersOfStreams : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(WorkersOfStreams, AreKeptAsManyAsTheyMayNeedAtOnceThoughTheirFramesDoNotMeet) {
+  const TimePoint give_up = WarmSize::Clock::now() + kLongEnough;
+  std::optional<int> kept;
+  while (!kept && WarmSize::Clock::now() < give_up) kept = KeptWhileStreamsTakeTurns(GetParam());
+  EXPECT_EQ(kept, static_cast<int>(GetParam()));
+}
+
+INSTANTIATE_TEST_SUITE_P(OneAndTwo, WorkersOfStreams, ::testing::Values(1, 2));
 
 }  // namespace
 }  // namespace partiemc::server
