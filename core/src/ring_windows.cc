@@ -16,9 +16,11 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Lanes = hn::CappedTag<double, kWindowPadding>;
+using Lanes = hn::CappedTag<float, 16>;
+using Units = hn::RebindToSigned<Lanes>;
 using Vector = hn::Vec<Lanes>;
 constexpr auto kLanes = static_cast<std::ptrdiff_t>(hn::MaxLanes(Lanes()));
+static_assert(kLanes < kWindowPadding, "windows end one vertex after all of their lanes have");
 
 HWY_INLINE Vector Dot(Vector ax, Vector ay, Vector bx, Vector by) {
   return hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by));
@@ -31,50 +33,64 @@ HWY_INLINE Vector AngleWeight(Vector cosine) {
   return power;
 }
 
-// Goes over the vertices [begin, end) by as many as there are lanes: in each block it calls
-// add(first, j, w) for every offset that is in the window of one of the block's vertices; j is the
-// neighbour of the first vertex, w the weights of the neighbours, 0 beyond a window. Then
-// finish(first, lanes).
+// Vertices as many as there are lanes.
+struct Block {
+  std::ptrdiff_t first, lanes;
+};
+
+// From vertices of a ring to neighbours, in cells; their coordinates begin at `from` and `to`.
+HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
+  const Lanes d;
+  const auto units = hn::Sub(hn::LoadU(Units(), to), from);
+  return hn::Mul(hn::ConvertTo(d, units), hn::Set(d, static_cast<float>(1 / kRingUnitsPerCell)));
+}
+
+// Goes over the vertices [begin, end) by blocks: in each it calls add(j, w) for every offset that
+// is in the window of one of its vertices; j is the neighbour of the first vertex, w the weights of
+// the neighbours, 0 beyond a window. Then finish(block).
 template <typename Start, typename Add, typename Finish>
 HWY_INLINE void ForEachWindow(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {
   const Lanes d;
-  const double* const arc = ring.arc;
-  const Vector one = hn::Set(d, 1.0);
-  const Vector inverse_square = hn::Set(d, 1 / (reach * reach));
-  std::ptrdiff_t low = begin;
-  std::ptrdiff_t high = begin;
-  while (arc[begin] - arc[low - 1] < reach) --low;
-  for (std::ptrdiff_t first = begin; first < end; first += kLanes) {
-    const std::ptrdiff_t lanes = std::min(kLanes, end - first);
-    std::ptrdiff_t before = 0;
-    std::ptrdiff_t after = 0;
-    for (std::ptrdiff_t k = first; k < first + lanes; ++k) {
-      while (arc[k] - arc[low] >= reach) ++low;
-      while (arc[high + 1] - arc[k] < reach) ++high;
-      before = std::max(before, k - low);
-      after = std::max(after, high - k);
-    }
-    start(first);
-    const Vector here = hn::LoadU(d, arc + first);
-    for (std::ptrdiff_t j = first - before; j <= first + after; ++j) {
-      const Vector distance = hn::Sub(hn::LoadU(d, arc + j), here);
-      const Vector t =
-          hn::Max(hn::Sub(one, hn::Mul(hn::Mul(distance, distance), inverse_square)), hn::Zero(d));
+  const Vector one = hn::Set(d, 1.0f);
+  const double reach_units = reach * kRingUnitsPerCell;
+  const Vector inverse_square = hn::Set(d, static_cast<float>(1 / (reach_units * reach_units)));
+  for (Block block{begin, kLanes}; block.first < end; block.first += kLanes) {
+    block.lanes = std::min(kLanes, end - block.first);
+    const auto in_block = hn::FirstN(d, static_cast<std::size_t>(block.lanes));
+    const auto here = hn::LoadU(Units(), ring.arc + block.first);
+    // Falls with the distance, to 0 or less at the window's end.
+    const auto nearness_of = [&](std::ptrdiff_t j) HWY_ATTR {
+      const auto units = hn::Sub(hn::LoadU(Units(), ring.arc + j), here);
+      const Vector distance = hn::ConvertTo(d, units);
+      return hn::Sub(one, hn::Mul(hn::Mul(distance, distance), inverse_square));
+    };
+    const auto add_near = [&](std::ptrdiff_t j, Vector nearness) HWY_ATTR {
+      const Vector t = hn::Max(nearness, hn::Zero(d));
       add(j, hn::Mul(hn::LoadU(d, ring.weight + j), hn::Mul(t, t)));
+    };
+    start(block.first);
+    add_near(block.first, one);
+    for (std::ptrdiff_t apart = 1;; ++apart) {
+      const Vector before = nearness_of(block.first - apart);
+      const Vector after = nearness_of(block.first + apart);
+      const auto is_near = hn::Gt(hn::Max(before, after), hn::Zero(d));
+      if (hn::AllFalse(d, hn::And(is_near, in_block))) break;
+      add_near(block.first - apart, before);
+      add_near(block.first + apart, after);
     }
-    finish(first, lanes);
+    finish(block);
   }
 }
 
-HWY_INLINE void StoreLanes(Vector values, std::ptrdiff_t lanes, double* target) {
+HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
   const Lanes d;
-  if (lanes == kLanes) {
-    hn::StoreU(values, d, target);
+  if (block.lanes == kLanes) {
+    hn::StoreU(values, d, target + block.first);
   } else {
-    HWY_ALIGN double all[kLanes];
+    HWY_ALIGN float all[kLanes];
     hn::Store(values, d, all);
-    std::copy(all, all + lanes, target);
+    std::copy(all, all + block.lanes, target + block.first);
   }
 }
 
@@ -96,14 +112,13 @@ void SumNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t e
         sum_x = hn::Add(sum_x, hn::Mul(w, x));
         sum_y = hn::Add(sum_y, hn::Mul(w, y));
       },
-      [&](std::ptrdiff_t first, std::ptrdiff_t lanes) HWY_ATTR {
+      [&](const Block& block) HWY_ATTR {
         const Vector square = Dot(sum_x, sum_y, sum_x, sum_y);
         const Vector length = hn::Sqrt(square);
-        const auto is_weak = hn::Lt(square, hn::Set(d, kWeakGradientSquare * kWeakGradientSquare));
-        StoreLanes(hn::IfThenElse(is_weak, own_x, hn::Div(sum_x, length)), lanes,
-                   ring.next_x + first);
-        StoreLanes(hn::IfThenElse(is_weak, own_y, hn::Div(sum_y, length)), lanes,
-                   ring.next_y + first);
+        const auto is_weak = hn::Lt(
+            square, hn::Set(d, static_cast<float>(kWeakGradientSquare * kWeakGradientSquare)));
+        StoreBlock(hn::IfThenElse(is_weak, own_x, hn::Div(sum_x, length)), block, ring.next_x);
+        StoreBlock(hn::IfThenElse(is_weak, own_y, hn::Div(sum_y, length)), block, ring.next_y);
       });
 }
 
@@ -119,12 +134,13 @@ void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t 
 void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach) {
   const Lanes d;
-  Vector x, y, normal_x, normal_y, turn, square;
+  hn::Vec<Units> x, y;
+  Vector normal_x, normal_y, turn, square;
   ForEachWindow(
       ring, begin, end, reach,
       [&](std::ptrdiff_t first) HWY_ATTR {
-        x = hn::LoadU(d, ring.x + first);
-        y = hn::LoadU(d, ring.y + first);
+        x = hn::LoadU(Units(), ring.x + first);
+        y = hn::LoadU(Units(), ring.y + first);
         normal_x = hn::LoadU(d, ring.normal_x + first);
         normal_y = hn::LoadU(d, ring.normal_y + first);
         turn = square = hn::Zero(d);
@@ -134,28 +150,29 @@ void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_
         const auto along_tangent = [&](Vector to_x, Vector to_y) HWY_ATTR {
           return hn::Sub(hn::Mul(to_y, normal_x), hn::Mul(to_x, normal_y));
         };
-        const Vector along = along_tangent(hn::Sub(hn::LoadU(d, ring.x + j), x),
-                                           hn::Sub(hn::LoadU(d, ring.y + j), y));
+        const Vector along =
+            along_tangent(CellsBetween(x, ring.x + j), CellsBetween(y, ring.y + j));
         const Vector turned = along_tangent(hn::Sub(hn::LoadU(d, ring.normal_x + j), normal_x),
                                             hn::Sub(hn::LoadU(d, ring.normal_y + j), normal_y));
         const Vector weighted = hn::Mul(w, along);
         turn = hn::Add(turn, hn::Mul(weighted, turned));
         square = hn::Add(square, hn::Mul(weighted, along));
       },
-      [&](std::ptrdiff_t first, std::ptrdiff_t lanes) HWY_ATTR {
+      [&](const Block& block) HWY_ATTR {
         const auto is_known = hn::Gt(square, hn::Zero(d));
-        StoreLanes(hn::IfThenElseZero(is_known, hn::Div(turn, square)), lanes, ring.shift + first);
+        StoreBlock(hn::IfThenElseZero(is_known, hn::Div(turn, square)), block, ring.shift);
       });
 }
 
 void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
-  Vector x, y, normal_x, normal_y, base, sum, weight;
+  hn::Vec<Units> x, y;
+  Vector normal_x, normal_y, base, sum, weight;
   ForEachWindow(
       ring, begin, end, reach,
       [&](std::ptrdiff_t first) HWY_ATTR {
-        x = hn::LoadU(d, ring.x + first);
-        y = hn::LoadU(d, ring.y + first);
+        x = hn::LoadU(Units(), ring.x + first);
+        y = hn::LoadU(Units(), ring.y + first);
         normal_x = hn::LoadU(d, ring.normal_x + first);
         normal_y = hn::LoadU(d, ring.normal_y + first);
         base = hn::LoadU(d, ring.base + first);
@@ -165,19 +182,19 @@ void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t en
         const Vector near_x = hn::LoadU(d, ring.normal_x + j);
         const Vector near_y = hn::LoadU(d, ring.normal_y + j);
         w = hn::Mul(w, AngleWeight(Dot(normal_x, normal_y, near_x, near_y)));
-        const Vector chord_x = hn::Sub(hn::LoadU(d, ring.x + j), x);
-        const Vector chord_y = hn::Sub(hn::LoadU(d, ring.y + j), y);
+        const Vector chord_x = CellsBetween(x, ring.x + j);
+        const Vector chord_y = CellsBetween(y, ring.y + j);
         const Vector offset = hn::Mul(hn::Add(Dot(normal_x, normal_y, chord_x, chord_y),
                                               Dot(near_x, near_y, chord_x, chord_y)),
-                                      hn::Set(d, 0.5));
+                                      hn::Set(d, 0.5f));
         const Vector raised = hn::Sub(hn::LoadU(d, ring.base + j), base);
         sum = hn::Add(sum, hn::Mul(w, hn::Add(offset, raised)));
         weight = hn::Add(weight, w);
       },
-      [&](std::ptrdiff_t first, std::ptrdiff_t lanes) HWY_ATTR {
+      [&](const Block& block) HWY_ATTR {
         const auto is_known = hn::Gt(weight, hn::Zero(d));
         const Vector mean = hn::IfThenElseZero(is_known, hn::Div(sum, weight));
-        StoreLanes(hn::Add(base, mean), lanes, ring.shift + first);
+        StoreBlock(hn::Add(base, mean), block, ring.shift);
       });
 }
 

@@ -1,6 +1,7 @@
 // Rings as windows along them are read: straight, with neither end nor beginning.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -12,40 +13,67 @@ struct UnrolledRingSize {
   std::uint32_t count = 0, margin = 0;
 };
 
+/// Lengths along rings and coordinates are whole numbers of this fraction of a cell, modulo 2^32:
+/// differences of vertices less than 512 cells apart are exact wherever the ring lies, and what is
+/// computed of them in floats is as exact on a long ring as on a short one.
+inline constexpr double kRingUnitsPerCell = 1 << 22;
+
+/// Requires: |cells| < 2^41.
+inline std::int32_t RingUnits(double cells) {
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(cells * kRingUnitsPerCell));
+}
+
+/// From one vertex to another, less than 512 cells away.
+inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) -
+                                   static_cast<std::uint32_t>(from));
+}
+
 /// One ring. Arrays are by vertex, 0 <= k < count, and go on beyond both ends by `margin` vertices
 /// that repeat the ring, so that a window is a contiguous stretch of them.
 struct UnrolledRing {
-  static constexpr int kArrays = 10;
+  static constexpr int kUnitArrays = 3, kFloatArrays = 7;
 
-  /// With arrays of which at(k) tells where the first vertex is.
-  template <typename At>
-  static UnrolledRing In(const UnrolledRingSize& size, At at) {
+  /// With arrays of which units(k) and floats(k) tell where the first vertex is.
+  template <typename Units, typename Floats>
+  static UnrolledRing In(const UnrolledRingSize& size, Units units, Floats floats) {
     return {.count = size.count,
             .margin = size.margin,
-            .x = at(0),
-            .y = at(1),
-            .normal_x = at(2),
-            .normal_y = at(3),
-            .next_x = at(4),
-            .next_y = at(5),
-            .arc = at(6),
-            .weight = at(7),
-            .base = at(8),
-            .shift = at(9)};
+            .x = units(0),
+            .y = units(1),
+            .arc = units(2),
+            .normal_x = floats(0),
+            .normal_y = floats(1),
+            .next_x = floats(2),
+            .next_y = floats(3),
+            .weight = floats(4),
+            .base = floats(5),
+            .shift = floats(6)};
   }
 
   std::ptrdiff_t count, margin;
-  double *x, *y;                ///< Lattice coordinates of the world, in cells.
-  double *normal_x, *normal_y;  ///< Unit, outward.
-  double *next_x, *next_y;      ///< Scratch: the normals of the next step; then the strips.
-  double* arc;                  ///< Length of the ring up to the vertex; ascends in margins, too.
-  double* weight;               ///< l: half of the two segments at the vertex.
-  double* base;                 ///< Shift along the normal that the vertex's plane asks for.
-  double* shift;                ///< Scratch of the steps; has no margins.
+  std::int32_t *x, *y;         ///< Lattice coordinates of the world, in units.
+  std::int32_t* arc;           ///< Length of the ring up to the vertex, in units; in margins, too.
+  float *normal_x, *normal_y;  ///< Unit, outward.
+  float *next_x, *next_y;      ///< Scratch: the normals of the next step; then the strips.
+  float* weight;               ///< l: half of the two segments at the vertex, in cells.
+  float* base;   ///< Shift along the normal that the vertex's plane asks for, in cells.
+  float* shift;  ///< Scratch of the steps; has no margins.
 
   /// Writes the elements [begin, end) of one of the arrays to where they are repeated. Different
   /// elements are repeated in different places.
-  void Repeat(double* values, std::ptrdiff_t begin, std::ptrdiff_t end) const;
+  template <typename Value>
+  void Repeat(Value* values, std::ptrdiff_t begin, std::ptrdiff_t end) const {
+    // A margin may be longer than the ring.
+    for (std::ptrdiff_t turn = count; turn + begin < count + margin; turn += count) {
+      std::copy(values + begin, values + std::min(end, count + margin - turn),
+                values + turn + begin);
+    }
+    for (std::ptrdiff_t turn = count; end - turn > -margin; turn += count) {
+      const std::ptrdiff_t first = std::max(begin, turn - margin);
+      std::copy(values + first, values + end, values + first - turn);
+    }
+  }
 };
 
 /// Memory of one ring that is short enough for the stack: it stays in the cache.
@@ -56,12 +84,15 @@ class ShortRing {
   }
   /// Requires: Holds(size). Valid as long as this object; elements have no values yet.
   UnrolledRing Of(const UnrolledRingSize& size) {
-    return UnrolledRing::In(size, [&](int array) { return arrays_[array] + size.margin; });
+    return UnrolledRing::In(
+        size, [&](int array) { return units_[array] + size.margin; },
+        [&](int array) { return floats_[array] + size.margin; });
   }
 
  private:
   static constexpr std::size_t kRoom = 768;
-  double arrays_[UnrolledRing::kArrays][kRoom];
+  std::int32_t units_[UnrolledRing::kUnitArrays][kRoom];
+  float floats_[UnrolledRing::kFloatArrays][kRoom];
 };
 
 /// Memory of the rings of a frame, kept warm from frame to frame.
@@ -80,7 +111,8 @@ class UnrolledRings {
  private:
   std::vector<Size> sizes_;
   std::vector<std::size_t> starts_;
-  std::vector<double> arrays_[UnrolledRing::kArrays];
+  std::vector<std::int32_t> units_[UnrolledRing::kUnitArrays];
+  std::vector<float> floats_[UnrolledRing::kFloatArrays];
 };
 
 }  // namespace partiemc

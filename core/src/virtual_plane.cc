@@ -45,8 +45,8 @@ constexpr double kMaxCurvature = 0.6;
 
 // A plane's own estimates are noisy: these shares of them are believed. The errors of the two are
 // different ones, so that both together do better than any one.
-constexpr double kSupportTrust = 0.35;
-constexpr double kStripTrust = 0.25;
+constexpr float kSupportTrust = 0.35f;
+constexpr float kStripTrust = 0.25f;
 // Of a ring's mean strip, where volumes are known, in spacings; more is a sign that they are not
 // the volumes of this outline.
 constexpr double kMaxMeanStrip = 0.4;
@@ -152,25 +152,27 @@ UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
 // Copies what the steps need, and measures the ring.
 void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) {
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.x[k] = v.point[first + k].x;
-    ring.y[k] = v.point[first + k].y;
-    ring.normal_x[k] = v.normal[first + k].x;
-    ring.normal_y[k] = v.normal[first + k].y;
+    ring.x[k] = RingUnits(v.point[first + k].x);
+    ring.y[k] = RingUnits(v.point[first + k].y);
+    ring.normal_x[k] = static_cast<float>(v.normal[first + k].x);
+    ring.normal_y[k] = static_cast<float>(v.normal[first + k].y);
   }
-  for (double* values : {ring.x, ring.y, ring.normal_x, ring.normal_y}) {
-    ring.Repeat(values, 0, ring.count);
-  }
-  ring.arc[0] = 0;
-  for (std::ptrdiff_t k = 0; k + 1 < ring.count + ring.margin; ++k) {
-    ring.arc[k + 1] =
-        ring.arc[k] + Distance({ring.x[k], ring.y[k]}, {ring.x[k + 1], ring.y[k + 1]});
-  }
-  for (std::ptrdiff_t k = 0; k > -ring.margin; --k) {
-    ring.arc[k - 1] =
-        ring.arc[k] - Distance({ring.x[k - 1], ring.y[k - 1]}, {ring.x[k], ring.y[k]});
+  for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
+  for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
+  const auto length_after = [&](std::ptrdiff_t k) {
+    const auto x = static_cast<float>(UnitsBetween(ring.x[k], ring.x[k + 1]));
+    const auto y = static_cast<float>(UnitsBetween(ring.y[k], ring.y[k + 1]));
+    return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
+  };
+  std::uint32_t arc = 0;
+  for (std::ptrdiff_t k = -ring.margin;; ++k) {
+    ring.arc[k] = static_cast<std::int32_t>(arc);
+    if (k + 1 == ring.count + ring.margin) break;
+    arc += static_cast<std::uint32_t>(length_after(k));
   }
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.weight[k] = (ring.arc[k + 1] - ring.arc[k - 1]) / 2;
+    ring.weight[k] = static_cast<float>(UnitsBetween(ring.arc[k - 1], ring.arc[k + 1])) *
+                     static_cast<float>(0.5 / kRingUnitsPerCell);
   }
   ring.Repeat(ring.weight, 0, ring.count);
 }
@@ -215,10 +217,10 @@ double RoundingOf(double curvature, double spacing) {
 }
 
 // Mean of a ring's values by length.
-double MeanOf(const UnrolledRing& ring, const double* values) {
+double MeanOf(const UnrolledRing& ring, const float* values) {
   double sum = 0, weight = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    sum += ring.weight[k] * values[k];
+    sum += double{ring.weight[k]} * values[k];
     weight += ring.weight[k];
   }
   return weight > 0 ? sum / weight : 0;
@@ -227,25 +229,26 @@ double MeanOf(const UnrolledRing& ring, const double* values) {
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
 // along the ring counts: their means depend on how the particles are arranged, not on the shape.
 // Where volumes are known, the mean of the strips is part of the truth.
-void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const UnrolledRing& ring) {
+void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const UnrolledRing& ring,
+                 const RingVertices& v) {
   const double h = input.scale.spacing;
   const double max_curvature = kMaxCurvature / h;
   const VirtualPlaneSteps& steps = input.parameters.steps;
   const PlaneEstimator estimator(input.field, input.scale);
-  double* strips = ring.next_x;
+  float* strips = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, kCurvatureReach * h);
     // By a few segments, which have two vertices each.
     PlaneQueries queries(estimator);
     for (std::ptrdiff_t k = begin; k < end; k += 2) {
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
-        const double curvature = std::clamp(ring.shift[i], -max_curvature, max_curvature);
-        ring.base[i] = steps.curvature ? RoundingOf(curvature, h) : 0;
+        const double curvature = std::clamp<double>(ring.shift[i], -max_curvature, max_curvature);
+        ring.base[i] = steps.curvature ? static_cast<float>(RoundingOf(curvature, h)) : 0;
         // What is kept where nothing tells where a plane belongs.
-        ring.shift[i] = steps.support ? -kSupportTrust * ring.base[i] : 0;
-        strips[i] = steps.support ? -kStripTrust * ring.base[i] : 0;
+        ring.shift[i] = steps.support ? kSupportTrust * -ring.base[i] : 0;
+        strips[i] = steps.support ? kStripTrust * -ring.base[i] : 0;
         if (!steps.support) continue;
-        const FieldPoint at = Locate(input, first_segment + k / 2, {ring.x[i], ring.y[i]});
+        const FieldPoint at = Locate(input, first_segment + k / 2, v.point[2 * first_segment + i]);
         if (at.tile == kNoTile) continue;
         queries.Add(i, at.tile,
                     {.x = at.x,
@@ -256,8 +259,8 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
       }
       if (queries.IsFull() || k + 2 >= end) {
         queries.Run([&](std::ptrdiff_t i, const PlaneEstimates& estimates) {
-          ring.shift[i] = kSupportTrust * (estimates.support - ring.base[i]);
-          strips[i] = kStripTrust * (estimates.strip - ring.base[i]);
+          ring.shift[i] = kSupportTrust * (static_cast<float>(estimates.support) - ring.base[i]);
+          strips[i] = kStripTrust * (static_cast<float>(estimates.strip) - ring.base[i]);
         });
       }
     }
@@ -269,7 +272,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
     mean -= std::clamp(mean_strip, -limit, limit);
   }
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.base[k] += ring.shift[k] + strips[k] - mean;
+    ring.base[k] += ring.shift[k] + strips[k] - static_cast<float>(mean);
   }
   ring.Repeat(ring.base, 0, ring.count);
 }
@@ -286,8 +289,9 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Unrolled
     }
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       v.normal[first + k] = {ring.normal_x[k], ring.normal_y[k]};
-      v.point[first + k] = {ring.x[k] + ring.shift[k] * ring.normal_x[k],
-                            ring.y[k] + ring.shift[k] * ring.normal_y[k]};
+      LatticePoint& point = v.point[first + k];
+      point.x += double{ring.shift[k]} * ring.normal_x[k];
+      point.y += double{ring.shift[k]} * ring.normal_y[k];
     }
   });
 }
@@ -297,7 +301,7 @@ void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, Ring
   const std::size_t first_segment = input.topology.offsets[r];
   Unroll(v, 2 * first_segment, ring);
   if (input.parameters.steps.normals) SmoothNormals(input, ring);
-  ShiftPlanes(input, first_segment, ring);
+  ShiftPlanes(input, first_segment, ring, v);
   SmoothPositions(input, 2 * first_segment, ring, v);
 }
 

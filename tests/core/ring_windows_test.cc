@@ -47,26 +47,30 @@ class RandomRing {
 
   UnrolledRing Unrolled(UnrolledRings& rings) const {
     // More than a turn in either direction.
-    const int margin = count() + 11;
+    const int margin = count() + 20;
     rings.sizes() = {{static_cast<std::uint32_t>(count()), static_cast<std::uint32_t>(margin)}};
     rings.Allocate();
     const UnrolledRing ring = rings[0];
     for (int k = 0; k < count(); ++k) {
-      ring.x[k] = points_[k].x;
-      ring.y[k] = points_[k].y;
-      ring.normal_x[k] = normals_[k].x;
-      ring.normal_y[k] = normals_[k].y;
-      ring.weight[k] = WeightOf(k);
-      ring.base[k] = bases_[k];
+      ring.x[k] = RingUnits(points_[k].x);
+      ring.y[k] = RingUnits(points_[k].y);
+      ring.normal_x[k] = static_cast<float>(normals_[k].x);
+      ring.normal_y[k] = static_cast<float>(normals_[k].y);
+      ring.weight[k] = static_cast<float>(WeightOf(k));
+      ring.base[k] = static_cast<float>(bases_[k]);
     }
-    for (double* values : {ring.x, ring.y, ring.normal_x, ring.normal_y, ring.weight, ring.base}) {
-      // In two parts, as two tasks would.
+    // In two parts, as two tasks would.
+    const auto repeat = [&](auto* values) {
       ring.Repeat(values, 0, count() / 3);
       ring.Repeat(values, count() / 3, count());
-    }
-    ring.arc[-margin] = 0;
-    for (int k = -margin; k + 1 < count() + margin; ++k) {
-      ring.arc[k + 1] = ring.arc[k] + steps_[(k + 2 * count()) % count()];
+    };
+    for (std::int32_t* values : {ring.x, ring.y}) repeat(values);
+    for (float* values : {ring.normal_x, ring.normal_y, ring.weight, ring.base}) repeat(values);
+    // Wraps around on the way.
+    double arc = 500;
+    for (int k = -margin; k < count() + margin; ++k) {
+      ring.arc[k] = RingUnits(arc);
+      arc += steps_[(k + 2 * count()) % count()];
     }
     return ring;
   }
@@ -139,11 +143,11 @@ TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
     MeanCurvature(ring, 0, ring.count, reach);
     for (int k = 0; k < ring.count; ++k) {
       const double curvature = expected.Curvature(k, reach);
-      EXPECT_NEAR(ring.shift[k], curvature, 1e-9 * (1 + std::abs(curvature))) << "seed " << seed;
+      EXPECT_NEAR(ring.shift[k], curvature, 2e-5 * (1 + std::abs(curvature))) << "seed " << seed;
     }
     MeanShift(ring, 0, ring.count, reach);
     for (int k = 0; k < ring.count; ++k) {
-      EXPECT_NEAR(ring.shift[k], expected.Shift(k, reach), 1e-9) << "seed " << seed;
+      EXPECT_NEAR(ring.shift[k], expected.Shift(k, reach), 1e-6) << "seed " << seed;
     }
     for (const bool by_angle : {false, true}) {
       MeanNormals(ring, 0, ring.count, reach, by_angle);
@@ -161,11 +165,11 @@ TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
   const RandomRing source(random, 40);
   UnrolledRings rings;
   const UnrolledRing ring = source.Unrolled(rings);
-  std::fill(ring.weight - ring.margin, ring.weight + ring.count + ring.margin, 0.0);
+  std::fill(ring.weight - ring.margin, ring.weight + ring.count + ring.margin, 0.0f);
   MeanNormals(ring, 0, ring.count, source.Length() / 4, true);
   for (int k = 0; k < ring.count; ++k) {
-    EXPECT_EQ(ring.next_x[k], source.normals()[k].x);
-    EXPECT_EQ(ring.next_y[k], source.normals()[k].y);
+    EXPECT_EQ(ring.next_x[k], static_cast<float>(source.normals()[k].x));
+    EXPECT_EQ(ring.next_y[k], static_cast<float>(source.normals()[k].y));
   }
 }
 
@@ -173,12 +177,12 @@ TEST(RingWindows, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
   support::Random random(5);
   const RandomRing source(random, 103);
   const double reach = source.Length() / 7;
-  std::vector<std::vector<double>> results;
+  std::vector<std::vector<float>> results;
   support::ForEachInstructionSet([&] {
-    for (const int stretch : {1, 5, 8, 50, 103}) {
+    for (const int stretch : {1, 5, 16, 50, 103}) {
       UnrolledRings rings;
       const UnrolledRing ring = source.Unrolled(rings);
-      std::vector<double> result;
+      std::vector<float> result;
       const auto in_stretches = [&](auto step) {
         for (std::ptrdiff_t begin = 0; begin < ring.count; begin += stretch) {
           step(begin, std::min(begin + stretch, ring.count));
@@ -196,8 +200,8 @@ TEST(RingWindows, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
       results.push_back(result);
     }
   });
-  for (const std::vector<double>& result : results) {
-    EXPECT_EQ(std::memcmp(result.data(), results[0].data(), result.size() * sizeof(double)), 0);
+  for (const std::vector<float>& result : results) {
+    EXPECT_EQ(std::memcmp(result.data(), results[0].data(), result.size() * sizeof(float)), 0);
   }
 }
 
