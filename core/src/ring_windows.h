@@ -15,8 +15,8 @@ inline constexpr std::ptrdiff_t kWindowPadding = 17;
 /// (core/METHOD.md, "The default placement"). A vertex per lane, in floats: first itself, then the
 /// two vertices beside it, the one before it first, then the next two, until a window ends. The
 /// bits are the same whatever the width of the vectors and wherever a stretch begins. Requires: the
-/// ring is at least two reaches long; its margins hold the vertices within a reach of its ends and
-/// kWindowPadding more.
+/// ring is at least two reaches long; its margins hold what SizeForWindows says and kWindowPadding
+/// more.
 
 /// Unit mean of the normals, into next_x and next_y; with `by_angle`, weighted by the angle between
 /// them, too (max(0, n_i . n_j)^16). The vertex's own normal where they cancel out.

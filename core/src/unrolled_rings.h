@@ -2,9 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
+
+#include "crossings.h"
 
 namespace partiemc {
 
@@ -28,6 +32,18 @@ inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) -
                                    static_cast<std::uint32_t>(from));
 }
+
+/// Length of a step, rounded down; of such lengths is what a ring's `arc` adds up.
+inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
+  const auto x = static_cast<float>(step_x);
+  const auto y = static_cast<float>(step_y);
+  return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
+}
+
+/// Numbers of a closed ring's vertices and of those that a window of `reach` cells holds at most
+/// beyond either of its ends, by the very lengths that windows go by: of two vertices that have all
+/// but fallen together none may be taken for being beyond it. Cost: the ring's length.
+UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach);
 
 /// One ring. Arrays are by vertex, 0 <= k < count, and go on beyond both ends by `margin` vertices
 /// that repeat the ring, so that a window is a contiguous stretch of them.

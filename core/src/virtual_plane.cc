@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "parallel.h"
@@ -135,18 +136,10 @@ UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   double length = 0;
   for (std::size_t k = 0; k < count; ++k) length += length_after(k);
   if (length < kMinRefinedLength * input.scale.spacing) return {};
-  // As many vertices as the widest window holds behind the last vertex, or before the first one.
-  const double reach = kWidestReach * input.scale.spacing;
-  std::size_t after = 0;
-  for (double distance = length_after(count - 1); distance < reach; ++after) {
-    distance += length_after(after % count);
-  }
-  std::size_t before = 0;
-  for (double distance = 0; distance < reach; ++before) {
-    distance += length_after(count - 1 - before % count);
-  }
-  return {static_cast<std::uint32_t>(count),
-          static_cast<std::uint32_t>(std::max(after, before) + kWindowPadding)};
+  UnrolledRings::Size size =
+      SizeForWindows(std::span(v.point).subspan(first, count), kWidestReach * input.scale.spacing);
+  size.margin += kWindowPadding;
+  return size;
 }
 
 // Copies what the steps need, and measures the ring.
@@ -160,9 +153,8 @@ void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) 
   for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
   for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
   const auto length_after = [&](std::ptrdiff_t k) {
-    const auto x = static_cast<float>(UnitsBetween(ring.x[k], ring.x[k + 1]));
-    const auto y = static_cast<float>(UnitsBetween(ring.y[k], ring.y[k + 1]));
-    return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
+    return LengthInUnits(UnitsBetween(ring.x[k], ring.x[k + 1]),
+                         UnitsBetween(ring.y[k], ring.y[k + 1]));
   };
   std::uint32_t arc = 0;
   for (std::ptrdiff_t k = -ring.margin;; ++k) {
