@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "measure.h"
+#include "parallel.h"
 
 namespace partiemc {
 namespace {
@@ -109,10 +110,10 @@ void MatchArea(const VertexInput& input, std::vector<double>& scratch,
   }
   if (!offset) return;
   scratch.resize(rings.points.size());
-  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
     OffsetRing(rings.RingPoints(ring), *offset * spacing,
                scratch.data() + 2 * std::size_t{rings.offsets[ring]});
-  }
+  });
   std::swap(rings.points, scratch);
 }
 

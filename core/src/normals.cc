@@ -47,13 +47,12 @@ void SetNormal(double x, double y, CellPlane& plane) {
 
 // Samples F at the middles of up to kQueriesAtOnce segments, with `at_entries` at their entries,
 // too.
-void SampleAtMiddles(const TileDirectory& directory, const PointField& field,
-                     std::span<const ActiveCell* const> cells, bool at_entries,
+void SampleAtMiddles(const TileDirectory& directory, const PointField& field, bool at_entries,
                      std::span<CellPlane> planes) {
   std::array<FieldPoints, kQueriesAtOnce> places;
   for (std::size_t k = 0; k < planes.size(); ++k) {
-    const ActiveCell& cell = *cells[k];
     CellPlane& plane = planes[k];
+    const ActiveCell& cell = plane.cell;
     plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
     const LatticePoint origin = CellOrigin(directory, cell);
     const auto in_tile = [&](const LatticePoint& point) {
@@ -76,8 +75,8 @@ void SampleAtMiddles(const TileDirectory& directory, const PointField& field,
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
 // no particle reaches the point the gradient stays 0, hence weak.
-void SampleAtMean(const TileDirectory& directory, const PointField& field, const ActiveCell& cell,
-                  CellPlane& plane) {
+void SampleAtMean(const TileDirectory& directory, const PointField& field, CellPlane& plane) {
+  const ActiveCell& cell = plane.cell;
   const double centre_x = cell.i + 0.5;
   const double centre_y = cell.j + 0.5;
   const FieldSample centre = field.Sample(cell.tile, centre_x, centre_y);
@@ -165,9 +164,9 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   ForEachCellByRow(bins.tiles, crossings, scratch.next_cell,
                    [&](std::uint32_t cell) { scratch.order.push_back(cell); });
   MatchPrevious(previous, bins.tiles, crossings, scratch);
-  // The normal that a segment's cell had in the frame before, or nullptr.
-  const auto previous_of = [&](std::uint32_t segment) {
-    const std::uint32_t index = scratch.previous[crossings.segments[segment].cell];
+  // The normal that a cell had in the frame before, or nullptr.
+  const auto previous_of = [&](std::uint32_t cell) {
+    const std::uint32_t index = scratch.previous[cell];
     return index == kNone ? nullptr : &previous[index];
   };
   planes.resize(rings.segments.size());
@@ -176,19 +175,19 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   // A few successive planes.
   const auto estimate = [&](std::size_t first, std::size_t count) {
     const std::span<CellPlane> some = std::span(planes).subspan(first, count);
-    std::array<const ActiveCell*, kQueriesAtOnce> cells;
+    std::array<std::uint32_t, kQueriesAtOnce> cells;
     for (std::size_t k = 0; k < count; ++k) {
-      cells[k] = &crossings.cells[crossings.segments[rings.segments[first + k]].cell];
+      cells[k] = crossings.segments[rings.segments[first + k]].cell;
+      some[k].cell = crossings.cells[cells[k]];
     }
     if (parameters.placement == Placement::kFarthestParticle) {
-      for (std::size_t k = 0; k < count; ++k) SampleAtMean(bins.tiles, field, *cells[k], some[k]);
+      for (CellPlane& plane : some) SampleAtMean(bins.tiles, field, plane);
     } else {
       const bool at_entries = parameters.placement == Placement::kVirtualPlane;
-      SampleAtMiddles(bins.tiles, field, cells, at_entries, some);
+      SampleAtMiddles(bins.tiles, field, at_entries, some);
     }
     for (std::size_t k = 0; k < count; ++k) {
       CellPlane& plane = some[k];
-      const std::uint32_t segment = rings.segments[first + k];
       plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
                       kWeakGradientSquare;
       if (plane.is_weak) {
@@ -196,8 +195,8 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
         continue;
       }
       SetNormal(plane.gradient_x, plane.gradient_y, plane);
-      Orient(previous_of(segment), plane);
-      Keep(*cells[k], crossings.segments[segment].cell, plane, scratch);
+      Orient(previous_of(cells[k]), plane);
+      Keep(plane.cell, cells[k], plane, scratch);
     }
   };
   ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t first, std::size_t last) {
@@ -215,13 +214,15 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
     for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
       const std::size_t first = rings.offsets[ring];
       const std::size_t count = rings.offsets[ring + 1] - first;
-      MendWeakNormals(std::span(rings.segments).subspan(first, count), previous_of,
-                      std::span(planes).subspan(first, count));
+      MendWeakNormals(
+          std::span(rings.segments).subspan(first, count),
+          [&](std::uint32_t segment) { return previous_of(crossings.segments[segment].cell); },
+          std::span(planes).subspan(first, count));
     }
     for (std::size_t k = 0; k < planes.size(); ++k) {
       if (!planes[k].is_weak) continue;
       const std::uint32_t index = crossings.segments[rings.segments[k]].cell;
-      Keep(crossings.cells[index], index, planes[k], scratch);
+      Keep(planes[k].cell, index, planes[k], scratch);
     }
   }
   Remember(bins.tiles, crossings, scratch, next);

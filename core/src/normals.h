@@ -18,6 +18,7 @@ namespace partiemc {
 /// What is known at the representative point of one segment. The point is the weighted mean at the
 /// cell's centre for `farthest-particle` (the paper's), the middle of the segment for the others.
 struct CellPlane {
+  ActiveCell cell;           ///< Of the segment: along a ring, cells lie anywhere in memory.
   LatticePoint point;        ///< Lattice coordinates of the world, in cells.
   LatticePoint entry, exit;  ///< The segment's ends: linear crossings of lattice edges.
   double value = 0;          ///< F at the point.

@@ -40,15 +40,13 @@ Direction NormalAt(const PointField& field, const TileDirectory& directory, cons
 
 }  // namespace
 
-LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossings,
-                         std::uint32_t segment, LatticePoint point) {
-  const Segment& here = crossings.segments[segment];
-  const ActiveCell& cell = crossings.cells[here.cell];
+LatticePoint ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
+                         const Segment& segment, LatticePoint point) {
   const LatticePoint origin = CellOrigin(directory, cell);
   double u = std::clamp(point.x - origin.x, kCellMargin, 1 - kCellMargin);
   double v = std::clamp(point.y - origin.y, kCellMargin, 1 - kCellMargin);
   if (cell.IsSaddle()) {
-    const int corner = CornerOf(here);
+    const int corner = CornerOf(segment);
     const bool right = corner == 1 || corner == 2;
     const bool upper = corner >= 2;
     if (right) u = 1 - u;
@@ -62,17 +60,6 @@ LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossi
     if (upper) v = 1 - v;
   }
   return {origin.x + u, origin.y + v};
-}
-
-LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
-  const double square = gradient.x * gradient.x + gradient.y * gradient.y;
-  if (square < kWeakGradientSquare) return point;
-  double step = -value / square;
-  // Its length is that of the gradient times as much.
-  if (step * step * square > max_step * max_step) {
-    step = std::copysign(max_step / std::sqrt(square), step);
-  }
-  return {point.x + step * gradient.x, point.y + step * gradient.y};
 }
 
 LatticePoint VirtualPlaneVertex(const CellPlane& plane) {

@@ -1,18 +1,31 @@
 // Where the vertex of one cell goes, for each placement (paper, sections 3.4-3.5).
 #pragma once
 
+#include <cmath>
+
 #include "vertices.h"
 
 namespace partiemc {
 
 /// `point` moved into the cell of `segment`, a little away from its sides; in a saddle into the
-/// half of the cell that belongs to the segment, so that its two segments never meet.
-LatticePoint ClampToCell(const TileDirectory& directory, const Crossings& crossings,
-                         std::uint32_t segment, LatticePoint point);
+/// half of the cell that belongs to the segment, so that its two segments never meet. Only there
+/// the segment is looked at.
+LatticePoint ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
+                         const Segment& segment, LatticePoint point);
 
 /// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
 /// `max_step` cells; `point` itself where the gradient is weak.
-LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step);
+inline LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient,
+                               double max_step) {
+  const double square = gradient.x * gradient.x + gradient.y * gradient.y;
+  if (square < kWeakGradientSquare) return point;
+  double step = -value / square;
+  // Its length is that of the gradient times as much.
+  if (step * step * square > max_step * max_step) {
+    step = std::copysign(max_step / std::sqrt(square), step);
+  }
+  return {point.x + step * gradient.x, point.y + step * gradient.y};
+}
 
 /// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
 /// most half a cell; none where the gradient is weak. In lattice coordinates.

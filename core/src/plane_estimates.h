@@ -61,7 +61,8 @@ class PlaneQueries {
     const bool joins = count_ > 0 && vertex % 2 == 1 && vertices_[count_ - 1] == vertex - 1 &&
                        planes_[count_ - 1].tile == tile;
     if (!joins) {
-      planes_[count_] = {.tile = tile};
+      planes_[count_].tile = tile;
+      planes_[count_].count = 0;
       vertices_[count_++] = vertex;
     }
     PlaneEstimator::Planes& of = planes_[count_ - 1];

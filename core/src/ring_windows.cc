@@ -94,6 +94,21 @@ HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
   }
 }
 
+// LengthInUnits of the step after each vertex, in place of its arc.
+void MeasureSteps(const UnrolledRing& ring) {
+  const Lanes d;
+  const Units d_units;
+  // May go on into the margin.
+  for (std::ptrdiff_t k = 0; k < ring.count; k += kLanes) {
+    const auto along = [&](const std::int32_t* at) HWY_ATTR {
+      return hn::ConvertTo(d, hn::Sub(hn::LoadU(d_units, at + k + 1), hn::LoadU(d_units, at + k)));
+    };
+    const Vector x = along(ring.x);
+    const Vector y = along(ring.y);
+    hn::StoreU(hn::ConvertTo(d_units, hn::Sqrt(Dot(x, y, x, y))), d_units, ring.arc + k);
+  }
+}
+
 template <bool kByAngle>
 void SumNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
@@ -205,9 +220,34 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
+HWY_EXPORT(MeasureSteps);
 HWY_EXPORT(MeanNormals);
 HWY_EXPORT(MeanCurvature);
 HWY_EXPORT(MeanShift);
+
+void MeasureArc(const UnrolledRing& ring) {
+  HWY_DYNAMIC_DISPATCH(MeasureSteps)(ring);
+  std::uint32_t length = 0;
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    const auto step = static_cast<std::uint32_t>(ring.arc[k]);
+    ring.arc[k] = static_cast<std::int32_t>(length);
+    length += step;
+  }
+  const auto moved = [&](std::int32_t arc, std::uint32_t by) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(arc) + by);
+  };
+  for (std::ptrdiff_t k = ring.count; k < ring.count + ring.margin; ++k) {
+    ring.arc[k] = moved(ring.arc[k - ring.count], length);
+  }
+  for (std::ptrdiff_t k = -1; k >= -ring.margin; --k) {
+    ring.arc[k] = moved(ring.arc[k + ring.count], 0 - length);
+  }
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    ring.weight[k] = static_cast<float>(UnitsBetween(ring.arc[k - 1], ring.arc[k + 1])) *
+                     static_cast<float>(0.5 / kRingUnitsPerCell);
+  }
+  ring.Repeat(ring.weight, 0, ring.count);
+}
 
 void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle) {

@@ -10,8 +10,12 @@ namespace partiemc {
 /// What vectors of up to sixteen vertices read beyond a window that ends in a margin.
 inline constexpr std::ptrdiff_t kWindowPadding = 17;
 
-/// Each function sums, for each of the vertices [begin, end) of a ring, over the vertices j less
-/// than `reach` from it along the ring, with weights that begin with l_j B(d, reach)
+/// Sets the arc and the weights of a ring by its coordinates, in the margins, too.
+/// Requires: coordinates are repeated in the margins, of kWindowPadding vertices at least.
+void MeasureArc(const UnrolledRing& ring);
+
+/// Each of these functions sums, for each of the vertices [begin, end) of a ring, over the vertices
+/// j less than `reach` from it along the ring, with weights that begin with l_j B(d, reach)
 /// (core/METHOD.md, "The default placement"). A vertex per lane, in floats: first itself, then the
 /// two vertices beside it, the one before it first, then the next two, until a window ends. The
 /// bits are the same whatever the width of the vectors and wherever a stretch begins. Requires: the

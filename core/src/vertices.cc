@@ -1,6 +1,7 @@
 #include "vertices.h"
 
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include "area.h"
@@ -39,9 +40,9 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
       break;
     case Placement::kQef:
       Store(plane.entry, cell_size, target);
-      Store(
-          ClampToCell(input.bins.tiles, input.crossings, segment, QefVertex(input, segment, plane)),
-          cell_size, target + 2);
+      Store(ClampToCell(input.bins.tiles, plane.cell, input.crossings.segments[segment],
+                        QefVertex(input, segment, plane)),
+            cell_size, target + 2);
       break;
     case Placement::kFarthestParticle: {
       const WorldPosition vertex = FarthestParticleVertex(input, segment, plane);
@@ -134,32 +135,40 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   PlaceOnVirtualPlanes(input, vertices);
   const RingTopology& topology = input.topology;
   const double cell_size = input.scale.cell_size;
-  placed.roots.clear();
-  placed.point_of_segment.resize(topology.segments.size());
+  std::uint32_t count = 0;
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    const auto of = [&](std::size_t segment) { return vertices.is_kept.begin() + 2 * segment; };
+    count = std::accumulate(of(topology.offsets[ring]), of(topology.offsets[ring + 1]), count);
+    rings.offsets.push_back(count);
+  }
+  rings.points.resize(2 * std::size_t{count});
+  rings.normals.resize(2 * std::size_t{count});
+  placed.roots.resize(2 * std::size_t{count});
+  placed.point_of_segment.resize(topology.segments.size());
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    std::size_t point = rings.offsets[ring];
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
          i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
       if (!vertices.is_kept[i]) continue;
       // Of the two vertices of segment i / 2, the cell's comes second and is always kept.
-      placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(rings.PointCount());
-      rings.points.push_back(vertices.point[i].x * cell_size);
-      rings.points.push_back(vertices.point[i].y * cell_size);
-      placed.roots.push_back(vertices.root[i].x * cell_size);
-      placed.roots.push_back(vertices.root[i].y * cell_size);
-      rings.normals.push_back(static_cast<float>(vertices.normal[i].x));
-      rings.normals.push_back(static_cast<float>(vertices.normal[i].y));
+      placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
+      Store(vertices.point[i], cell_size, &rings.points[2 * point]);
+      Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
+      rings.normals[2 * point] = vertices.normal[i].x;
+      rings.normals[2 * point + 1] = vertices.normal[i].y;
+      ++point;
     }
-    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
-  }
+  });
   rings.outer_of = topology.outer_of;
   MatchArea(input, placed.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   RepairRings(placed.roots, placed.repair, rings);
-  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    rings.measures.push_back(MeasureRing(rings.RingPoints(ring)));
-    rings.measures.back().particle_count = topology.particle_count[ring];
-  }
+  rings.measures.resize(topology.RingCount());
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
+    rings.measures[ring].particle_count = topology.particle_count[ring];
+  });
 }
 
 }  // namespace

@@ -62,28 +62,32 @@ double Distance(const LatticePoint& a, const LatticePoint& b) {
   return std::sqrt(Dot(chord, chord));
 }
 
-LatticePoint UnitOr(const LatticePoint& v, const LatticePoint& fallback) {
+VertexNormal UnitOf(const LatticePoint& v) {
   const double square = Dot(v, v);
-  if (square < kWeakGradientSquare * kWeakGradientSquare) return fallback;
+  if (square < kWeakGradientSquare * kWeakGradientSquare) return {1, 0};
   const double inverse = 1 / std::sqrt(square);
-  return {v.x * inverse, v.y * inverse};
+  return {static_cast<float>(v.x * inverse), static_cast<float>(v.y * inverse)};
 }
 
-const ActiveCell& CellOf(const VertexInput& input, std::size_t segment) {
-  const std::uint32_t index = input.topology.segments[segment];
-  return input.crossings.cells[input.crossings.segments[index].cell];
+// A point beyond the sides of a tile, in cells relative to it.
+FieldPoint LocateBeyond(const VertexInput& input, std::uint32_t tile, double x, double y) {
+  const int i = static_cast<int>(std::floor(x));
+  const int j = static_cast<int>(std::floor(y));
+  const TilePlace place = Normalise(input.bins.tiles, tile, i, j);
+  const bool usable = place.tile != kNoTile && input.field.IsIndexed(place.tile);
+  return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
+// A point in or next to the cell of a segment: in most cases in the tile of that.
 FieldPoint Locate(const VertexInput& input, std::size_t segment, const LatticePoint& point) {
-  const ActiveCell& cell = CellOf(input, segment);
+  const ActiveCell& cell = input.planes[segment].cell;
   const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
   const double x = point.x - origin.x + cell.i;
   const double y = point.y - origin.y + cell.j;
-  const int i = static_cast<int>(std::floor(x));
-  const int j = static_cast<int>(std::floor(y));
-  const TilePlace place = Normalise(input.bins.tiles, cell.tile, i, j);
-  const bool usable = place.tile != kNoTile && input.field.IsIndexed(place.tile);
-  return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
+  if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
+    return LocateBeyond(input, cell.tile, x, y);
+  }
+  return {input.field.IsIndexed(cell.tile) ? cell.tile : kNoTile, x, y};
 }
 
 // Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
@@ -96,9 +100,9 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   v.root[edge] = plane.entry;
   v.point[edge] = NewtonStep(plane.entry, plane.entry_value,
                              {plane.entry_gradient_x, plane.entry_gradient_y}, kMaxEdgeStep);
-  v.root[inner] = v.point[inner] =
-      ClampToCell(input.bins.tiles, input.crossings, input.topology.segments[segment],
-                  VirtualPlaneVertex(plane));
+  v.root[inner] = v.point[inner] = ClampToCell(
+      input.bins.tiles, plane.cell, input.crossings.segments[input.topology.segments[segment]],
+      VirtualPlaneVertex(plane));
   const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
     const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
     if (Dot(step, step) > kLongStep * kLongStep) {
@@ -108,8 +112,8 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
       gradient = {sample.gradient_x, sample.gradient_y};
     }
     v.normal[i] = Dot(gradient, gradient) >= kWeakGradientSquare
-                      ? UnitOr(gradient, {1, 0})
-                      : UnitOr({plane.OutwardX(), plane.OutwardY()}, {1, 0});
+                      ? UnitOf(gradient)
+                      : UnitOf({plane.OutwardX(), plane.OutwardY()});
   };
   set_normal(edge, plane.entry, {plane.entry_gradient_x, plane.entry_gradient_y});
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
@@ -133,9 +137,10 @@ UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   const auto length_after = [&](std::size_t k) {
     return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
   };
+  const double min_length = kMinRefinedLength * input.scale.spacing;
   double length = 0;
-  for (std::size_t k = 0; k < count; ++k) length += length_after(k);
-  if (length < kMinRefinedLength * input.scale.spacing) return {};
+  for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
+  if (length < min_length) return {};
   UnrolledRings::Size size =
       SizeForWindows(std::span(v.point).subspan(first, count), kWidestReach * input.scale.spacing);
   size.margin += kWindowPadding;
@@ -147,26 +152,12 @@ void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) 
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     ring.x[k] = RingUnits(v.point[first + k].x);
     ring.y[k] = RingUnits(v.point[first + k].y);
-    ring.normal_x[k] = static_cast<float>(v.normal[first + k].x);
-    ring.normal_y[k] = static_cast<float>(v.normal[first + k].y);
+    ring.normal_x[k] = v.normal[first + k].x;
+    ring.normal_y[k] = v.normal[first + k].y;
   }
   for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
   for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
-  const auto length_after = [&](std::ptrdiff_t k) {
-    return LengthInUnits(UnitsBetween(ring.x[k], ring.x[k + 1]),
-                         UnitsBetween(ring.y[k], ring.y[k + 1]));
-  };
-  std::uint32_t arc = 0;
-  for (std::ptrdiff_t k = -ring.margin;; ++k) {
-    ring.arc[k] = static_cast<std::int32_t>(arc);
-    if (k + 1 == ring.count + ring.margin) break;
-    arc += static_cast<std::uint32_t>(length_after(k));
-  }
-  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.weight[k] = static_cast<float>(UnitsBetween(ring.arc[k - 1], ring.arc[k + 1])) *
-                     static_cast<float>(0.5 / kRingUnitsPerCell);
-  }
-  ring.Repeat(ring.weight, 0, ring.count);
+  MeasureArc(ring);
 }
 
 // Calls body(begin, end) for stretches of a ring, in parallel where it is long.

@@ -133,6 +133,31 @@ class RandomRing {
   std::vector<double> bases_, steps_;
 };
 
+TEST(RingWindows, GoByTheLengthsOfStepsForAnyInstructionSet) {
+  for (const int count : {24, 31, 100}) {
+    support::Random random(static_cast<std::uint64_t>(count));
+    const RandomRing source(random, count);
+    support::ForEachInstructionSet([&] {
+      UnrolledRings rings;
+      const UnrolledRing ring = source.Unrolled(rings);
+      MeasureArc(ring);
+      for (std::ptrdiff_t k = 0; k + 1 < ring.count + ring.margin; ++k) {
+        const auto step = [&](std::ptrdiff_t from) {
+          return LengthInUnits(UnitsBetween(ring.x[from], ring.x[from + 1]),
+                               UnitsBetween(ring.y[from], ring.y[from + 1]));
+        };
+        ASSERT_EQ(UnitsBetween(ring.arc[k], ring.arc[k + 1]), step(k)) << "vertex " << k;
+        if (k >= ring.margin) continue;
+        ASSERT_EQ(UnitsBetween(ring.arc[-k - 1], ring.arc[-k]), step(-k - 1)) << "vertex " << k;
+        const double both = (step(k - 1) + step(k)) / kRingUnitsPerCell;
+        EXPECT_FLOAT_EQ(ring.weight[k], static_cast<float>(both / 2));
+        EXPECT_EQ(ring.weight[k - ring.margin],
+                  ring.weight[(k - ring.margin + 3 * ring.count) % ring.count]);
+      }
+    });
+  }
+}
+
 TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     support::Random random(seed);

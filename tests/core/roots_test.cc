@@ -48,10 +48,10 @@ enum class Clamping {
 LatticePoint Clamped(const Stages& stages, std::uint32_t segment, LatticePoint point,
                      Clamping clamping) {
   if (clamping == Clamping::kNone) return point;
-  if (clamping == Clamping::kWhole || clamping == Clamping::kToNodes) {
-    return ClampToCell(stages.bins.tiles, stages.crossings, segment, point);
-  }
   const ActiveCell& cell = stages.crossings.cells[stages.crossings.segments[segment].cell];
+  if (clamping == Clamping::kWhole || clamping == Clamping::kToNodes) {
+    return ClampToCell(stages.bins.tiles, cell, stages.crossings.segments[segment], point);
+  }
   const LatticePoint origin = CellOrigin(stages.bins.tiles, cell);
   const double margin = clamping == Clamping::kToSides ? 0 : 1.0 / 1024;
   return {origin.x + std::clamp(point.x - origin.x, margin, 1 - margin),

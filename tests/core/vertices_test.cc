@@ -203,7 +203,8 @@ TEST(Vertices, OfTheQefBeyondTheirCellAreMovedToItsSide) {
     const std::size_t k = corner.SegmentInCell(10, 10);
     const std::uint32_t segment = corner.topology.segments[k];
     const LatticePoint free = QefVertex(InputOf(corner, frame), segment, corner.planes[k]);
-    const LatticePoint kept = ClampToCell(corner.bins.tiles, corner.crossings, segment, free);
+    const LatticePoint kept = ClampToCell(corner.bins.tiles, corner.planes[k].cell,
+                                          corner.crossings.segments[segment], free);
     const auto within = [](double v) { return std::clamp(v, 10.0, 11.0); };
     EXPECT_NEAR(kept.x, within(free.x), 2e-3);
     EXPECT_NEAR(kept.y, within(free.y), 2e-3);
