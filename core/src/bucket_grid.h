@@ -1,55 +1,55 @@
-// The buckets into which particles around a tile are sorted.
+// The buckets into which the particles of a tile are sorted.
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 
-#include "cell_mask.h"
 #include "coordinate_block.h"
-#include "near_entries.h"
+#include "lattice.h"
 
 namespace partiemc {
 
-/// Buckets [column, column + columns) of the rows [row, row + rows) of a grid.
-struct BucketBox {
-  int column = 0, row = 0;
-  int columns = 0, rows = 0;
+/// How a tile is divided along one of its axes, and its neighbours alike: into powers of two of
+/// cells, so that each bucket lies in one tile.
+class BucketAxis {
+ public:
+  /// As wide as `width` cells, rounded down, but at least one.
+  explicit BucketAxis(double width = 0) {
+    while (shift_ < kTileShift && (2 << shift_) <= width) ++shift_;
+  }
 
-  std::uint32_t count() const { return static_cast<std::uint32_t>(columns * rows); }
+  /// Buckets along a tile.
+  int size() const { return kTileSize >> shift_; }
+
+  /// Of a coordinate in cells relative to the tile: counted from the first of the neighbour before
+  /// the tile to the last of the one behind it.
+  int Along(double coordinate) const {
+    const int cell = static_cast<int>(coordinate + kTileSize);
+    return std::clamp(cell, 0, 3 * kTileSize - 1) >> shift_;
+  }
+  /// The place of such a bucket's tile, 0 to 2.
+  int TileOf(int along) const { return along >> (kTileShift - shift_); }
+
+  /// Of a particle's coordinate in its tile, 0 <= coordinate < 32.
+  std::uint32_t InTile(float coordinate) const {
+    return static_cast<std::uint32_t>(static_cast<int>(coordinate)) >> shift_;
+  }
+
+ private:
+  int shift_ = 0;
 };
 
-/// Rows of square buckets over a tile and a margin around it; what is farther out counts to the
-/// outermost ones.
-class BucketGrid {
- public:
+/// Rows of buckets, much wider than high: what a row holds beyond the disc of a query is cheaper to
+/// pass over in vectors than more offsets are to look up and to write.
+struct BucketGrid {
   /// Positions are multiples of it.
   static constexpr double kStep = 1.0 / (1 << kFractionBits);
 
   BucketGrid() = default;
-  /// For queries within `radius` cells of points of the tile.
-  explicit BucketGrid(double radius);
+  /// For queries within `radius` cells of points of the tile, at most a tile.
+  explicit BucketGrid(double radius) : columns(radius * 8 / 3), rows(radius / 4) {}
 
-  /// Along either axis, of a coordinate in cells relative to the tile.
-  int Along(double coordinate) const {
-    // Truncation rounds down: nothing is farther from its tile than the margin.
-    const int index = static_cast<int>((coordinate + margin_) * per_cell_);
-    return std::clamp(index, 0, columns_ - 1);
-  }
-
-  /// All buckets.
-  BucketBox All() const { return {0, 0, columns_, columns_}; }
-  /// The smallest box with all that lies in cells of a mask, which has some.
-  BucketBox Around(const CellMask& mask) const;
-
-  /// By entry: its bucket, row after row of a box that has them all. Vectors may write a few more.
-  using Buckets = std::array<std::int32_t, NearEntries::kCapacity + NearEntries::kPadding>;
-  void Find(const NearEntries& near, const BucketBox& box, Buckets& buckets) const;
-
- private:
-  double margin_ = 0;  // Cells that buckets extend beyond the tile on each side.
-  double per_cell_ = 1;
-  int columns_ = 0;
+  BucketAxis columns, rows;
 };
 
 }  // namespace partiemc

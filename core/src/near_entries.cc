@@ -1,26 +1,11 @@
 #include "near_entries.h"
 
 #include <algorithm>
-#include <array>
 
 #ifndef PARTIEMC_NEAR_ENTRIES_ONCE
 #define PARTIEMC_NEAR_ENTRIES_ONCE
 namespace partiemc {
 namespace {
-
-// By mask of eight lanes: the chosen ones, then any. Its lower half is right for four lanes, too.
-constexpr std::array<std::array<std::uint8_t, 8>, 256> ChosenLanes() {
-  std::array<std::array<std::uint8_t, 8>, 256> chosen{};
-  for (unsigned mask = 0; mask < chosen.size(); ++mask) {
-    std::size_t count = 0;
-    for (std::uint8_t lane = 0; lane < 8; ++lane) {
-      if ((mask >> lane & 1) != 0) chosen[mask][count++] = lane;
-    }
-  }
-  return chosen;
-}
-
-constexpr auto kChosenLanes = ChosenLanes();
 
 // The entries [first, last) of a tile, those in `cells` of it; relative to another tile they are
 // shifted.
@@ -40,6 +25,8 @@ struct ListPart {
 #define HWY_TARGET_INCLUDE "near_entries.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+
+#include "compressor-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
@@ -81,39 +68,6 @@ class RowTable {
 
  private:
   const std::int32_t* rows_;
-#endif
-};
-
-// Moves the lanes of a mask to the front. In a register: some processors are slow at compressing
-// into memory.
-class Compressor {
- public:
-#if HWY_TARGET <= HWY_AVX3
-  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) : mask_(mask) {}
-
-  template <class D>
-  HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
-    return hn::Compress(values, hn::RebindMask(d, mask_));
-  }
-
- private:
-  hn::Mask<Bits> mask_;
-#else
-  // One look-up for all that is compressed by a mask.
-  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(Bits(), mask, bits);
-    const hn::Rebind<std::uint8_t, Lanes> d_byte;
-    lanes_ = hn::PromoteTo(Bits(), hn::LoadU(d_byte, kChosenLanes[bits[0]].data()));
-  }
-
-  template <class D>
-  HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
-    return hn::TableLookupLanes(values, hn::IndicesFromVec(d, lanes_));
-  }
-
- private:
-  hn::Vec<Bits> lanes_;
 #endif
 };
 
@@ -191,6 +145,16 @@ NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask*
     list.shift_x = static_cast<float>((place % 3 - 1) * kTileSize);
     list.shift_y = static_cast<float>((place / 3 - 1) * kTileSize);
   }
+}
+
+NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells,
+                   NearFields fields)
+    : entries_(bins.entries), fields_(fields), list_count_(1) {
+  lists_.front() = {.next = bins.offsets[tile],
+                    .end = bins.offsets[tile + 1],
+                    .cells = cells,
+                    .shift_x = 0,
+                    .shift_y = 0};
 }
 
 // Chooses the next of a list's entries. Returns false if there are no more.

@@ -36,6 +36,9 @@ class NearWalk {
  public:
   NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask, NearFields fields);
 
+  /// Over the tile's own particles in `cells` of it alone.
+  NearWalk(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells, NearFields fields);
+
   /// Calls visit(const NearEntries&) for all, a block after the other: tile after tile in the order
   /// of Neighbourhood, those of each in the order of the frame.
   template <typename Visit>

@@ -1,8 +1,8 @@
-// Sums over the particles near a point, in vectors of floats. Particles are copied together first,
-// so that the sums of all points of a cell run over one short array. Entry k of that array goes to
-// partial sum k modulo sixteen, and the sixteen are added up in one tree, however wide the vectors
-// of the processor are: the bits are the same everywhere. Compiled once for each target, hence the
-// guard that each of them turns.
+// Sums over the particles near a point, in vectors of floats. Particles within reach are copied
+// together first, so that the sums of all points of a cell run over one short array. Entry k of
+// that array goes to partial sum k modulo sixteen, and the sixteen are added up in one tree,
+// however wide the vectors of the processor are: the bits are the same everywhere. Compiled once
+// for each target, hence the guard that each of them turns.
 #if defined(PARTIEMC_NEAR_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PARTIEMC_NEAR_LANES_INL_H
 #undef PARTIEMC_NEAR_LANES_INL_H
@@ -18,6 +18,7 @@
 #include <span>
 #include <utility>
 
+#include "compressor-inl.h"
 #include "near_rows.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -46,26 +47,54 @@ struct NearChunk {
   int count;
 };
 
-// Appends entries [first, first + count), for which there is room. A vector's worth is always
-// copied: rows are short, and nobody could guess which are empty.
-template <bool kWeighted>
-HWY_INLINE void Append(const NearRows& near, std::uint32_t first, int count, NearChunk& chunk) {
-  const Lanes d;
-  const auto origin_x = hn::Set(d, near.origin_x);
-  const auto origin_y = hn::Set(d, near.origin_y);
-  int k = 0;
-  do {
-    for (int part = 0; part < kParts; ++part, k += kLanes) {
-      const int to = chunk.count + k;
-      hn::StoreU(hn::Sub(hn::LoadU(d, near.x + first + k), origin_x), d, chunk.x + to);
-      hn::StoreU(hn::Sub(hn::LoadU(d, near.y + first + k), origin_y), d, chunk.y + to);
+// Where particles of a query lie, and which of them are within reach, in registers.
+class NearDisc {
+ public:
+  HWY_INLINE explicit NearDisc(const NearRows& near)
+      : xs_(near.x),
+        ys_(near.y),
+        weights_(near.weight),
+        column_(hn::Set(Lanes(), near.column)),
+        centre_x_(hn::Set(Lanes(), near.centre_x)),
+        centre_y_(hn::Set(Lanes(), near.centre_y)),
+        reach_square_(hn::Set(Lanes(), near.reach_square)) {}
+
+  // Writes those of the entries [first, last) of a band, at most kPartialSums, that are within
+  // reach behind the first `to` particles of a chunk, which has room for them. Returns how many it
+  // has then.
+  template <bool kWeighted>
+  HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
+                        NearChunk& chunk) const {
+    const Lanes d;
+    const Compressor::Bits d_bits;
+    const auto period = hn::Set(d, kColumnPeriod);
+    const auto per_period = hn::Set(d, 1 / kColumnPeriod);
+    for (int part = 0; part < kParts; ++part, first += kLanes) {
+      const auto column = hn::Sub(hn::LoadU(d, xs_ + first), column_);
+      const auto x = hn::Sub(column, hn::Mul(hn::Round(hn::Mul(column, per_period)), period));
+      const auto y = hn::Sub(hn::LoadU(d, ys_ + first), origin_y);
+      const auto dx = hn::Sub(x, centre_x_);
+      const auto dy = hn::Sub(y, centre_y_);
+      const auto square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+      const auto is_near = hn::RebindMask(d_bits, hn::Lt(square, reach_square_));
+      const auto place = hn::Add(hn::Iota(d_bits, 0), hn::Set(d_bits, static_cast<int>(first)));
+      const auto is_entry = hn::Lt(place, hn::Set(d_bits, static_cast<int>(last)));
+      const auto is_in = hn::And(is_near, is_entry);
+      const Compressor compress(is_in);
+      hn::StoreU(compress(d, x), d, chunk.x + to);
+      hn::StoreU(compress(d, y), d, chunk.y + to);
       if constexpr (kWeighted) {
-        hn::StoreU(hn::LoadU(d, near.weight + first + k), d, chunk.weight + to);
+        hn::StoreU(compress(d, hn::LoadU(d, weights_ + first)), d, chunk.weight + to);
       }
+      to += static_cast<int>(hn::CountTrue(d_bits, is_in));
     }
-  } while (k < count);
-  chunk.count += count;
-}
+    return to;
+  }
+
+ private:
+  const float *xs_, *ys_, *weights_;
+  Vector column_, centre_x_, centre_y_, reach_square_;
+};
 
 // Ends a chunk with particles that are far from everything.
 template <bool kWeighted>
@@ -79,42 +108,52 @@ HWY_INLINE void Close(NearChunk& chunk) {
   }
 }
 
+// Collects the particles of `near` in a chunk. Whenever there may be no room for more, make_room()
+// has to use it up, or returns false to give up. Returns false if it did.
+template <bool kWeighted, typename MakeRoom>
+HWY_INLINE bool Collect(const NearRows& near, NearChunk& chunk, MakeRoom make_room) {
+  const NearDisc disc(near);
+  int count = 0;
+  for (int b = 0; b < near.band_count; ++b) {
+    const NearBand& band = near.bands[b];
+    const Vector origin_y = hn::Set(Lanes(), band.origin_y);
+    const std::uint32_t* offsets = band.offsets;
+    const std::uint32_t* const end = offsets + band.rows * band.row_stride;
+    for (; offsets != end; offsets += band.row_stride) {
+      std::uint32_t first = offsets[0];
+      const std::uint32_t last = offsets[band.columns];
+      do {
+        if (HWY_UNLIKELY(count + kPartialSums > NearChunk::kCapacity)) {
+          chunk.count = std::exchange(count, 0);
+          if (!make_room()) return false;
+        }
+        count = disc.Append<kWeighted>(origin_y, first, last, count, chunk);
+        first += kPartialSums;
+      } while (HWY_UNLIKELY(first < last));
+    }
+  }
+  chunk.count = count;
+  return true;
+}
+
 // Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
 template <bool kWeighted, typename Visit>
 HWY_INLINE void ForEachChunk(const NearRows& near, NearChunk& chunk, Visit visit) {
-  chunk.count = 0;
-  for (int row = 0; row < near.rows; ++row) {
-    const std::uint32_t* const offsets = near.offsets + row * near.row_stride;
-    std::uint32_t first = offsets[0];
-    const std::uint32_t last = offsets[near.columns];
-    while (chunk.count + (last - first) > NearChunk::kCapacity) {
-      const int room = NearChunk::kCapacity - chunk.count;
-      Append<kWeighted>(near, first, room, chunk);
-      first += room;
-      Close<kWeighted>(chunk);
-      visit(std::as_const(chunk));
-      chunk.count = 0;
-    }
-    Append<kWeighted>(near, first, static_cast<int>(last - first), chunk);
-  }
-  if (chunk.count == 0) return;
-  Close<kWeighted>(chunk);
-  visit(std::as_const(chunk));
+  const auto empty = [&]() HWY_ATTR {
+    Close<kWeighted>(chunk);
+    visit(std::as_const(chunk));
+    return true;
+  };
+  Collect<kWeighted>(near, chunk, empty);
+  if (chunk.count > 0) empty();
 }
 
-// The particles of `near` in one chunk. Returns false if they do not fit.
+// The particles of `near` in one chunk. Returns false if they may not fit.
 template <bool kWeighted>
 HWY_INLINE bool Gather(const NearRows& near, NearChunk& chunk) {
-  chunk.count = 0;
-  for (int row = 0; row < near.rows; ++row) {
-    const std::uint32_t* const offsets = near.offsets + row * near.row_stride;
-    const std::uint32_t first = offsets[0];
-    const std::uint32_t count = offsets[near.columns] - first;
-    if (HWY_UNLIKELY(chunk.count + count > NearChunk::kCapacity)) return false;
-    Append<kWeighted>(near, first, static_cast<int>(count), chunk);
-  }
-  Close<kWeighted>(chunk);
-  return true;
+  const bool fits = Collect<kWeighted>(near, chunk, [] { return false; });
+  if (fits) Close<kWeighted>(chunk);
+  return fits;
 }
 
 // Calls visit(query, chunk) for the particles of each of a few queries, as many at a time as a
@@ -125,13 +164,13 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   NearChunk chunks[kQueriesAtOnce];
   bool fits[kQueriesAtOnce];
   for (std::size_t k = 0; k < queries.size(); ++k) {
-    fits[k] = Gather<kWeighted>(queries[k], chunks[k]);
+    fits[k] = Gather<kWeighted>(queries[k].near, chunks[k]);
   }
   for (std::size_t k = 0; k < queries.size(); ++k) {
     if (HWY_LIKELY(fits[k])) {
       visit(k, chunks[k]);
     } else {
-      ForEachChunk<kWeighted>(queries[k], chunks[k],
+      ForEachChunk<kWeighted>(queries[k].near, chunks[k],
                               [&](const NearChunk& chunk) HWY_ATTR { visit(k, chunk); });
     }
   }

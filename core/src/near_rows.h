@@ -1,12 +1,13 @@
 // The particles around a few points, as they lie in memory.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
 namespace partiemc {
 
-/// Vectors may read so many entries past the end of a row.
+/// Vectors may read so many entries past the end of a row of buckets.
 inline constexpr int kRowPadding = 16;
 
 /// A query asks for sums at up to so many points: neighbours, which look at the same particles.
@@ -14,15 +15,31 @@ inline constexpr std::size_t kPointsAtOnce = 2;
 /// So many queries run at once: none waits for what is looked up for another.
 inline constexpr std::size_t kQueriesAtOnce = 8;
 
-/// Entries around points of a tile: row after row of buckets, each row a contiguous span.
-struct NearRows {
-  const float *x, *y;            ///< By entry, in cells relative to the tile.
-  const float* weight;           ///< By entry; null where all weigh Scale::uniform_weight.
-  const std::uint32_t* offsets;  ///< First bucket of the first row.
-  int rows, columns;             ///< Buckets to look at.
+/// Positions along x are told modulo this many cells, which is more than any points see of them.
+inline constexpr float kColumnPeriod = 128;
+
+/// Successive buckets of successive rows, of tiles side by side.
+struct NearBand {
+  const std::uint32_t* offsets;  ///< The first entry of the first bucket, and so on.
+  int columns, rows;             ///< Buckets to look at.
   int row_stride;                ///< Buckets from one row to the next.
-  /// The corner of a cell near the points: sums run in floats, in coordinates relative to it.
+  float origin_y;                ///< NearRows::origin_y, relative to those tiles.
+};
+
+/// Entries around points of a tile: row after row of buckets, each row a contiguous span. Not
+/// initialised: most points need one band.
+struct NearRows {
+  const float* x;       ///< By entry, in cells, modulo kColumnPeriod.
+  const float* y;       ///< By entry, in cells relative to the tile that it lies in.
+  const float* weight;  ///< By entry; null where all weigh Scale::uniform_weight.
+  /// The corner of a cell near the points, relative to the tile: sums run in floats, in coordinates
+  /// relative to it.
   float origin_x, origin_y;
+  float column;  ///< Where it is among `x`.
+  /// Only entries in this disc count, whose centre is relative to the origin.
+  float centre_x, centre_y, reach_square;
+  std::array<NearBand, 3> bands;
+  int band_count;
 };
 
 }  // namespace partiemc

@@ -67,8 +67,9 @@ void PlaneEstimator::Estimate(std::span<const Planes> planes,
     const Planes& of = planes[q];
     std::array<LatticePoint, kPointsAtOnce> points;
     for (std::size_t k = 0; k < of.count; ++k) points[k] = {of.planes[k].x, of.planes[k].y};
-    queries[q] = {field_.RowsNear(of.tile, std::span(points).first(of.count), radius), of.planes,
-                  of.count};
+    field_.FindNear(of.tile, std::span(points).first(of.count), radius, queries[q].near);
+    queries[q].planes = of.planes;
+    queries[q].count = of.count;
   }
   std::array<QuerySupports, kQueriesAtOnce> sums;
   SumSupports(std::span(queries).first(planes.size()), support_, strip_, sums);

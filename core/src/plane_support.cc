@@ -81,7 +81,7 @@ HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& s
   ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk) HWY_ATTR {
     const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.count; ++k) {
-      SumChunk<kWeighted>(query, chunk, query.planes[k], support, strip, totals[q][k]);
+      SumChunk<kWeighted>(query.near, chunk, query.planes[k], support, strip, totals[q][k]);
     }
   });
   for (std::size_t q = 0; q < queries.size(); ++q) {
@@ -94,8 +94,8 @@ HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& s
 
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
                  const StripShape& strip, std::span<QuerySupports> sums) {
-  queries.front().weight != nullptr ? Sum<true>(queries, support, strip, sums)
-                                    : Sum<false>(queries, support, strip, sums);
+  queries.front().near.weight != nullptr ? Sum<true>(queries, support, strip, sums)
+                                         : Sum<false>(queries, support, strip, sums);
 }
 
 }  // namespace HWY_NAMESPACE

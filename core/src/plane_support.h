@@ -39,7 +39,8 @@ struct SupportSums {
 };
 
 /// Up to kPointsAtOnce planes, and at least the particles in both discs of each.
-struct SupportQuery : NearRows {
+struct SupportQuery {
+  NearRows near;
   std::array<BentPlane, kPointsAtOnce> planes;
   std::size_t count;  ///< Of planes.
 };

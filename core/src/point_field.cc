@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "cell_mask.h"
 #include "level_set_formula.h"
@@ -10,28 +9,51 @@
 #include "parallel.h"
 
 namespace partiemc {
+namespace {
+
+// Marks tiles without a run.
+constexpr std::uint32_t kNoRun = 0xffffffff;
+
+// After so many tiles positions along x begin anew.
+constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
+
+}  // namespace
+
+// Marks the cells of each tile that are asked for, and those that a kernel reaches from them.
 void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
-  boxes_.assign(tiles, {});
-  asked_.resize(tiles);
+  tiles_.resize(tiles);
+  wanted_.resize(tiles);
   const auto is_active = [&](std::uint32_t tile) {
     if (tile == kNoTile) return false;
     const std::size_t end =
         tile + 1 < tiles ? crossings.tiles[tile + 1].first_cell : crossings.cells.size();
     return crossings.tiles[tile].first_cell < end;
   };
-  // Farther than a mask holds everything is asked for.
-  const int distance = static_cast<int>(std::min<double>(std::ceil(wander), kMaskMargin));
-  const bool all = wander > kMaskMargin;
-  ParallelFor(tiles, [&](std::uint32_t tile) {
-    const Neighbourhood& near = bins.tiles.neighbours(tile);
-    if (!std::any_of(near.begin(), near.end(), is_active)) return;
-    asked_[tile] = CellsNear(bins.tiles, tile, distance, [&](std::uint32_t of) -> const BitRows& {
-      return crossings.tiles[of].active;
-    });
-    if (all) asked_[tile].fill(~std::uint32_t{0});
-    if (IsEmpty(asked_[tile])) return;
-    boxes_[tile] = HasMasks() ? grid_.Around(Widened(asked_[tile], Reach(), Reach())) : grid_.All();
+  const auto active_of = [&](std::uint32_t tile) -> const BitRows& {
+    return crossings.tiles[tile].active;
+  };
+  constexpr BitRows kNoCells{};
+  BitRows all_cells;
+  all_cells.fill(~std::uint32_t{0});
+  // Farther than a mask holds all is asked for, and all is wanted.
+  const double distance = std::ceil(wander);
+  const double reach = distance + std::ceil(scale_.kernel_radius);
+  ParallelFor(tiles, [&](std::uint32_t index) {
+    const Neighbourhood& near = bins.tiles.neighbours(index);
+    const bool is_near = std::any_of(near.begin(), near.end(), is_active);
+    const auto cells_near = [&](double cells) {
+      return is_near ? CellsNear(bins.tiles, index, static_cast<int>(cells), active_of) : kNoCells;
+    };
+    Tile& tile = tiles_[index];
+    if (distance > kMaskMargin) {
+      tile.asked = is_near ? all_cells : kNoCells;
+    } else {
+      tile.asked = cells_near(distance);
+    }
+    wanted_[index] = reach > kMaskMargin ? all_cells : cells_near(reach);
+    tile.is_asked = !IsEmpty(tile.asked);
+    tile.column = static_cast<float>(bins.tiles[index].x & (kPeriodTiles - 1)) * kTileSize;
   });
 }
 
@@ -40,71 +62,95 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
   scale_ = scale;
   grid_ = BucketGrid(scale.kernel_radius);
   MarkTiles(bins, crossings, wander);
+  FindRuns(bins);
+  ParallelFor(runs_.size(), [&](std::size_t run) { SortRun(bins, runs_[run]); });
+  ParallelFor(static_cast<std::uint32_t>(tiles_.size()),
+              [&](std::uint32_t tile) { LinkRuns(bins.tiles, tile); });
+}
 
-  const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
+// Joins wanted tiles to runs, and makes room for what these hold.
+void PointField::FindRuns(const ParticleBins& bins) {
+  runs_.clear();
+  run_of_.assign(tiles_.size(), kNoRun);
+  std::uint32_t entry_count = 0;
+  for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) {
+    if (bins.CountOf(tile) == 0 || IsEmpty(wanted_[tile])) continue;
+    const auto& [y, x] = bins.tiles[tile];
+    const auto goes_on = [&](const TileCoordinate& last) { return last.y == y && last.x + 2 >= x; };
+    if (runs_.empty() || !goes_on(bins.tiles[runs_.back().last_tile])) {
+      runs_.push_back({.first_tile = tile, .first_column = x, .first_entry = entry_count});
+    }
+    runs_.back().last_tile = tile;
+    run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
+    // Room for all particles of the tile: to count those that are wanted takes longer.
+    entry_count += bins.CountOf(tile);
+  }
   std::uint32_t bucket_count = 0;
-  first_bucket_.resize(tiles);
-  for (std::uint32_t tile = 0; tile < tiles; ++tile) {
-    first_bucket_[tile] = bucket_count;
-    if (IsIndexed(tile)) bucket_count += boxes_[tile].count() + 2;
+  for (Run& run : runs_) {
+    const int tiles = bins.tiles[run.last_tile].x - run.first_column + 1;
+    run.row_stride = static_cast<std::uint32_t>(tiles * grid_.columns.size());
+    run.first_bucket = bucket_count;
+    bucket_count += OffsetCount(run);
   }
   bucket_offsets_.resize(bucket_count);
-  const auto for_each_indexed = [&](auto visit) {
-    ParallelFor(tiles, [&](std::uint32_t tile) {
-      if (IsIndexed(tile)) visit(tile);
-    });
-  };
-  first_entry_.resize(tiles);
-  for_each_indexed([&](std::uint32_t tile) { first_entry_[tile] = CountEntries(bins, tile); });
-  std::uint32_t entry_count = 0;
-  for (std::uint32_t tile = 0; tile < tiles; ++tile) {
-    if (IsIndexed(tile)) entry_count += std::exchange(first_entry_[tile], entry_count);
-  }
   x_.resize(entry_count + kRowPadding);
   y_.resize(entry_count + kRowPadding);
   source_.resize(entry_count);
   weight_.resize(bins.weight.empty() ? 0 : entry_count + kRowPadding);
-  for_each_indexed([&](std::uint32_t tile) { FillEntries(bins, tile); });
 }
 
-std::span<std::uint32_t> PointField::OffsetsOf(std::uint32_t tile) {
-  return {bucket_offsets_.data() + first_bucket_[tile], std::size_t{boxes_[tile].count()} + 2};
+// Tells a tile where the buckets around it are.
+void PointField::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
+  const Neighbourhood& neighbours = directory.neighbours(tile);
+  for (int y = 0; y < 3; ++y) {
+    RunBeside& beside = tiles_[tile].runs[y];
+    beside = {};
+    // All of these that have a run have the same.
+    for (int x = 0; x < 3; ++x) {
+      const std::uint32_t near = neighbours[y * 3 + x];
+      if (near == kNoTile || run_of_[near] == kNoRun) continue;
+      const Run& run = runs_[run_of_[near]];
+      const int first = (run.first_column - directory[tile].x) * grid_.columns.size();
+      beside = {.bucket = run.first_bucket - static_cast<std::uint32_t>(first),
+                .row_stride = run.row_stride,
+                .first = first,
+                .end = first + static_cast<int>(run.row_stride)};
+      break;
+    }
+  }
 }
 
-// The particles within reach of a point that may be asked for.
-NearWalk PointField::Near(const ParticleBins& bins, std::uint32_t tile, NearFields fields) const {
-  if (!HasMasks()) return NearWalk(bins, tile, nullptr, fields);
-  const CellMask mask = Widened(asked_[tile], Reach(), Reach());
-  return NearWalk(bins, tile, &mask, fields);
-}
-
-// Counts the particles in each bucket of a tile, two places behind it. Returns how many they are.
-std::uint32_t PointField::CountEntries(const ParticleBins& bins, std::uint32_t tile) {
-  const std::span<std::uint32_t> offsets = OffsetsOf(tile);
+// Sorts the wanted particles of a run by bucket.
+void PointField::SortRun(const ParticleBins& bins, const Run& run) {
+  // Calls visit(near, bucket_of, column) for blocks of particles of a tile: bucket_of(k) is that
+  // of the k-th, and `column` where their tile begins.
+  const auto for_each_block = [&](NearFields fields, auto visit) {
+    for (std::uint32_t tile = run.first_tile; tile <= run.last_tile; ++tile) {
+      if (run_of_[tile] == kNoRun) continue;
+      const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
+      const auto first = static_cast<std::uint32_t>(columns);
+      NearWalk(bins, tile, wanted_[tile], fields).ForEachBlock([&](const NearEntries& near) {
+        const auto bucket_of = [&](int k) {
+          return grid_.rows.InTile(near.y[k]) * run.row_stride + first +
+                 grid_.columns.InTile(near.x[k]);
+        };
+        visit(near, bucket_of, tiles_[tile].column);
+      });
+    }
+  };
+  // The counts of buckets stand two places behind them, then where the next entry of a bucket goes
+  // one place behind it, and in the end is where the next bucket starts.
+  const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);
-  BucketGrid::Buckets buckets;
-  std::uint32_t count = 0;
-  Near(bins, tile, NearFields::kPositions).ForEachBlock([&](const NearEntries& near) {
-    grid_.Find(near, boxes_[tile], buckets);
-    for (int k = 0; k < near.count; ++k) ++offsets[buckets[k] + 2];
-    count += static_cast<std::uint32_t>(near.count);
+  for_each_block(NearFields::kPositions, [&](const NearEntries& near, auto bucket_of, float) {
+    for (int k = 0; k < near.count; ++k) ++offsets[bucket_of(k) + 2];
   });
-  return count;
-}
-
-// Turns the counts of a tile's buckets into offsets, and fills the buckets.
-void PointField::FillEntries(const ParticleBins& bins, std::uint32_t tile) {
-  // Where the next entry of a bucket goes stands one place behind it, and in the end is where the
-  // next bucket starts.
-  const std::span<std::uint32_t> offsets = OffsetsOf(tile);
-  std::uint32_t next = first_entry_[tile];
+  std::uint32_t next = run.first_entry;
   for (std::uint32_t& offset : offsets) offset = next += offset;
-  BucketGrid::Buckets buckets;
-  Near(bins, tile, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
-    grid_.Find(near, boxes_[tile], buckets);
+  for_each_block(NearFields::kAll, [&](const NearEntries& near, auto bucket_of, float column) {
     for (int k = 0; k < near.count; ++k) {
-      const std::uint32_t to = offsets[buckets[k] + 1]++;
-      x_[to] = near.x[k];
+      const std::uint32_t to = offsets[bucket_of(k) + 1]++;
+      x_[to] = column + near.x[k];
       y_[to] = near.y[k];
       source_[to] = near.source[k];
       if (!bins.weight.empty()) weight_[to] = bins.weight[near.entry[k]];
@@ -152,11 +198,10 @@ class Spread {
 }  // namespace
 
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
-  const LatticePoint point{x, y};
-  const PointQuery query{RowsNear(tile, {&point, 1}, scale_.kernel_radius), {point}, 1};
-  QuerySums sums;
-  SumAtPoints(Kernel(), {&query, 1}, {&sums, 1});
-  return SampleOf(query, point, sums[0]);
+  const FieldPoints place{.tile = tile, .points = {LatticePoint{x, y}}, .count = 1};
+  FieldSamples samples;
+  Sample({&place, 1}, {&samples, 1});
+  return samples[0];
 }
 
 void PointField::Sample(std::span<const FieldPoints> places,
@@ -164,14 +209,15 @@ void PointField::Sample(std::span<const FieldPoints> places,
   std::array<PointQuery, kQueriesAtOnce> queries;
   for (std::size_t q = 0; q < places.size(); ++q) {
     const auto& [tile, points, count] = places[q];
-    const NearRows near = RowsNear(tile, std::span(points).first(count), scale_.kernel_radius);
-    queries[q] = {near, points, count};
+    FindNear(tile, std::span(points).first(count), scale_.kernel_radius, queries[q].near);
+    queries[q].points = points;
+    queries[q].count = count;
   }
   std::array<QuerySums, kQueriesAtOnce> sums;
   SumAtPoints(Kernel(), std::span(queries).first(places.size()), sums);
   for (std::size_t q = 0; q < places.size(); ++q) {
     for (std::size_t k = 0; k < places[q].count; ++k) {
-      samples[q][k] = SampleOf(queries[q], places[q].points[k], sums[q][k]);
+      samples[q][k] = SampleOf(queries[q].near, places[q].points[k], sums[q][k]);
     }
   }
 }

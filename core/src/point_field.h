@@ -43,19 +43,20 @@ struct FieldPoints {
 };
 using FieldSamples = std::array<FieldSample, kPointsAtOnce>;
 
-/// Particles near the isoline, sorted into buckets of about a cell, so that a point
-/// looks at its surroundings instead of its whole tile.
+/// Particles near the isoline, each once, those of a tile sorted into buckets of about a cell: a
+/// point looks at the buckets around it, in its tile and its neighbours.
 class PointField {
  public:
   /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
-  /// cells away from one, along each axis. Cost: linear in the entries of those cells' tiles.
+  /// cells away from one, along each axis. Cost: linear in the entries of the tiles around those
+  /// cells.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
              double wander);
 
   /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
   /// Requires: the tile is indexed. Particles miss where Covers is false.
   /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoints).
-  /// Cost: the particles within a kernel radius and a bucket.
+  /// Cost: the particles of the rows of buckets within a kernel radius.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
   /// The same of points of at most kQueriesAtOnce places, for less than one after the other. Those
@@ -65,35 +66,55 @@ class PointField {
   /// Whether particles weigh each their own.
   bool HasWeights() const { return !weight_.empty(); }
 
-  /// Calls visit(x, y, entry) for the particles of `tile`'s list within `radius` of a point of it,
-  /// and for some more. Requires: radius <= kernel radius.
+  /// Calls visit(x, y, entry) for the particles within `radius` of a point of `tile`, in cells
+  /// relative to it, and for some more. Requires: radius <= kernel radius.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// The particles within `radius` of any of some points, for a kernel of vectors. All of
-  /// `points` in cells relative to the tile.
-  NearRows RowsNear(std::uint32_t tile, std::span<const LatticePoint> points, double radius) const;
+  /// Sets `near` to the particles within `radius` of any of some points, and some more, for a
+  /// kernel of vectors. All of `points` in cells relative to the tile.
+  void FindNear(std::uint32_t tile, std::span<const LatticePoint> points, double radius,
+                NearRows& near) const;
 
   /// Index in the frame of the particle of an entry.
   std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
 
-  bool IsIndexed(std::uint32_t tile) const { return boxes_[tile].rows > 0; }
+  bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
 
   /// Whether a point of a tile, 0 <= x, y < 32, is near enough to an active cell.
   bool Covers(std::uint32_t tile, double x, double y) const {
-    return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
+    return IsIndexed(tile) &&
+           (tiles_[tile].asked[static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
   }
 
  private:
-  // The buckets of a tile within `radius` of a box, as far as they have entries.
-  BucketBox BucketsNear(std::uint32_t tile, const LatticePoint& low, const LatticePoint& high,
-                        double radius) const;
-  // The first bucket of a row of such a box.
-  const std::uint32_t* RowOf(std::uint32_t tile, const BucketBox& near, int row) const {
-    const BucketBox& box = boxes_[tile];
-    return bucket_offsets_.data() + first_bucket_[tile] + (near.row + row - box.row) * box.columns +
-           near.column - box.column;
-  }
+  // Tiles side by side whose particles are sorted as one: each row of buckets runs through all of
+  // them, so that a query finds one span in it. Where one tile between two is missing, or not
+  // wanted, its buckets are there and empty: no query sees two runs in a row of tiles.
+  struct Run {
+    std::uint32_t first_tile = 0, last_tile = 0;
+    std::int32_t first_column = 0;  // Of tiles.
+    std::uint32_t row_stride = 0;   // Buckets of a row.
+    std::uint32_t first_bucket = 0;
+    std::uint32_t first_entry = 0;
+  };
+
+  // The run above, beside or below a tile, as seen from it.
+  struct RunBeside {
+    std::uint32_t bucket = 0;  // The one in the tile's first column, of the first row, modulo 2^32.
+    std::uint32_t row_stride = 0;
+    int first = 0, end = 0;  // Its columns, from the tile's first.
+  };
+
+  // More than floats are off by, in cells: particles that far out add nothing to a sum.
+  static constexpr double kDiscMargin = 1e-3;
+
+  struct Tile {
+    std::array<RunBeside, 3> runs;  // From below to above.
+    float column;                   // Of its first node (kColumnPeriod).
+    bool is_asked;                  // Whether any of `asked`.
+    BitRows asked;                  // The cells in which points may lie.
+  };
 
   PointKernel Kernel() const {
     return {1 / (scale_.kernel_radius * scale_.kernel_radius), scale_.uniform_weight};
@@ -101,66 +122,83 @@ class PointField {
   FieldSample SampleOf(const NearRows& near, const LatticePoint& point,
                        const PointSums& sums) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
-  std::span<std::uint32_t> OffsetsOf(std::uint32_t tile);
-  bool HasMasks() const { return Reach() < kMaskMargin; }
-  int Reach() const { return static_cast<int>(std::ceil(scale_.kernel_radius)); }
-  NearWalk Near(const ParticleBins& bins, std::uint32_t tile, NearFields fields) const;
-  std::uint32_t CountEntries(const ParticleBins& bins, std::uint32_t tile);
-  void FillEntries(const ParticleBins& bins, std::uint32_t tile);
+  // Of its buckets, and two more.
+  std::uint32_t OffsetCount(const Run& run) const {
+    return run.row_stride * static_cast<std::uint32_t>(grid_.rows.size()) + 2;
+  }
+  void FindRuns(const ParticleBins& bins);
+  void LinkRuns(const TileDirectory& directory, std::uint32_t tile);
+  void SortRun(const ParticleBins& bins, const Run& run);
 
   Scale scale_;
   BucketGrid grid_;
-  std::vector<BitRows> asked_;               // Per tile: the cells in which points may lie.
-  std::vector<BucketBox> boxes_;             // Per tile: buckets that may have entries.
-  std::vector<std::uint32_t> first_bucket_;  // Per tile: the first of these in bucket_offsets_.
-  std::vector<std::uint32_t> first_entry_;   // Per tile: into the arrays of entries.
+  std::vector<Tile> tiles_;
+  std::vector<BitRows> wanted_;  // By tile: the cells that a kernel reaches from `asked`.
+  std::vector<Run> runs_;
+  std::vector<std::uint32_t> run_of_;  // By tile; kNoRun where there is none.
   std::vector<std::uint32_t> bucket_offsets_;
   std::vector<float> x_, y_, weight_;
   std::vector<std::uint32_t> source_;
 };
 
-inline BucketBox PointField::BucketsNear(std::uint32_t tile, const LatticePoint& low,
-                                         const LatticePoint& high, double radius) const {
-  const BucketBox& box = boxes_[tile];
-  BucketBox near;
-  const auto clip = [&](double from, double to, int begin, int count, int& first, int& size) {
-    first = std::max(grid_.Along(from - radius), begin);
-    size = std::min(grid_.Along(to + radius), begin + count - 1) - first + 1;
-  };
-  clip(low.x, high.x, box.column, box.columns, near.column, near.columns);
-  clip(low.y, high.y, box.row, box.rows, near.row, near.rows);
-  const bool any = near.columns > 0 && near.rows > 0;
-  return any ? near : BucketBox{.column = box.column, .row = box.row};
-}
-
-inline NearRows PointField::RowsNear(std::uint32_t tile, std::span<const LatticePoint> points,
-                                     double radius) const {
+inline void PointField::FindNear(std::uint32_t tile, std::span<const LatticePoint> points,
+                                 double radius, NearRows& near) const {
   LatticePoint low = points.front(), high = points.front();
   for (const LatticePoint& point : points.subspan(1)) {
     low = {std::min(low.x, point.x), std::min(low.y, point.y)};
     high = {std::max(high.x, point.x), std::max(high.y, point.y)};
   }
+  const Tile& of = tiles_[tile];
+  near.x = x_.data();
+  near.y = y_.data();
+  near.weight = weight_.empty() ? nullptr : weight_.data();
+  near.origin_x = static_cast<float>(static_cast<int>(low.x));
+  near.origin_y = static_cast<float>(static_cast<int>(low.y));
+  near.column = of.column + near.origin_x;
+  near.centre_x = static_cast<float>((low.x + high.x) / 2 - near.origin_x);
+  near.centre_y = static_cast<float>((low.y + high.y) / 2 - near.origin_y);
+  // Half of what lies between two points is at most this.
+  const double half = (high.x - low.x + high.y - low.y) / 2;
+  const double disc = radius + half + kDiscMargin;
+  near.reach_square = static_cast<float>(disc * disc);
   // What lies on the rim, or nearer to it than positions are to each other, adds nothing to a sum.
-  const BucketBox near = BucketsNear(tile, low, high, radius - BucketGrid::kStep / 2);
-  return {.x = x_.data(),
-          .y = y_.data(),
-          .weight = weight_.empty() ? nullptr : weight_.data(),
-          .offsets = RowOf(tile, near, 0),
-          .rows = near.rows,
-          .columns = near.columns,
-          .row_stride = boxes_[tile].columns,
-          .origin_x = static_cast<float>(static_cast<int>(low.x)),
-          .origin_y = static_cast<float>(static_cast<int>(low.y))};
+  const double reach = radius - BucketGrid::kStep / 2;
+  const auto& [columns, rows] = grid_;
+  const int first_column = columns.Along(low.x - reach) - columns.size();
+  const int last_column = columns.Along(high.x + reach) - columns.size();
+  const int first_row = rows.Along(low.y - reach), last_row = rows.Along(high.y + reach);
+  near.band_count = 0;
+  for (int y = rows.TileOf(first_row); y <= rows.TileOf(last_row); ++y) {
+    const RunBeside& run = of.runs[y];
+    const int column = std::max(first_column, run.first);
+    const int end = std::min(last_column + 1, run.end);
+    if (column >= end) continue;
+    const int row = std::max(first_row - y * rows.size(), 0);
+    const std::uint32_t bucket = run.bucket + row * run.row_stride + column;
+    near.bands[near.band_count++] = {
+        .offsets = bucket_offsets_.data() + bucket,
+        .columns = end - column,
+        .rows = std::min(last_row - y * rows.size() + 1, rows.size()) - row,
+        .row_stride = static_cast<int>(run.row_stride),
+        .origin_y = near.origin_y - static_cast<float>((y - 1) * kTileSize)};
+  }
 }
 
 template <typename Visit>
 void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radius,
                              Visit visit) const {
-  const BucketBox near = BucketsNear(tile, {x, y}, {x, y}, radius);
-  for (int row = 0; row < near.rows; ++row) {
-    const std::uint32_t* offsets = RowOf(tile, near, row);
-    for (std::uint32_t e = offsets[0]; e < offsets[near.columns]; ++e) {
-      visit(static_cast<double>(x_[e]), static_cast<double>(y_[e]), e);
+  const LatticePoint point{x, y};
+  NearRows near;
+  FindNear(tile, {&point, 1}, radius + BucketGrid::kStep, near);
+  for (const NearBand& band : std::span(near.bands).first(near.band_count)) {
+    for (int row = 0; row < band.rows; ++row) {
+      const std::uint32_t* const offsets = band.offsets + row * band.row_stride;
+      for (std::uint32_t e = offsets[0]; e < offsets[band.columns]; ++e) {
+        float along = x_[e] - near.column;
+        if (along > kColumnPeriod / 2) along -= kColumnPeriod;
+        if (along < -kColumnPeriod / 2) along += kColumnPeriod;
+        visit(double{near.origin_x} + along, double{near.origin_y} + (y_[e] - band.origin_y), e);
+      }
     }
   }
 }

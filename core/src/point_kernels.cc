@@ -137,7 +137,7 @@ HWY_INLINE void Sum(const PointKernel& kernel, std::span<const PointQuery> queri
   ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk) HWY_ATTR {
     const PointQuery& query = queries[q];
     for (std::size_t k = 0; k < query.count; ++k) {
-      SumChunk<AddSums<kWeighted>>(kernel, query, chunk, query.points[k], totals[q][k]);
+      SumChunk<AddSums<kWeighted>>(kernel, query.near, chunk, query.points[k], totals[q][k]);
     }
   });
   for (std::size_t q = 0; q < queries.size(); ++q) {
@@ -149,8 +149,8 @@ HWY_INLINE void Sum(const PointKernel& kernel, std::span<const PointQuery> queri
 
 void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
                  std::span<QuerySums> sums) {
-  queries.front().weight != nullptr ? Sum<true>(kernel, queries, sums)
-                                    : Sum<false>(kernel, queries, sums);
+  queries.front().near.weight != nullptr ? Sum<true>(kernel, queries, sums)
+                                         : Sum<false>(kernel, queries, sums);
 }
 
 PointThirdSums ThirdSumsAtPoint(const PointKernel& kernel, const NearRows& near,

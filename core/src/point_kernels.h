@@ -12,7 +12,8 @@ namespace partiemc {
 
 /// Up to kPointsAtOnce points, in cells relative to the tile, and the particles around them, at
 /// least those within R of each.
-struct PointQuery : NearRows {
+struct PointQuery {
+  NearRows near;
   std::array<LatticePoint, kPointsAtOnce> points;
   std::size_t count;  ///< Of points.
 };
@@ -42,8 +43,8 @@ struct PointThirdSums {
 /// sums[k][i] are those at points[i] of queries[k], at most kQueriesAtOnce, all or none of them
 /// with weights. Terms are floats, and so are their sums over up to 128 particles: off by a few
 /// 1e-7 of the sum of their magnitudes. Same bits for any processor, whatever is asked at once: a
-/// query's particles are dealt to sixteen partial sums by their place among them, and the sixteen
-/// are added up in one order (near_lanes-inl.h).
+/// query's particles within reach are dealt to sixteen partial sums by their place among them, and
+/// the sixteen are added up in one order (near_lanes-inl.h).
 using QuerySums = std::array<PointSums, kPointsAtOnce>;
 void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
                  std::span<QuerySums> sums);

@@ -120,6 +120,29 @@ TEST(NearEntries, OfAnEmptyMaskAreNone) {
   ExpectAllSeen(Bin(CrowdedScene(random)), &empty);
 }
 
+TEST(NearEntries, OfATileAloneAreThoseOfAMaskThatHasNoCellsElsewhere) {
+  support::Random random(4);
+  const ParticleBins bins = Bin(CrowdedScene(random));
+  BitRows cells;
+  for (std::uint32_t& row : cells) row = static_cast<std::uint32_t>(random.Bits());
+  CellMask mask{};
+  for (int j = 0; j < kTileSize; ++j) {
+    mask[j + kMaskMargin] = std::uint64_t{cells[j]} << kMaskMargin;
+  }
+  std::size_t seen = 0;
+  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    std::vector<Seen> own;
+    NearWalk(bins, tile, cells, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
+      for (int k = 0; k < near.count; ++k) {
+        own.push_back({near.source[k], near.entry[k], near.x[k], near.y[k]});
+      }
+    });
+    EXPECT_EQ(own, Expected(bins, tile, &mask));
+    seen += own.size();
+  }
+  EXPECT_GT(seen, 1000u);
+}
+
 TEST(NearEntries, OfAnySmallNumberOfParticlesAreRight) {
   // Fewer than a vector, at the end of the bins too.
   for (int count = 1; count <= 40; ++count) {

@@ -14,6 +14,30 @@
 namespace partiemc {
 namespace {
 
+// Rows of particles in one band. `xs` are told modulo kColumnPeriod; the disc has all.
+NearRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys, const float* weights,
+                 NearBand band, float origin_x, float origin_y) {
+  NearRows near;
+  near.x = xs.data();
+  near.y = ys.data();
+  near.weight = weights;
+  near.origin_x = origin_x;
+  near.origin_y = band.origin_y = origin_y;
+  near.column = origin_x < 0 ? origin_x + kColumnPeriod : origin_x;
+  near.centre_x = near.centre_y = 0;
+  near.reach_square = 1e4f;
+  near.bands[0] = band;
+  near.band_count = 1;
+  return near;
+}
+
+// A position, rounded as those of particles are, so that it is the same after any period.
+float Rounded(double position) {
+  return static_cast<float>(std::round(position * 131072) / 131072);
+}
+
+float InPeriod(float x) { return x < 0 ? x + kColumnPeriod : x; }
+
 // Particles in rows of 3 buckets, with more particles behind each row, which must not count.
 struct Rows {
   explicit Rows(support::Random& random) {
@@ -23,7 +47,8 @@ struct Rows {
     for (int row = 0; row < 5; ++row) {
       for (int bucket = 0; bucket < 4; ++bucket) {
         for (int n = static_cast<int>(random.Uniform(0, most)); n > 0; --n) {
-          x.push_back(static_cast<float>(random.Uniform(-3, 3)));
+          x.push_back(Rounded(random.Uniform(-3, 3)));
+          columns.push_back(InPeriod(x.back()));
           y.push_back(static_cast<float>(random.Uniform(-3, 3)));
           weight.push_back(static_cast<float>(random.Uniform(0.5, 2)));
           is_near.push_back(bucket < 3);
@@ -31,24 +56,19 @@ struct Rows {
         offsets.push_back(static_cast<std::uint32_t>(x.size()));
       }
     }
+    columns.resize(x.size() + kRowPadding);
     x.resize(x.size() + kRowPadding);
     y.resize(y.size() + kRowPadding);
     weight.resize(weight.size() + kRowPadding);
   }
 
   NearRows AsNear(bool weighted) const {
-    return {.x = x.data(),
-            .y = y.data(),
-            .weight = weighted ? weight.data() : nullptr,
-            .offsets = offsets.data(),
-            .rows = 5,
-            .columns = 3,
-            .row_stride = 4,
-            .origin_x = -1,
-            .origin_y = 1};
+    const NearBand band{
+        .offsets = offsets.data(), .columns = 3, .rows = 5, .row_stride = 4, .origin_y = 0};
+    return OneBand(columns, y, weighted ? weight.data() : nullptr, band, -1, 1);
   }
 
-  std::vector<float> x, y, weight;
+  std::vector<float> x, columns, y, weight;
   std::vector<bool> is_near;
   std::vector<std::uint32_t> offsets;
 };
@@ -139,15 +159,9 @@ TEST(PlaneSupport, TellsByTheVolumeOfAStripHowFarInsideOfTheBoundaryAPlaneIs) {
     const std::uint32_t offsets[] = {0, static_cast<std::uint32_t>(x.size())};
     x.resize(x.size() + kRowPadding);
     y.resize(y.size() + kRowPadding);
-    const NearRows near{.x = x.data(),
-                        .y = y.data(),
-                        .weight = nullptr,
-                        .offsets = offsets,
-                        .rows = 1,
-                        .columns = 1,
-                        .row_stride = 1,
-                        .origin_x = 0,
-                        .origin_y = 0};
+    const NearBand band{
+        .offsets = offsets, .columns = 1, .rows = 1, .row_stride = 1, .origin_y = 0};
+    const NearRows near = OneBand(x, y, nullptr, band, 0, 0);
     const double volume = SumSupport(near, plane, kShape, kWide).volume;
     EXPECT_NEAR(volume / width - 8.0 / 15 * kWide.depth, inside, 0.03) << "round " << round;
   }
@@ -164,14 +178,15 @@ TEST(PlaneSupport, OfManyPlanesAtOnceHasTheBitsOfEachAlone) {
       queries.push_back({of.AsNear(weighted),
                          {RandomPlane(random), RandomPlane(random)},
                          1 + random.Below(kPointsAtOnce)});
-      queries.back().rows = static_cast<int>(random.Below(6));
+      queries.back().near.bands[0].rows = static_cast<int>(random.Below(6));
     }
     support::ForEachInstructionSet([&] {
       std::vector<QuerySupports> all(queries.size());
       SumSupports(queries, kShape, kStrip, all);
       for (std::size_t q = 0; q < queries.size(); ++q) {
         for (std::size_t k = 0; k < queries[q].count; ++k) {
-          const SupportSums alone = SumSupport(queries[q], queries[q].planes[k], kShape, kStrip);
+          const SupportSums alone =
+              SumSupport(queries[q].near, queries[q].planes[k], kShape, kStrip);
           EXPECT_EQ(all[q][k].distance, alone.distance);
           EXPECT_EQ(all[q][k].weight, alone.weight);
           EXPECT_EQ(all[q][k].volume, alone.volume);

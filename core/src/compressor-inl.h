@@ -1,0 +1,82 @@
+// Moves the chosen lanes of a vector to its front. Compiled once for each target, hence the guard
+// that each of them turns.
+#ifndef PARTIEMC_COMPRESSOR_ONCE
+#define PARTIEMC_COMPRESSOR_ONCE
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace partiemc {
+
+// By mask of eight lanes: the chosen ones, then any. Its lower half is right for four lanes, too.
+inline constexpr auto kChosenLanes = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> chosen{};
+  for (unsigned mask = 0; mask < chosen.size(); ++mask) {
+    std::size_t count = 0;
+    for (std::uint8_t lane = 0; lane < 8; ++lane) {
+      if ((mask >> lane & 1) != 0) chosen[mask][count++] = lane;
+    }
+  }
+  return chosen;
+}();
+
+}  // namespace partiemc
+
+#endif  // PARTIEMC_COMPRESSOR_ONCE
+
+#if defined(PARTIEMC_COMPRESSOR_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef PARTIEMC_COMPRESSOR_INL_H
+#undef PARTIEMC_COMPRESSOR_INL_H
+#else
+#define PARTIEMC_COMPRESSOR_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Moves the lanes of a mask to the front, of vectors of up to sixteen lanes of 32 bits. In a
+// register: some processors are slow at compressing into memory.
+class Compressor {
+ public:
+  using Bits = hn::CappedTag<std::int32_t, 16>;
+
+#if HWY_TARGET <= HWY_AVX3
+  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) : mask_(mask) {}
+
+  template <class D>
+  HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
+    return hn::Compress(values, hn::RebindMask(d, mask_));
+  }
+
+ private:
+  hn::Mask<Bits> mask_;
+#else
+  // One look-up for all that is compressed by a mask.
+  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(Bits(), mask, bits);
+    const hn::Rebind<std::uint8_t, Bits> d_byte;
+    lanes_ = hn::PromoteTo(Bits(), hn::LoadU(d_byte, kChosenLanes[bits[0]].data()));
+  }
+
+  template <class D>
+  HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
+    return hn::TableLookupLanes(values, hn::IndicesFromVec(d, lanes_));
+  }
+
+ private:
+  hn::Vec<Bits> lanes_;
+#endif
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#endif  // the guard
