@@ -49,14 +49,15 @@ inline BitRows Transposed(BitRows rows) {
 inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
   const int dx = place % 3 - 1;
   const int dy = place / 3 - 1;
+  const int first = dy < 0 ? kTileSize - kMaskMargin : 0;
+  const int end = dy > 0 ? kMaskMargin : kTileSize;
+  // Before the tile its margin are the upper columns of its neighbour.
+  const int up = dx < 0 ? kTileSize - kMaskMargin : 0;
+  const int down = dx < 0 ? 0 : dx > 0 ? kTileSize + kMaskMargin : kMaskMargin;
   BitRows cells{};
-  for (int j = 0; j < kTileSize; ++j) {
-    const int row = j + dy * kTileSize + kMaskMargin;
-    if (row < 0 || row >= static_cast<int>(mask.size())) continue;
-    const std::uint64_t bits = mask[row];
-    cells[j] = static_cast<std::uint32_t>(dx < 0   ? bits << (kTileSize - kMaskMargin)
-                                          : dx > 0 ? bits >> (kTileSize + kMaskMargin)
-                                                   : bits >> kMaskMargin);
+  for (int j = first; j < end; ++j) {
+    const std::uint64_t bits = mask[j + dy * kTileSize + kMaskMargin];
+    cells[j] = static_cast<std::uint32_t>(bits << up >> down);
   }
   return cells;
 }

@@ -24,10 +24,12 @@ void ForEachCellByRow(const TileDirectory& directory, const Crossings& crossings
     while (last < tiles && directory[last].y == directory[first].y) ++last;
     for (int j = 0; j < kTileSize; ++j) {
       for (std::size_t tile = first; tile < last; ++tile) {
-        const std::size_t end =
-            tile + 1 < tiles ? crossings.tiles[tile + 1].first_cell : crossings.cells.size();
         std::uint32_t& cell = next_cell[tile];
-        for (; cell < end && crossings.cells[cell].j == j; ++cell) visit(cell);
+        // The tile's last cell may be the last of this row, or there may be none.
+        while (cell < crossings.cells.size() && crossings.cells[cell].j == j &&
+               crossings.cells[cell].tile == tile) {
+          visit(cell++);
+        }
       }
     }
   }
