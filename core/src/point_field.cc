@@ -75,10 +75,12 @@ void PointField::FindRuns(const ParticleBins& bins) {
   std::uint32_t entry_count = 0;
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) {
     if (bins.CountOf(tile) == 0 || IsEmpty(wanted_[tile])) continue;
-    const auto& [y, x] = bins.tiles[tile];
-    const auto goes_on = [&](const TileCoordinate& last) { return last.y == y && last.x + 2 >= x; };
+    const TileCoordinate& at = bins.tiles[tile];
+    const auto goes_on = [&](const TileCoordinate& last) {
+      return last.y == at.y && last.x + 2 >= at.x;
+    };
     if (runs_.empty() || !goes_on(bins.tiles[runs_.back().last_tile])) {
-      runs_.push_back({.first_tile = tile, .first_column = x, .first_entry = entry_count});
+      runs_.push_back({.first_tile = tile, .first_column = at.x, .first_entry = entry_count});
     }
     runs_.back().last_tile = tile;
     run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
