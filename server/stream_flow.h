@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "server/busy_streams.h"
 #include "server/compute_pool.h"
 #include "server/memory_budget.h"
 
