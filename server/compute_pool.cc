@@ -67,7 +67,7 @@ void ComputePool::Run() {
       task.afterwards();
     }
     lock.lock();
-    Drop(TakeOutlived(), lock);
+    GiveBack(TakeOutlived(), WarmSize::Clock::now() - gave_back_ >= warm_time_, lock);
   }
 }
 
@@ -81,7 +81,7 @@ void ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
     } else {
       task_came_.wait(lock);
     }
-    Drop(TakeOutlived(), lock);
+    GiveBack(TakeOutlived(), false, lock);
   }
 }
 
@@ -121,9 +121,10 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   return outlived;
 }
 
-// Lets `lock` go while memory is given back.
-void ComputePool::Drop(Workers workers, std::unique_lock<std::mutex>& lock) {
-  if (workers.empty()) return;
+// Where `due`, or where there are `workers` to drop. Lets `lock` go meanwhile.
+void ComputePool::GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock) {
+  if (workers.empty() && !due) return;
+  gave_back_ = WarmSize::Clock::now();
   lock.unlock();
   workers.clear();
   GiveBackFreedMemory();

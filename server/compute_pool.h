@@ -32,7 +32,9 @@ inline constexpr std::chrono::seconds kWarmTime(10);
 /// quarter of its largest is dropped with all of its buffers: after a large frame an idle server,
 /// or one with small frames, soon holds no more than it needs. It stays where as many streams as
 /// there are workers send such frames: how often these meet is luck, and may change by the minute,
-/// but they can at any time.
+/// but they can at any time. What is free of the process's memory goes back to the system whenever
+/// a worker is dropped, and every `warm_time` while there is work: what requests and answers needed
+/// at some moment, and the gaps that they left, do not add up.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
@@ -73,7 +75,7 @@ class ComputePool {
   std::unique_ptr<Worker> TakeWorker();
   void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream);
   Workers TakeOutlived();
-  static void Drop(Workers workers, std::unique_lock<std::mutex>& lock);
+  void GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock);
 
   const WarmSize::Clock::duration warm_time_;
   FrameObserver* const observer_;
@@ -85,7 +87,8 @@ class ComputePool {
   Workers idle_;             // Guarded by mutex_. The one that was used last is the last.
   std::size_t working_ = 0;  // Guarded by mutex_. Workers that are not idle.
   BusyStreams busy_;         // Guarded by mutex_.
-  bool stopping_ = false;    // Guarded by mutex_.
+  WarmSize::Clock::time_point gave_back_ = WarmSize::Clock::now();  // Guarded by mutex_.
+  bool stopping_ = false;                                           // Guarded by mutex_.
   std::vector<std::thread> runners_;
 };
 

@@ -8,7 +8,7 @@ namespace partiemc::server {
 /// thread is started.
 void KeepFreedMemory();
 
-/// Gives back what is free now. Milliseconds; for quiet moments.
+/// Gives back what is free now: half a millisecond for 13 MiB, during which nobody else allocates.
 void GiveBackFreedMemory();
 
 }  // namespace partiemc::server
