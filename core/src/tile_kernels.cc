@@ -81,8 +81,11 @@ void FindReaching(const NearEntries& near, float radius, const AskedColumns& ask
   const hn::RebindToSigned<decltype(d)> d_int;
   const auto step = static_cast<int>(hn::Lanes(d));
   for (int e = 0; e < near.count; e += step) {
-    const auto first = [&](const float* centre) HWY_ATTR {
-      return NodesAfter(d, hn::Sub(hn::LoadU(d, centre + e), hn::Set(d, radius)));
+    // Lanes behind the last entry hold anything, even what no integer can: they count as 0.
+    const auto is_entry = hn::FirstN(d, static_cast<std::size_t>(near.count - e));
+    const auto first = [&](const float* centres) HWY_ATTR {
+      const auto centre = hn::IfThenElseZero(is_entry, hn::LoadU(d, centres + e));
+      return NodesAfter(d, hn::Sub(centre, hn::Set(d, radius)));
     };
     hn::Store(first(near.x.data()), d_int, kernels.column.data() + e);
     hn::Store(hn::Max(first(near.y.data()), hn::Set(d_int, -AskedColumns::kRowShift)), d_int,

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
+#include <vector>
 
 #include "support/instruction_sets.h"
 #include "support/oracle.h"
@@ -178,6 +180,36 @@ TEST(AskedColumns, HaveTheRowsInWhichAKernelThatBeginsThereMeetsAskedNodes) {
       EXPECT_EQ(columns.rows[first], expected) << "radius " << radius << ", column " << first;
     }
   }
+}
+
+// Vectors read beyond them: no bit may depend on it, and no conversion of it may be undefined.
+TEST(NearMoments, DoNotDependOnWhatLiesBehindTheLastParticle) {
+  AskedNodes asked{.rows = {}, .is_open = true, .has_kernel_sums = false};
+  asked.rows.fill(~std::uint32_t{0});
+  const float radius = 2.5f;
+  const auto moments_with = [&](float behind) {
+    NearEntries near;
+    near.x.fill(behind);
+    near.y.fill(behind);
+    near.count = 3;
+    for (int k = 0; k < near.count; ++k) near.x[k] = near.y[k] = 4.25f * static_cast<float>(k);
+    MomentSums sums;
+    ClearMoments(asked, sums);
+    ScatterNearMoments(near, radius, ColumnsOf(asked, radius), asked.has_kernel_sums, sums);
+    std::vector<float> at_nodes;
+    for (int j = 0; j < kTileSize; ++j) {
+      for (int i = 0; i < kTileSize; ++i) {
+        at_nodes.push_back(sums.kernel[SumIndex(i, j)]);
+        at_nodes.push_back(sums.xy[SumIndex(i, j)]);
+      }
+    }
+    return at_nodes;
+  };
+  support::ForEachInstructionSet([&] {
+    const std::vector<float> expected = moments_with(0);
+    EXPECT_EQ(moments_with(1e30f), expected);
+    EXPECT_EQ(moments_with(std::numeric_limits<float>::quiet_NaN()), expected);
+  });
 }
 
 // Processors differ in their vectors: each kind that this one has must give the bits of all others.
