@@ -70,7 +70,7 @@ class RandomRing {
     double arc = 500;
     for (int k = -margin; k < count() + margin; ++k) {
       ring.arc[k] = RingUnits(arc);
-      arc += steps_[(k + 2 * count()) % count()];
+      arc += steps_[(k + margin * count()) % count()];
     }
     return ring;
   }
