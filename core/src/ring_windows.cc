@@ -71,13 +71,22 @@ HWY_INLINE void ForEachWindow(const UnrolledRing& ring, std::ptrdiff_t begin, st
     };
     start(block.first);
     add_near(block.first, one);
-    for (std::ptrdiff_t apart = 1;; ++apart) {
-      const Vector before = nearness_of(block.first - apart);
-      const Vector after = nearness_of(block.first + apart);
-      const auto is_near = hn::Gt(hn::Max(before, after), hn::Zero(d));
-      if (hn::AllFalse(d, hn::And(is_near, in_block))) break;
-      add_near(block.first - apart, before);
-      add_near(block.first + apart, after);
+    const auto is_near = [&](Vector nearness) HWY_ATTR {
+      return !hn::AllFalse(d, hn::And(hn::Gt(nearness, hn::Zero(d)), in_block));
+    };
+    // Each way until it ends: the other way may hold more vertices than a margin has here.
+    bool goes_before = true, goes_after = true;
+    for (std::ptrdiff_t apart = 1; goes_before || goes_after; ++apart) {
+      if (goes_before) {
+        const Vector nearness = nearness_of(block.first - apart);
+        goes_before = is_near(nearness);
+        if (goes_before) add_near(block.first - apart, nearness);
+      }
+      if (goes_after) {
+        const Vector nearness = nearness_of(block.first + apart);
+        goes_after = is_near(nearness);
+        if (goes_after) add_near(block.first + apart, nearness);
+      }
     }
     finish(block);
   }

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "crossings.h"
@@ -195,6 +198,55 @@ TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
   for (int k = 0; k < ring.count; ++k) {
     EXPECT_EQ(ring.next_x[k], static_cast<float>(source.normals()[k].x));
     EXPECT_EQ(ring.next_y[k], static_cast<float>(source.normals()[k].y));
+  }
+}
+
+// A polygon whose windows hold many more vertices in one place than at the ends of the ring.
+TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
+  constexpr int kSides = 60, kCrowd = 80;
+  constexpr double kReach = 10.5;
+  for (const int crowded : {15, kSides - 14}) {
+    std::vector<LatticePoint> points;
+    for (int k = 0; k < kSides; ++k) {
+      const double angle = 2 * 3.14159265358979323846 * k / kSides;
+      points.insert(points.end(), k == crowded ? kCrowd : 1,
+                    {kSides / 6.0 * std::cos(angle), kSides / 6.0 * std::sin(angle)});
+    }
+    const auto count = static_cast<std::ptrdiff_t>(points.size());
+    // What lies beyond the margins looks near and spoils every sum.
+    const auto results_with = [&](std::uint32_t more) {
+      UnrolledRingSize size = SizeForWindows(points, kReach);
+      size.margin += static_cast<std::uint32_t>(kWindowPadding) + more;
+      const std::ptrdiff_t room = 3 * count;
+      std::vector<std::int32_t> units(3 * room, 0);
+      std::vector<float> floats(7 * room, std::numeric_limits<float>::quiet_NaN());
+      const UnrolledRing ring = UnrolledRing::In(
+          size, [&](int array) { return units.data() + array * room + count; },
+          [&](int array) { return floats.data() + array * room + count; });
+      for (std::ptrdiff_t k = 0; k < count; ++k) {
+        ring.x[k] = RingUnits(points[k].x);
+        ring.y[k] = RingUnits(points[k].y);
+        ring.normal_x[k] = static_cast<float>(points[k].x * 6 / kSides);
+        ring.normal_y[k] = static_cast<float>(points[k].y * 6 / kSides);
+        ring.base[k] = 0.01f * static_cast<float>(k % 7);
+      }
+      for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, count);
+      for (float* values : {ring.normal_x, ring.normal_y, ring.base}) ring.Repeat(values, 0, count);
+      MeasureArc(ring);
+      std::vector<float> results;
+      const auto keep = [&](const float* of) { results.insert(results.end(), of, of + count); };
+      for (const bool by_angle : {false, true}) {
+        MeanNormals(ring, 0, count, kReach, by_angle);
+        keep(ring.next_x);
+        keep(ring.next_y);
+      }
+      MeanCurvature(ring, 0, count, kReach);
+      keep(ring.shift);
+      MeanShift(ring, 0, count, kReach);
+      keep(ring.shift);
+      return results;
+    };
+    support::ForEachInstructionSet([&] { EXPECT_EQ(results_with(0), results_with(80)); });
   }
 }
 
