@@ -43,13 +43,13 @@ struct FieldPoints {
 };
 using FieldSamples = std::array<FieldSample, kPointsAtOnce>;
 
-/// Particles near the isoline, each once, those of a tile sorted into buckets of about a cell: a
-/// point looks at the buckets around it, in its tile and its neighbours.
+/// Particles near the isoline, each once, sorted into rows of buckets (BucketGrid) that run through
+/// tiles side by side: a point looks at the buckets around it, in its tile and its neighbours.
 class PointField {
  public:
   /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
   /// cells away from one, along each axis. Cost: linear in the entries of the tiles around those
-  /// cells.
+  /// cells; in all entries where kernel and `wander` together reach farther than kMaskMargin.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
              double wander);
 
