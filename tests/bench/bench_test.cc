@@ -17,6 +17,7 @@
 #include "bench/scenes.h"
 #include "bench/statistics.h"
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::bench {
 namespace {
@@ -108,12 +109,7 @@ TEST(Report, FiguresHaveThreeDigits) {
 // A file of this test's own.
 class ExpectationFile {
  public:
-  explicit ExpectationFile(const std::string& text)
-      : path_(::testing::TempDir() + "/partiemc_expected_" +
-              ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv") {
-    std::ofstream(path_) << text;
-  }
-  ~ExpectationFile() { std::filesystem::remove(path_); }
+  explicit ExpectationFile(const std::string& text) : path_(folder_.Write("expected.csv", text)) {}
   const std::string& path() const { return path_; }
   std::string Text() const {
     std::ostringstream text;
@@ -122,7 +118,8 @@ class ExpectationFile {
   }
 
  private:
-  std::string path_;
+  const support::TemporaryFolder folder_;
+  const std::string path_;
 };
 
 std::vector<std::string> FailuresOf(double slow, double fast) {

@@ -18,6 +18,7 @@
 #include "server/machine_memory.h"
 #include "server/memory_door.h"
 #include "server/moving_blob.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
@@ -162,13 +163,12 @@ TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
 
 class MachineMemory : public ::testing::Test {
  protected:
-  MachineMemory() { std::filesystem::remove_all(root_); }
   void Write(const std::string& path, const std::string& text) const {
     std::filesystem::create_directories(std::filesystem::path(root_ + path).parent_path());
     std::ofstream(root_ + path) << text;
   }
-  std::string root_ = ::testing::TempDir() + "/partiemc_memory_" +
-                      ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  const support::TemporaryFolder folder_;
+  const std::string root_ = folder_.path();
 };
 
 TEST_F(MachineMemory, IsThatOfTheMachineWhereNoGroupLimitsIt) {

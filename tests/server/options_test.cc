@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/machine_memory.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
@@ -61,8 +62,8 @@ TEST(CommandLineOptions, ByDefaultListenOnLoopbackWithAffordableLimits) {
 }
 
 TEST(CommandLineOptions, FlagsCountMoreThanTheFileAndTheFileMoreThanTheEnvironment) {
-  const std::string path = ::testing::TempDir() + "/partiemc_options.toml";
-  std::ofstream(path) << "max-streams = 8\nframes-in-flight = 2\n";
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Write("options.toml", "max-streams = 8\nframes-in-flight = 2\n");
   const Environment streams("PARTIEMC_MAX_STREAMS", "5");
   const Environment tiles("PARTIEMC_MAX_TILES", "77");
   const CommandLine line = Parsed({"--config", path.c_str(), "--frames-in-flight", "3"});
@@ -72,8 +73,8 @@ TEST(CommandLineOptions, FlagsCountMoreThanTheFileAndTheFileMoreThanTheEnvironme
 }
 
 TEST(CommandLineOptions, TheConfigFileCanBeNamedByTheEnvironment) {
-  const std::string path = ::testing::TempDir() + "/partiemc_options_env.toml";
-  std::ofstream(path) << "max-streams = 9\n";
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Write("options.toml", "max-streams = 9\n");
   const Environment config("PARTIEMC_CONFIG", path.c_str());
   EXPECT_EQ(Parsed({}).server.limits.max_streams, 9u);
 }
@@ -136,8 +137,8 @@ TEST(CommandLineOptions, WhatIsWrongIsToldInOneLine) {
 }
 
 TEST(CommandLineOptions, AMisspeltOptionInTheFileIsRefused) {
-  const std::string path = ::testing::TempDir() + "/partiemc_options_misspelt.toml";
-  std::ofstream(path) << "max-stream = 8\n";
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Write("options.toml", "max-stream = 8\n");
   EXPECT_THAT(Refused({"--config", path.c_str()}), HasSubstr("max-stream"));
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "support/certificates.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
@@ -22,12 +23,10 @@ using ::testing::Not;
 class TlsIdentityFiles : public ::testing::Test {
  protected:
   TlsIdentityFiles() {
-    std::filesystem::create_directories(folder_);
     Write(files_.certificate, issued_.certificate);
     Write(files_.key, issued_.key);
     Write(files_.client_ca, authority_.certificate());
   }
-  ~TlsIdentityFiles() override { std::filesystem::remove_all(folder_); }
 
   static void Write(const std::string& path, const std::string& text) {
     std::ofstream(path) << text;
@@ -37,9 +36,9 @@ class TlsIdentityFiles : public ::testing::Test {
     return identity.ok() ? "accepted" : std::string(identity.status().message());
   }
 
-  const std::string folder_ = ::testing::TempDir() + "/partiemc_tls_" + std::to_string(getpid()) +
-                              "_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  TlsFiles files_{folder_ + "/server.pem", folder_ + "/server.key", folder_ + "/clients.pem"};
+  const support::TemporaryFolder folder_;
+  TlsFiles files_{folder_.Path("server.pem"), folder_.Path("server.key"),
+                  folder_.Path("clients.pem")};
   CertificateAuthority authority_{"authority"};
   IssuedCertificate issued_ = authority_.Issue("server");
 };
@@ -67,15 +66,16 @@ TEST_F(TlsIdentityFiles, AnExpiredCertificateIsReadAndItsEndKnown) {
 
 TEST_F(TlsIdentityFiles, AMissingFileIsNamedWithItsFlag) {
   const TlsFiles whole = files_;
-  files_.certificate = folder_ + "/none";
-  EXPECT_THAT(Refused(), AllOf(HasSubstr("--tls-cert " + folder_ + "/none"),
+  files_.certificate = folder_.Path("none");
+  EXPECT_THAT(Refused(), AllOf(HasSubstr("--tls-cert " + folder_.Path("none")),
                                HasSubstr("No such file or directory")));
   files_ = whole;
-  files_.key = folder_ + "/none";
-  EXPECT_THAT(Refused(), HasSubstr("--tls-key " + folder_ + "/none"));
+  files_.key = folder_.Path("none");
+  EXPECT_THAT(Refused(), HasSubstr("--tls-key " + folder_.Path("none")));
   files_ = whole;
-  files_.client_ca = folder_;
-  EXPECT_THAT(Refused(), AllOf(HasSubstr("--tls-client-ca " + folder_), HasSubstr("cannot be")));
+  files_.client_ca = folder_.path();
+  EXPECT_THAT(Refused(), AllOf(HasSubstr("--tls-client-ca " + folder_.path().string()),
+                               HasSubstr("cannot be")));
 }
 
 TEST_F(TlsIdentityFiles, ABrokenFileIsNamedAndNothingOfItShown) {

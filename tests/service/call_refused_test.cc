@@ -8,6 +8,7 @@
 #include <string>
 
 #include "service/error_testing.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
@@ -47,9 +48,7 @@ class CallRefused : public ErrorTable {
     Expect(status, ReasonOf(context), code, reason, message);
   }
   void WantToken() {
-    const std::string path = testing::TempDir() + "error_table_tokens";
-    std::ofstream(path) << kToken << '\n';
-    options_.token_file = path;
+    options_.token_file = folder_.Write("tokens", std::string(kToken) + "\n");
     Serve();
   }
   // Of GetServerInfo on a server that wants a token.
@@ -78,6 +77,8 @@ class CallRefused : public ErrorTable {
     client.SendAndReceive(open);
     return client.SendAndReceive(BlobRequest(1, 1, 0)).frame().checkpoint();
   }
+
+  const support::TemporaryFolder folder_;
 };
 
 using grpc::StatusCode;

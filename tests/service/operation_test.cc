@@ -13,6 +13,7 @@
 #include "server/health_check.h"
 #include "server/moving_blob.h"
 #include "service/service_testing.h"
+#include "support/temporary_folder.h"
 #include "wire/codec.h"
 
 namespace partiemc::server {
@@ -258,8 +259,9 @@ TEST(Addresses, AnAddressBeyondThisMachineNeedsAnExplicitWord) {
 }
 
 TEST(Addresses, AUnixSocketServesAndIsNotTakenFromItsOwner) {
+  const support::TemporaryFolder folder;
   ServerOptions options = TestOptions();
-  options.address = {.host = "", .port = 0, .unix_path = ::testing::TempDir() + "/partiemc.sock"};
+  options.address = {.host = "", .port = 0, .unix_path = folder.Path("partiemc.sock")};
   const auto server = StartServer(options);
   EXPECT_EQ(StreamedDigests(Connect(*server, Transport::kTcp), 1, 2), LocalDigests(1, 2));
   const auto second = Server::Start(options);

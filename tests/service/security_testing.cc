@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <thread>
 
 namespace partiemc::server {
@@ -24,16 +23,8 @@ bool Eventually(const std::function<bool()>& holds) {
   return true;
 }
 
-Security::Security() { std::filesystem::create_directories(folder_); }
-
-Security::~Security() {
-  server_.reset();
-  std::filesystem::remove_all(folder_);
-}
-
 void Security::Write(const std::string& name, const std::string& text) const {
-  std::ofstream(Path(name + ".part")) << text;
-  std::filesystem::rename(Path(name + ".part"), Path(name));
+  std::filesystem::rename(folder_.Write(name + ".part", text), Path(name));
 }
 
 void Security::WriteIdentity(const IssuedCertificate& identity) const {

@@ -4,7 +4,6 @@
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <functional>
 #include <memory>
@@ -12,6 +11,7 @@
 
 #include "service/service_testing.h"
 #include "support/certificates.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 
@@ -31,10 +31,7 @@ struct Client {
 
 class Security : public ::testing::Test {
  protected:
-  Security();
-  ~Security() override;
-
-  std::string Path(const std::string& name) const { return folder_ + "/" + name; }
+  std::string Path(const std::string& name) const { return folder_.Path(name); }
   // As a careful operator does it: whole or not at all.
   void Write(const std::string& name, const std::string& text) const;
   void WriteIdentity(const IssuedCertificate& identity) const;
@@ -56,9 +53,7 @@ class Security : public ::testing::Test {
   static End Call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
                   const std::string& authorization);
 
-  const std::string folder_ = ::testing::TempDir() + "/partiemc_security_" +
-                              std::to_string(getpid()) + "_" +
-                              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  const support::TemporaryFolder folder_;  // Goes after the server that looks into it.
   CertificateAuthority authority_{"authority"}, stranger_{"stranger"};
   std::unique_ptr<Server> server_;
 };

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <stdexcept>
+#include <string>
 
 #include "partiemc/reconstructor.h"
 #include "server/moving_blob.h"
@@ -39,8 +41,9 @@ ServerOptions TestOptions() {
 
 std::unique_ptr<Server> StartServer(const ServerOptions& options) {
   auto server = Server::Start(options);
-  EXPECT_TRUE(server.ok()) << server.status();
-  return server.ok() ? *std::move(server) : nullptr;
+  // Ends the test as failed, with these words.
+  if (!server.ok()) throw std::runtime_error("no server: " + server.status().ToString());
+  return *std::move(server);
 }
 
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport) {

@@ -21,7 +21,7 @@ std::string TransportName(Transport transport);
 /// Port 0 on loopback, two threads, and limits that are quick to reach.
 ServerOptions TestOptions();
 
-/// Fails the test and gives none where the server does not start.
+/// Ends the test as failed where the server does not start.
 std::unique_ptr<Server> StartServer(const ServerOptions& options);
 
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport);

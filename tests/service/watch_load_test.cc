@@ -309,13 +309,13 @@ std::uint64_t Enough(double rate) {
 }
 
 TEST(WatchLoad, OfASmallDamBreakIsCountedAndBoundedAndDelaysNoFrame) {
-  const client::TemporaryDirectory folder;
+  const support::TemporaryFolder folder;
   ASSERT_NO_FATAL_FAILURE(RecordDamBreak(folder.Path("dam.pemc"), Enough(load.rate)));
   Compare({.path = folder.Path("dam.pemc"), .rate = load.rate});
 }
 
 TEST(WatchLoad, OfLargeResultsIsCountedAndBoundedAndDelaysNoFrame) {
-  const client::TemporaryDirectory folder;
+  const support::TemporaryFolder folder;
   ASSERT_NO_FATAL_FAILURE(
       RecordSquare(folder.Path("square.pemc"), load.particles, Enough(load.large_rate)));
   // The fill with the largest results: 40 bytes a particle.

@@ -30,7 +30,7 @@ void WriteDump(const std::string& path, double origin) {
 }
 
 TEST(Convert, KeepsTheFramesAndTheParticlesThatWereAskedFor) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   WriteDump(directory.Path("dump.lammpstrj"), 0);
   const Ran ran = RunPartiemc({"convert", directory.Path("dump.lammpstrj"),
                                directory.Path("out.pemc"), "--select", "type=1", "--frames", "1:3",
@@ -48,7 +48,7 @@ TEST(Convert, KeepsTheFramesAndTheParticlesThatWereAskedFor) {
 }
 
 TEST(Convert, ARecordingOfARecordingIsTheSame) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   ASSERT_EQ(RunPartiemc({"convert", kDamBreak, directory.Path("a.pemc")}).exit_code, 0);
   const auto original = RecordingReader::Open(kDamBreak, "");
   const auto copy = RecordingReader::Open(directory.Path("a.pemc"), "");
@@ -67,7 +67,7 @@ TEST(Convert, ARecordingOfARecordingIsTheSame) {
 }
 
 TEST(Convert, RefusesFloat32FarFromTheOriginAndLeavesNothingBehind) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   WriteDump(directory.Path("far.lammpstrj"), 1e6);
   const std::vector<std::string> arguments = {"convert", directory.Path("far.lammpstrj"),
                                               directory.Path("far.pemc"), "--spacing", "0.1"};
@@ -81,7 +81,7 @@ TEST(Convert, RefusesFloat32FarFromTheOriginAndLeavesNothingBehind) {
 }
 
 TEST(Convert, AnInputThatIsNotThereIsExitCodeThree) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   const Ran ran = RunPartiemc({"convert", "/nonexistent", directory.Path("out.pemc")});
   EXPECT_EQ(ran.exit_code, 3);
   EXPECT_THAT(FilesIn(directory.path()), IsEmpty());

@@ -18,7 +18,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string output = directory.Path("made/by/it");
   const Ran ran = RunPartiemc({"evaluate", "--set", "smoke", "--recording", kDamBreak, "--frames",
                                "0:20", "--steps", "--output-dir", output});
@@ -55,7 +55,7 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
 }
 
 TEST(Evaluate, AWrongWordIsOneLineAndNothingIsMade) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   const std::vector<std::vector<std::string>> wrong = {
       {"--set", "smok"},
       {"--methods", "marching-cubes"},

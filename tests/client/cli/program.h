@@ -7,19 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "support/temporary_folder.h"
+
 namespace partiemc::client {
-
-/// A directory that is gone with the object.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory();
-  ~TemporaryDirectory();
-  std::string Path(const std::string& name) const { return (path_ / name).string(); }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// A program under way. Its output goes to files, so that it never waits for a reader.
 class Program {
@@ -38,7 +28,7 @@ class Program {
   std::string Error() const;
 
  private:
-  TemporaryDirectory directory_;
+  support::TemporaryFolder directory_;
   pid_t id_ = -1;
   int exit_code_ = -1;
   bool ended_ = false;
@@ -61,7 +51,7 @@ class ServerProgram {
   void Signal(int signal) const { program_.Signal(signal); }
 
  private:
-  TemporaryDirectory directory_;
+  support::TemporaryFolder directory_;
   Program program_;
   std::string address_;
 };

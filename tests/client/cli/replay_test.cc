@@ -42,7 +42,7 @@ std::vector<std::string> Column(const std::string& csv, const std::string& name)
 }
 
 // Three small frames; the second one holds what no frame may hold.
-void WriteFrames(const TemporaryDirectory& directory) {
+void WriteFrames(const support::TemporaryFolder& directory) {
   for (int k = 0; k < 3; ++k) {
     std::ofstream file(directory.Path("frame_" + std::to_string(k) + ".csv"));
     file << "x,y\n";
@@ -54,7 +54,7 @@ void WriteFrames(const TemporaryDirectory& directory) {
 }
 
 TEST(Replay, InProcessWritesEveryOutputAndATable) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   const Ran ran =
       RunPartiemc({"replay", kDamBreak, "--local", "--frames", "10:13", "--check", "--output-dir",
                    directory.Path("frames"), "--format", "geojson,svg,obj,csv", "--stats",
@@ -76,7 +76,7 @@ TEST(Replay, InProcessWritesEveryOutputAndATable) {
 // replayed.
 TEST(Replay, ByTheLatestPolicyEveryFrameIsReplayedOrSkippedAndCounted) {
   for (const char* rate : {"max", "150"}) {
-    const TemporaryDirectory directory;
+    const support::TemporaryFolder directory;
     const Ran ran =
         RunPartiemc({"replay", kDamBreak, "--local", "--threads", "1", "--policy", "latest",
                      "--rate", rate, "--check", "--stats", directory.Path("stats.csv")});
@@ -99,7 +99,8 @@ TEST(Replay, ByTheLatestPolicyEveryFrameIsReplayedOrSkippedAndCounted) {
 }
 
 // A block that stays and one that leaps over it, with the columns that `header` names.
-void WriteLeap(const TemporaryDirectory& directory, const std::string& header, bool with_times) {
+void WriteLeap(const support::TemporaryFolder& directory, const std::string& header,
+               bool with_times) {
   for (int frame = 0; frame < 4; ++frame) {
     std::ofstream file(directory.Path("frame_" + std::to_string(frame) + ".csv"));
     file << header << "\n";
@@ -115,7 +116,7 @@ void WriteLeap(const TemporaryDirectory& directory, const std::string& header, b
 
 // The frames of a replay at spacing 1 as GeoJSON, which tells identities.
 std::vector<std::string> Outlines(const std::string& input, std::vector<std::string> where) {
-  const TemporaryDirectory output;
+  const support::TemporaryFolder output;
   where.insert(where.begin(), {"replay", input, "--quiet", "--spacing", "1", "--output-dir",
                                output.Path("frames"), "--format", "geojson"});
   const Ran ran = RunPartiemc(where);
@@ -137,13 +138,13 @@ TEST(Replay, RingsThatLeapKeepTheirIdentityByIdsOrByVelocitiesWithTimes) {
                                                     {kWithVelocities, false, false},
                                                     {kWithNeither, true, false}}) {
     SCOPED_TRACE(header + (with_times ? " with times" : " without times"));
-    const TemporaryDirectory directory;
+    const support::TemporaryFolder directory;
     WriteLeap(directory, header, with_times);
     const std::vector<std::string> local = Outlines(directory.path().string(), {"--local"});
     EXPECT_THAT(local.at(3), HasSubstr(is_kept ? "\"identity\":2" : "\"identity\":5"));
     EXPECT_EQ(Outlines(directory.path().string(), {"--server", server.address()}), local);
     // A recording made of it has the same outlines, and times where there were none.
-    const TemporaryDirectory recordings;
+    const support::TemporaryFolder recordings;
     ASSERT_EQ(
         RunPartiemc({"convert", directory.path().string(), recordings.Path("a.pemc")}).exit_code,
         0);
@@ -152,7 +153,7 @@ TEST(Replay, RingsThatLeapKeepTheirIdentityByIdsOrByVelocitiesWithTimes) {
 }
 
 TEST(Replay, UsesTheSpacingThatTheRecordingKnowsUnlessToldOtherwise) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   const auto area = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {
         "replay",   kDamBreak, "--local", "--quiet",
@@ -170,7 +171,7 @@ TEST(Replay, UsesTheSpacingThatTheRecordingKnowsUnlessToldOtherwise) {
 TEST(Replay, ThroughAServerGivesTheBitsOfInProcess) {
   const ServerProgram server;
   ASSERT_THAT(server.address(), Not(IsEmpty()));
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   for (const char* placement : {"marching-squares", "farthest-particle", "virtual-plane"}) {
     const Ran remote =
         RunPartiemc({"replay", kDamBreak, "--server", server.address(), "--quiet", "--placement",
@@ -191,7 +192,7 @@ TEST(Replay, ThroughAServerGivesTheBitsOfInProcess) {
 }
 
 TEST(Replay, AFrameThatIsRefusedIsToldAndTheOthersGoOn) {
-  const TemporaryDirectory input, output;
+  const support::TemporaryFolder input, output;
   WriteFrames(input);
   const ServerProgram server;
   for (const std::vector<std::string>& where :
@@ -216,7 +217,7 @@ TEST(Replay, QuietSaysNothing) {
 }
 
 TEST(Replay, ARecordingThatWasCutOffIsReplayedAsFarAsItGoes) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string whole = Content(kDamBreak);
   std::ofstream(directory.Path("cut.pemc"), std::ios::binary) << whole.substr(0, whole.size() / 2);
   const Ran ran = RunPartiemc({"replay", directory.Path("cut.pemc"), "--local"});
@@ -225,7 +226,7 @@ TEST(Replay, ARecordingThatWasCutOffIsReplayedAsFarAsItGoes) {
 }
 
 TEST(Replay, ADamagedRecordingIsExitCodeThreeAndLeavesNoStatisticsTakenForWhole) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   std::string bytes = Content(kDamBreak);
   bytes[bytes.size() / 2] = static_cast<char>(~bytes[bytes.size() / 2]);
   std::ofstream(directory.Path("damaged.pemc"), std::ios::binary) << bytes;
@@ -251,7 +252,7 @@ TEST(Replay, APlaceThatCannotBeWrittenIsKnownBeforeTheWork) {
 }
 
 TEST(Replay, CtrlCEndsItWithWholeFramesAndNothingHalfWritten) {
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   Program replay(
       PARTIEMC_PROGRAM,
       {"replay", kDamBreak, "--local", "--rate", "50", "--output-dir", directory.Path("frames"),
@@ -271,7 +272,7 @@ TEST(Replay, CtrlCEndsItWithWholeFramesAndNothingHalfWritten) {
 
 TEST(Replay, AServerThatDiesIsExitCodeFourInOneLine) {
   const ServerProgram server;
-  const TemporaryDirectory directory;
+  const support::TemporaryFolder directory;
   Program replay(PARTIEMC_PROGRAM, {"replay", kDamBreak, "--server", server.address(), "--rate",
                                     "50", "--quiet", "--output-dir", directory.Path("frames"),
                                     "--stats", directory.Path("stats.csv")});

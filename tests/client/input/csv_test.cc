@@ -9,12 +9,12 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 RecordedFrame Read(const std::string& content, const SequenceOptions& options = {}) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   return ReadOne(directory.Write("frame.csv", content), options);
 }
 
 absl::Status Refusal(const std::string& content, const SequenceOptions& options = {}) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   return ReadAll(directory.Write("frame.csv", content), options).status;
 }
 
@@ -80,7 +80,7 @@ TEST(Csv, WhatIsNotFiniteIsPassedOnForTheCoreToJudge) {
 TEST(Csv, RepeatedIdsAreNoIds) {
   EXPECT_THAT(Read("x,y,gid\n1,2,4294967295\n3,4,4294967295\n").ids, IsEmpty());
   EXPECT_THAT(Read("x,y,id\n1,2,0.5\n3,4,1\n").ids, IsEmpty());
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   directory.Write("a0.csv", "x,y,id\n1,2,7\n3,4,7\n");
   directory.Write("a1.csv", "x,y,id\n1,2,7\n3,4,7\n");
   const ReadSequence read = ReadAll(directory.Write("a2.csv", "x,y,id\n1,2,7\n3,4,7\n"));
@@ -88,7 +88,7 @@ TEST(Csv, RepeatedIdsAreNoIds) {
 }
 
 TEST(Csv, VelocitiesAreTakenOnlyWhereAllAreFinite) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const ReadSequence read =
       ReadAll(directory.Write("a.csv", "x,y,vx,vy\n1,2,0.25,1\n3,4,nan,0\n5,6,1e99,0\n"));
   EXPECT_THAT(read.frames.at(0).velocities, IsEmpty());
@@ -98,7 +98,7 @@ TEST(Csv, VelocitiesAreTakenOnlyWhereAllAreFinite) {
 
 TEST(Csv, VolumesAreTakenOnlyWhereAllArePositive) {
   EXPECT_THAT(Read("x,y,vol\n1,2,0.25\n3,4,0.5\n").volumes, ElementsAre(0.25f, 0.5f));
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const ReadSequence read = ReadAll(directory.Write("a.csv", "x,y,vol\n1,2,0.25\n3,4,0\n"));
   EXPECT_THAT(read.frames.at(0).volumes, IsEmpty());
   EXPECT_THAT(read.notices, ElementsAre(testing::HasSubstr("volumes are ignored")));

@@ -1,7 +1,5 @@
-// Files made on the spot, and sequences read whole.
+// Sequences read whole, from files made on the spot.
 #pragma once
-
-#include <unistd.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -13,32 +11,9 @@
 #include "client/input/sequence.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::client {
-
-/// A directory that goes away with its test.
-class InputDirectory {
- public:
-  InputDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "partiemc-input-XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  InputDirectory(const InputDirectory&) = delete;
-  InputDirectory& operator=(const InputDirectory&) = delete;
-  ~InputDirectory() { std::filesystem::remove_all(path_); }
-
-  /// Writes a file and returns its path.
-  std::string Write(const std::string& name, std::string_view content) const {
-    const std::string path = Path(name);
-    std::ofstream(path, std::ios::binary) << content;
-    return path;
-  }
-  std::string Path(const std::string& name) const { return path_ + "/" + name; }
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 /// All frames of an input up to its end or the first error.
 struct ReadSequence {

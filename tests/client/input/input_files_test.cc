@@ -14,7 +14,8 @@ std::vector<double> FirstCoordinates(const ReadSequence& read) {
   return firsts;
 }
 
-InputDirectory& WriteFrames(InputDirectory& directory, const std::string& stem, int count) {
+support::TemporaryFolder& WriteFrames(support::TemporaryFolder& directory, const std::string& stem,
+                                      int count) {
   for (int k = 0; k < count; ++k) {
     directory.Write(stem + std::to_string(k) + ".csv", "x,y\n" + std::to_string(k) + ",0\n");
   }
@@ -22,7 +23,7 @@ InputDirectory& WriteFrames(InputDirectory& directory, const std::string& stem, 
 }
 
 TEST(InputFiles, ADirectoryIsReadInTheOrderOfItsNumbers) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   const ReadSequence read = ReadAll(WriteFrames(directory, "frame_", 12).path());
   ASSERT_TRUE(read.status.ok()) << read.status;
   EXPECT_EQ(read.frame_count, 12u);
@@ -32,30 +33,30 @@ TEST(InputFiles, ADirectoryIsReadInTheOrderOfItsNumbers) {
 }
 
 TEST(InputFiles, SeveralSeriesAreRefusedByNameWithAPatternToUse) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "Water_", 3);
   WriteFrames(directory, "Soil_", 2);
   directory.Write("Wall.csv", "x,y\n1,2\n");
-  for (const std::string& input : {directory.path(), directory.path() + "/*.csv"}) {
+  for (const std::string& input : {directory.path().string(), directory.Path("*.csv")}) {
     ExpectRefused(ReadAll(input).status, absl::StatusCode::kFailedPrecondition,
                   {"3 series", "Soil_*.csv (2 files)", "Wall.csv (1 file)", "Water_*.csv (3 files)",
-                   "'" + directory.path() + "/Water_*.csv'"});
+                   std::string("'") + directory.Path("Water_*.csv") + "'"});
   }
-  EXPECT_EQ(ReadAll(directory.path() + "/Soil_*.csv").frames.size(), 2u);
+  EXPECT_EQ(ReadAll(directory.Path("Soil_*.csv")).frames.size(), 2u);
 }
 
 TEST(InputFiles, RunsThatDifferInAnotherNumberAreSeveralSeriesUnlessAPatternSaysOtherwise) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "run1_", 2);
   WriteFrames(directory, "run2_", 2);
   ExpectRefused(ReadAll(directory.path()).status, absl::StatusCode::kFailedPrecondition,
                 {"run1_*.csv (2 files)", "run2_*.csv (2 files)"});
-  EXPECT_EQ(ReadAll(directory.path() + "/run2_*").frames.size(), 2u);
-  EXPECT_EQ(ReadAll(directory.path() + "/run*").frames.size(), 4u);
+  EXPECT_EQ(ReadAll(directory.Path("run2_*")).frames.size(), 2u);
+  EXPECT_EQ(ReadAll(directory.Path("run*")).frames.size(), 4u);
 }
 
 TEST(InputFiles, FilesWithoutPositionsAreSkippedWithANotice) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "frame_", 2);
   directory.Write("energy.csv", "t,kinetic\n0,1\n");
   directory.Write("in.dam", "units lj\ndimension 2\n");
@@ -68,10 +69,10 @@ TEST(InputFiles, FilesWithoutPositionsAreSkippedWithANotice) {
 }
 
 TEST(InputFiles, TimesBesideTheFramesAreTheirTimes) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "frame_", 3);
   directory.Write("times.csv", "frame,t\n0,0.5\n1,0.75\n");
-  for (const std::string& input : {directory.path(), directory.path() + "/frame_*.csv"}) {
+  for (const std::string& input : {directory.path().string(), directory.Path("frame_*.csv")}) {
     const ReadSequence read = ReadAll(input);
     ASSERT_EQ(read.frames.size(), 3u) << read.status;
     EXPECT_EQ(read.frames[0].time, 0.5);
@@ -83,23 +84,23 @@ TEST(InputFiles, TimesBesideTheFramesAreTheirTimes) {
 }
 
 TEST(InputFiles, ATimesFileMayBeASingleColumn) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "frame_", 2);
   const std::string times = directory.Path("t.txt");
   directory.Write("t.txt", "0.5\n0.75\n");
-  const ReadSequence read = ReadAll(directory.path() + "/frame_*.csv", {.times = times});
+  const ReadSequence read = ReadAll(directory.Path("frame_*.csv"), {.times = times});
   ASSERT_EQ(read.frames.size(), 2u) << read.status;
   EXPECT_EQ(read.frames[1].time, 0.75);
   directory.Write("t.txt", "0.5\nnan\n");
-  ExpectRefused(ReadAll(directory.path() + "/frame_*.csv", {.times = times}).status,
+  ExpectRefused(ReadAll(directory.Path("frame_*.csv"), {.times = times}).status,
                 absl::StatusCode::kDataLoss, {"t.txt:2", "time"});
   directory.Write("t.txt", "a,b\n1,2\n");
-  ExpectRefused(ReadAll(directory.path() + "/frame_*.csv", {.times = times}).status,
+  ExpectRefused(ReadAll(directory.Path("frame_*.csv"), {.times = times}).status,
                 absl::StatusCode::kFailedPrecondition, {"t.txt", "frame,t"});
 }
 
 TEST(InputFiles, ARangeKeepsTheIndicesOfTheInput) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "frame_", 10);
   const ReadSequence read = ReadAll(directory.path(), {.frames = "2:9:3"});
   EXPECT_EQ(read.frame_count, 3u);
@@ -112,7 +113,7 @@ TEST(InputFiles, ARangeKeepsTheIndicesOfTheInput) {
 }
 
 TEST(InputFiles, ARangeWithinOneFilePassesOverTheOthers) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   std::string dump;
   for (const char* x : {"0", "1", "2", "3"}) {
     dump += std::string("1\nAtoms. Timestep: 0\n1 ") + x + " 0 0\n";
@@ -142,7 +143,7 @@ TEST(InputFiles, TheCountOfARangeIsTheNumberOfIndicesInIt) {
 }
 
 TEST(InputFiles, WhatIsNotThereIsSaidWithAdvice) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   ExpectRefused(ReadAll(directory.Path("none.csv")).status, absl::StatusCode::kNotFound,
                 {"none.csv", "check the path"});
   ExpectRefused(ReadAll(directory.Path("*.vtp")).status, absl::StatusCode::kNotFound,
@@ -156,7 +157,7 @@ TEST(InputFiles, WhatIsNotThereIsSaidWithAdvice) {
 }
 
 TEST(InputFiles, AnErrorInALaterFileComesAfterTheFramesBefore) {
-  InputDirectory directory;
+  support::TemporaryFolder directory;
   WriteFrames(directory, "frame_", 4);
   directory.Write("frame_2.csv", "x,y\n1,oops\n");
   const ReadSequence read = ReadAll(directory.path());

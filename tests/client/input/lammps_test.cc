@@ -18,7 +18,7 @@ std::string Frame(const std::string& step, const std::string& count, const std::
 }
 
 ReadSequence Read(const std::string& content, const SequenceOptions& options = {}) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   return ReadAll(directory.Write("dump.txt", content), options);
 }
 

@@ -86,7 +86,7 @@ TEST(Npy, EveryLayoutOfTheSamePositionsReadsTheSame) {
   const std::vector<float> narrow(kPositions.begin(), kPositions.end());
   const std::vector<double> by_column = {1.5, 3, -2, 4.25};
   const std::vector<double> flat = {1.5, -2, 7, 3, 4.25, 7};
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   for (const std::string& content :
        {Npy("'<f8'", "(2, 2)", Bytes(kPositions)), Npy("'>f8'", "(2, 2)", Bytes(kPositions, true)),
         Npy("'<f4'", "(2, 2)", Bytes(narrow)), Npy("'>f4'", "(2, 2)", Bytes(narrow, true)),
@@ -99,12 +99,12 @@ TEST(Npy, EveryLayoutOfTheSamePositionsReadsTheSame) {
 }
 
 TEST(Npy, AnArrayWithoutRowsIsAFrameWithoutParticles) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   EXPECT_EQ(ReadOne(directory.Write("pos.npy", Npy("'<f8'", "(0, 2)", ""))).ParticleCount(), 0u);
 }
 
 TEST(Npy, MoreColumnsAreNamedInTheirOrder) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string path =
       directory.Write("pos.npy", Npy("'<f8'", "(1, 4)", Bytes<double>({5, 1, 2, 9})));
   ExpectRefused(ReadAll(path).status, absl::StatusCode::kFailedPrecondition,
@@ -115,7 +115,7 @@ TEST(Npy, MoreColumnsAreNamedInTheirOrder) {
 }
 
 TEST(Npy, WhatIsNoTableOfNumbersIsRefused) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const auto refusal = [&](const std::string& content) {
     return ReadAll(directory.Write("pos.npy", content)).status;
   };
@@ -130,7 +130,7 @@ TEST(Npy, WhatIsNoTableOfNumbersIsRefused) {
 }
 
 TEST(Npy, DamageAndDeclaredSizesAreFoundOut) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string whole = Npy("'<f8'", "(2, 2)", Bytes(kPositions));
   for (std::size_t size = 6; size < whole.size(); ++size) {
     const absl::Status status = ReadAll(directory.Write("pos.npy", whole.substr(0, size))).status;
@@ -147,7 +147,7 @@ TEST(Npy, DamageAndDeclaredSizesAreFoundOut) {
 }
 
 TEST(Npz, NamedArraysAreRecognisedStoredAndDeflated) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   for (const bool deflate : {false, true}) {
     const RecordedFrame frame = ReadOne(directory.Write(
         "frame.npz",
@@ -163,7 +163,7 @@ TEST(Npz, NamedArraysAreRecognisedStoredAndDeflated) {
 }
 
 TEST(Npz, SeparateAxesAreRecognisedAndOthersChosen) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string path = directory.Write(
       "frame.npz", Zip({{"x.npy", Npy("'<f4'", "(2,)", Bytes<float>({1, 3})), false},
                         {"y.npy", Npy("'<f4'", "(2,)", Bytes<float>({2, 4})), false},
@@ -180,7 +180,7 @@ TEST(Npz, SeparateAxesAreRecognisedAndOthersChosen) {
 }
 
 TEST(Npz, PickledObjectsAreRefusedWithTheWayOut) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string path = directory.Write(
       "frame.npz", Zip({{"version.npy", Npy("'<i8'", "()", Bytes<std::int64_t>({2})), false},
                         {"particles.npy", Npy("'|O'", "()", "pickle"), false}}));
@@ -189,7 +189,7 @@ TEST(Npz, PickledObjectsAreRefusedWithTheWayOut) {
 }
 
 TEST(Npz, EveryFlippedOrMissingByteIsAnErrorOrHarmlessAndNeverACrash) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string whole = Zip({{"pos.npy", Npy("'<f8'", "(2, 2)", Bytes(kPositions)), true}});
   for (std::size_t at = 4; at < whole.size(); ++at) {
     std::string flipped = whole;

@@ -43,7 +43,7 @@ std::string Zstd(const std::string& content) {
 class Packed : public testing::TestWithParam<std::string (*)(const std::string&)> {};
 
 TEST_P(Packed, ReadsAsThePlainFileWhateverItsName) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const ReadSequence plain = ReadAll(directory.Write("plain", Dump(80)));
   const ReadSequence packed = ReadAll(directory.Write("packed", GetParam()(Dump(80))));
   ASSERT_TRUE(packed.status.ok()) << packed.status;
@@ -54,7 +54,7 @@ TEST_P(Packed, ReadsAsThePlainFileWhateverItsName) {
 }
 
 TEST_P(Packed, PartsThatFollowEachOtherAreOneFile) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const ReadSequence read =
       ReadAll(directory.Write("packed", GetParam()(Dump(3)) + GetParam()(Dump(2))));
   ASSERT_TRUE(read.status.ok()) << read.status;
@@ -62,7 +62,7 @@ TEST_P(Packed, PartsThatFollowEachOtherAreOneFile) {
 }
 
 TEST_P(Packed, WhatIsCutOffIsSaidAfterTheFramesBefore) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   // Larger than the blocks of the packings, so that a part can be unpacked.
   const std::string whole = GetParam()(Dump(200));
   const ReadSequence read = ReadAll(directory.Write("packed", whole.substr(0, whole.size() - 40)));
@@ -72,7 +72,7 @@ TEST_P(Packed, WhatIsCutOffIsSaidAfterTheFramesBefore) {
 }
 
 TEST_P(Packed, DamageIsAnError) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   std::string whole = GetParam()(Dump(3));
   for (std::size_t k = 20; k < 120; ++k) whole[k] = static_cast<char>(k * 37);
   const ReadSequence read = ReadAll(directory.Write("packed", whole));
@@ -82,7 +82,7 @@ TEST_P(Packed, DamageIsAnError) {
 INSTANTIATE_TEST_SUITE_P(Packings, Packed, testing::Values(&Gzip, &Zstd));
 
 TEST(Packed, TablesMayBePackedToo) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   EXPECT_THAT(ReadOne(directory.Write("frame.csv.gz", Gzip("x,y\n1,2\n"))).positions,
               testing::ElementsAre(1, 2));
 }

@@ -6,7 +6,7 @@ namespace partiemc::client {
 namespace {
 
 absl::Status Refusal(const std::string& name, const std::string& content) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   return ReadAll(directory.Write(name, content)).status;
 }
 
@@ -36,7 +36,7 @@ TEST(Refusals, TheSamplesOfOtherFormatsAreRefused) {
 TEST(Refusals, RubbishUnderAnyNameIsRefusedInOneLine) {
   const std::uint32_t seed = 20;
   std::mt19937 random(seed);
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   for (const char* name :
        {"a.csv", "a.npy", "a.npz", "a.vtp", "a.vtk", "a.xyz", "a.txt", "dump.a"}) {
     for (const char* mark : {"", "\x93NUMPY\x01", "PK\x03\x04", "# vtk DataFile Version 4.2\n",

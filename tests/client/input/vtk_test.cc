@@ -27,7 +27,7 @@ std::string Array(const std::string& name, const std::string& type, const std::s
 }
 
 TEST(Vtk, AFileOfOldSphinxsysIsRead) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const RecordedFrame frame =
       ReadOne(directory.Write("WaterBlock_0000000000.vtp",
                               Vtp("2", "1 2 0 3 4.5 0",
@@ -42,7 +42,7 @@ TEST(Vtk, AFileOfOldSphinxsysIsRead) {
 }
 
 TEST(Vtk, PointsAreSelectedByTheirArrays) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string path =
       directory.Write("a.vtp", Vtp("2", "1 2 0 3 4 0", Array("Type", "Int32", "1", "1 2")));
   EXPECT_THAT(ReadOne(path, {.select = {"Type=2"}}).positions, ElementsAre(3, 4));
@@ -53,14 +53,14 @@ TEST(Vtk, PointsAreSelectedByTheirArrays) {
 }
 
 TEST(Vtk, AFileWithoutPointsIsAFrameWithoutParticles) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string path = directory.Write("a.vtp", Vtp("0", ""));
   EXPECT_EQ(ReadOne(path).ParticleCount(), 0u);
   EXPECT_EQ(ReadOne(path, {.select = {"type=1"}}).ParticleCount(), 0u);
 }
 
 TEST(Vtk, LegacyFilesTellTheirTime) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const RecordedFrame frame = ReadOne(
       directory.Write("a.vtk",
                       "# vtk DataFile Version 4.2\nx\nASCII\nDATASET POLYDATA\nFIELD FieldData 1\n"
@@ -71,7 +71,7 @@ TEST(Vtk, LegacyFilesTellTheirTime) {
 }
 
 TEST(Vtk, DeclaredCountsAreNotBelieved) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   for (const char* count : {"60000000", "999999999999"}) {
     ExpectRefused(ReadAll(directory.Write("a.vtp", Vtp(count, "1 2 0"))).status,
                   absl::StatusCode::kDataLoss, {"a.vtp", count, "points"});
@@ -85,7 +85,7 @@ TEST(Vtk, DeclaredCountsAreNotBelieved) {
 }
 
 TEST(Vtk, WhatVtkSaysBecomesOurErrorAndIsNotPrinted) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const std::string whole = Vtp("2", "1 2 0 3 4 0");
   testing::internal::CaptureStderr();
   const absl::Status cut = ReadAll(directory.Write("a.vtp", whole.substr(0, 330))).status;
@@ -100,7 +100,7 @@ TEST(Vtk, WhatVtkSaysBecomesOurErrorAndIsNotPrinted) {
 }
 
 TEST(Vtk, AGridHoldsNoParticles) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   ExpectRefused(ReadAll(directory.Write("a.vtk",
                                         "# vtk DataFile Version 4.2\nx\nASCII\nDATASET "
                                         "STRUCTURED_POINTS\nDIMENSIONS 2 2 1\nORIGIN 0 0 "
@@ -112,7 +112,7 @@ TEST(Vtk, AGridHoldsNoParticles) {
 #else
 
 TEST(Vtk, ABuildWithoutVtkSaysHowToGetIt) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   ExpectRefused(ReadAll(directory.Write("a.vtp", Vtp("1", "1 2 0"))).status,
                 absl::StatusCode::kUnimplemented, {"a.vtp", "libvtk9-dev", "-DPARTIEMC_VTK=ON"});
 }

@@ -6,7 +6,7 @@ namespace {
 using testing::ElementsAre;
 
 TEST(Xyz, FramesOfALammpsXyzDumpAreRead) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const ReadSequence read = ReadAll(directory.Write(
       "dump.xyz",
       "2\nAtoms. Timestep: 0\n1 1 2 0\n2 3 4 0\n0\nAtoms. Timestep: 5\n1\nx\nSi 5 6 0\n"));
@@ -27,7 +27,7 @@ TEST(Xyz, ElementsCanBeSelected) {
 }
 
 TEST(Xyz, AFrameThatIsCutOffIsNamedAndThoseBeforeAreDelivered) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   const ReadSequence read =
       ReadAll(directory.Write("dump.xyz", "1\nAtoms. Timestep: 0\n1 1 2 0\n3\nAtoms.\n1 1 2 0\n"));
   EXPECT_EQ(read.frames.size(), 1u);
@@ -35,13 +35,13 @@ TEST(Xyz, AFrameThatIsCutOffIsNamedAndThoseBeforeAreDelivered) {
 }
 
 TEST(Xyz, DeclaredCountsAreNotBelieved) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   ExpectRefused(ReadAll(directory.Write("a.xyz", "18446744073709551615\nAtoms.\n1 1 2 0\n")).status,
                 absl::StatusCode::kDataLoss, {"a.xyz:1", "number of particles"});
 }
 
 TEST(Xyz, OtherColumnsThanSpeciesAndPositionAreRefused) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   ExpectRefused(
       ReadAll(directory.Write("a.xyz", "1\nProperties=id:I:1:pos:R:3 pbc=\"F F F\"\n1 1 2 0\n"))
           .status,
@@ -49,7 +49,7 @@ TEST(Xyz, OtherColumnsThanSpeciesAndPositionAreRefused) {
 }
 
 TEST(Xyz, PointsWithoutACountAreATable) {
-  const InputDirectory directory;
+  const support::TemporaryFolder directory;
   EXPECT_THAT(ReadOne(directory.Write("cloud.xyz", "1 2 0\n3 4 0\n")).positions,
               ElementsAre(1, 2, 3, 4));
 }

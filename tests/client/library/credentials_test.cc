@@ -15,6 +15,7 @@
 #include "partiemc/client/stream.h"
 #include "server/server.h"
 #include "support/certificates.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::client {
 namespace {
@@ -30,9 +31,8 @@ constexpr std::chrono::milliseconds kShortDeadline{500};
 class ClientCredentials : public ::testing::Test {
  protected:
   ClientCredentials() {
-    std::filesystem::create_directories(folder_);
     const auto write = [this](const std::string& name, const std::string& text) {
-      std::ofstream(Path(name)) << text;
+      folder_.Write(name, text);
     };
     const IssuedCertificate server = authority_.Issue("server"), own = authority_.Issue("client");
     write("ca.pem", authority_.certificate());
@@ -55,17 +55,14 @@ class ClientCredentials : public ::testing::Test {
              .key_file = Path("client.key"),
              .token_file = Path("tokens")};
   }
-  ~ClientCredentials() override { std::filesystem::remove_all(folder_); }
 
-  std::string Path(const std::string& name) const { return folder_ + "/" + name; }
+  std::string Path(const std::string& name) const { return folder_.Path(name); }
   absl::Status Ask(const Credentials& credentials,
                    std::chrono::milliseconds deadline = kDeadline) const {
     return GetServerInfo(address_, deadline, credentials).status();
   }
 
-  const std::string folder_ = ::testing::TempDir() + "/partiemc_credentials_" +
-                              std::to_string(getpid()) + "_" +
-                              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  const support::TemporaryFolder folder_;
   CertificateAuthority authority_{"authority"};
   std::unique_ptr<server::Server> server_;
   std::string address_;

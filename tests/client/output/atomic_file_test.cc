@@ -39,7 +39,7 @@ class FileSizeLimit {
 };
 
 TEST(AtomicFile, WhatWasAppendedIsTheWholeContent) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   auto file = AtomicFile::Create(directory / "out.txt");
   ASSERT_TRUE(file.ok()) << file.status();
   std::string expected;
@@ -56,7 +56,7 @@ TEST(AtomicFile, WhatWasAppendedIsTheWholeContent) {
 }
 
 TEST(AtomicFile, NothingHasTheNameBeforeCommit) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   auto file = AtomicFile::Create(directory / "out.txt");
   ASSERT_TRUE(file.ok());
   ASSERT_TRUE(file->Append(std::string(100'000, 'x')).ok());
@@ -64,7 +64,7 @@ TEST(AtomicFile, NothingHasTheNameBeforeCommit) {
 }
 
 TEST(AtomicFile, AFileThatIsGivenUpLeavesNothingAndTheOldOneAsItWas) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   ASSERT_TRUE(WriteFileAtomically(directory / "out.txt", "old").ok());
   {
     auto file = AtomicFile::Create(directory / "out.txt");
@@ -76,14 +76,14 @@ TEST(AtomicFile, AFileThatIsGivenUpLeavesNothingAndTheOldOneAsItWas) {
 }
 
 TEST(AtomicFile, AnOldFileIsReplaced) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   ASSERT_TRUE(WriteFileAtomically(directory / "out.txt", "a long old content").ok());
   ASSERT_TRUE(WriteFileAtomically(directory / "out.txt", "new").ok());
   EXPECT_EQ(ReadFile(directory / "out.txt"), "new");
 }
 
 TEST(AtomicFile, AMissingDirectoryIsNamedAndNothingIsLeft) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const absl::Status status = WriteFileAtomically(directory / "missing/out.txt", "text");
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(status.message()), HasSubstr("missing/out.txt"));
@@ -92,14 +92,14 @@ TEST(AtomicFile, AMissingDirectoryIsNamedAndNothingIsLeft) {
 }
 
 TEST(AtomicFile, ADirectoryInItsPlaceIsRefusedBeforeAnythingIsWritten) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   std::filesystem::create_directory(directory / "out.txt");
   EXPECT_FALSE(AtomicFile::Create(directory / "out.txt").ok());
   EXPECT_THAT(directory.Entries(), ElementsAre("out.txt"));
 }
 
 TEST(AtomicFile, AFullDiskInTheMiddleLeavesNothing) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const FileSizeLimit limit(150'000);
   auto file = AtomicFile::Create(directory / "out.txt");
   ASSERT_TRUE(file.ok());
@@ -115,7 +115,7 @@ TEST(AtomicFile, AFullDiskInTheMiddleLeavesNothing) {
 // A pipe of its own stands for all that is no regular file: with /dev/null, a mistake would
 // replace the machine's.
 TEST(AtomicFile, APipeIsWrittenStraightAwayAndStaysAPipe) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const std::filesystem::path pipe = directory / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   // Open for reading first, so that a writer does not wait for a reader.
@@ -131,7 +131,7 @@ TEST(AtomicFile, APipeIsWrittenStraightAwayAndStaysAPipe) {
 }
 
 TEST(AtomicFile, ASymbolicLinkIsFollowed) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   ASSERT_TRUE(WriteFileAtomically(directory / "real.txt", "old").ok());
   std::filesystem::create_symlink("real.txt", directory / "link.txt");
   ASSERT_TRUE(WriteFileAtomically(directory / "link.txt", "new").ok());
@@ -145,7 +145,7 @@ TEST(AtomicFile, AMessageStaysOneLineWhateverTheName) {
 }
 
 TEST(AtomicFile, PermissionsAreThoseOfAnOrdinaryNewFile) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const mode_t before = ::umask(027);
   ASSERT_TRUE(WriteFileAtomically(directory / "out.txt", "text").ok());
   ::umask(before);

@@ -1,7 +1,5 @@
-// Results made by hand, and a directory that goes away with its test.
+// Results made by hand.
 #pragma once
-
-#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
@@ -12,34 +10,9 @@
 #include <vector>
 
 #include "output/frame_record.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::client {
-
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "partiemc-test-XXXXXX").native();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-  const std::filesystem::path& path() const { return path_; }
-
-  /// Names of all entries, hidden ones too.
-  std::vector<std::string> Entries() const {
-    std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
-      names.push_back(entry.path().filename().native());
-    }
-    return names;
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline std::string ReadFile(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);

@@ -296,7 +296,7 @@ TEST(Vtp, LinesComeBeforePolygonsAndEachCellHasItsClassWhereTheBuildHasVtk) {
 }
 
 TEST(FrameWriter, FilesAreNumberedByTheIndexInTheInput) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const auto writer = FrameWriter::Create({.directory = directory / "made/on/the/way",
                                            .formats = {FrameFormat::kGeoJson, FrameFormat::kObj}});
   ASSERT_TRUE(writer.ok()) << writer.status();
@@ -312,7 +312,7 @@ TEST(FrameWriter, FilesAreNumberedByTheIndexInTheInput) {
 }
 
 TEST(FrameWriter, ADirectoryThatGoesAwayIsToldAndLeavesNothing) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const auto writer =
       FrameWriter::Create({.directory = directory / "out", .formats = {FrameFormat::kSvg}});
   ASSERT_TRUE(writer.ok());
@@ -325,7 +325,7 @@ TEST(FrameWriter, ADirectoryThatGoesAwayIsToldAndLeavesNothing) {
 }
 
 TEST(FrameWriter, AFileInPlaceOfTheDirectoryIsRefused) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   std::ofstream(directory / "out") << "a file";
   const auto writer = FrameWriter::Create({.directory = directory / "out"});
   EXPECT_FALSE(writer.ok());

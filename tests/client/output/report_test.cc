@@ -38,7 +38,7 @@ std::vector<std::string> Geometries(const std::string& page) {
 }
 
 std::string Page(const ReportOptions& options, const std::vector<FrameRecord>& frames) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   auto report = ReportWriter::Create(directory / "report.html", options);
   EXPECT_TRUE(report.ok()) << report.status();
   Summary summary;
@@ -219,7 +219,7 @@ TEST(Report, ANumberThatIsNotFiniteIsNull) {
 }
 
 TEST(Report, WithoutFinishThereIsNoPage) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const Result result = SquareWithHoleAndIsland();
   {
     auto report = ReportWriter::Create(directory / "report.html", {.title = "t"});
@@ -230,7 +230,7 @@ TEST(Report, WithoutFinishThereIsNoPage) {
 }
 
 TEST(Report, AMissingDirectoryIsToldBeforeTheWork) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const auto report = ReportWriter::Create(directory / "missing/report.html", {.title = "t"});
   EXPECT_EQ(report.status().code(), absl::StatusCode::kNotFound);
 }

@@ -39,7 +39,7 @@ std::string Written(const std::filesystem::path& path, const std::vector<FrameRe
 }
 
 TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   Result result = SquareWithHoleAndIsland();
   result.statistics.perimeter = 23.5;
   result.statistics.self_intersections = 1;
@@ -54,7 +54,7 @@ TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
 }
 
 TEST(Statistics, JsonIsAnArrayOfObjects) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const Result result = SquareWithHoleAndIsland();
   const auto rows =
       ordered_json::parse(Written(directory / "stats.JSON", {Record(result), Record(result)}));
@@ -66,20 +66,20 @@ TEST(Statistics, JsonIsAnArrayOfObjects) {
 }
 
 TEST(Statistics, NamesAreUniqueSoThatAnObjectHoldsEveryColumn) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const Result result = SquareWithHoleAndIsland();
   const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
   EXPECT_EQ(rows[0].size(), StatisticsColumns().size());
 }
 
 TEST(Statistics, NoFramesAtAllAreAHeaderOrAnEmptyArray) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   EXPECT_EQ(Written(directory / "stats.csv", {}), std::string(kHeader) + "\n");
   EXPECT_THAT(ordered_json::parse(Written(directory / "stats.json", {})), IsEmpty());
 }
 
 TEST(Statistics, AnAreaReadsBackTheSame) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   Result result;
   result.statistics.area = 0.1 + 0.2;
   const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
@@ -87,7 +87,7 @@ TEST(Statistics, AnAreaReadsBackTheSame) {
 }
 
 TEST(Statistics, ANumberThatIsNotFiniteIsNullInJson) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   Result result;
   result.statistics.area = std::numeric_limits<double>::quiet_NaN();
   const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
@@ -95,7 +95,7 @@ TEST(Statistics, ANumberThatIsNotFiniteIsNullInJson) {
 }
 
 TEST(Statistics, AnotherExtensionIsRefusedAndNothingIsLeft) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const auto writer = StatisticsWriter::Create(directory / "stats.txt");
   EXPECT_EQ(writer.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(writer.status().message()), HasSubstr("must end in .csv or .json"));
@@ -103,7 +103,7 @@ TEST(Statistics, AnotherExtensionIsRefusedAndNothingIsLeft) {
 }
 
 TEST(Statistics, WithoutFinishThereIsNoFile) {
-  TemporaryDirectory directory;
+  support::TemporaryFolder directory;
   const Result result = SquareWithHoleAndIsland();
   {
     auto writer = StatisticsWriter::Create(directory / "stats.csv");

@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "support/temporary_folder.h"
+
 namespace partiemc::client {
 namespace {
 
@@ -25,17 +27,9 @@ constexpr unsigned kSeed = 20240229;
 
 class Recording : public ::testing::Test {
  protected:
-  Recording() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "recording.XXXXXX").string();
-    directory_ = ::mkdtemp(pattern.data());
-  }
-  ~Recording() override { std::filesystem::remove_all(directory_); }
+  std::string Path(const std::string& name = "test.pemc") const { return directory_.Path(name); }
 
-  std::string Path(const std::string& name = "test.pemc") const {
-    return (directory_ / name).string();
-  }
-
-  std::filesystem::path directory_;
+  support::TemporaryFolder directory_;
 };
 
 // Frames of different sizes, an empty one among them; every second one has no volumes.
@@ -261,7 +255,7 @@ TEST_F(Recording, AnUnfinishedOneLeavesNoFile) {
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE((*writer)->Add(RandomFrames(1)[0]).ok());
   }
-  EXPECT_TRUE(std::filesystem::is_empty(directory_));
+  EXPECT_TRUE(std::filesystem::is_empty(directory_.path()));
 }
 
 TEST_F(Recording, IsKnownByItsFirstBytes) {
@@ -270,7 +264,7 @@ TEST_F(Recording, IsKnownByItsFirstBytes) {
   WriteBytes(Path("text.pemc"), "x,y\n0,0\n");
   EXPECT_FALSE(IsRecording(Path("text.pemc")));
   EXPECT_FALSE(IsRecording(Path("missing.pemc")));
-  EXPECT_FALSE(IsRecording(directory_.string()));
+  EXPECT_FALSE(IsRecording(directory_.path().string()));
 }
 
 TEST_F(Recording, OptionsOutOfRangeAreRefused) {
