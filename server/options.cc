@@ -140,14 +140,14 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->envname("PARTIEMC_MAX_WATCHER_BYTES")
       ->group(kGroup);
   app.add_option("--max-particles", limits.frame.max_particles, "Particles of one frame")
-      ->check(CLI::Range(1, 1'000'000'000))
+      ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostParticles))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_PARTICLES")
       ->group(kGroup);
   app.add_option("--max-tiles", limits.frame.max_tiles,
                  "Tiles of 32 x 32 lattice nodes that one frame may reach, 10 kB of memory each")
-      ->check(CLI::Range(1, 100'000'000))
+      ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostTiles))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_TILES")

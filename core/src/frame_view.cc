@@ -192,6 +192,20 @@ absl::Status InvalidFrame(std::string_view reason, std::string field, std::strin
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
+absl::Status Validate(const FrameLimits& limits) {
+  const auto check = [](std::string_view field, std::size_t value, std::size_t most) {
+    if (value <= most) return absl::OkStatus();
+    return InvalidFrame(kReasonOutOfRange, "limits." + std::string(field), absl::StrCat(value),
+                        absl::StrCat("must be at most ", most));
+  };
+  if (absl::Status status =
+          check("max_particles", limits.max_particles, FrameLimits::kMostParticles);
+      !status.ok()) {
+    return status;
+  }
+  return check("max_tiles", limits.max_tiles, FrameLimits::kMostTiles);
+}
+
 absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits) {
   const std::size_t values = std::visit([](auto view) { return view.size(); }, frame.positions);
   if (frame.components != 2 && frame.components != 3) {

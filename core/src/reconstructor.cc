@@ -175,6 +175,7 @@ Workspace& Workspace::operator=(Workspace&&) noexcept = default;
 absl::StatusOr<Reconstructor> Reconstructor::Create(const ReconstructionParameters& parameters,
                                                     const FrameLimits& limits) {
   if (absl::Status status = Validate(parameters); !status.ok()) return status;
+  if (absl::Status status = Validate(limits); !status.ok()) return status;
   return Reconstructor(Resolve(parameters), limits);
 }
 

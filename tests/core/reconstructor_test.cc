@@ -96,6 +96,20 @@ TEST(Reconstructor, DegenerateSetsOfParticlesKeepEveryPromise) {
   }
 }
 
+TEST(Reconstructor, LimitsBeyondWhatCanBeCountedAreRefusedByName) {
+  constexpr std::size_t kParticles = FrameLimits::kMostParticles, kTiles = FrameLimits::kMostTiles;
+  EXPECT_TRUE(Reconstructor::Create({}, {kParticles, kTiles}).ok());
+  const auto refused = [](const FrameLimits& limits) {
+    const absl::Status status = Reconstructor::Create({}, limits).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    const auto violation = FindViolation(status);
+    return violation ? violation->field + " " + violation->value + " " + violation->rule : "";
+  };
+  EXPECT_EQ(refused({kParticles + 1, 100}),
+            "limits.max_particles 1000000001 must be at most 1000000000");
+  EXPECT_EQ(refused({100, kTiles + 1}), "limits.max_tiles 1000001 must be at most 1000000");
+}
+
 TEST(Reconstructor, ABadFrameLeavesTheStateAsItWasAndTheResultEmpty) {
   const Reconstructor reconstructor =
       Make({.placement = Placement::kVirtualPlane}, {.max_particles = 5000, .max_tiles = 500});

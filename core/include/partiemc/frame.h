@@ -6,6 +6,8 @@
 #include <span>
 #include <variant>
 
+#include "absl/status/status.h"
+
 namespace partiemc {
 
 /// Particles of one instant, each array in the same order. Views must outlive the call only.
@@ -40,9 +42,15 @@ struct Frame {
 
 /// What a frame may cost. A frame beyond a limit is refused before anything is allocated for it.
 struct FrameLimits {
+  /// The most that limits may be: all that is counted for such a frame fits into 32 bits.
+  static constexpr std::size_t kMostParticles = 1'000'000'000, kMostTiles = 1'000'000;
+
   std::size_t max_particles = 16'000'000;
   /// Tiles of 32 x 32 lattice nodes that particles reach; a tile costs about 10 kB of memory.
   std::size_t max_tiles = 131'072;
 };
+
+/// INVALID_ARGUMENT with reason OUT_OF_RANGE if a limit is beyond the most that it may be.
+absl::Status Validate(const FrameLimits& limits);
 
 }  // namespace partiemc

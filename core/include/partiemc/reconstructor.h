@@ -36,7 +36,7 @@ class Workspace {
 /// Knows the order of the seven stages; holds no state of a stream. Safe to share between threads.
 class Reconstructor {
  public:
-  /// Errors: INVALID_ARGUMENT, see Validate(ReconstructionParameters).
+  /// Errors: INVALID_ARGUMENT, see Validate of either.
   static absl::StatusOr<Reconstructor> Create(const ReconstructionParameters& parameters,
                                               const FrameLimits& limits = {});
 
