@@ -149,7 +149,7 @@ def check_frame(directory, row, may_fold):
 
 def check_sequence(partiemc, source, arguments, placement):
     """Returns frames, frames that count crossings or folds, and what is wrong."""
-    with tempfile.support::TemporaryFolder() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         command = [partiemc, "replay", str(source), "--local", "--quiet", "--placement", placement,
                    "--output-dir", str(folder), "--format", "geojson,obj", "--stats", str(folder / "stats.csv")]
@@ -175,7 +175,7 @@ def main():
     options = parser.parse_args()
     root = pathlib.Path(__file__).resolve().parents[2]
     failures, frames = 0, 0
-    with tempfile.support::TemporaryFolder() as target:
+    with tempfile.TemporaryDirectory() as target:
         sequences = list(bundled(root))
         if options.data:
             sequences += list(recordings(options.data, pathlib.Path(target)))
