@@ -19,7 +19,7 @@ struct Seen {
   std::uint32_t source, entry;
   float x, y;
 
-  friend auto operator<=>(const Seen&, const Seen&) = default;
+  bool operator==(const Seen&) const = default;
 };
 
 std::vector<Seen> InOrder(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
