@@ -4,24 +4,8 @@
 
 #include <chrono>
 #include <filesystem>
-#include <thread>
 
 namespace partiemc::server {
-namespace {
-
-// Against hanging.
-constexpr std::chrono::seconds kEventually{120};
-
-}  // namespace
-
-bool Eventually(const std::function<bool()>& holds) {
-  const auto deadline = std::chrono::steady_clock::now() + kEventually;
-  while (!holds()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return true;
-}
 
 void Security::Write(const std::string& name, const std::string& text) const {
   std::filesystem::rename(folder_.Write(name + ".part", text), Path(name));

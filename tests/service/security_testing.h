@@ -5,7 +5,6 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <memory>
 #include <string>
 
@@ -17,9 +16,6 @@ namespace partiemc::server {
 
 inline constexpr char kToken[] = "alice-secret-0123456789";
 inline constexpr char kOtherToken[] = "bob-secret-0123456789ab";
-
-// Looks again and again: a change of files counts some milliseconds after it.
-bool Eventually(const std::function<bool()>& holds);
 
 // What a client brings along.
 struct Client {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "partiemc/reconstructor.h"
 #include "server/moving_blob.h"
@@ -44,6 +45,15 @@ std::unique_ptr<Server> StartServer(const ServerOptions& options) {
   // Ends the test as failed, with these words.
   if (!server.ok()) throw std::runtime_error("no server: " + server.status().ToString());
   return *std::move(server);
+}
+
+bool Eventually(const std::function<bool()>& holds) {
+  const auto deadline = std::chrono::steady_clock::now() + kDeadline;
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
 }
 
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport) {

@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,6 +24,10 @@ ServerOptions TestOptions();
 
 /// Ends the test as failed where the server does not start.
 std::unique_ptr<Server> StartServer(const ServerOptions& options);
+
+/// Looks again and again, for what comes about some milliseconds later: a change of files, the end
+/// of a call as the server sees it. False after two minutes.
+bool Eventually(const std::function<bool()>& holds);
 
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport);
 
