@@ -1,5 +1,7 @@
 #include "bins.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -30,7 +32,7 @@ double TileMargin(const Scale& scale) {
 // cache.
 constexpr std::size_t kBlockParticles = 256;
 
-// The homes met last, by the low bits of their coordinates: a body of up to 256 x 128 tiles finds
+// The homes met last, by the low bits of their coordinates: a body of up to 256 x 256 tiles finds
 // all of its homes here, and thousands of scattered tiles most of theirs, without a probe of the
 // directory that would have to be guessed. Homes whose index is too large are not remembered.
 class RecentHomes {
@@ -48,7 +50,7 @@ class RecentHomes {
   }
 
  private:
-  static constexpr int kColumnBits = 8, kRowBits = 7;
+  static constexpr int kColumnBits = 8, kRowBits = 8;
   static constexpr std::uint16_t kNone = std::numeric_limits<std::uint16_t>::max();
   BinStretch& stretch_;
   std::array<std::uint16_t, 1 << (kColumnBits + kRowBits)> index_;
@@ -70,6 +72,8 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
                    scratch.positions.data() + 2 * start)) {
       return false;
     }
+    // They come while homes are looked up, which needs no memory that is far away.
+    reader.Prefetch(start + count, std::min(kBlockParticles, last - start - count));
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t home = recent.Find({tiles[2 * k + 1], tiles[2 * k]});
       ++stretch.entries[home];
@@ -129,6 +133,11 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
   return total;
 }
 
+// Where lists are more than the nearest caches keep lines for, the one that a particle is written
+// to is asked for so many particles before.
+constexpr std::size_t kNearHomes = 2048;
+constexpr std::size_t kFillAhead = 24;
+
 // Second pass over a stretch: writes its entries.
 void FillEntries(std::size_t first, std::size_t last, std::span<const float> volumes,
                  double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
@@ -136,17 +145,27 @@ void FillEntries(std::size_t first, std::size_t last, std::span<const float> vol
   const std::uint32_t* const home = bins.scratch.home.data();
   std::uint32_t* const next = stretch.entries.data();
   BinEntry* const entries = bins.entries.data();
-  if (volumes.empty()) {
-    for (std::size_t k = first; k < last; ++k) {
-      entries[next[home[k]]++] = {positions[2 * k], positions[2 * k + 1],
-                                  static_cast<std::uint32_t>(k)};
+  const auto fill = [&](auto set_weight) {
+    const auto fill_one = [&](std::size_t k) {
+      const std::uint32_t entry = next[home[k]]++;
+      entries[entry] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
+      set_weight(entry, k);
+    };
+    std::size_t k = first;
+    if (stretch.homes.size() > kNearHomes) {
+      for (; k + kFillAhead < last; ++k) {
+        hwy::Prefetch(entries + next[home[k + kFillAhead]]);
+        fill_one(k);
+      }
     }
-    return;
-  }
-  for (std::size_t k = first; k < last; ++k) {
-    const std::uint32_t entry = next[home[k]]++;
-    entries[entry] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
-    bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
+    for (; k < last; ++k) fill_one(k);
+  };
+  if (volumes.empty()) {
+    fill([](std::uint32_t, std::size_t) {});
+  } else {
+    fill([&](std::uint32_t entry, std::size_t k) {
+      bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
+    });
   }
 }
 
@@ -222,9 +241,16 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
 }
 
 // A stretch has at least so many particles, and there are at most so many of them: enough for the
-// tasks to balance, few enough that counts by stretch and tile stay below the particles.
+// tasks to balance, few enough that counts by stretch and tile stay below the particles. Each meets
+// most homes anew, so that one thread has one.
 constexpr std::size_t kMinStretch = 1 << 15;
 constexpr std::size_t kMaxStretches = 16;
+constexpr std::size_t kStretchesPerThread = 4;
+
+std::size_t MaxStretches() {
+  const std::size_t threads = ThreadCount();
+  return threads > 1 ? std::min(kMaxStretches, kStretchesPerThread * threads) : 1;
+}
 
 }  // namespace
 
@@ -242,7 +268,8 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   const std::size_t count = frame.ParticleCount();
   scratch.home.resize(count);
   scratch.positions.resize(2 * count);
-  const std::size_t length = std::max(kMinStretch, (count + kMaxStretches - 1) / kMaxStretches);
+  const std::size_t most = MaxStretches();
+  const std::size_t length = std::max(kMinStretch, (count + most - 1) / most);
   scratch.stretches.resize((count + length - 1) / length);
   const auto for_each_stretch = [&](auto visit) {
     ParallelFor(scratch.stretches.size(), [&](std::size_t k) {

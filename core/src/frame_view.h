@@ -1,6 +1,8 @@
 // The numbers of a frame: how they are read, and whether they are usable.
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <cstddef>
 #include <span>
 #include <string>
@@ -42,6 +44,14 @@ class PositionReader {
       copy[2 * k + 1] = second_[(first + k) * components_];
     }
     return {copy, 2 * count};
+  }
+
+  /// Asks the memory for the numbers of `count` particles from `first` on.
+  void Prefetch(std::size_t first, std::size_t count) const {
+    constexpr std::size_t kPerLine = 64 / sizeof(Real);
+    for (std::size_t k = first * components_; k < (first + count) * components_; k += kPerLine) {
+      hwy::Prefetch(first_ + k);
+    }
   }
 
   using Number = Real;

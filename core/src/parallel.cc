@@ -26,6 +26,10 @@ void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action) 
   });
 }
 
+std::size_t ThreadCount() {
+  return static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+}
+
 TaskArena* MakeArena(unsigned threads) {
   return new TaskArena(threads > 0 ? static_cast<int>(threads) : tbb::info::default_concurrency());
 }

@@ -52,11 +52,16 @@ RangeAction RangeActionOf(ForkJoin& fork_join, const Body& body) {
 void Invoke(const Action& a, const Action& b);
 void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action);
 
+std::size_t ThreadCount();
+
 TaskArena* MakeArena(unsigned threads);  // 0: one for each processor.
 void DeleteArena(TaskArena* arena);
 void Execute(TaskArena& arena, const Action& action);
 
 }  // namespace erased
+
+/// For how many threads the caller's Arena has places.
+inline std::size_t ThreadCount() { return erased::ThreadCount(); }
 
 /// Calls body(first, last) for ranges that together are [0, count), each of at least half of
 /// `grain` where there are so many.
