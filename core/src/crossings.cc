@@ -207,12 +207,6 @@ std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& cross
   return crossings.segments[next].entry == entry ? next : next + 1;
 }
 
-LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
-  const TileCoordinate& tile = directory[cell.tile];
-  return {static_cast<double>((std::int64_t{tile.x} << kTileShift) + cell.i),
-          static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
-}
-
 LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
                           const ActiveCell& cell, int edge) {
   // Every edge is walked from its lower or left node, so that both cells compute the same.

@@ -96,6 +96,10 @@ LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_
                           const ActiveCell& cell, int edge);
 
 /// Lower left node of a cell.
-LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell);
+inline LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
+  const TileCoordinate& tile = directory[cell.tile];
+  return {static_cast<double>((std::int64_t{tile.x} << kTileShift) + cell.i),
+          static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
+}
 
 }  // namespace partiemc
