@@ -10,6 +10,12 @@
 namespace partiemc {
 namespace {
 
+// How far the passes have come with a tile.
+enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
+
+// A range of so many tiles has more than a few whose neighbours are all among them.
+constexpr std::size_t kTilesAtOnce = 64;
+
 // Null where they are uniform.
 const float* WeightsOf(const ParticleBins& bins) {
   return bins.weight.empty() ? nullptr : bins.weight.data();
@@ -29,8 +35,10 @@ float WeightOf(const ParticleBins& bins, const Scale& scale) {
 
 // First pass: the kernels of a tile's own particles in the rows that they reach, or, where they
 // reach too far for the margin of the sums, of all around it in every row.
-void SumTile(const ParticleBins& bins, float radius, std::uint32_t tile, LevelSet& level_set) {
+void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+             LevelSet& level_set) {
   std::array<float, kTileNodes>& values = level_set.tiles[tile];
+  const auto radius = static_cast<float>(scale.kernel_radius);
   const bool fits = radius <= kSumMargin;
   if (fits && bins.CountOf(tile) == 0) return;
   alignas(64) NodeSums sums;
@@ -65,8 +73,8 @@ void FillRowsOf(float* values, NodeRange rows, NodeRange kept, float value) {
 }
 
 // Second pass: the density at every node, and what follows from it alone.
-void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
-                  LevelSet& level_set) {
+void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                       LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
   BitRows& inside = level_set.inside[tile];
   BitRows& open = level_set.open[tile];
@@ -103,10 +111,11 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   return EvaluateNodes(asked, sums, WeightOf(bins, scale), scale, level_set.tiles[tile].data());
 }
 
-// Still second pass, while the sums are in the nearest cache: F where the density leaves the side
-// of a node open.
-void SampleOpenNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
-                     LevelSet& level_set) {
+// And, while the sums are in the nearest cache, F where the density leaves the side of a node open.
+void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                  LevelSet& level_set) {
+  ClassifyByDensity(bins, scale, tile, level_set);
+  level_set.passes[tile] = kClassified;
   const BitRows& open = level_set.open[tile];
   if (IsEmpty(open)) return;
   const BitRows inside =
@@ -137,14 +146,41 @@ BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level
 // Third pass: F where the density has decided the side, but the isoline crosses an edge.
 void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
+  level_set.passes[tile] = kSampled;
   BitRows ends = EndsOfCrossedEdges(bins.tiles, level_set, tile);
   for (int j = 0; j < kTileSize; ++j) ends[j] &= ~level_set.open[tile][j];
   if (!IsEmpty(ends)) SampleNodes(bins, scale, tile, {ends, false, false}, level_set);
 }
 
-template <typename Visit>
-void ForEachTile(const ParticleBins& bins, Visit visit) {
-  ParallelFor(static_cast<std::uint32_t>(bins.tiles.size()), visit);
+// The passes over the tiles [first, last). A pass looks at what the one before has left in the
+// tiles around, so that a tile goes through it as soon as these are ready, while they are in a near
+// cache. Tiles next to those of other ranges, which may not be ready, are left as they are.
+void SampleTiles(const ParticleBins& bins, const Scale& scale, std::uint32_t first,
+                 std::uint32_t last, LevelSet& level_set) {
+  // The tile itself is among those around it.
+  const auto last_around = [&](std::uint32_t tile) {
+    std::uint32_t result = tile;
+    for (const std::uint32_t near : bins.tiles.neighbours(tile)) {
+      if (near != kNoTile) result = std::max(result, near);
+    }
+    return result;
+  };
+  const auto are_around = [&](std::uint32_t tile, Passes passes) {
+    return std::ranges::all_of(bins.tiles.neighbours(tile), [&](std::uint32_t near) {
+      return near >= first && (near == kNoTile || level_set.passes[near] >= passes);
+    });
+  };
+  std::uint32_t classified = first, sampled = first;
+  for (std::uint32_t tile = first; tile < last; ++tile) {
+    SumTile(bins, scale, tile, level_set);
+    level_set.passes[tile] = kSummed;
+    for (; classified <= tile && last_around(classified) <= tile; ++classified) {
+      if (are_around(classified, kSummed)) ClassifyTile(bins, scale, classified, level_set);
+    }
+    for (; sampled < classified && last_around(sampled) < classified; ++sampled) {
+      if (are_around(sampled, kClassified)) SampleDecidedEnds(bins, scale, sampled, level_set);
+    }
+  }
 }
 
 }  // namespace
@@ -155,14 +191,20 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   level_set.tiles.resize(tiles);
   level_set.inside.resize(tiles);
   level_set.open.resize(tiles);
+  level_set.passes.assign(tiles, 0);
   const auto radius = static_cast<float>(scale.kernel_radius);
   if (radius <= kSumMargin) level_set.rims.Prepare(bins, radius);
-  ForEachTile(bins, [&](std::uint32_t tile) { SumTile(bins, radius, tile, level_set); });
-  ForEachTile(bins, [&](std::uint32_t tile) {
-    ClassifyTile(bins, scale, tile, level_set);
-    SampleOpenNodes(bins, scale, tile, level_set);
+  ParallelForRanges(tiles, kTilesAtOnce, [&](std::size_t first, std::size_t last) {
+    SampleTiles(bins, scale, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+                level_set);
   });
-  ForEachTile(bins, [&](std::uint32_t tile) { SampleDecidedEnds(bins, scale, tile, level_set); });
+  const auto for_the_rest = [&](Passes before, auto pass) {
+    ParallelFor(static_cast<std::uint32_t>(tiles), [&](std::uint32_t tile) {
+      if (level_set.passes[tile] == before) pass(bins, scale, tile, level_set);
+    });
+  };
+  for_the_rest(kSummed, ClassifyTile);
+  for_the_rest(kClassified, SampleDecidedEnds);
 }
 
 }  // namespace partiemc

@@ -22,7 +22,8 @@ struct LevelSet {
   float void_value = 0;         ///< F where no particle reaches, hence in tiles that do not exist.
 
   // Scratch.
-  std::vector<BitRows> open;  ///< By tile: the nodes that the density does not decide.
+  std::vector<BitRows> open;         ///< By tile: the nodes that the density does not decide.
+  std::vector<std::uint8_t> passes;  ///< By tile: how many are done (SampleField).
   SumRims rims;
 
   /// F at the node (i, j) of `tile`, 0 <= i, j <= 32: the last row and column are the neighbours'.
