@@ -33,12 +33,8 @@ class CrossedRows {
   void ForEachEdge(const TileDirectory& directory, const Crossings& crossings, Visit visit);
 
  private:
-  template <typename Visit>
-  void VisitCell(const TileDirectory& directory, const Crossings& crossings, const ActiveCell& cell,
-                 Visit visit) const;
-
   std::vector<std::uint32_t> ring_of_segment_;
-  std::vector<std::uint32_t> next_cell_;  // By tile.
+  CellsByRow cells_;
 };
 
 inline void CrossedRows::SetRings(const Crossings& crossings,
@@ -53,28 +49,21 @@ inline void CrossedRows::SetRings(const Crossings& crossings,
 }
 
 template <typename Visit>
-void CrossedRows::VisitCell(const TileDirectory& directory, const Crossings& crossings,
-                            const ActiveCell& cell, Visit visit) const {
-  const std::uint32_t end = cell.first_segment + (cell.IsSaddle() ? 2 : 1);
-  for (std::uint32_t segment = cell.first_segment; segment < end; ++segment) {
-    const Segment& here = crossings.segments[segment];
-    // Edge 0, the cell's lower one: every horizontal edge is that of one cell. What enters through
-    // it has the inside on its left.
-    if (here.entry != 0 && here.exit != 0) continue;
-    if (ring_of_segment_[segment] == kNoRing) continue;
-    visit(CrossedEdge{.row = directory[cell.tile].y * kTileSize + cell.j,
-                      .column = directory[cell.tile].x * kTileSize + cell.i,
-                      .ring = ring_of_segment_[segment],
-                      .begins_inside = here.exit == 0});
-  }
-}
-
-template <typename Visit>
 void CrossedRows::ForEachEdge(const TileDirectory& directory, const Crossings& crossings,
                               Visit visit) {
-  ForEachCellByRow(directory, crossings, next_cell_, [&](std::uint32_t cell) {
-    VisitCell(directory, crossings, crossings.cells[cell], visit);
-  });
+  // Every horizontal edge is the lower one of one cell, whose first segment runs through it.
+  const auto crosses_lower_edge = [](const ActiveCell& cell) {
+    return ((cell.corners ^ cell.corners >> 1) & 1) != 0;
+  };
+  for (const std::uint32_t index : cells_.List(directory, crossings, crosses_lower_edge)) {
+    const ActiveCell& cell = crossings.cells[index];
+    const std::uint32_t ring = ring_of_segment_[cell.first_segment];
+    if (ring == kNoRing) continue;
+    visit(CrossedEdge{.row = directory[cell.tile].y * kTileSize + cell.j,
+                      .column = directory[cell.tile].x * kTileSize + cell.i,
+                      .ring = ring,
+                      .begins_inside = (cell.corners >> 1 & 1) != 0});
+  }
 }
 
 }  // namespace partiemc

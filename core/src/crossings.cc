@@ -71,17 +71,17 @@ BitRows InteriorCells(const NodeRows& nodes) {
 }
 
 // Marks active and interior cells and counts cells and segments.
-CrossingCounts ClassifyCells(const TileDirectory& directory, std::vector<TileBits>& tiles,
-                             std::uint32_t tile) {
-  const NodeRows nodes = InsideRows(directory, tiles, tile);
-  TileBits& bits = tiles[tile];
-  bits.interior = InteriorCells(nodes);
+CrossingCounts ClassifyCells(const TileDirectory& directory, std::uint32_t tile,
+                             Crossings& crossings) {
+  const NodeRows nodes = InsideRows(directory, crossings.tiles, tile);
+  TileBits& bits = crossings.tiles[tile];
+  const BitRows interior = crossings.interior[tile] = InteriorCells(nodes);
   BitRows saddles;
   std::uint32_t any_active = 0;
   for (int j = 0; j < kTileSize; ++j) {
     const std::uint32_t any =
         nodes.left[j] | nodes.right[j] | nodes.left[j + 1] | nodes.right[j + 1];
-    bits.active[j] = any & ~bits.interior[j];
+    bits.active[j] = any & ~interior[j];
     any_active |= bits.active[j];
     saddles[j] = (nodes.left[j] ^ nodes.right[j]) & (nodes.left[j] ^ nodes.left[j + 1]) &
                  (nodes.right[j] ^ nodes.right[j + 1]);
@@ -156,13 +156,14 @@ void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
                    Crossings& crossings) {
   const std::size_t tile_count = directory.size();
   crossings.tiles.resize(tile_count);
+  crossings.interior.resize(tile_count);
   ForEachTile(tile_count,
               [&](std::uint32_t tile) { crossings.tiles[tile].inside = level_set.inside[tile]; });
 
   std::vector<CrossingCounts>& counts = crossings.counts;
   counts.resize(tile_count + 1);
   ForEachTile(tile_count, [&](std::uint32_t tile) {
-    counts[tile] = ClassifyCells(directory, crossings.tiles, tile);
+    counts[tile] = ClassifyCells(directory, tile, crossings);
   });
   CrossingCounts total;
   for (std::size_t tile = 0; tile < tile_count; ++tile) {
@@ -183,7 +184,7 @@ void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
 
 void MarkInteriorCells(const TileDirectory& directory, Crossings& crossings) {
   ForEachTile(directory.size(), [&](std::uint32_t tile) {
-    crossings.tiles[tile].interior = InteriorCells(InsideRows(directory, crossings.tiles, tile));
+    crossings.interior[tile] = InteriorCells(InsideRows(directory, crossings.tiles, tile));
   });
 }
 

@@ -21,9 +21,10 @@ namespace partiemc {
 struct ActiveCell {
   std::uint32_t tile = 0;
   std::uint8_t i = 0, j = 0;
-  std::uint8_t corners = 0;         ///< The case, 1 to 14.
-  std::uint8_t joined = 0;          ///< Saddles only: 1 if the inside corners are joined.
-  std::uint32_t first_segment = 0;  ///< Its segments are this one and, in a saddle, the next.
+  std::uint8_t corners = 0;  ///< The case, 1 to 14.
+  std::uint8_t joined = 0;   ///< Saddles only: 1 if the inside corners are joined.
+  /// Its segments are this one and, in a saddle, the next. If one runs through edge 0, this does.
+  std::uint32_t first_segment = 0;
 
   bool IsSaddle() const { return corners == 5 || corners == 10; }
 };
@@ -42,7 +43,6 @@ struct LatticePoint {
 struct TileBits {
   BitRows inside{};                                  ///< Node is inside.
   BitRows active{};                                  ///< Cell has inside and outside corners.
-  BitRows interior{};                                ///< All four corners of the cell are inside.
   std::uint32_t first_cell = 0;                      ///< Index of the tile's first active cell.
   std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below it.
 };
@@ -54,6 +54,7 @@ struct CrossingCounts {
 
 struct Crossings {
   std::vector<TileBits> tiles;
+  std::vector<BitRows> interior;  ///< By tile: all four corners of the cell are inside.
   std::vector<ActiveCell> cells;  ///< By tile, row, column.
   std::vector<Segment> segments;  ///< By cell.
 

@@ -1,4 +1,5 @@
-// The interior cells as shapes: their staircase outline and their cover by rectangles.
+// The interior cells, in rows of bits by tile, as shapes: their staircase outline and their cover
+// by rectangles.
 #pragma once
 
 #include <array>
@@ -6,18 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "crossings.h"
 #include "lattice.h"
 
 namespace partiemc {
-
-/// Takes the cells that the rings run through, or that they ran over on their way from `roots`,
-/// out of the interior: what is left lies inside of the rings and does not touch them. `points` and
-/// `roots` are interleaved, in world units, one of each per point of the rings.
-/// Cost: linear in the points.
-void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
-                         std::span<const std::uint32_t> offsets, std::span<const double> roots,
-                         double cell_size, std::vector<TileBits>& tiles);
 
 /// Closed loops along lattice edges with interior cells on the left: outlines counter-clockwise,
 /// voids clockwise. Only the corners are listed. Where two interior cells touch at a node only, the
@@ -30,7 +22,7 @@ struct Staircases {
 };
 
 /// Cost: linear in tiles and in the length of the loops.
-void TraceStaircases(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> interior,
                      Staircases& staircases);
 
 /// `width` x `height` cells from the cell `corner` on, to the right and upwards.
@@ -48,7 +40,7 @@ struct MergeScratch {
 /// Covers the interior cells with disjoint rectangles (paper, section 3.8): rows are scanned, each
 /// free cell grows along its row, then by whole rows. Appends to `rectangles` in that order.
 /// Cost: linear in cells, as section 3.7 claims.
-void MergeCells(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+void MergeCells(const TileDirectory& directory, std::span<const BitRows> interior,
                 MergeScratch& scratch, std::vector<CellRectangle>& rectangles);
 
 }  // namespace partiemc

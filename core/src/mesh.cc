@@ -7,6 +7,7 @@
 #include "bits.h"
 #include "parallel.h"
 #include "predicates.h"
+#include "touched_cells.h"
 
 namespace partiemc {
 namespace {
@@ -119,7 +120,7 @@ void MeshBuilder::ForEachRectangle(Visit visit) const {
   if (input_.parameters.fill != Fill::kGrid) return;
   for (std::uint32_t tile = 0; tile < input_.directory.size(); ++tile) {
     for (int j = 0; j < kTileSize; ++j) {
-      for (std::uint32_t row = input_.crossings.tiles[tile].interior[j]; row != 0; row &= row - 1) {
+      for (std::uint32_t row = scratch_.interior[tile][j]; row != 0; row &= row - 1) {
         visit(CellRectangle{{tile, std::countr_zero(row), j}, 1, 1});
       }
     }
@@ -128,12 +129,12 @@ void MeshBuilder::ForEachRectangle(Visit visit) const {
 
 // Finds the shapes of the interior.
 void MeshBuilder::FindShapes() {
-  const std::vector<TileBits>& tiles = input_.crossings.tiles;
+  const std::span<const BitRows> interior = scratch_.interior;
   scratch_.rectangles.clear();
-  ParallelInvoke([&] { TraceStaircases(input_.directory, tiles, scratch_.staircases); },
+  ParallelInvoke([&] { TraceStaircases(input_.directory, interior, scratch_.staircases); },
                  [&] {
                    if (input_.parameters.fill != Fill::kGreedy) return;
-                   MergeCells(input_.directory, tiles, scratch_.merge, scratch_.rectangles);
+                   MergeCells(input_.directory, interior, scratch_.merge, scratch_.rectangles);
                  });
 }
 
@@ -204,8 +205,8 @@ void MeshBuilder::MoveVertices() {
 
 std::uint64_t MeshBuilder::CountInteriorCells() const {
   std::uint64_t count = 0;
-  for (const TileBits& bits : input_.crossings.tiles) {
-    for (const std::uint32_t row : bits.interior) count += CountBits(row);
+  for (const BitRows& rows : scratch_.interior) {
+    for (const std::uint32_t row : rows) count += CountBits(row);
   }
   return count;
 }
@@ -255,9 +256,10 @@ std::uint64_t MeshBuilder::CountFolded() const {
 
 absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
   mesh_.Clear();
+  scratch_.interior = input_.crossings.interior;
   if (input_.parameters.placement == Placement::kVirtualPlane) {
     ExcludeTouchedCells(input_.directory, input_.rings.points, input_.rings.offsets,
-                        input_.placed.roots, input_.scale.cell_size, input_.crossings.tiles);
+                        input_.placed.roots, input_.scale.cell_size, scratch_.interior);
   }
   FindShapes();
   const Fill fill = input_.parameters.fill;

@@ -19,6 +19,7 @@ namespace partiemc {
 
 /// Warm buffers of BuildMesh.
 struct MeshScratch {
+  std::vector<BitRows> interior;  // The interior cells that no ring touches, by tile.
   Staircases staircases;
   MergeScratch merge;
   std::vector<CellRectangle> rectangles;
@@ -29,7 +30,7 @@ struct MeshScratch {
 
 struct MeshInput {
   const TileDirectory& directory;
-  Crossings& crossings;             ///< Interior cells that the rings touch are taken out.
+  const Crossings& crossings;
   const RingScratch& ring_scratch;  ///< Components, and the outer rings of them.
   const RingTopology& topology;
   const std::vector<CellPlane>& planes;

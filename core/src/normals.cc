@@ -4,38 +4,40 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <tuple>
 
-#include "cells_by_row.h"
 #include "parallel.h"
 
 namespace partiemc {
 namespace {
 
-auto KeyOf(const CellNormal& normal) { return std::tuple(normal.row, normal.column); }
+// Orders cells by row, then column, as State::normals are.
+std::int64_t KeyOf(const CellNormal& normal) {
+  return (std::int64_t{normal.row} << 32) + normal.column;
+}
 
-CellNormal KeyOf(const TileDirectory& directory, const ActiveCell& cell) {
+// The place of a cell, without its normal.
+CellNormal PlaceOf(const TileDirectory& directory, const ActiveCell& cell) {
   const TileCoordinate& tile = directory[cell.tile];
-  CellNormal key;
-  key.column = (tile.x << kTileShift) + cell.i;
-  key.row = (tile.y << kTileShift) + cell.j;
-  return key;
+  return {(tile.x << kTileShift) + cell.i, (tile.y << kTileShift) + cell.j, 0, 0};
 }
 
 constexpr std::uint32_t kNone = 0xffffffff;
 
-// Finds the normals that cells had in the frame before: both are in one order. A saddle has two
-// planes and so no normal of its own to remember.
-void MatchPrevious(std::span<const CellNormal> previous, const TileDirectory& directory,
-                   const Crossings& crossings, NormalScratch& scratch) {
+// Finds the normals that the cells of `order` had in the frame before: both are in one order.
+// Writes the cells' places to `next`.
+void MatchPrevious(std::span<const CellNormal> previous, std::span<const std::uint32_t> order,
+                   const TileDirectory& directory, const Crossings& crossings,
+                   NormalScratch& scratch, std::vector<CellNormal>& next) {
   scratch.previous.assign(crossings.cells.size(), kNone);
-  std::uint32_t next = 0;
-  for (const std::uint32_t index : scratch.order) {
-    const ActiveCell& cell = crossings.cells[index];
-    const auto key = KeyOf(KeyOf(directory, cell));
-    while (next < previous.size() && KeyOf(previous[next]) < key) ++next;
-    if (next == previous.size()) return;
-    if (KeyOf(previous[next]) == key && !cell.IsSaddle()) scratch.previous[index] = next;
+  next.resize(order.size());
+  std::uint32_t before = 0;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    next[k] = PlaceOf(directory, crossings.cells[order[k]]);
+    const std::int64_t key = KeyOf(next[k]);
+    while (before < previous.size() && KeyOf(previous[before]) < key) ++before;
+    if (before < previous.size() && KeyOf(previous[before]) == key) {
+      scratch.previous[order[k]] = before;
+    }
   }
 }
 
@@ -138,18 +140,16 @@ void Keep(const ActiveCell& cell, std::uint32_t index, const CellPlane& plane,
   scratch.normal[index] = {static_cast<float>(plane.normal_x), static_cast<float>(plane.normal_y)};
 }
 
-// The cell normals to remember, in the order of rows.
-void Remember(const TileDirectory& directory, const Crossings& crossings,
-              const NormalScratch& scratch, std::vector<CellNormal>& next) {
-  next.clear();
-  for (const std::uint32_t index : scratch.order) {
-    const auto& [x, y] = scratch.normal[index];
+// Gives the places in `next` their cells' normals; those without one go.
+void Remember(std::span<const std::uint32_t> order, const NormalScratch& scratch,
+              std::vector<CellNormal>& next) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto& [x, y] = scratch.normal[order[k]];
     if (x == 0 && y == 0) continue;
-    CellNormal normal = KeyOf(directory, crossings.cells[index]);
-    normal.x = x;
-    normal.y = y;
-    next.push_back(normal);
+    next[kept++] = {next[k].column, next[k].row, x, y};
   }
+  next.resize(kept);
 }
 
 }  // namespace
@@ -160,10 +160,10 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
                      std::span<const CellNormal> previous, NormalScratch& scratch,
                      std::vector<CellPlane>& planes, std::vector<CellNormal>& next) {
   if (!parameters.normal_memory) previous = {};
-  scratch.order.clear();
-  ForEachCellByRow(bins.tiles, crossings, scratch.next_cell,
-                   [&](std::uint32_t cell) { scratch.order.push_back(cell); });
-  MatchPrevious(previous, bins.tiles, crossings, scratch);
+  // A saddle has two planes and so no normal of its own to remember.
+  const std::span<const std::uint32_t> order = scratch.cells_by_row.List(
+      bins.tiles, crossings, [](const ActiveCell& cell) { return !cell.IsSaddle(); });
+  MatchPrevious(previous, order, bins.tiles, crossings, scratch, next);
   // The normal that a cell had in the frame before, or nullptr.
   const auto previous_of = [&](std::uint32_t cell) {
     const std::uint32_t index = scratch.previous[cell];
@@ -225,7 +225,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       Keep(planes[k].cell, index, planes[k], scratch);
     }
   }
-  Remember(bins.tiles, crossings, scratch, next);
+  Remember(order, scratch, next);
 }
 
 }  // namespace partiemc

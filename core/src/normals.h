@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "cells_by_row.h"
 #include "crossings.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
@@ -42,11 +43,10 @@ inline constexpr double kWeakGradientSquare = 1e-3;
 
 /// Warm buffers of EstimateNormals.
 struct NormalScratch {
-  std::vector<std::uint32_t> order;     ///< Active cells in the order of State::normals.
+  CellsByRow cells_by_row;
   std::vector<std::uint32_t> previous;  ///< By active cell: which of the previous normals is its.
   /// By active cell: its normal to remember; 0 where it has none.
   std::vector<std::array<float, 2>> normal;
-  std::vector<std::uint32_t> next_cell;
 };
 
 /// One plane per segment of `rings`, in their order. `previous` are the cell normals of the frame

@@ -118,11 +118,11 @@ void RelateByNodes(const RingHistory& previous, const RingsNow& now, RelationScr
     if (AreOfOneKind(previous, now, before, number)) relations.push_back({before, number, nodes});
   };
   MoveRuns(previous.runs, s.shift_before, s.moved);
-  FindSharedNodes(s.moved, now.runs, s.shared);
+  FindSharedNodes(s.moved, now.runs, s.newest, s.shared);
   for (const SharedNodes& pair : s.shared) add(pair.a, pair.b, pair.nodes);
   if (AnyMoves(s.shift_now)) {
     MoveRuns(now.runs, s.shift_now, s.moved);
-    FindSharedNodes(s.moved, previous.runs, s.shared);
+    FindSharedNodes(s.moved, previous.runs, s.newest, s.shared);
     for (const SharedNodes& pair : s.shared) add(pair.b, pair.a, pair.nodes);
   }
   Unite(relations);
@@ -211,7 +211,7 @@ void MarkCounting(RelationScratch& s, std::vector<RingRelation>& relations) {
 // it, or velocities that are wrong. Not outer rings whose samples have told otherwise.
 void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
                 std::vector<RingRelation>& relations) {
-  FindSharedNodes(previous.runs, now.runs, s.shared);
+  FindSharedNodes(previous.runs, now.runs, s.newest, s.shared);
   for (const SharedNodes& pair : s.shared) {
     if (!AreOfOneKind(previous, now, pair.a, pair.b)) continue;
     if (s.linked_before[pair.a] || s.linked_now[pair.b]) continue;

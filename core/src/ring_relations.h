@@ -37,6 +37,7 @@ struct RelationScratch {
   std::vector<std::int64_t> ways;
   std::vector<NodeRun> moved;
   std::vector<SharedNodes> shared;
+  std::vector<std::uint32_t> newest;  // For FindSharedNodes.
   std::vector<std::uint64_t> nodes_before, nodes_now;
   std::vector<std::uint32_t> sample_count;  // By ring of the last frame.
   std::vector<std::uint64_t> told;          // By number: nodes that the samples account for.

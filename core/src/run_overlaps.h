@@ -27,12 +27,13 @@ void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of
               std::vector<NodeRun>& moved);
 
 /// Writes to `shared` the pairs of rings that share nodes, by a, then b, each once. `a_runs` are
-/// sorted by row, then column; `b_runs` are disjoint too.
+/// sorted by row, then column; `b_runs` are disjoint too. `newest` is scratch, by ring of `a_runs`.
 /// Moved rings that pile up on each other could meet any number of times: beyond 16 encounters a
 /// run, `shared` is left empty. Runs that are where they were, or moved without collisions, meet
-/// at most once each. Cost: linear in runs, n log n in encounters.
+/// at most once each. Cost: linear in runs and their rings, n log n in pairs of rings, at worst in
+/// encounters.
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
-                     std::vector<SharedNodes>& shared);
+                     std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared);
 
 /// Nodes of a run.
 inline std::uint64_t NodeCount(std::int32_t first, std::int32_t last) {

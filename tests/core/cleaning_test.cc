@@ -71,7 +71,7 @@ TEST(Cleaning, TheCellsOfADroppedHoleBecomeInterior) {
              Plain(true));
   dropped.RunOn(Holed{32, 32, 0.75}, kLow, kHigh, At({{24, 32}}), Plain(true));
   for (std::size_t tile = 0; tile < full.crossings.tiles.size(); ++tile) {
-    EXPECT_EQ(full.crossings.tiles[tile].interior, dropped.crossings.tiles[tile].interior);
+    EXPECT_EQ(full.crossings.interior[tile], dropped.crossings.interior[tile]);
   }
   EXPECT_EQ(full.result.rings.points, dropped.result.rings.points);
 }
@@ -215,7 +215,7 @@ TEST(Cleaning, WhatLiesInDroppedSprayGoesWithItAndItsNodesAreOutside) {
   EXPECT_EQ(stages.result.mesh, body.result.mesh);
   for (std::size_t tile = 0; tile < body.crossings.tiles.size(); ++tile) {
     EXPECT_EQ(stages.crossings.tiles[tile].inside, body.crossings.tiles[tile].inside);
-    EXPECT_EQ(stages.crossings.tiles[tile].interior, body.crossings.tiles[tile].interior);
+    EXPECT_EQ(stages.crossings.interior[tile], body.crossings.interior[tile]);
   }
   // With one particle less to ask for, the outermost stays, and what is in it is judged by itself.
   parameters.min_component_particles = 5;

@@ -137,7 +137,7 @@ TEST(Crossings, UniformCellsAreNotActive) {
   const Contour full = OneCell(CornersOf(15));
   EXPECT_EQ(full.CellOn(10, 10), nullptr);
   EXPECT_EQ(full.crossings.cells.size(), 8u);  // Those around it.
-  EXPECT_EQ(full.crossings.tiles[0].interior[10], std::uint32_t{1} << 10);
+  EXPECT_EQ(full.crossings.interior[0][10], std::uint32_t{1} << 10);
 }
 
 TEST(Crossings, AValueOfExactlyZeroIsOutside) {

@@ -149,8 +149,8 @@ TEST(Mesh, GridHasTwoTrianglesForEachInteriorCellAndGreedyFewer) {
   support::Stages stages;
   stages.Run(support::Lattice(34, 67), {.fill = Fill::kGrid, .spacing = 1.0});
   std::size_t cells = 0;
-  for (const TileBits& bits : stages.crossings.tiles) {
-    for (const std::uint32_t row : bits.interior) cells += std::popcount(row);
+  for (const BitRows& rows : stages.mesh_scratch.interior) {
+    for (const std::uint32_t row : rows) cells += std::popcount(row);
   }
   const auto& classes = stages.result.mesh.classes;
   EXPECT_EQ(std::count(classes.begin(), classes.end(), TriangleClass::kInterior),
@@ -172,16 +172,16 @@ TEST_P(GreedyRectangles, AreDisjointAndCoverTheInteriorCellsExactly) {
     }
   }
   directory.Seal();
-  std::vector<TileBits> tiles(directory.size());
+  std::vector<BitRows> interior(directory.size());
   const double density = random.Uniform(0.5, 1);
-  for (TileBits& bits : tiles) {
-    for (std::uint32_t& row : bits.interior) {
+  for (BitRows& rows : interior) {
+    for (std::uint32_t& row : rows) {
       for (int i = 0; i < 32; ++i) row |= std::uint32_t{random.Chance(density)} << i;
     }
   }
   MergeScratch scratch;
   std::vector<CellRectangle> rectangles;
-  MergeCells(directory, tiles, scratch, rectangles);
+  MergeCells(directory, interior, scratch, rectangles);
   std::map<std::pair<std::int64_t, std::int64_t>, int> covered;
   for (const CellRectangle& r : rectangles) {
     ASSERT_GT(r.width, 0);
@@ -193,17 +193,17 @@ TEST_P(GreedyRectangles, AreDisjointAndCoverTheInteriorCellsExactly) {
       }
     }
   }
-  std::size_t interior = 0;
-  for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
+  std::size_t cells = 0;
+  for (std::size_t tile = 0; tile < interior.size(); ++tile) {
     for (int j = 0; j < 32; ++j) {
       for (int i = 0; i < 32; ++i) {
-        if ((tiles[tile].interior[j] >> i & 1) == 0) continue;
-        ++interior;
+        if ((interior[tile][j] >> i & 1) == 0) continue;
+        ++cells;
         EXPECT_EQ((covered[{32 * directory[tile].x + i, 32 * directory[tile].y + j}]), 1);
       }
     }
   }
-  EXPECT_EQ(covered.size(), interior);
+  EXPECT_EQ(covered.size(), cells);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, GreedyRectangles, testing::Range(1, 11));
@@ -214,21 +214,21 @@ TEST(Mesh, ARectangleOfCellsIsOneRectangleHoweverTilesCutIt) {
     for (std::int32_t x = 0; x <= 2; ++x) directory.Insert({y, x});
   }
   directory.Seal();
-  std::vector<TileBits> tiles(directory.size());
-  for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
+  std::vector<BitRows> interior(directory.size());
+  for (std::size_t tile = 0; tile < interior.size(); ++tile) {
     for (int j = 0; j < 32; ++j) {
       for (int i = 0; i < 32; ++i) {
         const int x = 32 * directory[tile].x + i;
         const int y = 32 * directory[tile].y + j;
         if (x >= 20 && x < 70 && y >= 10 && y < 80) {
-          tiles[tile].interior[j] |= std::uint32_t{1} << i;
+          interior[tile][j] |= std::uint32_t{1} << i;
         }
       }
     }
   }
   MergeScratch scratch;
   std::vector<CellRectangle> rectangles;
-  MergeCells(directory, tiles, scratch, rectangles);
+  MergeCells(directory, interior, scratch, rectangles);
   ASSERT_EQ(rectangles.size(), 1u);
   EXPECT_EQ(directory[rectangles[0].corner.tile], (TileCoordinate{0, 0}));
   EXPECT_EQ(rectangles[0].corner.i, 20);
@@ -236,7 +236,7 @@ TEST(Mesh, ARectangleOfCellsIsOneRectangleHoweverTilesCutIt) {
   EXPECT_EQ(rectangles[0].width, 50);
   EXPECT_EQ(rectangles[0].height, 70);
   Staircases staircases;
-  TraceStaircases(directory, tiles, staircases);
+  TraceStaircases(directory, interior, staircases);
   EXPECT_EQ(staircases.corners.size(), 4u);
   EXPECT_EQ(staircases.pinches, 0u);
 }
@@ -246,11 +246,11 @@ TEST(Mesh, CellsThatTouchAtANodeOnlyArePinchedThere) {
   directory.Insert({0, 0});
   directory.Seal();
   for (const bool rising : {true, false}) {
-    std::vector<TileBits> tiles(1);
-    tiles[0].interior[5] = rising ? 1u << 5 : 1u << 6;
-    tiles[0].interior[6] = rising ? 1u << 6 : 1u << 5;
+    std::vector<BitRows> interior(1);
+    interior[0][5] = rising ? 1u << 5 : 1u << 6;
+    interior[0][6] = rising ? 1u << 6 : 1u << 5;
     Staircases staircases;
-    TraceStaircases(directory, tiles, staircases);
+    TraceStaircases(directory, interior, staircases);
     EXPECT_EQ(staircases.offsets, (std::vector<std::uint32_t>{0, 4, 8}));
     EXPECT_EQ(staircases.pinches, 1u);
   }

@@ -46,7 +46,8 @@ Shared ByNodes(const std::vector<NodeRun>& a_runs, const std::vector<CellShift>&
 
 Shared Found(const std::vector<NodeRun>& a_runs, const std::vector<NodeRun>& b_runs) {
   std::vector<SharedNodes> pairs;
-  FindSharedNodes(a_runs, b_runs, pairs);
+  std::vector<std::uint32_t> newest;
+  FindSharedNodes(a_runs, b_runs, newest, pairs);
   Shared shared;
   for (const SharedNodes& pair : pairs) {
     EXPECT_TRUE(shared.emplace(std::pair(pair.a, pair.b), pair.nodes).second);
