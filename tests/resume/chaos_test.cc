@@ -4,8 +4,6 @@
 
 #include <atomic>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <string>
 #include <thread>
@@ -15,10 +13,10 @@
 #include "resume/options.h"
 #include "resume/workload.h"
 #include "server/server.h"
-#include "service/server_process.h"
 #include "support/certificates.h"
 #include "support/chaos_proxy.h"
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::resume {
 namespace {
@@ -139,14 +137,10 @@ TEST_F(Chaos, FlippedBitsNeverLoseDoubleOrReorderInSilence) {
 TEST_F(Chaos, FlippedBitsUnderTlsAreSeenInNoAnswer) {
   const CertificateAuthority authority("authority");
   const IssuedCertificate identity = authority.Issue("server");
-  const auto write = [](const std::string& name, const std::string& text) {
-    std::string path = server::TemporaryPath(name);
-    std::ofstream(path) << text;
-    return path;
-  };
-  credentials_ = {.tls = true, .ca_file = write("ca.pem", authority.certificate())};
-  const server::TlsFiles files{.certificate = write("server.pem", identity.certificate),
-                               .key = write("server.key", identity.key)};
+  const support::TemporaryFolder folder;
+  credentials_ = {.tls = true, .ca_file = folder.Write("ca.pem", authority.certificate())};
+  const server::TlsFiles files{.certificate = folder.Write("server.pem", identity.certificate),
+                               .key = folder.Write("server.key", identity.key)};
   server::ServerOptions options;
   options.tls = files;
   ASSERT_NO_FATAL_FAILURE(Serve(options));
@@ -163,9 +157,6 @@ TEST_F(Chaos, FlippedBitsUnderTlsAreSeenInNoAnswer) {
   std::printf("%llu bits flipped, %zu reconnections, %zu answers\n",
               static_cast<unsigned long long>(proxy_->flipped()),
               outcome.history.reconnections.size(), outcome.history.answers.size());
-  for (const std::string& path : {credentials_.ca_file, files.certificate, files.key}) {
-    std::filesystem::remove(path);
-  }
 }
 
 // The proof that the validators can fail.

@@ -112,13 +112,13 @@ Fleet::Fleet(std::size_t count) : servers_(count), addresses_(count) {
 }
 
 void Fleet::Start(std::size_t server, const std::string& address) {
-  const std::string port_file = server::TemporaryPath("port");
+  const support::TemporaryFolder folder;
+  const std::string port_file = folder.Path("port");
   servers_[server] = std::make_unique<server::ServerProcess>(
       std::vector<std::string>{"--address", address, "--port-file", port_file});
   WaitFor([&] { return std::filesystem::exists(port_file); }, "a server");
   addresses_[server] = server::FileText(port_file);
   if (!addresses_[server].empty()) addresses_[server].pop_back();  // The end of the line.
-  std::filesystem::remove(port_file);
 }
 
 void Fleet::KillAndRestart(std::size_t server) {
@@ -147,20 +147,20 @@ std::string DoorName(Door door) {
 }
 
 ProxyProcess::ProxyProcess(Door door, const std::vector<std::string>& servers)
-    : folder_(server::TemporaryPath("proxy")), socket_(folder_ + "/socket") {
-  std::filesystem::create_directory(folder_);
-  const std::string file = folder_ + "/configuration";
+    : socket_(folder_.Path("socket")) {
+  const std::string folder = folder_.path().string();
+  const std::string file = folder_.Path("configuration");
   const bool is_nginx = door == Door::kNginx;
-  std::ofstream(file) << (is_nginx ? NginxFile(folder_, socket_, servers)
+  std::ofstream(file) << (is_nginx ? NginxFile(folder, socket_, servers)
                                    : HaproxyFile(socket_, servers));
   std::vector<std::string> arguments =
       is_nginx ? std::vector<std::string>{"nginx",
                                           "-p",
-                                          folder_,
+                                          folder,
                                           "-c",
                                           file,
                                           "-e",
-                                          folder_ + "/error.log"}
+                                          folder_.Path("error.log")}
                : std::vector<std::string>{"haproxy", "-db", "-q", "-f", file};
   // Debian has both where a plain user's search path does not look.
   arguments.front() = "/usr/sbin/" + arguments.front();
@@ -178,8 +178,6 @@ ProxyProcess::~ProxyProcess() {
     kill(process_, SIGKILL);
     waitpid(process_, nullptr, 0);
   }
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
 }
 
 }  // namespace partiemc::resume

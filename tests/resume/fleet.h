@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "service/server_process.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::resume {
 
@@ -52,7 +53,8 @@ class ProxyProcess {
   std::string address() const { return "unix:" + socket_; }
 
  private:
-  std::string folder_, socket_;
+  support::TemporaryFolder folder_;
+  std::string socket_;
   pid_t process_ = 0;
 };
 

@@ -29,12 +29,6 @@ std::vector<std::string> With(std::vector<std::string> arguments, const std::str
 
 }  // namespace
 
-std::string TemporaryPath(const std::string& name) {
-  static int count = 0;
-  return ::testing::TempDir() + "/partiemc_" + std::to_string(getpid()) + "_" +
-         std::to_string(count++) + "_" + name;
-}
-
 std::string FileText(const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
@@ -42,14 +36,15 @@ std::string FileText(const std::string& path) {
 }
 
 ServerProcess::ServerProcess(std::vector<std::string> arguments)
-    : output_(TemporaryPath("output")) {
+    : folder_(std::make_unique<support::TemporaryFolder>()) {
+  const std::string output = folder_->Path("output");
   arguments.insert(arguments.begin(), PARTIEMC_SERVER);
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output_.c_str(),
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
                                    O_CREAT | O_TRUNC | O_WRONLY, 0600);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
   EXPECT_EQ(posix_spawn(&process_, argv[0], &actions, nullptr, argv.data(), environ), 0);
@@ -61,12 +56,10 @@ ServerProcess::~ServerProcess() {
     kill(process_, SIGKILL);
     Wait();
   }
-  std::error_code ignored;
-  if (!output_.empty()) std::filesystem::remove(output_, ignored);
 }
 
 ServerProcess::ServerProcess(ServerProcess&& other) noexcept
-    : output_(std::exchange(other.output_, {})), process_(std::exchange(other.process_, 0)) {}
+    : folder_(std::move(other.folder_)), process_(std::exchange(other.process_, 0)) {}
 
 void ServerProcess::Signal(int signal) { kill(process_, signal); }
 
@@ -127,16 +120,16 @@ int RunServer(const std::vector<std::string>& arguments, std::string* output) {
 }
 
 ServingProcess::ServingProcess(std::vector<std::string> arguments)
-    : port_file_(TemporaryPath("port")), process_(With(std::move(arguments), port_file_)) {
-  while (!std::filesystem::exists(port_file_)) {
+    : process_(With(std::move(arguments), folder_.Path("port"))) {
+  const std::string port_file = folder_.Path("port");
+  while (!std::filesystem::exists(port_file)) {
     if (const auto code = process_.WaitFor(std::chrono::milliseconds(5))) {
       throw std::runtime_error("the server left with " + std::to_string(*code) + ": " +
                                process_.Output());
     }
   }
-  address_ = FileText(port_file_);
+  address_ = FileText(port_file);
   address_.pop_back();  // The end of the line.
-  std::filesystem::remove(port_file_);
 }
 
 }  // namespace partiemc::server

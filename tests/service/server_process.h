@@ -5,19 +5,20 @@
 
 #include <chrono>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace partiemc::server {
+#include "support/temporary_folder.h"
 
-/// A path in the tests' temporary folder that no other test has.
-std::string TemporaryPath(const std::string& name);
+namespace partiemc::server {
 
 std::string FileText(const std::string& path);
 
-/// partiemc-server with these arguments, its output in a file. Killed when it goes out of scope.
+/// partiemc-server with these arguments, its output in a file. Both are gone when this
+/// goes out of scope.
 class ServerProcess {
  public:
   explicit ServerProcess(std::vector<std::string> arguments);
@@ -31,7 +32,7 @@ class ServerProcess {
   /// As Wait; nothing if it is still there after `time`.
   std::optional<int> WaitFor(std::chrono::milliseconds time);
 
-  std::string Output() const { return FileText(output_); }
+  std::string Output() const { return FileText(folder_->Path("output")); }
   pid_t process() const { return process_; }
 
   // While it runs:
@@ -44,7 +45,7 @@ class ServerProcess {
   std::optional<int> Reap(int options);
   double StatusNumber(const std::string& field) const;
 
-  std::string output_;
+  std::unique_ptr<const support::TemporaryFolder> folder_;
   pid_t process_ = 0;
 };
 
@@ -60,7 +61,7 @@ class ServingProcess {
   const ServerProcess& process() const { return process_; }
 
  private:
-  std::string port_file_;
+  support::TemporaryFolder folder_;
   ServerProcess process_;
   std::string address_;
 };
