@@ -2,13 +2,13 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 #include <vector>
@@ -20,12 +20,6 @@ namespace partiemc::bench {
 namespace {
 
 constexpr double kStartDeadlineMs = 20'000;
-
-std::filesystem::path NewFolder() {
-  std::string folder = (std::filesystem::temp_directory_path() / "partiemc_bench_XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) Fail("cannot create a temporary folder " + folder);
-  return folder;
-}
 
 // Starts a process that ends with this one, however that ends.
 pid_t Spawn(std::vector<std::string> arguments, const std::filesystem::path& log) {
@@ -48,7 +42,7 @@ pid_t Spawn(std::vector<std::string> arguments, const std::filesystem::path& log
 
 }  // namespace
 
-ServerProcess::ServerProcess(Transport transport) : folder_(NewFolder()) {
+ServerProcess::ServerProcess(Transport transport) {
   const std::filesystem::path port_file = folder_ / "address", log = folder_ / "log";
   const std::string listen = transport == Transport::kTcp ? std::string("127.0.0.1:0")
                                                           : "unix:" + (folder_ / "socket").string();
@@ -73,8 +67,6 @@ ServerProcess::~ServerProcess() {
   kill(process_, SIGTERM);
   int status = 0;
   waitpid(process_, &status, 0);
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
 }
 
 double ServerProcess::CpuMs() const {

@@ -3,8 +3,9 @@
 
 #include <sys/types.h>
 
-#include <filesystem>
 #include <string>
+
+#include "support/temporary_folder.h"
 
 namespace partiemc::bench {
 
@@ -30,7 +31,7 @@ class ServerProcess {
  private:
   double StatusMb(const std::string& field) const;
 
-  std::filesystem::path folder_;
+  support::TemporaryFolder folder_;
   std::string address_;
   pid_t process_ = 0;
 };
