@@ -2,18 +2,19 @@
 // say, does not meet itself, nor the run after it if that goes to the right, too: on contours this
 // leaves hardly any pairs of neighbours, by comparisons of coordinates alone.
 //
-// Other runs are found in hash grids, one per size of runs: a run lies in the grid whose cells are
-// just larger than its box, in the cell of its lower left corner, and so in one cell of one grid
-// only, however long it is. It is compared with runs of its own grid and of coarser ones, of which
-// few cells can hold runs that reach it.
+// A short ring whose box touches no other ring's is searched by itself, each run against all of the
+// later ones. Other runs are found in hash grids, one per size of runs: a run lies in the grid
+// whose cells are just larger than its box, in the cell of its lower left corner, and so in one
+// cell of one grid only, however long it is. It is compared with runs of its own grid and of
+// coarser ones, of which few cells can hold runs that reach it.
 #include "intersections.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <bit>
 #include <limits>
 
+#include "hash_grids.h"
 #include "parallel.h"
 #include "predicates.h"
 
@@ -25,101 +26,18 @@ using Run = TouchingPairsBuffers::Run;
 // Segments of a run. Longer ones have larger boxes, of which more overlap.
 constexpr std::uint32_t kRunLength = 8;
 
+// Runs of a short ring. Comparing a run with all others of so many costs less than to find those
+// near it.
+constexpr std::uint32_t kShortRingRuns = 64;
+
 // Directions that all segments of a run may have.
 constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-// Bits for the column and for the row of a cell, and for the level of its grid, in one key.
-constexpr int kIndexBits = 29;
-constexpr int kLevelBits = 5;
-constexpr int kLevels = 1 << kLevelBits;
-static_assert(2 * kIndexBits + kLevelBits <= 64);
-
-// A run's box is this much smaller than its cell, so that rounding of an index to the wrong side of
-// a cell's border cannot put it two cells away from one that it touches. Any value well above
-// 2^-24, the error of an index, will do.
-constexpr double kSlack = 1.0 + 0x1p-10;
-
 struct Segment {
   Point a, b;
 };
-
-/// A box around points.
-struct Box {
-  double left = std::numeric_limits<double>::infinity(), bottom = left, right = -left, top = -left;
-
-  void Add(const Point& point) {
-    left = std::min(left, point.x);
-    bottom = std::min(bottom, point.y);
-    right = std::max(right, point.x);
-    top = std::max(top, point.y);
-  }
-};
-
-template <typename AnyBox>
-double Extent(const AnyBox& box) {
-  return std::max(box.right - box.left, box.top - box.bottom);
-}
-
-template <typename BoxA, typename BoxB>
-bool BoxesTouch(const BoxA& a, const BoxB& b) {
-  return a.right >= b.left && b.right >= a.left && a.top >= b.bottom && b.top >= a.bottom;
-}
-
-/// Level k has square cells of side `finest` * 2^k.
-class Grids {
- public:
-  Grids(const Box& bounds, double mean_extent)
-      : origin_{bounds.left, bounds.bottom},
-        // Cells of twice the mean extent hold almost all runs of a contour in one grid and
-        // still make few candidates; the second bound keeps
-        // indices below 2^27, the third keeps sizes above zero when all points coincide.
-        finest_(std::max(
-            {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {
-    for (int level = 0; level < kLevels; ++level) per_length_[level] = 1 / CellSize(level);
-  }
-
-  /// The first level whose cells hold a box of `extent`; 28 at most, by the bounds of the finest.
-  int LevelFor(double extent) const {
-    int level = 0;
-    while (level + 1 < kLevels && CellSize(level) < kSlack * extent) ++level;
-    return level;
-  }
-
-  double CellSize(int level) const { return finest_ * static_cast<double>(1u << level); }
-
-  std::int64_t Column(double x, int level) const {
-    return static_cast<std::int64_t>((x - origin_.x) * per_length_[level]);
-  }
-  std::int64_t Row(double y, int level) const {
-    return static_cast<std::int64_t>((y - origin_.y) * per_length_[level]);
-  }
-
-  static std::uint64_t Key(int level, std::int64_t column, std::int64_t row) {
-    return static_cast<std::uint64_t>(level) << (2 * kIndexBits) |
-           static_cast<std::uint64_t>(row) << kIndexBits | static_cast<std::uint64_t>(column);
-  }
-
- private:
-  Point origin_;
-  double finest_;
-  std::array<double, kLevels> per_length_;  // By level: 1 / size of its cells.
-};
-
-// Cells of a block of this many by this many share a line of the cache: neighbours on a ring, and
-// all that they are compared with, are found in few of them.
-constexpr int kBlockBits = 2;
-constexpr std::uint64_t kInBlock = (1u << kBlockBits) - 1;
-constexpr std::size_t kBlockSlots = std::size_t{1} << (2 * kBlockBits);
-
-/// Fibonacci hashing of the block: the high bits of the product depend on all bits of the key.
-std::size_t SlotOf(std::uint64_t cell, std::size_t slot_count) {
-  const std::uint64_t block = cell & ~(kInBlock << kIndexBits | kInBlock);
-  const std::uint64_t in_block = (cell >> kIndexBits & kInBlock) << kBlockBits | (cell & kInBlock);
-  const std::uint64_t hash = (block * 0x9e3779b97f4a7c15u) >> 32;
-  return static_cast<std::size_t>(hash * kBlockSlots | in_block) & (slot_count - 1);
-}
 
 /// Whether `second`, which begins where `first` ends, lies on it for more than that point.
 bool FoldsBack(const Segment& first, const Segment& second) {
@@ -148,8 +66,9 @@ class PairSearch {
 
   void CollectRuns(std::span<const std::uint32_t> ring_offsets);
   void Measure(Run& run) const;
-  Grids MakeGrids() const;
-  void FillGrids(const Grids& grids);
+  void FindLoneRuns(std::span<const std::uint32_t> ring_offsets);
+  HashGrids MakeGrids() const;
+  void FillGrids(const HashGrids& grids);
 
   bool Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) const;
   template <typename Visit>
@@ -157,8 +76,10 @@ class PairSearch {
   template <typename Visit>
   void ForEachPairBetween(const Run& first, const Run& second, Visit visit) const;
   template <typename Visit>
-  void ForEachPair(const Grids& grids, std::uint32_t run, Visit visit) const;
-  bool FindPairs(const Grids& grids);
+  void ForEachPairInRing(std::uint32_t run, Visit visit) const;
+  template <typename Visit>
+  void ForEachPair(const HashGrids& grids, std::uint32_t run, Visit visit) const;
+  bool FindPairs(const HashGrids& grids);
 
   std::span<const double> points_;
   TouchingPairsBuffers& buffers_;
@@ -198,29 +119,61 @@ void PairSearch::Measure(Run& run) const {
   run.directions = static_cast<std::uint8_t>(directions);
 }
 
-Grids PairSearch::MakeGrids() const {
+/// Runs from the one that begins at segment `first` to the end of its ring.
+std::uint32_t RunsUpTo(std::uint32_t ring_end, std::uint32_t first) {
+  return (ring_end - first + kRunLength - 1) / kRunLength;
+}
+
+void PairSearch::FindLoneRuns(std::span<const std::uint32_t> ring_offsets) {
+  std::vector<Run>& runs = buffers_.runs;
+  std::vector<Box>& boxes = buffers_.ring_boxes;
+  boxes.clear();
+  std::size_t next = 0;
+  for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
+    Box& box = boxes.emplace_back();
+    for (; next < runs.size() && runs[next].first < ring_offsets[ring + 1]; ++next) {
+      box.Add({runs[next].left, runs[next].bottom});
+      box.Add({runs[next].right, runs[next].top});
+    }
+  }
+  FindBoxesApart(boxes, buffers_.boxes_apart, buffers_.is_apart);
+  next = 0;
+  for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
+    const std::uint32_t count = RunsUpTo(ring_offsets[ring + 1], ring_offsets[ring]);
+    const bool is_alone = buffers_.is_apart[ring] != 0 && count <= kShortRingRuns;
+    for (const std::size_t end = next + count; next < end; ++next) runs[next].is_alone = is_alone;
+  }
+}
+
+HashGrids PairSearch::MakeGrids() const {
   Box bounds;
   double extents = 0;
+  std::size_t count = 0;
   for (const Run& run : buffers_.runs) {
+    if (run.is_alone) continue;
+    ++count;
     bounds.Add({run.left, run.bottom});
     bounds.Add({run.right, run.top});
     extents += Extent(run);
   }
-  return Grids(bounds, extents / static_cast<double>(buffers_.runs.size()));
+  return HashGrids(bounds, extents / static_cast<double>(std::max(count, std::size_t{1})));
 }
 
 /// Puts every run into its cell.
-void PairSearch::FillGrids(const Grids& grids) {
+void PairSearch::FillGrids(const HashGrids& grids) {
   std::vector<Run>& runs = buffers_.runs;
   std::vector<std::uint32_t>& slots = buffers_.slots;
-  slots.assign(std::max(std::bit_ceil(2 * runs.size()), kBlockSlots), kNone);
+  const auto count = static_cast<std::size_t>(
+      std::ranges::count_if(runs, [](const Run& run) { return !run.is_alone; }));
+  slots.assign(std::max(std::bit_ceil(2 * count), kBlockSlots), kNone);
   used_levels_ = 0;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     Run& run = runs[k];
+    if (run.is_alone) continue;
     const int level = grids.LevelFor(Extent(run));
     used_levels_ |= 1u << level;
     run.level = static_cast<std::uint8_t>(level);
-    run.cell = Grids::Key(level, grids.Column(run.left, level), grids.Row(run.bottom, level));
+    run.cell = HashGrids::Key(level, grids.Column(run.left, level), grids.Row(run.bottom, level));
     std::uint32_t& slot = slots[SlotOf(run.cell, slots.size())];
     run.next_in_slot = slot;
     slot = static_cast<std::uint32_t>(k);
@@ -265,15 +218,29 @@ void PairSearch::ForEachPairBetween(const Run& first, const Run& second, Visit v
   }
 }
 
+template <typename Visit>
+void PairSearch::ForEachPairInRing(std::uint32_t index, Visit visit) const {
+  const std::span<const Run> runs = buffers_.runs;
+  const Run& run = runs[index];
+  const std::uint32_t end = index + RunsUpTo(run.ring_end, run.first);
+  for (std::uint32_t other = index + 1; other < end; ++other) {
+    ForEachPairBetween(run, runs[other], visit);
+  }
+}
+
 /// Calls visit(i, j) for all pairs that count, of segments of a run and of later ones. What a run
 /// may touch has its lower left corner no farther to the right and above than its box, and less
 /// than a cell to the left and below.
 template <typename Visit>
-void PairSearch::ForEachPair(const Grids& grids, std::uint32_t index, Visit visit) const {
+void PairSearch::ForEachPair(const HashGrids& grids, std::uint32_t index, Visit visit) const {
   const std::span<const Run> runs = buffers_.runs;
   const std::span<const std::uint32_t> slots = buffers_.slots;
   const Run& run = runs[index];
   ForEachPairWithin(run, visit);
+  if (run.is_alone) {
+    ForEachPairInRing(index, visit);
+    return;
+  }
   for (int level = run.level; used_levels_ >> level != 0; ++level) {
     if ((used_levels_ >> level & 1u) == 0) continue;
     const std::int64_t first_column = std::max<std::int64_t>(grids.Column(run.left, level) - 1, 0);
@@ -284,7 +251,7 @@ void PairSearch::ForEachPair(const Grids& grids, std::uint32_t index, Visit visi
     const bool finds_all = run.level < level;
     for (std::int64_t row = first_row; row <= last_row; ++row) {
       for (std::int64_t column = first_column; column <= last_column; ++column) {
-        const std::uint64_t cell = Grids::Key(level, column, row);
+        const std::uint64_t cell = HashGrids::Key(level, column, row);
         for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNone;
              other = runs[other].next_in_slot) {
           if (runs[other].cell != cell || (!finds_all && other <= index)) continue;
@@ -296,7 +263,7 @@ void PairSearch::ForEachPair(const Grids& grids, std::uint32_t index, Visit visi
 }
 
 /// Finds out which runs find pairs; returns whether any does.
-bool PairSearch::FindPairs(const Grids& grids) {
+bool PairSearch::FindPairs(const HashGrids& grids) {
   std::atomic<bool> has_pair = false;
   ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t run) {
     bool finds_pair = false;
@@ -311,7 +278,8 @@ std::size_t PairSearch::Count(std::span<const std::uint32_t> ring_offsets) {
   CollectRuns(ring_offsets);
   buffers_.pairs.clear();
   if (buffers_.runs.empty()) return 0;
-  const Grids grids = MakeGrids();
+  FindLoneRuns(ring_offsets);
+  const HashGrids grids = MakeGrids();
   FillGrids(grids);
   // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
   // of threads.

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "point.h"
+#include "boxes_apart.h"
 
 namespace partiemc {
 
@@ -23,9 +23,13 @@ struct TouchingPairsBuffers {
     std::uint32_t next_in_slot = 0;      // A list of runs whose cells share a slot.
     std::uint8_t level = 0;              // Of its grid (intersections.cc).
     std::uint8_t directions = 0;         // In which all of its segments go (intersections.cc).
+    bool is_alone = false;               // Its ring is searched by itself (intersections.cc).
     bool finds_pair = false;             // Whether it is the earlier one of a pair that counts.
   };
   std::vector<Run> runs;
+  std::vector<Box> ring_boxes;
+  std::vector<std::uint8_t> is_apart;  // By ring.
+  BoxesApartScratch boxes_apart;
   std::vector<std::uint32_t> slots;
 
   /// Pairs that were counted, each segment named by the point that it begins at. At most as many as

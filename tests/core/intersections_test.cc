@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "predicates.h"
@@ -107,6 +108,26 @@ TEST(CountTouchingPairs, AgreesWithAllPairsForSegmentsOfVeryDifferentLengths) {
       const Point centre{testing::Uniform(random, -1, 1), testing::Uniform(random, -1, 1)};
       std::vector<Point> ring = testing::RandomStar(random, 3 + random() % 20);
       for (Point& point : ring) point = {centre.x + size * point.x, centre.y + size * point.y};
+      rings.AddLoop(ring);
+    }
+    EXPECT_EQ(Count(rings), CountAllPairs(rings)) << "seed " << seed;
+  }
+}
+
+/// Short rings that come near no other are searched by themselves, long ones and others are not.
+TEST(CountTouchingPairs, AgreesWithAllPairsWhetherRingsLieApartOrTogether) {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    Random random(seed);
+    Region rings;
+    for (int k = 0; k < 12; ++k) {
+      const Point centre{10 * (k + testing::Uniform(random, -1, 1)),
+                         testing::Uniform(random, -3, 3)};
+      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % (k % 4 == 0 ? 600 : 60));
+      for (Point& point : ring) point = {centre.x + 5 * point.x, centre.y + 5 * point.y};
+      // Crossings, near each other and far apart along the ring.
+      for (std::size_t swaps = random() % 3; swaps > 0; --swaps) {
+        std::swap(ring[random() % ring.size()], ring[random() % ring.size()]);
+      }
       rings.AddLoop(ring);
     }
     EXPECT_EQ(Count(rings), CountAllPairs(rings)) << "seed " << seed;
