@@ -69,7 +69,7 @@ void Components::UniteRuns(const TileDirectory& directory, const Crossings& cros
 }
 
 void Components::Label(const TileDirectory& directory, const Crossings& crossings) {
-  first_run_.resize(crossings.tiles.size() * kTileSize);
+  first_run_.resize(crossings.tiles.size() * kTileSize + 1);
   std::uint32_t runs = 0;
   for (std::size_t tile = 0; tile < crossings.tiles.size(); ++tile) {
     const BitRows& rows = crossings.tiles[tile].inside;
@@ -80,6 +80,7 @@ void Components::Label(const TileDirectory& directory, const Crossings& crossing
     }
     runs += full;
   }
+  first_run_.back() = runs;
   label_.resize(runs);
   std::iota(label_.begin(), label_.end(), 0u);
   for (std::uint32_t tile = 0; tile < crossings.tiles.size(); ++tile) {
@@ -104,26 +105,32 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
   return label_[RunAt(crossings, node)];
 }
 
-// The component of all inside nodes of a tile and of its cells' corners beyond it.
+// The component of all inside nodes of a tile and of its cells' corners beyond it. Runs are
+// numbered by tile, row, column, so that those of the tile are successive, and those of a row.
 std::uint32_t Components::ComponentSeenFrom(const TileDirectory& directory,
                                             const Crossings& crossings, std::uint32_t tile) const {
   std::uint32_t seen = kNoComponent;
-  const auto see = [&](const TilePlace& node) {
-    if (!IsInside(crossings, node)) return;
-    const std::uint32_t component = At(crossings, node);
-    if (seen == kNoComponent) seen = component;
-    if (seen != component) seen = kSeveralComponents;
+  const auto see = [&](std::uint32_t first, std::uint32_t count) {
+    if (count == 0) return;
+    if (seen == kNoComponent) seen = label_[first];
+    std::uint32_t differs = 0;
+    for (std::uint32_t run = first; run < first + count; ++run) differs |= label_[run] ^ seen;
+    if (differs != 0) seen = kSeveralComponents;
   };
-  for (int j = 0; j <= kTileSize && seen != kSeveralComponents; ++j) {
-    const TilePlace first = Normalise(directory, tile, 0, j);
-    if (first.tile != kNoTile) {
-      std::uint32_t starts = RunStarts(crossings.tiles[first.tile].inside[first.j]);
-      for (; starts != 0; starts &= starts - 1) {
-        see({first.tile, std::countr_zero(starts), first.j});
-      }
+  const auto see_left_nodes = [&](std::uint32_t other, int rows) {
+    for (int j = 0; other != kNoTile && j < rows; ++j) {
+      see(first_run_[other * kTileSize + j], crossings.tiles[other].inside[j] & 1);
     }
-    see(Normalise(directory, tile, kTileSize, j));
+  };
+  const Neighbourhood& near = directory.neighbours(tile);
+  const std::uint32_t first = first_run_[tile * kTileSize];
+  see(first, first_run_[(tile + 1) * kTileSize] - first);
+  if (const std::uint32_t above = near[7]; above != kNoTile) {
+    const std::uint32_t starts = RunStarts(crossings.tiles[above].inside[0]);
+    see(first_run_[above * kTileSize], static_cast<std::uint32_t>(CountBits(starts)));
   }
+  see_left_nodes(near[5], kTileSize);
+  see_left_nodes(near[8], 1);
   return seen;
 }
 

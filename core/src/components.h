@@ -61,7 +61,7 @@ class Components {
   void Unite(std::uint32_t a, std::uint32_t b);
   void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
 
-  // By tile * 32 + row. The rows of a tile that is all inside are one run.
+  // By tile * 32 + row, and in the end how many. The rows of a tile that is all inside are one run.
   std::vector<std::uint32_t> first_run_;
   std::vector<std::uint32_t> label_;  // By run: parent while uniting, then the component.
   std::vector<TileShare> shares_;     // By tile.

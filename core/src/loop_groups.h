@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,11 @@ class LoopGroups {
 
   /// Adds a point to the loop that is being made.
   void AddPoint(std::uint32_t point) { points_.push_back(point); }
+  /// Adds the points [first, last), one after the other.
+  void AddPoints(std::uint32_t first, std::uint32_t last) {
+    points_.resize(points_.size() + (last - first));
+    std::iota(points_.end() - (last - first), points_.end(), first);
+  }
   /// Ends that loop; with `reversed`, its points go the other way round.
   void EndLoop(std::uint32_t group, bool reversed = false);
 

@@ -65,7 +65,7 @@ void MeshBuilder::AddRingLoops() {
   const std::vector<std::uint32_t>& offsets =
       MovesVertices() ? input_.topology.offsets : input_.rings.offsets;
   for (std::uint32_t ring = 0; ring + 1 < offsets.size(); ++ring) {
-    for (std::uint32_t k = offsets[ring]; k < offsets[ring + 1]; ++k) scratch_.loops.AddPoint(k);
+    scratch_.loops.AddPoints(offsets[ring], offsets[ring + 1]);
     const std::uint32_t outer = input_.topology.outer_of[ring];
     scratch_.loops.EndLoop(outer == kNoRing ? ring : outer);
   }
