@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "measure.h"
+#include "parallel.h"
 #include "predicates.h"
 
 namespace partiemc {
@@ -63,10 +64,17 @@ int WindingNumber(const Rings& rings, std::size_t ring, const Point& point) {
   return winding;
 }
 
+void MeasureRings(Rings& rings) {
+  rings.measures.resize(rings.RingCount());
+  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
+    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
+  });
+}
+
 // Marks the rings that are turned inside out or lie on the wrong side of others, with those
-// around them. Of rings that do not cross, one is in its place if and only if the others wind
-// around its leftmost point as often as around the region outside of an outer ring (0), or around
-// the fluid that a hole lies in (1).
+// around them. Requires: rings were measured. Of rings that do not cross, one is in its place if
+// and only if the others wind around its leftmost point as often as around the region outside of an
+// outer ring (0), or around the fluid that a hole lies in (1).
 bool MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   const std::size_t count = rings.RingCount();
   scratch.boxes.resize(count);
@@ -91,7 +99,7 @@ bool MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
       if (is_around(other)) winding += WindingNumber(rings, other, point);
     }
     const bool is_hole = rings.outer_of[ring] != kNoRing;
-    const bool is_turned = (MeasureRing(rings.RingPoints(ring)).area < 0) != is_hole;
+    const bool is_turned = (rings.measures[ring].area < 0) != is_hole;
     if (is_turned || winding != (is_hole ? 1 : 0)) {
       has_found = true;
       MarkRing(rings, ring, scratch.is_marked);
@@ -127,16 +135,17 @@ void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
         MarkSegment(rings, first, scratch.is_marked);
         MarkSegment(rings, second, scratch.is_marked);
       }
-    } else if (MarkMisplacedRings(rings, scratch)) {
-      all_the_way = true;
     } else {
-      return;
+      MeasureRings(rings);
+      if (!MarkMisplacedRings(rings, scratch)) return;
+      all_the_way = true;
     }
     if (Retreat(roots, all_the_way, scratch, rings)) continue;
     // What is marked is at its roots already, so it is something else that is out of its place.
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
-    if (!Retreat(roots, true, scratch, rings)) return;
+    if (!Retreat(roots, true, scratch, rings)) break;
   }
+  MeasureRings(rings);
 }
 
 }  // namespace partiemc

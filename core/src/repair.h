@@ -31,6 +31,7 @@ struct RepairScratch {
 /// is small, and the other one has passed over it), or that was turned inside out, goes back as a
 /// whole, with those around it. Ordinary frames need no round.
 /// Ends: from the fifth round on each brings at least one more point to its root.
+/// Measures the rings (measure.h) as they are in the end.
 /// Cost: near-linear in the points for each round.
 void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings);
 

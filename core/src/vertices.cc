@@ -164,11 +164,9 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   RepairRings(placed.roots, placed.repair, rings);
-  rings.measures.resize(topology.RingCount());
-  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
     rings.measures[ring].particle_count = topology.particle_count[ring];
-  });
+  }
 }
 
 }  // namespace

@@ -32,11 +32,16 @@ std::vector<double> Reversed(const std::vector<double>& ring) {
   return result;
 }
 
-// Moves `rings` from `roots`, repairs them, and checks that nothing crosses.
+// Moves `rings` from `roots`, repairs them, and checks that nothing crosses and that they were
+// measured as they are now.
 Rings Repaired(const Rings& roots, Rings rings) {
   RepairScratch scratch;
   RepairRings(roots.points, scratch, rings);
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.offsets, scratch.pairs), 0u);
+  EXPECT_EQ(rings.measures.size(), rings.RingCount());
+  for (std::size_t ring = 0; ring < rings.measures.size(); ++ring) {
+    EXPECT_EQ(rings.measures[ring], MeasureRing(rings.RingPoints(ring))) << "ring " << ring;
+  }
   return rings;
 }
 
