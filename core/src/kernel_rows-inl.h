@@ -88,6 +88,25 @@ HWY_INLINE void AddRow(Vector row_term, Vector column_term, float weight,
   AddTo(sums, k);
 }
 
+// Calls visit(column, row, terms of the columns from there, dy, term of the row) for each vector of
+// these nodes of a kernel.
+template <typename Visit>
+HWY_INLINE void ForEachVector(float x, float y, NodeRange columns, NodeRange rows,
+                              float inverse_square, Visit visit) {
+  const Lanes d;
+  const Vector one = hn::Set(d, 1.0f);
+  const Vector first_dy = hn::Set(d, y - static_cast<float>(rows.first));
+  for (int column = columns.first; column <= columns.last; column += kLanes) {
+    const ColumnTerms terms = ColumnTermsAt(x, column, columns.last, inverse_square);
+    Vector dy = first_dy;
+    for (int row = rows.first; row <= rows.last; ++row) {
+      const Vector row_term = hn::Sub(one, hn::Mul(hn::Mul(dy, dy), hn::Set(d, inverse_square)));
+      visit(column, row, terms, dy, row_term);
+      dy = hn::Sub(dy, one);  // Exact, as positions in tiles are.
+    }
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc
 HWY_AFTER_NAMESPACE();

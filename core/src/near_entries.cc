@@ -27,6 +27,7 @@ struct ListPart {
 #include <hwy/highway.h>
 
 #include "compressor-inl.h"
+#include "row_table-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
@@ -37,39 +38,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Lanes = hn::CappedTag<float, NearEntries::kPadding>;
 using Indices = hn::RebindToUnsigned<Lanes>;
 using Bits = hn::RebindToSigned<Lanes>;
-
-// Looks up rows of cells by their number.
-class RowTable {
- public:
-#if HWY_TARGET <= HWY_AVX3
-  // In two registers.
-  HWY_INLINE explicit RowTable(const BitRows& rows)
-      : lower_(hn::LoadU(Indices(), rows.data())),
-        upper_(hn::LoadU(Indices(), rows.data() + kTileSize / 2)) {}
-
-  HWY_INLINE hn::Vec<Bits> operator[](hn::Vec<Bits> row) const {
-    const Bits d;
-    const auto half = hn::Set(d, kTileSize / 2 - 1);
-    const auto place = hn::IndicesFromVec(Indices(), hn::And(row, half));
-    const auto is_upper = hn::RebindMask(Indices(), hn::Gt(row, half));
-    return hn::BitCast(d, hn::IfThenElse(is_upper, hn::TableLookupLanes(upper_, place),
-                                         hn::TableLookupLanes(lower_, place)));
-  }
-
- private:
-  hn::Vec<Indices> lower_, upper_;
-#else
-  HWY_INLINE explicit RowTable(const BitRows& rows)
-      : rows_(reinterpret_cast<const std::int32_t*>(rows.data())) {}
-
-  HWY_INLINE hn::Vec<Bits> operator[](hn::Vec<Bits> row) const {
-    return hn::GatherIndex(Bits(), rows_, row);
-  }
-
- private:
-  const std::int32_t* rows_;
-#endif
-};
 
 // Sets `near` to the chosen entries. Reads whole vectors, if need be of the entries behind them.
 template <NearFields kFields>

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-
-#include "cell_mask.h"
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
@@ -23,25 +20,6 @@ namespace HWY_NAMESPACE {
 HWY_INLINE NodeRange NodesReached(float centre, float radius, NodeRange among) {
   return {std::max(NodeAfter(centre - radius), among.first),
           std::min(NodeAfter(centre + radius) - 1, among.last)};
-}
-
-// Calls visit(column, row, terms of the columns from there, dy, term of the row) for each vector of
-// these nodes of a kernel.
-template <typename Visit>
-HWY_INLINE void ForEachVector(float x, float y, NodeRange columns, NodeRange rows,
-                              float inverse_square, Visit visit) {
-  const Lanes d;
-  const Vector one = hn::Set(d, 1.0f);
-  const Vector first_dy = hn::Set(d, y - static_cast<float>(rows.first));
-  for (int column = columns.first; column <= columns.last; column += kLanes) {
-    const ColumnTerms terms = ColumnTermsAt(x, column, columns.last, inverse_square);
-    Vector dy = first_dy;
-    for (int row = rows.first; row <= rows.last; ++row) {
-      const Vector row_term = hn::Sub(one, hn::Mul(hn::Mul(dy, dy), hn::Set(d, inverse_square)));
-      visit(column, row, terms, dy, row_term);
-      dy = hn::Sub(dy, one);  // Exact, as positions in tiles are.
-    }
-  }
 }
 
 template <bool kWeighted>
@@ -64,79 +42,6 @@ void ScatterNearKernels(const NearEntries& near, const float* weight, float radi
                         NodeSums& sums) {
   weight != nullptr ? ScatterNearKernelsOf<true>(near, weight, radius, sums)
                     : ScatterNearKernelsOf<false>(near, weight, radius, sums);
-}
-
-// Where kernels begin, and the rows in which they reach asked nodes. Those of as many rows are
-// listed together, so that the ends of loops over rows need not be guessed.
-struct ReachingKernels {
-  alignas(64) NearEntries::PerEntry<std::int32_t> column, row;
-  std::array<std::array<std::uint8_t, NearEntries::kCapacity>, kTileSize + 1> of_rows;
-  std::array<int, kTileSize + 1> count{};  // By number of rows: how many are listed.
-};
-static_assert(NearEntries::kCapacity <= 256, "places are bytes");
-
-void FindReaching(const NearEntries& near, float radius, const AskedColumns& asked,
-                  ReachingKernels& kernels) {
-  const hn::CappedTag<float, NearEntries::kPadding> d;
-  const hn::RebindToSigned<decltype(d)> d_int;
-  const auto step = static_cast<int>(hn::Lanes(d));
-  for (int e = 0; e < near.count; e += step) {
-    // Lanes behind the last entry hold anything, even what no integer can: they count as 0.
-    const auto is_entry = hn::FirstN(d, static_cast<std::size_t>(near.count - e));
-    const auto first = [&](const float* centres) HWY_ATTR {
-      const auto centre = hn::IfThenElseZero(is_entry, hn::LoadU(d, centres + e));
-      return NodesAfter(d, hn::Sub(centre, hn::Set(d, radius)));
-    };
-    hn::Store(first(near.x.data()), d_int, kernels.column.data() + e);
-    hn::Store(hn::Max(first(near.y.data()), hn::Set(d_int, -AskedColumns::kRowShift)), d_int,
-              kernels.row.data() + e);
-  }
-  for (int e = 0; e < near.count; ++e) {
-    const std::uint64_t column = asked.rows[std::clamp(kernels.column[e], 0, kTileSize)];
-    const std::uint64_t rows =
-        column >> std::min(kernels.row[e] + AskedColumns::kRowShift, 63) & asked.kernel_rows;
-    const int before = std::countr_zero(rows | std::uint64_t{1} << 63);
-    const int last = 63 - std::countl_zero(rows | 1);
-    const int count = rows != 0 ? last - before + 1 : 0;
-    kernels.row[e] += before;
-    kernels.of_rows[count][kernels.count[count]++] = static_cast<std::uint8_t>(e);
-  }
-}
-
-template <bool kKernel>
-void ScatterNearMomentsOf(const NearEntries& near, float radius, const AskedColumns& asked,
-                          MomentSums& sums) {
-  const float inverse_square = 1 / (radius * radius);
-  ReachingKernels kernels;
-  FindReaching(near, radius, asked, kernels);
-  for (int count = 1; count <= kTileSize; ++count) {
-    for (int n = 0; n < kernels.count[count]; ++n) {
-      const int e = kernels.of_rows[count][n];
-      const NodeRange columns = {std::max(kernels.column[e], 0),
-                                 std::min(kernels.column[e] + asked.span, kTileSize) - 1};
-      const NodeRange rows = {kernels.row[e], kernels.row[e] + count - 1};
-      ForEachVector(near.x[e], near.y[e], columns, rows, inverse_square,
-                    [&](int column, int row, const ColumnTerms& terms, Vector dy, Vector row_term)
-                        HWY_ATTR {
-                          const Vector k = KernelAt(row_term, terms.term);
-                          const int at = SumIndex(column, row);
-                          if constexpr (kKernel) AddTo(sums.kernel.data() + at, k);
-                          const Vector kx = hn::Mul(k, terms.dx);
-                          const Vector ky = hn::Mul(k, dy);
-                          AddTo(sums.moment_x.data() + at, kx);
-                          AddTo(sums.moment_y.data() + at, ky);
-                          AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
-                          AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
-                          AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
-                        });
-    }
-  }
-}
-
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
-                        bool has_kernel_sums, MomentSums& sums) {
-  has_kernel_sums ? ScatterNearMomentsOf<false>(near, radius, asked, sums)
-                  : ScatterNearMomentsOf<true>(near, radius, asked, sums);
 }
 
 HWY_INLINE std::uint32_t BitsOf(hn::Mask<Lanes> mask) {
@@ -268,50 +173,12 @@ HWY_AFTER_NAMESPACE();
 namespace partiemc {
 
 HWY_EXPORT(ScatterNearKernels);
-HWY_EXPORT(ScatterNearMoments);
 HWY_EXPORT(ClassifyNodes);
 HWY_EXPORT(EvaluateNodes);
 
 void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
                         NodeSums& sums) {
   HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
-}
-
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
-                        bool has_kernel_sums, MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, radius, asked, has_kernel_sums, sums);
-}
-
-AskedColumns ColumnsOf(const AskedNodes& asked, float radius) {
-  const int span = static_cast<int>(std::ceil(2 * radius));
-  AskedColumns columns{.span = span, .kernel_rows = ~std::uint64_t{0} >> std::max(64 - span, 0)};
-  // In place of each node all columns from which a kernel reaches it.
-  BitRows within = asked.rows;
-  const int width = std::min(span, kTileSize);
-  for (int reached = 1; reached < width;) {
-    const int step = std::min(reached, width - reached);
-    for (std::uint32_t& row : within) row |= row >> step;
-    reached += step;
-  }
-  within = Transposed(within);
-  for (int column = 0; column < kTileSize; ++column) {
-    columns.rows[column] = std::uint64_t{within[column]} << AskedColumns::kRowShift;
-  }
-  return columns;
-}
-
-void ClearMoments(const AskedNodes& asked, MomentSums& sums) {
-  int first = 0, last = kTileSize - 1;
-  while (asked.rows[first] == 0) ++first;
-  while (asked.rows[last] == 0) --last;
-  const auto clear = [&](NodeSums& channel) {
-    // Vectors that begin in the tile end before its next row does.
-    std::fill(channel.begin() + SumIndex(0, first), channel.begin() + SumIndex(0, last + 1), 0.0f);
-  };
-  if (!asked.has_kernel_sums) clear(sums.kernel);
-  for (NodeSums* const channel : {&sums.moment_x, &sums.moment_y, &sums.xx, &sums.xy, &sums.yy}) {
-    clear(*channel);
-  }
 }
 
 void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,

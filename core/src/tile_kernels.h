@@ -1,10 +1,11 @@
 // The inner loops of the field stage, over one tile, in the vectors of the processor at hand.
 //
-// Every target (tile_kernels.cc and scatter_kernels.cc are compiled once for each) gives the same
-// bits: a lane does what the scalar formula says, in the same order, without fused multiply-adds,
-// and no sum runs across lanes.
+// Every target (tile_kernels.cc, moment_kernels.cc and scatter_kernels.cc are compiled once for
+// each) gives the same bits: a lane does what the scalar formula says, in the same order, without
+// fused multiply-adds, and no sum runs across lanes.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -47,13 +48,13 @@ struct AskedNodes {
 
 /// In which rows of a tile kernels of a radius find asked nodes.
 struct AskedColumns {
-  /// Kernels that begin farther before the tile than this do not reach it.
-  static constexpr int kRowShift = kTileSize - 1;
-  /// By first column of a kernel, 0 for those before the tile: bit j + kRowShift for row j. None
-  /// beyond the tile.
-  std::array<std::uint64_t, kTileSize + 1> rows{};
-  int span;                   ///< Rows and columns of a kernel.
-  std::uint64_t kernel_rows;  ///< As many bits.
+  /// By first column of a kernel, 0 for those before the tile: the rows that have asked nodes in
+  /// the columns that it covers.
+  BitRows rows;
+  int span;  ///< Rows and columns of a kernel.
+
+  /// Most rows of the tile that a kernel reaches.
+  int MaxRows() const { return std::min(span, kTileSize); }
 };
 AskedColumns ColumnsOf(const AskedNodes& asked, float radius);
 

@@ -170,11 +170,11 @@ TEST(AskedColumns, HaveTheRowsInWhichAKernelThatBeginsThereMeetsAskedNodes) {
     }
     const AskedColumns columns = ColumnsOf(asked, radius);
     EXPECT_EQ(columns.span, static_cast<int>(std::ceil(2 * radius)));
-    for (int first = 0; first <= kTileSize; ++first) {
-      std::uint64_t expected = 0;
+    for (int first = 0; first < kTileSize; ++first) {
+      std::uint32_t expected = 0;
       for (int j = 0; j < kTileSize; ++j) {
         for (int i = first; i < std::min(first + columns.span, kTileSize); ++i) {
-          expected |= std::uint64_t{asked.rows[j] >> i & 1} << (j + AskedColumns::kRowShift);
+          expected |= (asked.rows[j] >> i & 1) << j;
         }
       }
       EXPECT_EQ(columns.rows[first], expected) << "radius " << radius << ", column " << first;
