@@ -5,6 +5,7 @@
 
 #include "measure.h"
 #include "parallel.h"
+#include "ring_offset.h"
 
 namespace partiemc {
 namespace {
@@ -25,9 +26,6 @@ constexpr double kFadeTo = 1.6;
 // area behind, each tenth more costs calm where bodies merge (core/METHOD.md, "The default
 // placement", 6).
 constexpr double kFollow = 0.9;
-
-// Longest mitre, as a multiple of the offset.
-constexpr double kMaxMitre = 2;
 
 double Smoothstep(double low, double high, double x) {
   const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
@@ -66,33 +64,6 @@ std::optional<Wish> WishOf(const VertexInput& input, const Rings& rings, double 
   const double wanted = (volume - area) / perimeter / spacing;
   return Wish{.offset = std::clamp(wanted, -kMaxOffset, kMaxOffset),
               .trust = 1 - Smoothstep(kFadeFrom, kFadeTo, std::abs(wanted))};
-}
-
-// Moves the points of one ring outward by `offset` along the mitres of their segments.
-void OffsetRing(std::span<const double> points, double offset, double* target) {
-  const std::size_t count = points.size() / 2;
-  const auto normal_after = [&](std::size_t k, double& x, double& y) {
-    const std::size_t next = k + 1 == count ? 0 : k + 1;
-    x = points[2 * next + 1] - points[2 * k + 1];
-    y = points[2 * k] - points[2 * next];
-    const double length = std::sqrt(x * x + y * y);
-    if (length > 0) {
-      x /= length;
-      y /= length;
-    }
-  };
-  double before_x, before_y;
-  normal_after(count - 1, before_x, before_y);
-  for (std::size_t k = 0; k < count; ++k) {
-    double x, y;
-    normal_after(k, x, y);
-    // (a + b) / (1 + a . b) has length 1 / cos of half the turn.
-    const double divisor = std::max(1 + before_x * x + before_y * y, 2 / (kMaxMitre * kMaxMitre));
-    target[2 * k] = points[2 * k] + offset * (before_x + x) / divisor;
-    target[2 * k + 1] = points[2 * k + 1] + offset * (before_y + y) / divisor;
-    before_x = x;
-    before_y = y;
-  }
 }
 
 }  // namespace

@@ -20,7 +20,8 @@ constexpr double kAxisReach = 0x1p-96;
 void SnapToAxes(double cell_size, std::span<double> coordinates) {
   const double reach = kAxisReach * cell_size;
   for (double& coordinate : coordinates) {
-    if (coordinate != 0 && std::abs(coordinate) < reach) coordinate = 0;
+    const bool is_near = (coordinate != 0) & (std::abs(coordinate) < reach);
+    coordinate = is_near ? 0 : coordinate;  // Written in any case, which makes vectors of it.
   }
 }
 
