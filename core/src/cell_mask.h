@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 
@@ -95,32 +96,40 @@ inline CellMask Widened(const BitRows& rows, int before, int after) {
   return mask;
 }
 
-/// Where bits of a tile and of its neighbours are at most `distance` cells away, along each axis:
-/// the cells of the tile. rows_of(index) are the rows of an existing tile.
-/// Requires: 0 <= distance <= kMaskMargin.
+/// The bits of a tile and of its neighbours. rows_of(index) are the rows of an existing tile.
 template <typename RowsOf>
-BitRows CellsNear(const TileDirectory& directory, std::uint32_t tile, int distance,
-                  RowsOf rows_of) {
+CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, RowsOf rows_of) {
   const Neighbourhood& near = directory.neighbours(tile);
-  BitRows result{};
-  for (int row = -distance; row < kTileSize + distance; ++row) {
-    const int dy = row >> kTileShift;
-    std::uint64_t cells = 0;
-    for (int dx = -1; dx <= 1; ++dx) {
-      const std::uint32_t owner = near[(dy + 1) * 3 + dx + 1];
-      if (owner == kNoTile) continue;
-      const std::uint64_t bits = rows_of(owner)[row & (kTileSize - 1)];
-      cells |= dx < 0 ? bits >> (kTileSize - kMaskMargin) : bits << (kMaskMargin + dx * kTileSize);
-    }
-    if (cells == 0) continue;
-    std::uint64_t widened = 0;
-    for (int d = 0; d <= distance; ++d) widened |= cells << d | cells >> d;
-    const auto bits = static_cast<std::uint32_t>(widened >> kMaskMargin);
-    for (int j = std::max(row - distance, 0); j <= std::min(row + distance, kTileSize - 1); ++j) {
-      result[j] |= bits;
+  CellMask mask{};
+  for (int place = 0; place < static_cast<int>(near.size()); ++place) {
+    if (near[place] == kNoTile) continue;
+    const BitRows& rows = rows_of(near[place]);
+    const int dx = place % 3 - 1;
+    const int dy = place / 3 - 1;
+    const int first = dy < 0 ? kTileSize - kMaskMargin : 0;
+    const int end = dy > 0 ? kMaskMargin : kTileSize;
+    const int up = dx < 0 ? 0 : kMaskMargin + dx * kTileSize;
+    const int down = dx < 0 ? kTileSize - kMaskMargin : 0;
+    for (int j = first; j < end; ++j) {
+      mask[j + dy * kTileSize + kMaskMargin] |= std::uint64_t{rows[j]} >> down << up;
     }
   }
-  return result;
+  return mask;
+}
+
+/// Adds all cells within `distance` of one of the mask, along each axis. Right in the tile for
+/// 0 <= distance <= kMaskMargin; cells beyond the margin are not known.
+inline void Widen(CellMask& mask, int distance) {
+  // What is wide already takes a step three times as long without leaving a gap.
+  for (int done = 0; done < distance;) {
+    const int step = std::min(2 * done + 1, distance - done);
+    for (std::uint64_t& row : mask) row |= row << step | row >> step;
+    const CellMask rows = mask;
+    const std::size_t rest = mask.size() - step;
+    for (std::size_t j = 0; j < rest; ++j) mask[j] |= rows[j + step];
+    for (std::size_t j = 0; j < rest; ++j) mask[j + step] |= rows[j];
+    done += step;
+  }
 }
 
 }  // namespace partiemc

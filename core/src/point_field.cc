@@ -14,6 +14,9 @@ namespace {
 // Marks tiles without a run.
 constexpr std::uint32_t kNoRun = 0xffffffff;
 
+// Of a tile in its own Neighbourhood.
+constexpr int kOwnPlace = 4;
+
 // After so many tiles positions along x begin anew.
 constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
 
@@ -33,25 +36,25 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
   const auto active_of = [&](std::uint32_t tile) -> const BitRows& {
     return crossings.tiles[tile].active;
   };
-  constexpr BitRows kNoCells{};
   BitRows all_cells;
   all_cells.fill(~std::uint32_t{0});
   // Farther than a mask holds all is asked for, and all is wanted.
   const double distance = std::ceil(wander);
   const double reach = distance + std::ceil(scale_.kernel_radius);
+  const auto mark = [](CellMask& mask, double cells) {
+    Widen(mask, static_cast<int>(cells));
+    return CellsOfNeighbour(mask, kOwnPlace);
+  };
   ParallelFor(tiles, [&](std::uint32_t index) {
     const Neighbourhood& near = bins.tiles.neighbours(index);
-    const bool is_near = std::any_of(near.begin(), near.end(), is_active);
-    const auto cells_near = [&](double cells) {
-      return is_near ? CellsNear(bins.tiles, index, static_cast<int>(cells), active_of) : kNoCells;
-    };
     Tile& tile = tiles_[index];
-    if (distance > kMaskMargin) {
-      tile.asked = is_near ? all_cells : kNoCells;
-    } else {
-      tile.asked = cells_near(distance);
+    tile.asked = {};
+    wanted_[index] = reach > kMaskMargin ? all_cells : BitRows{};
+    if (std::any_of(near.begin(), near.end(), is_active)) {
+      CellMask mask = CellsAround(bins.tiles, index, active_of);
+      tile.asked = distance > kMaskMargin ? all_cells : mark(mask, distance);
+      if (reach <= kMaskMargin) wanted_[index] = mark(mask, reach - distance);
     }
-    wanted_[index] = reach > kMaskMargin ? all_cells : cells_near(reach);
     tile.is_asked = !IsEmpty(tile.asked);
     tile.column = static_cast<float>(bins.tiles[index].x & (kPeriodTiles - 1)) * kTileSize;
   });

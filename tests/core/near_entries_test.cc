@@ -155,5 +155,47 @@ TEST(NearEntries, OfAnySmallNumberOfParticlesAreRight) {
   }
 }
 
+TEST(CellMasks, KnowTheCellsAroundATileAndAllThatAreNearToOne) {
+  support::Random random(5);
+  const ParticleBins bins = Bin(CrowdedScene(random));
+  std::vector<BitRows> rows(bins.tiles.size());
+  for (BitRows& cells : rows) {
+    for (std::uint32_t& row : cells) {
+      row = static_cast<std::uint32_t>(random.Bits() & random.Bits() & random.Bits());
+      if (random.Chance(0.8)) row = random.Chance(0.5) ? 0 : row & 0x80000001u;
+    }
+  }
+  const auto has = [&](std::uint32_t tile, int i, int j) {
+    const TilePlace place = Normalise(bins.tiles, tile, i, j);
+    return place.tile != kNoTile && (rows[place.tile][place.j] >> place.i & 1) != 0;
+  };
+  const auto is_near = [&](std::uint32_t tile, int i, int j, int distance) {
+    for (int y = j - distance; y <= j + distance; ++y) {
+      for (int x = i - distance; x <= i + distance; ++x) {
+        if (has(tile, x, y)) return true;
+      }
+    }
+    return false;
+  };
+  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    const CellMask around =
+        CellsAround(bins.tiles, tile, [&](std::uint32_t of) -> const BitRows& { return rows[of]; });
+    for (int distance = 0; distance <= kMaskMargin; ++distance) {
+      CellMask mask = around, in_two_steps = around;
+      Widen(mask, distance);
+      Widen(in_two_steps, distance / 3);
+      Widen(in_two_steps, distance - distance / 3);
+      for (int j = 0; j < kTileSize; ++j) {
+        for (int i = 0; i < kTileSize; ++i) {
+          const bool expected = is_near(tile, i, j, distance);
+          const int bit = i + kMaskMargin;
+          ASSERT_EQ(mask[j + kMaskMargin] >> bit & 1, expected) << tile << ' ' << i << ' ' << j;
+          ASSERT_EQ(in_two_steps[j + kMaskMargin] >> bit & 1, expected) << distance;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace partiemc
