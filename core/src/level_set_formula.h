@@ -9,9 +9,8 @@
 namespace partiemc {
 
 /// Larger eigenvalue of the symmetric matrix (xx xy; xy yy), which has no negative one.
-template <typename Real>
-Real LargerEigenvalue(Real xx, Real xy, Real yy) {
-  const Real half = (xx - yy) / 2;
+inline double LargerEigenvalue(double xx, double xy, double yy) {
+  const double half = (xx - yy) / 2;
   return (xx + yy) / 2 + std::sqrt(half * half + xy * xy);
 }
 
@@ -20,33 +19,16 @@ Real LargerEigenvalue(Real xx, Real xy, Real yy) {
 ///   phi = |x - xbar| - r;
 ///   the spread s, the larger eigenvalue of sum k d d^T / (R^2 sum k), d = x_i - x.
 /// Where f is at most g, or above t, the density alone decides the side: phi and s are asked in
-/// between only. All branches are lengths. Real is float at nodes, double at points.
-template <typename Real>
-class LevelSetFormula {
- public:
-  explicit LevelSetFormula(const Scale& scale)
-      : guard_(static_cast<Real>(scale.guard)),
-        saturation_(static_cast<Real>(scale.saturation)),
-        slope_(static_cast<Real>(scale.guard_slope)),
-        gap_spread_(static_cast<Real>(scale.gap_spread)),
-        gap_slope_(static_cast<Real>(scale.gap_slope)) {}
-
-  bool IsSurelyOutside(Real density) const { return density <= guard_; }
-  bool IsSurelyInside(Real density) const { return density > saturation_; }
-
-  /// Positive where the density is below g.
-  Real Guard(Real density) const { return (guard_ - density) * slope_; }
-  /// Positive between bodies, where particles are on both sides and none is near.
-  Real Gap(Real spread) const { return (spread - gap_spread_) * gap_slope_; }
-  /// Negative where the density is above t.
-  Real Saturation(Real density) const { return (saturation_ - density) * slope_; }
-
-  Real Value(Real density, Real phi, Real spread) const {
-    return std::min(std::max({phi, Guard(density), Gap(spread)}), Saturation(density));
-  }
-
- private:
-  Real guard_, saturation_, slope_, gap_spread_, gap_slope_;
-};
+/// between only. All branches are lengths. In vectors it is in NodeFormula (tile_kernels.cc) and,
+/// with its gradient, PointFormula (point_formula-inl.h).
+inline double LevelSetValue(const Scale& scale, double density, double phi, double spread) {
+  // Positive where the density is below g.
+  const double guard = (scale.guard - density) * scale.guard_slope;
+  // Positive between bodies, where particles are on both sides and none is near.
+  const double gap = (spread - scale.gap_spread) * scale.gap_slope;
+  // Negative where the density is above t.
+  const double saturation = (scale.saturation - density) * scale.guard_slope;
+  return std::min(std::max({phi, guard, gap}), saturation);
+}
 
 }  // namespace partiemc

@@ -156,9 +156,9 @@ HWY_INLINE bool Gather(const NearRows& near, NearChunk& chunk) {
   return fits;
 }
 
-// Calls visit(query, chunk) for the particles of each of a few queries, as many at a time as a
-// chunk holds. First copies those of all queries, so that the sums of one need not wait for what is
-// looked up for it.
+// Calls visit(query, chunk, is_all) for the particles of each of a few queries, as many at a time
+// as a chunk holds: is_all where these are all that the query has. First copies those of all
+// queries, so that the sums of one need not wait for what is looked up for it.
 template <bool kWeighted, typename Query, typename Visit>
 HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   NearChunk chunks[kQueriesAtOnce];
@@ -168,10 +168,10 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   }
   for (std::size_t k = 0; k < queries.size(); ++k) {
     if (HWY_LIKELY(fits[k])) {
-      visit(k, chunks[k]);
+      visit(k, chunks[k], true);
     } else {
       ForEachChunk<kWeighted>(queries[k].near, chunks[k],
-                              [&](const NearChunk& chunk) HWY_ATTR { visit(k, chunk); });
+                              [&](const NearChunk& chunk) HWY_ATTR { visit(k, chunk, false); });
     }
   }
 }
@@ -188,6 +188,16 @@ class PartialSums {
       for (Vector& sum : sums) sum = hn::Zero(Lanes());
       for (int k = part * kLanes; k < chunk.count; k += kPartialSums) add(k, sums);
       for (int channel = 0; channel < kChannels; ++channel) parts_[channel][part] = sums[channel];
+    }
+  }
+
+  // Keeps them for TotalsAtPoints.
+  template <typename Parts>
+  HWY_INLINE void Store(Parts& parts, std::size_t point) const {
+    for (int channel = 0; channel < kChannels; ++channel) {
+      for (int part = 0; part < kParts; ++part) {
+        hn::Store(parts_[channel][part], Lanes(), parts[channel][point] + part * kLanes);
+      }
     }
   }
 
@@ -246,6 +256,54 @@ class PartialSums {
 
   Vector parts_[kChannels][kParts];
 };
+
+// Totals of one channel at kLanes points from the partial sums of each, added up as PartialSums
+// does: lane k is that of parts[first + k], or of parts[last] if that comes before.
+HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t first,
+                                 std::size_t last) {
+  const Lanes d;
+  Vector sums[kLanes];
+  for (std::size_t point = 0; point < kLanes; ++point) {
+    const float* const from = parts[std::min(first + point, last)];
+    Vector folded[kParts];
+    for (int part = 0; part < kParts; ++part) folded[part] = hn::Load(d, from + part * kLanes);
+    for (int count = kParts / 2; count > 0; count /= 2) {
+      for (int part = 0; part < count; ++part) {
+        folded[part] = hn::Add(folded[part], folded[part + count]);
+      }
+    }
+    sums[point] = folded[0];
+  }
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (kLanes == 16) {
+    for (int k = 0; k < 8; ++k) {
+      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 8], sums[k]),
+                        hn::ConcatUpperUpper(d, sums[k + 8], sums[k]));
+    }
+    // In blocks of four lanes: those of k, k + 4, k + 8, k + 12.
+    for (int k = 0; k < 4; ++k) {
+      sums[k] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(sums[k + 4]), sums[k]),
+                        hn::OddEvenBlocks(sums[k + 4], hn::SwapAdjacentBlocks(sums[k])));
+    }
+  } else if constexpr (kLanes == 8) {
+    for (int k = 0; k < 4; ++k) {
+      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 4], sums[k]),
+                        hn::ConcatUpperUpper(d, sums[k + 4], sums[k]));
+    }
+  }
+  const hn::Repartition<double, Lanes> d_pair;
+  const auto pairs = [&](int k) HWY_ATTR {
+    return hn::BitCast(d_pair, hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
+                                       hn::InterleaveUpper(d, sums[k], sums[k + 1])));
+  };
+  const auto lower = pairs(0);
+  const auto upper = pairs(2);
+  return hn::Add(hn::BitCast(d, hn::InterleaveLower(d_pair, lower, upper)),
+                 hn::BitCast(d, hn::InterleaveUpper(d_pair, lower, upper)));
+#else
+  return sums[0];
+#endif
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc

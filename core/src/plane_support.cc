@@ -78,7 +78,7 @@ template <bool kWeighted>
 HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& support,
                     const StripShape& strip, std::span<QuerySupports> sums) {
   double totals[kQueriesAtOnce][kPointsAtOnce][kSupportSums] = {};
-  ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk) HWY_ATTR {
+  ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk, bool) HWY_ATTR {
     const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.count; ++k) {
       SumChunk<kWeighted>(query.near, chunk, query.planes[k], support, strip, totals[q][k]);

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "cell_mask.h"
-#include "level_set_formula.h"
 #include "near_entries.h"
 #include "parallel.h"
 
@@ -163,50 +162,22 @@ void PointField::SortRun(const ParticleBins& bins, const Run& run) {
   });
 }
 
-namespace {
-
-// The spread of the particles (level_set_formula.h) from their moments, in units of R^2.
-class Spread {
- public:
-  Spread(const PointSums& sums, double inverse_square)
-      : sums_(sums),
-        share_(inverse_square / sums.kernel),
-        xx_(sums.kxx * share_),
-        xy_(sums.kxy * share_),
-        yy_(sums.kyy * share_),
-        value_(LargerEigenvalue(xx_, xy_, yy_)) {}
-
-  double value() const { return value_; }
-
-  LatticePoint Gradient(const PointThirdSums& third) const {
-    // The eigenvector's square e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue; where both
-    // are the same, either direction is as good.
-    const double gap = 2 * value_ - (xx_ + yy_);
-    const double exx = gap > 0 ? (value_ - yy_) / gap : 0.5;
-    const double exy = gap > 0 ? xy_ / gap : 0;
-    const double eyy = 1 - exx;
-    // ds = e . dM e, where M is a ratio of sums, and d_a = x_i - x falls as x grows.
-    const auto along = [&](double dxx, double dxy, double dyy, double slope) {
-      return (exx * dxx + 2 * exy * dxy + eyy * dyy) * share_ - value_ * slope / sums_.kernel;
-    };
-    return {
-        along(third.xxx - 2 * sums_.moment_x, third.xxy - sums_.moment_y, third.xyy, sums_.slope_x),
-        along(third.xxy, third.xyy - sums_.moment_x, third.yyy - 2 * sums_.moment_y,
-              sums_.slope_y)};
-  }
-
- private:
-  const PointSums& sums_;
-  double share_, xx_, xy_, yy_, value_;
-};
-
-}  // namespace
-
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
-  const FieldPoints place{.tile = tile, .points = {LatticePoint{x, y}}, .count = 1};
-  FieldSamples samples;
-  Sample({&place, 1}, {&samples, 1});
-  return samples[0];
+  PointQuery query{.points = {LatticePoint{x, y}}, .count = 1};
+  FindNear(tile, std::span(query.points).first(1), scale_.kernel_radius, query.near);
+  PointSamples samples;
+  SampleAtPoints(scale_, {&query, 1}, samples);
+  return {.density = samples.density[0],
+          .mean_x = samples.mean_x[0],
+          .mean_y = samples.mean_y[0],
+          .phi = samples.phi[0],
+          .phi_x = samples.phi_x[0],
+          .phi_y = samples.phi_y[0],
+          .spread = samples.spread[0],
+          .value = samples.value[0],
+          .gradient_x = samples.gradient_x[0],
+          .gradient_y = samples.gradient_y[0],
+          .has_support = samples.kernel[0] > 0};
 }
 
 void PointField::Sample(std::span<const FieldPoints> places,
@@ -218,58 +189,14 @@ void PointField::Sample(std::span<const FieldPoints> places,
     queries[q].points = points;
     queries[q].count = count;
   }
-  std::array<QuerySums, kQueriesAtOnce> sums;
-  SumAtPoints(Kernel(), std::span(queries).first(places.size()), sums);
+  PointSamples at;
+  SampleAtPoints(scale_, std::span(queries).first(places.size()), at);
+  std::size_t point = 0;
   for (std::size_t q = 0; q < places.size(); ++q) {
-    for (std::size_t k = 0; k < places[q].count; ++k) {
-      samples[q][k] = SampleOf(queries[q].near, places[q].points[k], sums[q][k]);
+    for (std::size_t k = 0; k < places[q].count; ++k, ++point) {
+      samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point]};
     }
   }
-}
-
-FieldSample PointField::SampleOf(const NearRows& near, const LatticePoint& point,
-                                 const PointSums& sums) const {
-  FieldSample sample;
-  if (sums.kernel <= 0) {
-    sample.phi = scale_.kernel_radius - scale_.reference_radius;
-    sample.value = scale_.VoidValue();
-    return sample;
-  }
-  sample.has_support = true;
-  sample.density = sums.density;
-  const double share = 1 / sums.kernel;
-  sample.mean_x = sums.moment_x * share;
-  sample.mean_y = sums.moment_y * share;
-  const double distance = std::sqrt(sample.mean_x * sample.mean_x + sample.mean_y * sample.mean_y);
-  sample.phi = distance - scale_.reference_radius;
-  if (distance > 0) {
-    // grad |v| with v = x - xbar = -mean and d xbar_a / dx_b = (sum k_b (d_a - mean_a)) / sum k.
-    const double jxx = (sums.xx - sample.mean_x * sums.slope_x) * share;
-    const double jxy = (sums.xy - sample.mean_x * sums.slope_y) * share;
-    const double jyx = (sums.xy - sample.mean_y * sums.slope_x) * share;
-    const double jyy = (sums.yy - sample.mean_y * sums.slope_y) * share;
-    const double unit_x = sample.mean_x / distance;
-    const double unit_y = sample.mean_y / distance;
-    sample.phi_x = unit_x * jxx + unit_y * jyx - unit_x;
-    sample.phi_y = unit_x * jxy + unit_y * jyy - unit_y;
-  }
-  const LevelSetFormula<double> formula(scale_);
-  const Spread spread(sums, Kernel().inverse_square);
-  sample.spread = spread.value();
-  sample.value = formula.Value(sums.density, sample.phi, sample.spread);
-  if (sample.value == sample.phi) {
-    sample.gradient_x = sample.phi_x;
-    sample.gradient_y = sample.phi_y;
-  } else if (sample.value == formula.Gap(sample.spread)) {
-    const LatticePoint gradient = spread.Gradient(ThirdSumsAtPoint(Kernel(), near, point));
-    sample.gradient_x = gradient.x * scale_.gap_slope;
-    sample.gradient_y = gradient.y * scale_.gap_slope;
-  } else {
-    // Guard and saturation fall with the density alike.
-    sample.gradient_x = -sums.density_x * scale_.guard_slope;
-    sample.gradient_y = -sums.density_y * scale_.guard_slope;
-  }
-  return sample;
 }
 
 }  // namespace partiemc

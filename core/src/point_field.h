@@ -35,13 +35,19 @@ struct FieldPoint {
   double x = 0, y = 0;
 };
 
-/// One or two points of a tile, in cells relative to it, and what the field is there.
+/// One or two points of a tile, in cells relative to it.
 struct FieldPoints {
   std::uint32_t tile = kNoTile;
   std::array<LatticePoint, kPointsAtOnce> points;
   std::size_t count = 0;
 };
-using FieldSamples = std::array<FieldSample, kPointsAtOnce>;
+
+/// F and grad F at a point.
+struct LevelSetSample {
+  double value = 0;
+  double gradient_x = 0, gradient_y = 0;
+};
+using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 
 /// Particles near the isoline, each once, sorted into rows of buckets (BucketGrid) that run through
 /// tiles side by side: a point looks at the buckets around it, in its tile and its neighbours.
@@ -116,11 +122,6 @@ class PointField {
     BitRows asked;                  // The cells in which points may lie.
   };
 
-  PointKernel Kernel() const {
-    return {1 / (scale_.kernel_radius * scale_.kernel_radius), scale_.uniform_weight};
-  }
-  FieldSample SampleOf(const NearRows& near, const LatticePoint& point,
-                       const PointSums& sums) const;
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   // Of its buckets, and two more.
   std::uint32_t OffsetCount(const Run& run) const {

@@ -1,6 +1,9 @@
 #include "point_kernels.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <iterator>
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
@@ -9,29 +12,11 @@
 #include <hwy/highway.h>
 
 #include "near_lanes-inl.h"
+#include "point_formula-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
-
-// With t = 1 - d^2 / R^2: k = t^3 and dk / da = 6 t^2 d_a / R^2, whose factor comes last. Sums over
-// w k etc. follow from the others where all weights are the same.
-enum Channel {
-  kKernel,
-  kMomentX,
-  kMomentY,
-  kSlopeX,
-  kSlopeY,
-  kKxx,
-  kKxy,
-  kKyy,
-  kXx,
-  kXy,
-  kYy,
-  kSums
-};
-enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
-enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
 
 // What particles contribute: d, t and t^2; t is 0 beyond the kernel.
 struct Terms {
@@ -90,81 +75,138 @@ struct AddThirdSums {
   }
 };
 
-// Adds a chunk's particles to the sums at a point.
+// The sums over a chunk's particles at a point.
 template <typename AddTerms>
-HWY_INLINE void SumChunk(const PointKernel& kernel, const NearRows& near, const NearChunk& chunk,
-                         const LatticePoint& point, double (&totals)[AddTerms::kChannels]) {
+HWY_INLINE PartialSums<AddTerms::kChannels> SumChunk(double inverse_square, const NearRows& near,
+                                                     const NearChunk& chunk,
+                                                     const LatticePoint& point) {
   const Lanes d;
   const Vector x = hn::Set(d, static_cast<float>(point.x - near.origin_x));
   const Vector y = hn::Set(d, static_cast<float>(point.y - near.origin_y));
-  const Vector inverse_square = hn::Set(d, static_cast<float>(kernel.inverse_square));
-  PartialSums<AddTerms::kChannels> sums(
+  const Vector scale = hn::Set(d, static_cast<float>(inverse_square));
+  return PartialSums<AddTerms::kChannels>(
       chunk, [&](int k, Vector(&channels)[AddTerms::kChannels]) HWY_ATTR {
         const Vector dx = hn::Sub(hn::Load(d, chunk.x + k), x);
         const Vector dy = hn::Sub(hn::Load(d, chunk.y + k), y);
         const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
-        const Vector t =
-            hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0f), hn::Mul(square, inverse_square)));
+        const Vector t = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0f), hn::Mul(square, scale)));
         AddTerms()(chunk.weight + k, Terms{dx, dy, t, hn::Mul(t, t)}, channels);
       });
-  sums.AddTo(totals);
 }
 
-template <bool kWeighted>
-PointSums Named(const PointKernel& kernel, const double* totals) {
-  const double slope = 6 * kernel.inverse_square;
-  const double w = kernel.uniform_weight;
-  return {.kernel = totals[kKernel],
-          .moment_x = totals[kMomentX],
-          .moment_y = totals[kMomentY],
-          .slope_x = slope * totals[kSlopeX],
-          .slope_y = slope * totals[kSlopeY],
-          .kxx = totals[kKxx],
-          .kxy = totals[kKxy],
-          .kyy = totals[kKyy],
-          .xx = slope * totals[kXx],
-          .xy = slope * totals[kXy],
-          .yy = slope * totals[kYy],
-          .density = kWeighted ? totals[kDensity] : w * totals[kKernel],
-          .density_x = slope * (kWeighted ? totals[kDensityX] : w * totals[kSlopeX]),
-          .density_y = slope * (kWeighted ? totals[kDensityY] : w * totals[kSlopeY])};
-}
-
-template <bool kWeighted>
-HWY_INLINE void Sum(const PointKernel& kernel, std::span<const PointQuery> queries,
-                    std::span<QuerySums> sums) {
-  double totals[kQueriesAtOnce][kPointsAtOnce][AddSums<kWeighted>::kChannels] = {};
-  ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk) HWY_ATTR {
-    const PointQuery& query = queries[q];
-    for (std::size_t k = 0; k < query.count; ++k) {
-      SumChunk<AddSums<kWeighted>>(kernel, query.near, chunk, query.points[k], totals[q][k]);
-    }
+void SumThird(double inverse_square, const NearRows& near, const LatticePoint& point,
+              double (&totals)[kThirdSums]) {
+  NearChunk room;
+  ForEachChunk<false>(near, room, [&](const NearChunk& chunk) HWY_ATTR {
+    SumChunk<AddThirdSums>(inverse_square, near, chunk, point).AddTo(totals);
   });
-  for (std::size_t q = 0; q < queries.size(); ++q) {
-    for (std::size_t k = 0; k < queries[q].count; ++k) {
-      sums[q][k] = Named<kWeighted>(kernel, totals[q][k]);
+}
+
+// Sums at the points of some queries. The totals of all points are added up at once. Where
+// particles are too many for one chunk, the totals of each chunk go to a sum in doubles, point by
+// point.
+template <bool kWeighted>
+class SumsAtPoints {
+ public:
+  HWY_INLINE SumsAtPoints(double inverse_square, std::span<const PointQuery> queries) {
+    std::size_t first[kQueriesAtOnce];
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+      first[q] = count_;
+      count_ += queries[q].count;
+    }
+    const auto visit = [&](std::size_t q, const NearChunk& chunk, bool is_all) HWY_ATTR {
+      const PointQuery& query = queries[q];
+      for (std::size_t k = 0; k < query.count; ++k) {
+        PartialSums<kChannels> sums =
+            SumChunk<AddSums<kWeighted>>(inverse_square, query.near, chunk, query.points[k]);
+        if (count_ > kFewPoints) sums.Store(parts_, first[q] + k);
+        if (HWY_UNLIKELY(!is_all || count_ <= kFewPoints)) AddAlone(first[q] + k, sums);
+      }
+    };
+    ForEachQuery<kWeighted>(queries, visit);
+    if (count_ > kFewPoints) {
+      Total();
+      for (std::size_t point = 0; alone_ >> point != 0; ++point) {
+        if ((alone_ >> point & 1) != 0) TakeAlone(point, point);
+      }
+    } else {
+      // What is behind the last point counts for nothing, but is computed with.
+      constexpr std::size_t kEnd = std::max(kFewPoints, PointFormula<kWeighted>::kLanes);
+      for (std::size_t point = 0; point < kEnd; ++point) {
+        TakeAlone(std::min(point, count_ - 1), point);
+      }
+    }
+  }
+
+  std::size_t count() const { return count_; }
+  const typename PointFormula<kWeighted>::Totals& totals() const { return totals_; }
+
+ private:
+  static constexpr int kChannels = AddSums<kWeighted>::kChannels;
+  // The totals of so many are faster added up one by one.
+  static constexpr std::size_t kFewPoints = 2;
+  static_assert(PointSamples::kCapacity % kPartialSums == 0 && PointSamples::kCapacity < 64);
+
+  HWY_INLINE void AddAlone(std::size_t point, PartialSums<kChannels>& sums) {
+    double(&totals)[kChannels] = totals_alone_[point];
+    if ((alone_ >> point & 1) == 0) std::fill(std::begin(totals), std::end(totals), 0.0);
+    alone_ |= std::uint64_t{1} << point;
+    sums.AddTo(totals);
+  }
+
+  void TakeAlone(std::size_t from, std::size_t to) {
+    for (int channel = 0; channel < kChannels; ++channel) {
+      totals_[channel][to] = totals_alone_[from][channel];
+    }
+  }
+
+  HWY_INLINE void Total() {
+    const hn::CappedTag<double, kPartialSums> d;
+    const hn::Rebind<float, decltype(d)> d_float;
+    HWY_ALIGN float totals[kLanes];
+    for (int channel = 0; channel < kChannels; ++channel) {
+      for (std::size_t first = 0; first < count_; first += kLanes) {
+        hn::Store(TotalsAtPoints(parts_[channel], first, count_ - 1), Lanes(), totals);
+        for (std::size_t k = 0; k < kLanes; k += hn::Lanes(d)) {
+          hn::Store(hn::PromoteTo(d, hn::Load(d_float, totals + k)), d,
+                    totals_[channel] + first + k);
+        }
+      }
+    }
+  }
+
+  std::size_t count_ = 0;
+  std::uint64_t alone_ = 0;  // Those in totals_alone_: bit k is point k.
+  HWY_ALIGN float parts_[kChannels][PointSamples::kCapacity][kPartialSums];
+  HWY_ALIGN typename PointFormula<kWeighted>::Totals totals_;
+  double totals_alone_[PointSamples::kCapacity][kChannels];
+};
+
+template <bool kWeighted>
+HWY_INLINE void Sample(const Scale& scale, std::span<const PointQuery> queries,
+                       PointSamples& samples) {
+  const double inverse_square = 1 / (scale.kernel_radius * scale.kernel_radius);
+  const SumsAtPoints<kWeighted> sums(inverse_square, queries);
+  const PointFormula<kWeighted> formula(scale);
+  const std::uint64_t gaps = formula(sums.totals(), sums.count(), samples);
+  if (gaps == 0) return;
+  std::size_t point = 0;
+  for (const PointQuery& query : queries) {
+    for (std::size_t k = 0; k < query.count; ++k, ++point) {
+      if ((gaps >> point & 1) == 0) continue;
+      double third[kThirdSums] = {};
+      SumThird(inverse_square, query.near, query.points[k], third);
+      const LatticePoint gradient = formula.GapGradient(sums.totals(), third, point);
+      samples.gradient_x[point] = gradient.x;
+      samples.gradient_y[point] = gradient.y;
     }
   }
 }
 
-void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
-                 std::span<QuerySums> sums) {
-  queries.front().near.weight != nullptr ? Sum<true>(kernel, queries, sums)
-                                         : Sum<false>(kernel, queries, sums);
-}
-
-PointThirdSums ThirdSumsAtPoint(const PointKernel& kernel, const NearRows& near,
-                                const LatticePoint& point) {
-  double totals[kThirdSums] = {};
-  NearChunk room;
-  ForEachChunk<false>(near, room, [&](const NearChunk& chunk) HWY_ATTR {
-    SumChunk<AddThirdSums>(kernel, near, chunk, point, totals);
-  });
-  const double slope = 6 * kernel.inverse_square;
-  return {.xxx = slope * totals[kXxx],
-          .xxy = slope * totals[kXxy],
-          .xyy = slope * totals[kXyy],
-          .yyy = slope * totals[kYyy]};
+void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries,
+                    PointSamples& samples) {
+  queries.front().near.weight != nullptr ? Sample<true>(scale, queries, samples)
+                                         : Sample<false>(scale, queries, samples);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -174,17 +216,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(SumAtPoints);
-HWY_EXPORT(ThirdSumsAtPoint);
+HWY_EXPORT(SampleAtPoints);
 
-void SumAtPoints(const PointKernel& kernel, std::span<const PointQuery> queries,
-                 std::span<QuerySums> sums) {
-  HWY_DYNAMIC_DISPATCH(SumAtPoints)(kernel, queries, sums);
-}
-
-PointThirdSums ThirdSumsAtPoint(const PointKernel& kernel, const NearRows& near,
-                                const LatticePoint& point) {
-  return HWY_DYNAMIC_DISPATCH(ThirdSumsAtPoint)(kernel, near, point);
+void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries,
+                    PointSamples& samples) {
+  HWY_DYNAMIC_DISPATCH(SampleAtPoints)(scale, queries, samples);
 }
 
 }  // namespace partiemc

@@ -32,7 +32,7 @@ constexpr double kBoundarySlope = 1.164;
 }  // namespace
 
 double Scale::VoidValue() const {
-  return LevelSetFormula<double>(*this).Value(0, kernel_radius - reference_radius, 0);
+  return LevelSetValue(*this, 0, kernel_radius - reference_radius, 0);
 }
 
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,

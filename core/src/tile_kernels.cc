@@ -81,7 +81,7 @@ struct DensityBranches {
   Vector guard, saturation;
 };
 
-// LevelSetFormula in vectors, of what is known of nodes.
+// LevelSetValue in vectors, of what is known of nodes.
 class NodeFormula {
  public:
   HWY_INLINE NodeFormula(const AskedNodes& asked, float weight, const Scale& scale)
