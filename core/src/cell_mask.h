@@ -84,15 +84,23 @@ inline unsigned NeighboursWithCells(const CellMask& mask) {
 /// The cells (i + di, j + dj), -before <= di, dj <= after, of every bit (i, j) of `rows`.
 /// Requires: 0 <= before, after <= kMaskMargin.
 inline CellMask Widened(const BitRows& rows, int before, int after) {
+  // From the last cell and row of each box its reach doubles, down to the first.
+  const int size = before + after + 1;
+  const auto double_reach = [&](auto widen_by) {
+    for (int reached = 1; reached < size;) {
+      const int step = std::min(reached, size - reached);
+      widen_by(step);
+      reached += step;
+    }
+  };
   CellMask mask{};
   for (int j = 0; j < kTileSize; ++j) {
-    if (rows[j] == 0) continue;
-    std::uint64_t cells = 0;
-    for (int d = -before; d <= after; ++d) cells |= std::uint64_t{rows[j]} << (kMaskMargin + d);
-    const int centre = j + kMaskMargin;
-    const int end = std::min(centre + after, static_cast<int>(mask.size()) - 1);
-    for (int row = centre - before; row <= end; ++row) mask[row] |= cells;
+    mask[j + kMaskMargin + after] = std::uint64_t{rows[j]} << (kMaskMargin + after);
   }
+  double_reach([&](int step) {
+    for (std::uint64_t& row : mask) row |= row >> step;
+    for (std::size_t row = 0; row + step < mask.size(); ++row) mask[row] |= mask[row + step];
+  });
   return mask;
 }
 

@@ -197,5 +197,32 @@ TEST(CellMasks, KnowTheCellsAroundATileAndAllThatAreNearToOne) {
   }
 }
 
+TEST(CellMasks, WidenedHaveTheCellsOfTheBoxesAroundBits) {
+  support::Random random(6);
+  for (const auto& [before, after] :
+       {std::pair(0, 0), std::pair(1, 0), std::pair(0, 1), std::pair(3, 2), std::pair(7, 8),
+        std::pair(kMaskMargin, kMaskMargin - 1), std::pair(kMaskMargin, kMaskMargin)}) {
+    BitRows rows{};
+    for (int n = 0; n < 6; ++n) {
+      rows[random.Below(kTileSize)] |= std::uint32_t{1} << random.Below(kTileSize);
+    }
+    rows[0] |= 1;  // Their boxes end where the mask does.
+    rows[kTileSize - 1] |= std::uint32_t{1} << (kTileSize - 1);
+    CellMask expected{};
+    for (int j = 0; j < kTileSize; ++j) {
+      for (int i = 0; i < kTileSize; ++i) {
+        if ((rows[j] >> i & 1) == 0) continue;
+        for (int row = j - before; row <= std::min(j + after, kTileSize + kMaskMargin - 1); ++row) {
+          for (int cell = i - before; cell <= std::min(i + after, kTileSize + kMaskMargin - 1);
+               ++cell) {
+            expected[row + kMaskMargin] |= std::uint64_t{1} << (cell + kMaskMargin);
+          }
+        }
+      }
+    }
+    EXPECT_EQ(Widened(rows, before, after), expected) << before << " before, " << after << " after";
+  }
+}
+
 }  // namespace
 }  // namespace partiemc
