@@ -25,29 +25,37 @@ HWY_INLINE Vector Bump(Vector square, Vector inverse_square) {
   return hn::Mul(t, t);
 }
 
-// Adds a chunk's particles to the sums of a plane.
+HWY_INLINE Vector InverseSquare(double length) { return Constant(1 / (length * length)); }
+
+// What planes have in common.
+struct Shapes {
+  HWY_INLINE Shapes(const SupportShape& support, const StripShape& strip)
+      : support_radius(Constant(support.radius * support.radius)),
+        support_height(Constant(support.height)),
+        support_width(InverseSquare(support.half_width)),
+        support_depth(Constant(support.depth)),
+        inverse_spacing(Constant(1 / support.spacing)),
+        strip_radius(Constant(strip.radius * strip.radius)),
+        strip_height(Constant(strip.height)),
+        strip_width(InverseSquare(strip.half_width)),
+        strip_depth(InverseSquare(strip.depth)) {}
+
+  // Radii squared; widths and the strip's depth as Bump takes them.
+  Vector support_radius, support_height, support_width, support_depth, inverse_spacing;
+  Vector strip_radius, strip_height, strip_width, strip_depth;
+};
+
+// The sums over a chunk's particles for a plane.
 template <bool kWeighted>
-HWY_INLINE void SumChunk(const NearRows& near, const NearChunk& chunk, const BentPlane& plane,
-                         const SupportShape& support, const StripShape& strip,
-                         double (&totals)[kSupportSums]) {
+HWY_INLINE PartialSums<kSupportSums> SumChunk(const NearRows& near, const NearChunk& chunk,
+                                              const BentPlane& plane, const Shapes& shapes) {
   const Lanes d;
-  const auto inverse_square = [](double length)
-                                  HWY_ATTR { return Constant(1 / (length * length)); };
   const Vector x = Constant(plane.x - near.origin_x);
   const Vector y = Constant(plane.y - near.origin_y);
   const Vector normal_x = Constant(plane.normal_x);
   const Vector normal_y = Constant(plane.normal_y);
   const Vector half_curvature = Constant(plane.curvature / 2);
-  const Vector support_radius = Constant(support.radius * support.radius);
-  const Vector support_height = Constant(support.height);
-  const Vector support_width = inverse_square(support.half_width);
-  const Vector support_depth = Constant(support.depth);
-  const Vector inverse_spacing = Constant(1 / support.spacing);
-  const Vector strip_radius = Constant(strip.radius * strip.radius);
-  const Vector strip_height = Constant(strip.height);
-  const Vector strip_width = inverse_square(strip.half_width);
-  const Vector strip_depth = inverse_square(strip.depth);
-  PartialSums<kSupportSums> sums(chunk, [&](int k, Vector(&channels)[kSupportSums]) HWY_ATTR {
+  return PartialSums<kSupportSums>(chunk, [&](int k, Vector(&channels)[kSupportSums]) HWY_ATTR {
     const Vector dx = hn::Sub(hn::Load(d, chunk.x + k), x);
     const Vector dy = hn::Sub(hn::Load(d, chunk.y + k), y);
     const Vector along = hn::Sub(hn::Mul(normal_x, dy), hn::Mul(normal_y, dx));
@@ -56,40 +64,44 @@ HWY_INLINE void SumChunk(const NearRows& near, const NearChunk& chunk, const Ben
     const Vector along_square = hn::Mul(along, along);
     const Vector distance = hn::Add(above, hn::Mul(half_curvature, along_square));
 
-    Vector w = hn::Max(hn::Add(hn::Mul(distance, inverse_spacing), support_depth), hn::Zero(d));
+    Vector w = hn::Max(hn::Add(hn::Mul(distance, shapes.inverse_spacing), shapes.support_depth),
+                       hn::Zero(d));
     for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
-    const auto supports = hn::And(hn::Lt(square, support_radius), hn::Lt(above, support_height));
-    w = hn::IfThenElseZero(supports, hn::Mul(Bump(along_square, support_width), w));
+    const auto supports =
+        hn::And(hn::Lt(square, shapes.support_radius), hn::Lt(above, shapes.support_height));
+    w = hn::IfThenElseZero(supports, hn::Mul(Bump(along_square, shapes.support_width), w));
     channels[kDistance] =
         hn::Add(channels[kDistance], hn::IfThenElseZero(supports, hn::Mul(w, distance)));
     channels[kWeight] = hn::Add(channels[kWeight], w);
 
     const Vector below = hn::Min(distance, hn::Zero(d));
-    Vector volume =
-        hn::Mul(Bump(along_square, strip_width), Bump(hn::Mul(below, below), strip_depth));
+    Vector volume = hn::Mul(Bump(along_square, shapes.strip_width),
+                            Bump(hn::Mul(below, below), shapes.strip_depth));
     if constexpr (kWeighted) volume = hn::Mul(volume, hn::Load(d, chunk.weight + k));
-    const auto is_in_strip = hn::And(hn::Lt(square, strip_radius), hn::Lt(above, strip_height));
+    const auto is_in_strip =
+        hn::And(hn::Lt(square, shapes.strip_radius), hn::Lt(above, shapes.strip_height));
     channels[kVolume] = hn::Add(channels[kVolume], hn::IfThenElseZero(is_in_strip, volume));
   });
-  sums.AddTo(totals);
 }
 
 template <bool kWeighted>
 HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& support,
                     const StripShape& strip, std::span<QuerySupports> sums) {
-  double totals[kQueriesAtOnce][kPointsAtOnce][kSupportSums] = {};
-  ForEachQuery<kWeighted>(queries, [&](std::size_t q, const NearChunk& chunk, bool) HWY_ATTR {
+  const Shapes shapes(support, strip);
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    for (std::size_t k = 0; k < queries[q].count; ++k) sums[q][k] = {};
+  }
+  const auto visit = [&](std::size_t q, const NearChunk& chunk, bool) HWY_ATTR {
     const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.count; ++k) {
-      SumChunk<kWeighted>(query.near, chunk, query.planes[k], support, strip, totals[q][k]);
+      double totals[kSupportSums] = {};
+      SumChunk<kWeighted>(query.near, chunk, query.planes[k], shapes).AddTo(totals);
+      sums[q][k].distance += totals[kDistance];
+      sums[q][k].weight += totals[kWeight];
+      sums[q][k].volume += totals[kVolume];
     }
-  });
-  for (std::size_t q = 0; q < queries.size(); ++q) {
-    for (std::size_t k = 0; k < queries[q].count; ++k) {
-      const auto& of = totals[q][k];
-      sums[q][k] = {of[kDistance], of[kWeight], of[kVolume]};
-    }
-  }
+  };
+  ForEachQuery<kWeighted>(queries, visit);
 }
 
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
