@@ -104,9 +104,11 @@ inline CellMask Widened(const BitRows& rows, int before, int after) {
   return mask;
 }
 
-/// The bits of a tile and of its neighbours. rows_of(index) are the rows of an existing tile.
+/// The bits of a tile, and of its neighbours those in rows up to `margin` beyond its sides.
+/// rows_of(index) are the rows of an existing tile. Requires: 0 <= margin <= kMaskMargin.
 template <typename RowsOf>
-CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, RowsOf rows_of) {
+CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int margin,
+                     RowsOf rows_of) {
   const Neighbourhood& near = directory.neighbours(tile);
   CellMask mask{};
   for (int place = 0; place < static_cast<int>(near.size()); ++place) {
@@ -114,8 +116,8 @@ CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, RowsOf 
     const BitRows& rows = rows_of(near[place]);
     const int dx = place % 3 - 1;
     const int dy = place / 3 - 1;
-    const int first = dy < 0 ? kTileSize - kMaskMargin : 0;
-    const int end = dy > 0 ? kMaskMargin : kTileSize;
+    const int first = dy < 0 ? kTileSize - margin : 0;
+    const int end = dy > 0 ? margin : kTileSize;
     const int up = dx < 0 ? 0 : kMaskMargin + dx * kTileSize;
     const int down = dx < 0 ? kTileSize - kMaskMargin : 0;
     for (int j = first; j < end; ++j) {
@@ -132,10 +134,11 @@ inline void Widen(CellMask& mask, int distance) {
   for (int done = 0; done < distance;) {
     const int step = std::min(2 * done + 1, distance - done);
     for (std::uint64_t& row : mask) row |= row << step | row >> step;
-    const CellMask rows = mask;
+    // Upwards from below, then downwards from above: no row is read after it took one in, but for
+    // what it has brought along already.
     const std::size_t rest = mask.size() - step;
-    for (std::size_t j = 0; j < rest; ++j) mask[j] |= rows[j + step];
-    for (std::size_t j = 0; j < rest; ++j) mask[j + step] |= rows[j];
+    for (std::size_t j = 0; j < rest; ++j) mask[j] |= mask[j + step];
+    for (std::size_t j = rest; j-- > 0;) mask[j + step] |= mask[j];
     done += step;
   }
 }

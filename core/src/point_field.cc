@@ -40,6 +40,7 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
   // Farther than a mask holds all is asked for, and all is wanted.
   const double distance = std::ceil(wander);
   const double reach = distance + std::ceil(scale_.kernel_radius);
+  const int margin = static_cast<int>(std::min<double>(reach, kMaskMargin));
   const auto mark = [](CellMask& mask, double cells) {
     Widen(mask, static_cast<int>(cells));
     return CellsOfNeighbour(mask, kOwnPlace);
@@ -50,7 +51,7 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
     tile.asked = {};
     wanted_[index] = reach > kMaskMargin ? all_cells : BitRows{};
     if (std::any_of(near.begin(), near.end(), is_active)) {
-      CellMask mask = CellsAround(bins.tiles, index, active_of);
+      CellMask mask = CellsAround(bins.tiles, index, margin, active_of);
       tile.asked = distance > kMaskMargin ? all_cells : mark(mask, distance);
       if (reach <= kMaskMargin) wanted_[index] = mark(mask, reach - distance);
     }

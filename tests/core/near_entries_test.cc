@@ -178,10 +178,10 @@ TEST(CellMasks, KnowTheCellsAroundATileAndAllThatAreNearToOne) {
     return false;
   };
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    const CellMask around =
-        CellsAround(bins.tiles, tile, [&](std::uint32_t of) -> const BitRows& { return rows[of]; });
     for (int distance = 0; distance <= kMaskMargin; ++distance) {
-      CellMask mask = around, in_two_steps = around;
+      CellMask mask = CellsAround(bins.tiles, tile, distance,
+                                  [&](std::uint32_t of) -> const BitRows& { return rows[of]; });
+      CellMask in_two_steps = mask;
       Widen(mask, distance);
       Widen(in_two_steps, distance / 3);
       Widen(in_two_steps, distance - distance / 3);
