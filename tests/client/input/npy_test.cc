@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "client/input/deflated.h"
 #include "client/input/fixtures.h"
 
 namespace partiemc::client {
@@ -44,26 +45,12 @@ struct Entry {
   bool deflate = false;
 };
 
-std::string RawDeflate(const std::string& content) {
-  z_stream stream = {};
-  deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
-  std::string packed(content.size() + 100, '\0');
-  std::string input = content;
-  stream.next_in = reinterpret_cast<Bytef*>(input.data());
-  stream.avail_in = static_cast<uInt>(input.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
-}
-
 std::string Zip(const std::vector<Entry>& entries) {
   std::string zip;
   std::string directory;
   for (const Entry& entry : entries) {
-    const std::string data = entry.deflate ? RawDeflate(entry.content) : entry.content;
+    const std::string data =
+        entry.deflate ? Deflated(entry.content, Wrapping::kNone) : entry.content;
     const auto crc = crc32(0, reinterpret_cast<const Bytef*>(entry.content.data()),
                            static_cast<uInt>(entry.content.size()));
     const std::string common = LittleEndian(20, 2) + LittleEndian(0, 2) +

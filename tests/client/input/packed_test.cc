@@ -1,6 +1,6 @@
-#include <zlib.h>
 #include <zstd.h>
 
+#include "client/input/deflated.h"
 #include "client/input/fixtures.h"
 
 namespace partiemc::client {
@@ -19,20 +19,7 @@ std::string Dump(int frames) {
   return dump;
 }
 
-std::string Gzip(const std::string& content) {
-  z_stream stream = {};
-  deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
-  std::string packed(content.size() + 100, '\0');
-  std::string input = content;
-  stream.next_in = reinterpret_cast<Bytef*>(input.data());
-  stream.avail_in = static_cast<uInt>(input.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
-}
+std::string Gzip(const std::string& content) { return Deflated(content, Wrapping::kGzip); }
 
 std::string Zstd(const std::string& content) {
   std::string packed(ZSTD_compressBound(content.size()), '\0');
