@@ -270,7 +270,9 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   scratch.positions.resize(2 * count);
   const std::size_t most = MaxStretches();
   const std::size_t length = std::max(kMinStretch, (count + most - 1) / most);
-  scratch.stretches.resize((count + length - 1) / length);
+  const std::size_t stretches = (count + length - 1) / length;
+  if (scratch.all_stretches.size() < stretches) scratch.all_stretches.resize(stretches);
+  scratch.stretches = std::span(scratch.all_stretches).first(stretches);
   const auto for_each_stretch = [&](auto visit) {
     ParallelFor(scratch.stretches.size(), [&](std::size_t k) {
       visit(scratch.stretches[k], k * length, std::min(count, (k + 1) * length));

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -37,13 +38,14 @@ struct BinStretch {
 
 /// Warm buffers of BinParticles.
 struct BinScratch {
-  std::vector<BinStretch> stretches;
-  std::vector<std::uint32_t> home;     ///< By particle: its home in its stretch.
-  std::vector<float> positions;        ///< By particle: x and y in its home.
-  std::vector<TileCoordinate> homes;   ///< Tiles that hold particles, sorted.
-  std::vector<std::uint32_t> offsets;  ///< By these: their first entry.
-  std::vector<std::uint32_t> next;     ///< By these: where the next stretch goes on.
-  std::vector<std::uint32_t> reached;  ///< By these: tiles that must exist (AddReachedTiles).
+  std::vector<BinStretch> all_stretches;  ///< Of frames so far: a small one leaves them warm.
+  std::span<BinStretch> stretches;        ///< The first of them: those of this frame.
+  std::vector<std::uint32_t> home;        ///< By particle: its home in its stretch.
+  std::vector<float> positions;           ///< By particle: x and y in its home.
+  std::vector<TileCoordinate> homes;      ///< Tiles that hold particles, sorted.
+  std::vector<std::uint32_t> offsets;     ///< By these: their first entry.
+  std::vector<std::uint32_t> next;        ///< By these: where the next stretch goes on.
+  std::vector<std::uint32_t> reached;     ///< By these: tiles that must exist (AddReachedTiles).
 };
 
 /// Particles sorted by tile, each in the list of the tile that it lies in. Tiles exist farther out:

@@ -71,7 +71,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
   const auto reconstructor = Reconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   // Bodies that meet and part, spray, holes that cleaning fills, more than one stretch of
-  // particles.
+  // particles; then few particles, then none.
   std::vector<Particles> frames;
   for (int k = 0; k < 4; ++k) {
     support::Random random(static_cast<std::uint64_t>(k));
@@ -81,6 +81,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
     if (tested.volumes) frame.volumes.assign(frame.size(), 1.0f);
     frames.push_back(frame);
   }
+  frames.insert(frames.begin() + 2, {support::Disc(5), Particles()});
   State state;
   Workspace workspace;
   Result result;
