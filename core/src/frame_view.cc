@@ -7,7 +7,6 @@
 #include <span>
 
 #include "absl/strings/str_cat.h"
-#include "distinct_ids.h"
 #include "parallel.h"
 #include "partiemc/status.h"
 
@@ -124,14 +123,14 @@ absl::Status CheckVolumes(const Frame& frame) {
   return absl::OkStatus();
 }
 
-absl::Status CheckIds(const Frame& frame) {
+absl::Status CheckIds(const Frame& frame, DistinctIdsScratch& scratch) {
   if (frame.ids.empty()) return absl::OkStatus();
   if (frame.ids.size() != frame.ParticleCount()) {
     return InvalidFrame(
         kReasonCount, "ids", absl::StrCat(frame.ids.size(), " values"),
         absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
   }
-  const auto repeated = FindRepeated(frame.ids);
+  const auto repeated = FindRepeated(frame.ids, scratch);
   if (!repeated) return absl::OkStatus();
   return InvalidFrame(kReasonDuplicate, absl::StrCat("ids[", repeated->again, "]"),
                       absl::StrCat(frame.ids[repeated->again]),
@@ -206,7 +205,8 @@ absl::Status Validate(const FrameLimits& limits) {
   return check("max_tiles", limits.max_tiles, FrameLimits::kMostTiles);
 }
 
-absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits) {
+absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits,
+                        DistinctIdsScratch& scratch) {
   const std::size_t values = std::visit([](auto view) { return view.size(); }, frame.positions);
   if (frame.components != 2 && frame.components != 3) {
     return InvalidFrame(kReasonOutOfRange, "components", absl::StrCat(frame.components),
@@ -228,7 +228,7 @@ absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limi
     if (absl::Status status = CheckPlanar(frame, plane); !status.ok()) return status;
   }
   if (absl::Status status = CheckVolumes(frame); !status.ok()) return status;
-  if (absl::Status status = CheckIds(frame); !status.ok()) return status;
+  if (absl::Status status = CheckIds(frame, scratch); !status.ok()) return status;
   return CheckVelocities(frame);
 }
 

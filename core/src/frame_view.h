@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "absl/status/status.h"
+#include "distinct_ids.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 
@@ -104,6 +105,7 @@ absl::Status InvalidFrame(std::string_view reason, std::string field, std::strin
 /// OK if every number of the frame is usable: coordinates finite and in one plane, volumes
 /// positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a Violation that names
 /// the first particle at fault.
-absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits);
+absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits,
+                        DistinctIdsScratch& scratch);
 
 }  // namespace partiemc

@@ -187,7 +187,8 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
   Scale scale;
   {
     const StageScope scope(observer, Stage::kBins);
-    if (absl::Status status = CheckFrame(frame, parameters_.plane, limits_); !status.ok()) {
+    if (absl::Status status = CheckFrame(frame, parameters_.plane, limits_, buffers.distinct_ids);
+        !status.ok()) {
       return status;
     }
     auto decided = DecideLengths(parameters_, frame, state, buffers.spacing);

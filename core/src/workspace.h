@@ -6,6 +6,7 @@
 
 #include "bins.h"
 #include "crossings.h"
+#include "distinct_ids.h"
 #include "field.h"
 #include "identities.h"
 #include "intersections.h"
@@ -20,6 +21,7 @@
 namespace partiemc {
 
 struct Workspace::Buffers {
+  DistinctIdsScratch distinct_ids;
   SpacingScratch spacing;
   ParticleBins bins;
   LevelSet level_set;

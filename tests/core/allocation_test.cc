@@ -45,13 +45,13 @@ struct AllocationCase {
   Placement placement;
   Fill fill;
   int threads;
-  bool volumes;
+  bool volumes, ids;
   bool estimates_spacing = false;  // In each frame.
 };
 
 void PrintTo(const AllocationCase& tested, std::ostream* out) {
   *out << Name(tested.placement) << ", " << Name(tested.fill) << ", " << tested.threads
-       << " threads" << (tested.volumes ? ", volumes" : "")
+       << " threads" << (tested.volumes ? ", volumes" : "") << (tested.ids ? ", ids" : "")
        << (tested.estimates_spacing ? ", spacing estimated" : "");
 }
 
@@ -79,6 +79,9 @@ TEST_P(WarmFrame, AllocatesNothing) {
     frame.Add(support::Shifted(support::Blob(random, 12), 118 + 6 * k, 5));
     frame.Add(support::Shifted(support::Noise(random, 200, 60), -200, 150));
     if (tested.volumes) frame.volumes.assign(frame.size(), 1.0f);
+    for (std::size_t id = 0; tested.ids && id < frame.size(); ++id) {
+      frame.ids.push_back(k % 2 == 0 ? id : id << 32);  // Numbers without and with large gaps.
+    }
     frames.push_back(frame);
   }
   frames.insert(frames.begin() + 2, {support::Disc(5), Particles()});
@@ -105,11 +108,13 @@ std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
   for (const Placement placement : AllPlacements()) {
     for (const Fill fill : AllFills()) {
-      for (const int threads : {1, 2}) cases.push_back({placement, fill, threads, threads == 1});
+      for (const int threads : {1, 2}) {
+        cases.push_back({placement, fill, threads, threads == 1, threads == 2});
+      }
     }
   }
   for (const int threads : {1, 2}) {
-    cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, false, true});
+    cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, false, false, true});
   }
   return cases;
 }

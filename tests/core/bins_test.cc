@@ -268,6 +268,11 @@ std::vector<BadFrame> BadFrames() {
   };
 }
 
+absl::Status Check(const Frame& frame, Plane plane, const FrameLimits& limits) {
+  DistinctIdsScratch scratch;
+  return CheckFrame(frame, plane, limits, scratch);
+}
+
 class BadFrameTest : public testing::TestWithParam<BadFrame> {};
 
 TEST_P(BadFrameTest, IsRefusedWithReasonAndField) {
@@ -277,7 +282,7 @@ TEST_P(BadFrameTest, IsRefusedWithReasonAndField) {
                     .volumes = bad.volumes,
                     .ids = bad.ids,
                     .velocities = bad.velocities};
-  const absl::Status status = CheckFrame(frame, Plane::kXy, {.max_particles = 100});
+  const absl::Status status = Check(frame, Plane::kXy, {.max_particles = 100});
   EXPECT_EQ(status.code(), bad.code) << status;
   ASSERT_TRUE(FindViolation(status).has_value());
   EXPECT_EQ(FindViolation(status)->reason, bad.reason);
@@ -293,13 +298,13 @@ TEST(Bins, AGoodFrameOfAnyKindIsAccepted) {
   const std::vector<float> flat = {0, 0, 5, 1, 0, 5, 0, 1, 5};
   const std::vector<float> volumes = {1, 2, 3};
   const std::vector<std::uint64_t> ids = {5, ~0ull, 0};
-  EXPECT_TRUE(CheckFrame({}, Plane::kXy, {}).ok());
-  EXPECT_TRUE(CheckFrame({.positions = std::span<const float>(flat),
-                          .components = 3,
-                          .volumes = volumes,
-                          .ids = ids,
-                          .velocities = flat},
-                         Plane::kXy, {.max_particles = 3})
+  EXPECT_TRUE(Check({}, Plane::kXy, {}).ok());
+  EXPECT_TRUE(Check({.positions = std::span<const float>(flat),
+                     .components = 3,
+                     .volumes = volumes,
+                     .ids = ids,
+                     .velocities = flat},
+                    Plane::kXy, {.max_particles = 3})
                   .ok());
 }
 
@@ -326,9 +331,9 @@ TEST(Bins, ThreeComponentsAreReadInTheirPlane) {
 TEST(Bins, ParticlesOutsideTheNamedPlaneAreToldByTheAxisThatVaries) {
   const std::vector<double> xyz = {0, 0, 0, 1, 0, 1, 2, 0, 2};
   const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
-  EXPECT_TRUE(CheckFrame(frame, Plane::kXz, {}).ok());
-  EXPECT_EQ(FindViolation(CheckFrame(frame, Plane::kXy, {}))->field, "positions[2].z");
-  EXPECT_EQ(FindViolation(CheckFrame(frame, Plane::kYz, {}))->field, "positions[2].x");
+  EXPECT_TRUE(Check(frame, Plane::kXz, {}).ok());
+  EXPECT_EQ(FindViolation(Check(frame, Plane::kXy, {}))->field, "positions[2].z");
+  EXPECT_EQ(FindViolation(Check(frame, Plane::kYz, {}))->field, "positions[2].x");
 }
 
 }  // namespace
