@@ -81,26 +81,10 @@ inline unsigned NeighboursWithCells(const CellMask& mask) {
   return places;
 }
 
-/// The cells (i + di, j + dj), -before <= di, dj <= after, of every bit (i, j) of `rows`.
-/// Requires: 0 <= before, after <= kMaskMargin.
-inline CellMask Widened(const BitRows& rows, int before, int after) {
-  // From the last cell and row of each box its reach doubles, down to the first.
-  const int size = before + after + 1;
-  const auto double_reach = [&](auto widen_by) {
-    for (int reached = 1; reached < size;) {
-      const int step = std::min(reached, size - reached);
-      widen_by(step);
-      reached += step;
-    }
-  };
+/// The bits of a tile alone.
+inline CellMask MaskOf(const BitRows& rows) {
   CellMask mask{};
-  for (int j = 0; j < kTileSize; ++j) {
-    mask[j + kMaskMargin + after] = std::uint64_t{rows[j]} << (kMaskMargin + after);
-  }
-  double_reach([&](int step) {
-    for (std::uint64_t& row : mask) row |= row >> step;
-    for (std::size_t row = 0; row + step < mask.size(); ++row) mask[row] |= mask[row + step];
-  });
+  for (int j = 0; j < kTileSize; ++j) mask[j + kMaskMargin] = std::uint64_t{rows[j]} << kMaskMargin;
   return mask;
 }
 
@@ -127,20 +111,27 @@ CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int mar
   return mask;
 }
 
-/// Adds all cells within `distance` of one of the mask, along each axis. Right in the tile for
-/// 0 <= distance <= kMaskMargin; cells beyond the margin are not known.
-inline void Widen(CellMask& mask, int distance) {
-  // What is wide already takes a step three times as long without leaving a gap.
-  for (int done = 0; done < distance;) {
-    const int step = std::min(2 * done + 1, distance - done);
-    for (std::uint64_t& row : mask) row |= row << step | row >> step;
-    // Upwards from below, then downwards from above: no row is read after it took one in, but for
-    // what it has brought along already.
-    const std::size_t rest = mask.size() - step;
-    for (std::size_t j = 0; j < rest; ++j) mask[j] |= mask[j + step];
-    for (std::size_t j = rest; j-- > 0;) mask[j + step] |= mask[j];
-    done += step;
-  }
+/// Adds the cells (i + di, j + dj), -before <= di, dj <= after, of every cell (i, j) of the mask.
+/// Of cells beyond the margin nothing is known, so that those that they would add miss. Requires: 0
+/// <= before, after <= kMaskMargin.
+inline void Widen(CellMask& mask, int before, int after) {
+  // What reaches far already takes a step as long and one more without leaving a gap.
+  const auto reach = [](int distance, auto step_by) {
+    for (int reached = 0; reached < distance;) {
+      const int step = std::min(reached + 1, distance - reached);
+      step_by(step);
+      reached += step;
+    }
+  };
+  // No row is read after it took another one in.
+  reach(before, [&](int step) {
+    for (std::uint64_t& row : mask) row |= row >> step;
+    for (std::size_t row = 0; row + step < mask.size(); ++row) mask[row] |= mask[row + step];
+  });
+  reach(after, [&](int step) {
+    for (std::uint64_t& row : mask) row |= row << step;
+    for (std::size_t row = mask.size() - step; row-- > 0;) mask[row + step] |= mask[row];
+  });
 }
 
 }  // namespace partiemc

@@ -100,11 +100,11 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
                     const AskedNodes& asked, LevelSet& level_set) {
   MomentSums sums;
   ClearMoments(asked, sums);
-  CellMask mask;
+  CellMask mask = MaskOf(asked.rows);
   const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
   const bool masked = reach < kMaskMargin;
   // A node is reached from the cells whose far side is less than the radius before it.
-  if (masked) mask = Widened(asked.rows, reach, reach - 1);
+  if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
   const AskedColumns columns = ColumnsOf(asked, radius);
   NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)

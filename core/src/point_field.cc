@@ -42,7 +42,7 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
   const double reach = distance + std::ceil(scale_.kernel_radius);
   const int margin = static_cast<int>(std::min<double>(reach, kMaskMargin));
   const auto mark = [](CellMask& mask, double cells) {
-    Widen(mask, static_cast<int>(cells));
+    Widen(mask, static_cast<int>(cells), static_cast<int>(cells));
     return CellsOfNeighbour(mask, kOwnPlace);
   };
   ParallelFor(tiles, [&](std::uint32_t index) {

@@ -182,9 +182,9 @@ TEST(CellMasks, KnowTheCellsAroundATileAndAllThatAreNearToOne) {
       CellMask mask = CellsAround(bins.tiles, tile, distance,
                                   [&](std::uint32_t of) -> const BitRows& { return rows[of]; });
       CellMask in_two_steps = mask;
-      Widen(mask, distance);
-      Widen(in_two_steps, distance / 3);
-      Widen(in_two_steps, distance - distance / 3);
+      Widen(mask, distance, distance);
+      Widen(in_two_steps, distance / 3, distance / 3);
+      Widen(in_two_steps, distance - distance / 3, distance - distance / 3);
       for (int j = 0; j < kTileSize; ++j) {
         for (int i = 0; i < kTileSize; ++i) {
           const bool expected = is_near(tile, i, j, distance);
@@ -197,7 +197,7 @@ TEST(CellMasks, KnowTheCellsAroundATileAndAllThatAreNearToOne) {
   }
 }
 
-TEST(CellMasks, WidenedHaveTheCellsOfTheBoxesAroundBits) {
+TEST(CellMasks, AreWidenedByABoxAroundEachCell) {
   support::Random random(6);
   for (const auto& [before, after] :
        {std::pair(0, 0), std::pair(1, 0), std::pair(0, 1), std::pair(3, 2), std::pair(7, 8),
@@ -220,7 +220,9 @@ TEST(CellMasks, WidenedHaveTheCellsOfTheBoxesAroundBits) {
         }
       }
     }
-    EXPECT_EQ(Widened(rows, before, after), expected) << before << " before, " << after << " after";
+    CellMask mask = MaskOf(rows);
+    Widen(mask, before, after);
+    EXPECT_EQ(mask, expected) << before << " before, " << after << " after";
   }
 }
 
