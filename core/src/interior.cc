@@ -125,6 +125,45 @@ void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> in
   staircases.pinches /= 2;  // Each was passed by both of its cells.
 }
 
+std::int64_t EulerCharacteristic(const TileDirectory& directory, const Staircases& staircases) {
+  const auto at = [&](std::uint32_t k) {
+    const TilePlace& node = staircases.corners[k];
+    const TileCoordinate& tile = directory[node.tile];
+    return std::pair((std::int64_t{tile.x} << kTileShift) + node.i,
+                     (std::int64_t{tile.y} << kTileShift) + node.j);
+  };
+  auto characteristic = -static_cast<std::int64_t>(staircases.pinches);
+  for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
+    // The area, exact in integers: of an axis-aligned loop the integral of x dy.
+    std::int64_t area = 0;
+    const std::uint32_t first = staircases.offsets[loop];
+    const std::uint32_t last = staircases.offsets[loop + 1];
+    const auto origin = at(first);
+    for (std::uint32_t k = first; k < last; ++k) {
+      const auto a = at(k);
+      const auto b = at(k + 1 < last ? k + 1 : first);
+      area += (a.first - origin.first) * (b.second - a.second);
+    }
+    characteristic += area > 0 ? 1 : -1;
+  }
+  return characteristic;
+}
+
+std::array<TilePlace, 4> CornersOf(const TileDirectory& directory, const CellRectangle& rectangle) {
+  const auto moved = [&](TilePlace place, int right, int up) {
+    for (place.i += right; place.i >= kTileSize; place.i -= kTileSize) {
+      place.tile = directory.neighbours(place.tile)[5];
+    }
+    for (place.j += up; place.j >= kTileSize; place.j -= kTileSize) {
+      place.tile = directory.neighbours(place.tile)[7];
+    }
+    return place;
+  };
+  const TilePlace& corner = rectangle.corner;
+  const TilePlace right = moved(corner, rectangle.width, 0);
+  return {corner, right, moved(right, 0, rectangle.height), moved(corner, 0, rectangle.height)};
+}
+
 void MergeCells(const TileDirectory& directory, std::span<const BitRows> interior,
                 MergeScratch& scratch, std::vector<CellRectangle>& rectangles) {
   scratch.free.assign(interior.begin(), interior.end());

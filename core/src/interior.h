@@ -25,11 +25,19 @@ struct Staircases {
 void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> interior,
                      Staircases& staircases);
 
+/// Euler characteristic of the cells that the loops bound, taken as open sets: outlines less voids,
+/// and less pinches, which join cells. Cost: linear in corners.
+std::int64_t EulerCharacteristic(const TileDirectory& directory, const Staircases& staircases);
+
 /// `width` x `height` cells from the cell `corner` on, to the right and upwards.
 struct CellRectangle {
   TilePlace corner;
   int width, height;
 };
+
+/// Its corners, counter-clockwise from the lower left one. Requires: all of its cells are interior,
+/// so that there are tiles all along its sides.
+std::array<TilePlace, 4> CornersOf(const TileDirectory& directory, const CellRectangle& rectangle);
 
 /// Warm buffers of MergeCells.
 struct MergeScratch {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <numeric>
 
 #include "bits.h"
 #include "parallel.h"
@@ -13,7 +14,8 @@ namespace partiemc {
 namespace {
 
 // Builds one mesh. Points of the connectivity: the points of the rings (for `farthest-particle`:
-// the middles of all segments), then lattice nodes as they are needed.
+// the middles of all segments), then the nodes of the lattice that triangles name. Where these are
+// not known yet when loops are triangulated, the corners of the staircases stand in for them.
 class MeshBuilder {
  public:
   MeshBuilder(const MeshInput& input, MeshScratch& scratch, Mesh& mesh)
@@ -23,18 +25,25 @@ class MeshBuilder {
 
  private:
   bool MovesVertices() const { return input_.parameters.placement == Placement::kFarthestParticle; }
+  bool HasBand() const {
+    return input_.parameters.fill != Fill::kNone && input_.parameters.fill != Fill::kPolygon;
+  }
+  void FindInterior();
   void CollectRingPoints();
-  std::array<TilePlace, 4> CornersOf(const CellRectangle& rectangle) const;
   template <typename Visit>
   void ForEachRectangle(Visit visit) const;
-  void FindShapes();
-  void AddNodes();
+  void FillRectangles();
+  void NumberCorners();
+  void AppendNodes();
+  void AppendCorners();
+  void PutNodesInPlace();
   void AddRingLoops();
   void AddStaircaseLoops(bool reversed);
   std::uint32_t OuterRingAt(const TilePlace& inside_node) const;
-  absl::Status TriangulateLoops(TriangleClass triangle_class);
-  void FillRectangles();
-  absl::Status FillInterior();
+  bool TriangulateLoops(TriangleClass triangle_class);
+  bool TriangulateByLoops();
+  bool OneSweepIsLong() const;
+  bool TriangulateAll();
   void MoveVertices();
   std::uint64_t CountInteriorCells() const;
   std::uint64_t ExpectedBandTriangles() const;
@@ -44,7 +53,15 @@ class MeshBuilder {
   MeshScratch& scratch_;
   Mesh& mesh_;
   std::size_t ring_points_ = 0;  // Points of the connectivity that belong to rings.
+  std::uint64_t interior_cells_ = 0;
 };
+
+void MeshBuilder::FindInterior() {
+  scratch_.interior = input_.crossings.interior;
+  if (input_.parameters.placement != Placement::kVirtualPlane) return;
+  ExcludeTouchedCells(input_.directory, input_.rings.points, input_.rings.offsets,
+                      input_.placed.roots, input_.scale.cell_size, scratch_.interior);
+}
 
 void MeshBuilder::CollectRingPoints() {
   if (!MovesVertices()) {
@@ -58,6 +75,95 @@ void MeshBuilder::CollectRingPoints() {
     }
   }
   ring_points_ = mesh_.PointCount();
+}
+
+// Calls visit(CellRectangle) for each rectangle of the fill; `grid` has one for every cell.
+template <typename Visit>
+void MeshBuilder::ForEachRectangle(Visit visit) const {
+  for (const CellRectangle& rectangle : scratch_.rectangles) visit(rectangle);
+  if (input_.parameters.fill != Fill::kGrid) return;
+  for (std::uint32_t tile = 0; tile < input_.directory.size(); ++tile) {
+    for (int j = 0; j < kTileSize; ++j) {
+      for (std::uint32_t row = scratch_.interior[tile][j]; row != 0; row &= row - 1) {
+        visit(CellRectangle{{tile, std::countr_zero(row), j}, 1, 1});
+      }
+    }
+  }
+}
+
+// Numbers the nodes that rectangles have and makes two triangles of each. Every corner of
+// a staircase is among these nodes: a rectangle that is next to a node without having its corner
+// there has two neighbours, or all, of the four cells around it. Those around a corner, one or
+// three that are interior, or two across from each other, cannot be paired like that.
+void MeshBuilder::FillRectangles() {
+  const Fill fill = input_.parameters.fill;
+  interior_cells_ = CountInteriorCells();
+  scratch_.rectangles.clear();
+  if (fill == Fill::kGreedy) {
+    MergeCells(input_.directory, scratch_.interior, scratch_.merge, scratch_.rectangles);
+  }
+  NodeVertices& nodes = scratch_.nodes;
+  nodes.Clear(input_.directory.size());
+  ForEachRectangle([&](const CellRectangle& rectangle) {
+    for (const TilePlace& corner : CornersOf(input_.directory, rectangle)) nodes.Add(corner);
+  });
+  nodes.Number(static_cast<std::uint32_t>(ring_points_));
+  scratch_.triangles.resize(6 *
+                            (fill == Fill::kGrid ? interior_cells_ : scratch_.rectangles.size()));
+  std::uint32_t* next = scratch_.triangles.data();
+  ForEachRectangle([&](const CellRectangle& rectangle) {
+    std::array<std::uint32_t, 4> corners;
+    std::ranges::transform(CornersOf(input_.directory, rectangle), corners.begin(),
+                           [&](const TilePlace& node) { return nodes.At(node); });
+    for (const int corner : {0, 1, 2, 0, 2, 3}) *next++ = corners[corner];
+  });
+}
+
+// The number of the node of each corner of the staircases.
+void MeshBuilder::NumberCorners() {
+  const std::vector<TilePlace>& corners = scratch_.staircases.corners;
+  NodeVertices& nodes = scratch_.nodes;
+  if (input_.parameters.fill == Fill::kConforming) {
+    for (const TilePlace& corner : corners) nodes.Add(corner);
+    nodes.Number(static_cast<std::uint32_t>(ring_points_));
+  }
+  scratch_.corner_numbers.resize(corners.size());
+  if (!HasBand()) return;
+  std::ranges::transform(corners, scratch_.corner_numbers.begin(),
+                         [&](const TilePlace& node) { return nodes.At(node); });
+}
+
+void MeshBuilder::AppendNodes() {
+  scratch_.nodes.AppendPoints(input_.directory, input_.scale.cell_size, mesh_.points);
+}
+
+// Appends the corners of the staircases to the points; a node that loops pass twice comes twice.
+void MeshBuilder::AppendCorners() {
+  const std::vector<TilePlace>& corners = scratch_.staircases.corners;
+  for (const TilePlace& corner : corners) {
+    const Point point = NodePoint(input_.directory, corner, input_.scale.cell_size);
+    mesh_.points.insert(mesh_.points.end(), {point.x, point.y});
+  }
+  scratch_.corner_numbers.resize(corners.size());
+  std::iota(scratch_.corner_numbers.begin(), scratch_.corner_numbers.end(),
+            static_cast<std::uint32_t>(ring_points_));
+}
+
+// Puts the nodes in the place of the corners of the staircases.
+void MeshBuilder::PutNodesInPlace() {
+  NumberCorners();
+  mesh_.points.resize(2 * ring_points_);
+  const auto renumber = [this] {
+    if (scratch_.corner_numbers.empty()) return;  // Then no triangle has one.
+    const auto first = static_cast<std::uint32_t>(ring_points_);
+    for (std::uint32_t& point : mesh_.triangles) {
+      // Without a branch: of a triangle's points, nobody guesses which are corners.
+      const bool is_corner = point >= first;
+      const std::uint32_t number = scratch_.corner_numbers[is_corner ? point - first : 0];
+      point = is_corner ? number : point;
+    }
+  };
+  ParallelInvoke(renumber, [this] { AppendNodes(); });
 }
 
 // Loops are grouped by components, each named by its outer ring.
@@ -79,100 +185,71 @@ std::uint32_t MeshBuilder::OuterRingAt(const TilePlace& inside_node) const {
 void MeshBuilder::AddStaircaseLoops(bool reversed) {
   const Staircases& staircases = scratch_.staircases;
   for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
-    for (std::uint32_t k = staircases.offsets[loop]; k < staircases.offsets[loop + 1]; ++k) {
-      scratch_.loops.AddPoint(scratch_.nodes.At(staircases.corners[k]));
-    }
+    const std::uint32_t first = staircases.offsets[loop];
+    const std::uint32_t count = staircases.offsets[loop + 1] - first;
+    scratch_.loops.AddPoints(std::span(scratch_.corner_numbers).subspan(first, count));
     // The corners of interior cells are inside, in one component: cells stay on their side of every
     // ring, or were excluded.
-    scratch_.loops.EndLoop(OuterRingAt(staircases.corners[staircases.offsets[loop]]), reversed);
+    scratch_.loops.EndLoop(OuterRingAt(staircases.corners[first]), reversed);
   }
 }
 
-absl::Status MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
-  if (!scratch_.loops.Triangulate(mesh_.points, mesh_.triangles)) {
-    return absl::InternalError("mesh: the rings of this frame cannot be triangulated");
-  }
+bool MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
+  const bool is_done = scratch_.loops.Triangulate(mesh_.points, mesh_.triangles);
   mesh_.classes.resize(mesh_.triangles.size() / 3, triangle_class);
-  return absl::OkStatus();
+  return is_done;
 }
 
-// The corners of a rectangle, counter-clockwise from the lower left one. They are inside, so that
-// there are tiles all along its sides.
-std::array<TilePlace, 4> MeshBuilder::CornersOf(const CellRectangle& rectangle) const {
-  const auto moved = [this](TilePlace place, int right, int up) {
-    for (place.i += right; place.i >= kTileSize; place.i -= kTileSize) {
-      place.tile = input_.directory.neighbours(place.tile)[5];
-    }
-    for (place.j += up; place.j >= kTileSize; place.j -= kTileSize) {
-      place.tile = input_.directory.neighbours(place.tile)[7];
-    }
-    return place;
+// What rings and staircases bound: the band between them, all of the inside for `polygon`, and for
+// `conforming` the interior, as the corners of the staircases are the only points that the band has
+// there.
+bool MeshBuilder::TriangulateByLoops() {
+  scratch_.loops.Clear();
+  AddRingLoops();
+  if (HasBand()) AddStaircaseLoops(true);
+  if (!TriangulateLoops(TriangleClass::kBoundary)) return false;
+  if (input_.parameters.fill != Fill::kConforming) return true;
+  AddStaircaseLoops(false);
+  return TriangulateLoops(TriangleClass::kInterior);
+}
+
+// Whether one ring is so long that the sweep of its component is most of what has to be done, and
+// there is a thread that may fill rectangles meanwhile.
+bool MeshBuilder::OneSweepIsLong() const {
+  if (!HasBand() || ThreadCount() == 1) return false;
+  const std::vector<std::uint32_t>& offsets = input_.topology.offsets;
+  std::uint32_t longest = 0;
+  for (std::size_t ring = 0; ring + 1 < offsets.size(); ++ring) {
+    longest = std::max(longest, offsets[ring + 1] - offsets[ring]);
+  }
+  return longest > offsets.back() / 2;
+}
+
+// Finds the shapes of the interior and triangulates everything, in whichever order is faster: both
+// make the same triangles.
+bool MeshBuilder::TriangulateAll() {
+  bool is_done = false;
+  const auto trace = [this] {
+    TraceStaircases(input_.directory, scratch_.interior, scratch_.staircases);
   };
-  const TilePlace& corner = rectangle.corner;
-  const TilePlace right = moved(corner, rectangle.width, 0);
-  return {corner, right, moved(right, 0, rectangle.height), moved(corner, 0, rectangle.height)};
-}
-
-// Calls visit(CellRectangle) for each rectangle of the fill; `grid` has one for every cell.
-template <typename Visit>
-void MeshBuilder::ForEachRectangle(Visit visit) const {
-  for (const CellRectangle& rectangle : scratch_.rectangles) visit(rectangle);
-  if (input_.parameters.fill != Fill::kGrid) return;
-  for (std::uint32_t tile = 0; tile < input_.directory.size(); ++tile) {
-    for (int j = 0; j < kTileSize; ++j) {
-      for (std::uint32_t row = scratch_.interior[tile][j]; row != 0; row &= row - 1) {
-        visit(CellRectangle{{tile, std::countr_zero(row), j}, 1, 1});
-      }
-    }
+  if (OneSweepIsLong()) {
+    const auto sweep = [&] {
+      trace();
+      AppendCorners();
+      is_done = TriangulateByLoops();
+    };
+    ParallelInvoke(sweep, [this] { FillRectangles(); });
+    PutNodesInPlace();
+  } else {
+    ParallelInvoke(trace, [this] { FillRectangles(); });
+    NumberCorners();
+    AppendNodes();
+    is_done = TriangulateByLoops();
   }
-}
-
-// Finds the shapes of the interior.
-void MeshBuilder::FindShapes() {
-  const std::span<const BitRows> interior = scratch_.interior;
-  scratch_.rectangles.clear();
-  ParallelInvoke([&] { TraceStaircases(input_.directory, interior, scratch_.staircases); },
-                 [&] {
-                   if (input_.parameters.fill != Fill::kGreedy) return;
-                   MergeCells(input_.directory, interior, scratch_.merge, scratch_.rectangles);
-                 });
-}
-
-// Adds the nodes that the triangles will have to the points.
-void MeshBuilder::AddNodes() {
-  NodeVertices& nodes = scratch_.nodes;
-  nodes.Clear(input_.directory.size());
-  for (const TilePlace& corner : scratch_.staircases.corners) nodes.Add(corner);
-  ForEachRectangle([&](const CellRectangle& rectangle) {
-    for (const TilePlace& corner : CornersOf(rectangle)) nodes.Add(corner);
-  });
-  nodes.Number(input_.directory, input_.scale.cell_size, mesh_.points);
-}
-
-// Two triangles for each rectangle.
-void MeshBuilder::FillRectangles() {
-  const std::size_t count =
-      input_.parameters.fill == Fill::kGrid ? CountInteriorCells() : scratch_.rectangles.size();
-  const std::size_t first = mesh_.triangles.size();
-  mesh_.triangles.resize(first + 6 * count);
+  mesh_.triangles.insert(mesh_.triangles.end(), scratch_.triangles.begin(),
+                         scratch_.triangles.end());
   mesh_.classes.resize(mesh_.triangles.size() / 3, TriangleClass::kInterior);
-  std::uint32_t* next = mesh_.triangles.data() + first;
-  ForEachRectangle([&](const CellRectangle& rectangle) {
-    std::array<std::uint32_t, 4> corners;
-    std::ranges::transform(CornersOf(rectangle), corners.begin(),
-                           [this](const TilePlace& node) { return scratch_.nodes.At(node); });
-    for (const int corner : {0, 1, 2, 0, 2, 3}) *next++ = corners[corner];
-  });
-}
-
-absl::Status MeshBuilder::FillInterior() {
-  if (input_.parameters.fill == Fill::kConforming) {
-    // The corners of the staircases are the only points that the band has there.
-    AddStaircaseLoops(false);
-    return TriangulateLoops(TriangleClass::kInterior);
-  }
-  FillRectangles();
-  return absl::OkStatus();
+  return is_done;
 }
 
 // Replaces the middles of the segments by the vertices of the rings. A triangle of which two
@@ -212,34 +289,15 @@ std::uint64_t MeshBuilder::CountInteriorCells() const {
 }
 
 // Triangles of the band by Euler's formula: n - 2 chi, where chi of the band is that of the rings'
-// inside less that of the interior cells, whose pinches join them.
+// inside less that of the interior cells.
 std::uint64_t MeshBuilder::ExpectedBandTriangles() const {
   const Staircases& staircases = scratch_.staircases;
   std::int64_t rings = 0;
   for (const std::uint32_t outer : input_.topology.outer_of) rings += outer == kNoRing ? 1 : -1;
-  std::int64_t cells = -static_cast<std::int64_t>(staircases.pinches);
-  for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
-    // Twice the signed area, exact in integers: corners differ by whole cells.
-    std::int64_t twice_area = 0;
-    const std::uint32_t first = staircases.offsets[loop];
-    const std::uint32_t last = staircases.offsets[loop + 1];
-    const auto at = [&](std::uint32_t k) {
-      const TilePlace& node = staircases.corners[k];
-      const TileCoordinate& tile = input_.directory[node.tile];
-      return std::pair((std::int64_t{tile.x} << kTileShift) + node.i,
-                       (std::int64_t{tile.y} << kTileShift) + node.j);
-    };
-    const auto origin = at(first);
-    for (std::uint32_t k = first; k < last; ++k) {
-      const auto a = at(k);
-      const auto b = at(k + 1 < last ? k + 1 : first);
-      // Of an axis-aligned loop: the integral of x dy.
-      twice_area += 2 * (a.first - origin.first) * (b.second - a.second);
-    }
-    cells += twice_area > 0 ? 1 : -1;
-  }
   const std::size_t points = input_.rings.PointCount() + staircases.corners.size();
-  return static_cast<std::uint64_t>(static_cast<std::int64_t>(points) - 2 * (rings - cells));
+  return static_cast<std::uint64_t>(
+      static_cast<std::int64_t>(points) -
+      2 * (rings - EulerCharacteristic(input_.directory, staircases)));
 }
 
 std::uint64_t MeshBuilder::CountFolded() const {
@@ -256,34 +314,23 @@ std::uint64_t MeshBuilder::CountFolded() const {
 
 absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
   mesh_.Clear();
-  scratch_.interior = input_.crossings.interior;
-  if (input_.parameters.placement == Placement::kVirtualPlane) {
-    ExcludeTouchedCells(input_.directory, input_.rings.points, input_.rings.offsets,
-                        input_.placed.roots, input_.scale.cell_size, scratch_.interior);
-  }
-  FindShapes();
-  const Fill fill = input_.parameters.fill;
-  const bool has_band = fill != Fill::kNone && fill != Fill::kPolygon;
-  if (fill != Fill::kNone) {
-    scratch_.loops.Clear();
+  FindInterior();
+  if (input_.parameters.fill == Fill::kNone) {
+    TraceStaircases(input_.directory, scratch_.interior, scratch_.staircases);
+    interior_cells_ = CountInteriorCells();
+  } else {
     CollectRingPoints();
-    AddRingLoops();
-    if (has_band) {
-      AddNodes();
-      AddStaircaseLoops(true);
+    if (!TriangulateAll()) {
+      return absl::InternalError("mesh: the rings of this frame cannot be triangulated");
     }
-    if (absl::Status status = TriangulateLoops(TriangleClass::kBoundary); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = FillInterior(); !status.ok()) return status;
     if (MovesVertices()) MoveVertices();
   }
   const auto band_triangles =
-      has_band ? static_cast<std::uint64_t>(std::count(mesh_.classes.begin(), mesh_.classes.end(),
-                                                       TriangleClass::kBoundary))
-               : ExpectedBandTriangles();
+      HasBand() ? static_cast<std::uint64_t>(std::count(mesh_.classes.begin(), mesh_.classes.end(),
+                                                        TriangleClass::kBoundary))
+                : ExpectedBandTriangles();
   statistics.triangles = mesh_.TriangleCount();
-  statistics.triangles_grid = 2 * CountInteriorCells() + band_triangles;
+  statistics.triangles_grid = 2 * interior_cells_ + band_triangles;
   statistics.folded_triangles = MovesVertices() ? CountFolded() : 0;
   return absl::OkStatus();
 }

@@ -9,6 +9,7 @@
 
 #include "bits.h"
 #include "lattice.h"
+#include "point.h"
 
 namespace partiemc {
 
@@ -22,9 +23,13 @@ class NodeVertices {
   /// Names a node, once or several times.
   void Add(const TilePlace& node) { tiles_[node.tile].named[node.j] |= std::uint32_t{1} << node.i; }
 
-  /// Numbers the nodes by tile, row, column, and appends them to `points`, interleaved and in world
-  /// units. The first gets the number of points that are there already.
-  void Number(const TileDirectory& directory, double cell_size, std::vector<double>& points);
+  /// Numbers the nodes by tile, row, column, from `first` on.
+  void Number(std::uint32_t first);
+
+  /// Appends the nodes in the order of their numbers, interleaved and in world units.
+  /// Requires: they were numbered.
+  void AppendPoints(const TileDirectory& directory, double cell_size,
+                    std::vector<double>& points) const;
 
   /// The point of a node. Requires: it was named before Number.
   std::uint32_t At(const TilePlace& node) const {
@@ -42,24 +47,41 @@ class NodeVertices {
   };
 
   std::vector<Tile> tiles_;
+  std::size_t count_ = 0;
 };
 
-inline void NodeVertices::Number(const TileDirectory& directory, double cell_size,
-                                 std::vector<double>& points) {
+/// Where a node lies, in world units.
+inline Point NodePoint(const TileDirectory& directory, const TilePlace& node, double cell_size) {
   const auto world = [cell_size](std::int32_t tile, int offset) {
     return static_cast<double>((std::int64_t{tile} << kTileShift) + offset) * cell_size;
   };
-  for (std::size_t k = 0; k < tiles_.size(); ++k) {
-    Tile& tile = tiles_[k];
-    tile.first = static_cast<std::uint32_t>(points.size() / 2);
-    std::uint32_t count = 0;
+  const TileCoordinate& tile = directory[node.tile];
+  return {world(tile.x, node.i), world(tile.y, node.j)};
+}
+
+inline void NodeVertices::Number(std::uint32_t first) {
+  std::uint32_t next = first;
+  for (Tile& tile : tiles_) {
+    tile.first = next;
     for (int j = 0; j < kTileSize; ++j) {
-      tile.before_row[j] = static_cast<std::uint16_t>(count);
-      const double y = world(directory[k].y, j);
-      for (std::uint32_t rest = tile.named[j]; rest != 0; rest &= rest - 1) {
-        points.push_back(world(directory[k].x, std::countr_zero(rest)));
-        points.push_back(y);
-        ++count;
+      tile.before_row[j] = static_cast<std::uint16_t>(next - tile.first);
+      next += static_cast<std::uint32_t>(CountBits(tile.named[j]));
+    }
+  }
+  count_ = next - first;
+}
+
+inline void NodeVertices::AppendPoints(const TileDirectory& directory, double cell_size,
+                                       std::vector<double>& points) const {
+  const std::size_t size_before = points.size();
+  points.resize(size_before + 2 * count_);
+  double* next = points.data() + size_before;
+  for (std::uint32_t k = 0; k < tiles_.size(); ++k) {
+    for (int j = 0; j < kTileSize; ++j) {
+      const double y = NodePoint(directory, {k, 0, j}, cell_size).y;
+      for (std::uint32_t rest = tiles_[k].named[j]; rest != 0; rest &= rest - 1) {
+        *next++ = NodePoint(directory, {k, std::countr_zero(rest), j}, cell_size).x;
+        *next++ = y;
       }
     }
   }

@@ -287,9 +287,12 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
   rings.dropped_holes = 0;
   rings.dropped_components = 0;
   rings.dropped_spray = 0;
-  Trace(bins.tiles, crossings, scratch.next_segment, rings);
-  FindEntries(bins.tiles, level_set, crossings, rings);
-  CountComponents(bins, crossings, scratch);
+  ParallelInvoke(
+      [&] {
+        Trace(bins.tiles, crossings, scratch.next_segment, rings);
+        FindEntries(bins.tiles, level_set, crossings, rings);
+      },
+      [&] { CountComponents(bins, crossings, scratch); });
   if (*parameters.clean) Clean(bins, scale, crossings, scratch, rings);
   Nest(bins, crossings, scratch, rings);
   if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {

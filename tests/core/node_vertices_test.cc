@@ -35,7 +35,8 @@ TEST(NodeVertices, EachNodeIsOnePointAtItsPlaceInTheOrderOfTilesRowsColumns) {
       expected[{tile, node}] = place;
     }
     std::vector<double> points{1, 2, 3, 4};
-    nodes.Number(directory, cell_size, points);
+    nodes.Number(2);
+    nodes.AppendPoints(directory, cell_size, points);
     ASSERT_EQ(points.size(), 4 + 2 * expected.size()) << "seed 12, round " << round;
     EXPECT_EQ(points[3], 4);
     std::uint32_t number = 2;
