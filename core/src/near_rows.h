@@ -10,8 +10,9 @@ namespace partiemc {
 /// Vectors may read so many entries past the end of a row of buckets.
 inline constexpr int kRowPadding = 16;
 
-/// A query asks for sums at up to so many points: neighbours, which look at the same particles.
-inline constexpr std::size_t kPointsAtOnce = 2;
+/// A query asks for sums at up to so many points, which look at the same particles: those of two
+/// segments.
+inline constexpr std::size_t kPointsAtOnce = 4;
 /// So many queries run at once: none waits for what is looked up for another.
 inline constexpr std::size_t kQueriesAtOnce = 8;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "parallel.h"
+#include "point_groups.h"
 
 namespace partiemc {
 namespace {
@@ -47,32 +48,33 @@ void SetNormal(double x, double y, CellPlane& plane) {
   plane.normal_y = y / length;
 }
 
-// Samples F at the middles of up to kQueriesAtOnce segments, with `at_entries` at their entries,
-// too.
-void SampleAtMiddles(const TileDirectory& directory, const PointField& field, bool at_entries,
-                     std::span<CellPlane> planes) {
-  std::array<FieldPoints, kQueriesAtOnce> places;
-  for (std::size_t k = 0; k < planes.size(); ++k) {
-    CellPlane& plane = planes[k];
-    const ActiveCell& cell = plane.cell;
-    plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
-    const LatticePoint origin = CellOrigin(directory, cell);
-    const auto in_tile = [&](const LatticePoint& point) {
-      return LatticePoint{point.x - origin.x + cell.i, point.y - origin.y + cell.j};
-    };
-    places[k] = {cell.tile, {in_tile(plane.point), in_tile(plane.entry)}, at_entries ? 2u : 1u};
-  }
-  std::array<FieldSamples, kQueriesAtOnce> samples;
-  field.Sample(std::span(places).first(planes.size()), samples);
-  for (std::size_t k = 0; k < planes.size(); ++k) {
-    const auto& [middle, entry] = samples[k];
-    planes[k].value = middle.value;
-    planes[k].gradient_x = middle.gradient_x;
-    planes[k].gradient_y = middle.gradient_y;
-    planes[k].entry_value = entry.value;
-    planes[k].entry_gradient_x = entry.gradient_x;
-    planes[k].entry_gradient_y = entry.gradient_y;
-  }
+// Collects the middles of segments, of which a plane's vertex is 2 k + 1, and their entries, 2 k.
+template <typename Groups>
+void AddPoints(const TileDirectory& directory, std::size_t k, bool with_entry, CellPlane& plane,
+               Groups& groups) {
+  const ActiveCell& cell = plane.cell;
+  plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
+  const LatticePoint origin = CellOrigin(directory, cell);
+  const auto add = [&](std::size_t vertex, const LatticePoint& point) {
+    groups.Add(vertex, cell.tile, {point.x - origin.x + cell.i, point.y - origin.y + cell.j});
+  };
+  if (with_entry) add(2 * k, plane.entry);
+  add(2 * k + 1, plane.point);
+}
+
+void SetSample(std::size_t vertex, const LevelSetSample& sample, std::span<CellPlane> planes) {
+  CellPlane& plane = planes[vertex / 2];
+  const bool at_middle = vertex % 2 == 1;
+  (at_middle ? plane.value : plane.entry_value) = sample.value;
+  (at_middle ? plane.gradient_x : plane.entry_gradient_x) = sample.gradient_x;
+  (at_middle ? plane.gradient_y : plane.entry_gradient_y) = sample.gradient_y;
+}
+
+// The segment, or the one before it, with which a group begins.
+std::size_t GroupOf(const RingTopology& rings, std::size_t segment) {
+  if (segment == rings.segments.size()) return segment;
+  const auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), segment);
+  return BeginsGroup(segment - *(end - 1)) ? segment : segment - 1;
 }
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
@@ -172,43 +174,54 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   planes.resize(rings.segments.size());
   scratch.normal.assign(crossings.cells.size(), {0, 0});
   std::atomic<bool> any_is_weak = false;
-  // A few successive planes.
-  const auto estimate = [&](std::size_t first, std::size_t count) {
-    const std::span<CellPlane> some = std::span(planes).subspan(first, count);
-    std::array<std::uint32_t, kQueriesAtOnce> cells;
-    for (std::size_t k = 0; k < count; ++k) {
-      cells[k] = crossings.segments[rings.segments[first + k]].cell;
-      some[k].cell = crossings.cells[cells[k]];
+  const auto set_normal = [&](std::size_t k) {
+    CellPlane& plane = planes[k];
+    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
+                    kWeakGradientSquare;
+    if (plane.is_weak) {
+      any_is_weak.store(true, std::memory_order_relaxed);
+      return;
     }
-    if (parameters.placement == Placement::kFarthestParticle) {
-      for (CellPlane& plane : some) SampleAtMean(bins.tiles, field, plane);
-    } else {
-      const bool at_entries = parameters.placement == Placement::kVirtualPlane;
-      SampleAtMiddles(bins.tiles, field, at_entries, some);
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      CellPlane& plane = some[k];
-      plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
-                      kWeakGradientSquare;
-      if (plane.is_weak) {
-        any_is_weak.store(true, std::memory_order_relaxed);
-        continue;
+    const std::uint32_t cell = crossings.segments[rings.segments[k]].cell;
+    SetNormal(plane.gradient_x, plane.gradient_y, plane);
+    Orient(previous_of(cell), plane);
+    Keep(plane.cell, cell, plane, scratch);
+  };
+  const auto sample = [&](std::span<const FieldPoints> groups) {
+    std::array<FieldSamples, kQueriesAtOnce> samples;
+    field.Sample(groups, samples);
+    for (std::size_t q = 0; q < groups.size(); ++q) {
+      for (std::size_t k = 0; k < groups[q].count; ++k) {
+        SetSample(groups[q].vertices[k], samples[q][k], planes);
       }
-      SetNormal(plane.gradient_x, plane.gradient_y, plane);
-      Orient(previous_of(cells[k]), plane);
-      Keep(plane.cell, cells[k], plane, scratch);
+    }
+    for (const FieldPoints& group : groups) {
+      for (const std::size_t vertex : std::span(group.vertices).first(group.count)) {
+        if (vertex % 2 == 1) set_normal(vertex / 2);
+      }
     }
   };
-  ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t first, std::size_t last) {
+  const bool at_entries = parameters.placement == Placement::kVirtualPlane;
+  ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t from, std::size_t to) {
+    const std::size_t first = GroupOf(rings, from);
+    const std::size_t last = GroupOf(rings, to);
     auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
+    auto groups = CollectPoints<LatticePoint>(sample);
     for (std::size_t k = first; k < last; ++k) {
       if (k == *end) ++end;
-      planes[k].entry = rings.entries[k];
-      planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
+      CellPlane& plane = planes[k];
+      plane.cell = crossings.cells[crossings.segments[rings.segments[k]].cell];
+      plane.entry = rings.entries[k];
+      plane.exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
+      if (parameters.placement == Placement::kFarthestParticle) {
+        SampleAtMean(bins.tiles, field, plane);
+        set_normal(k);
+        continue;
+      }
+      if (BeginsGroup(k - *(end - 1))) groups.Part();
+      AddPoints(bins.tiles, k, at_entries, plane, groups);
     }
-    for (std::size_t k = first; k < last; k += kQueriesAtOnce) {
-      estimate(k, std::min(kQueriesAtOnce, last - k));
-    }
+    groups.Finish();
   });
   if (any_is_weak) {
     for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {

@@ -59,22 +59,18 @@ PlaneEstimates PlaneEstimator::EstimatesOf(const SupportSums& sums) const {
           .strip = limited(volume / width - kHalfBump * strip_.depth)};
 }
 
-void PlaneEstimator::Estimate(std::span<const Planes> planes,
+void PlaneEstimator::Estimate(std::span<const Planes> groups,
                               std::span<Estimates> estimates) const {
   const double radius = std::max(support_.radius, strip_.radius);
   std::array<SupportQuery, kQueriesAtOnce> queries;
-  for (std::size_t q = 0; q < planes.size(); ++q) {
-    const Planes& of = planes[q];
-    std::array<LatticePoint, kPointsAtOnce> points;
-    for (std::size_t k = 0; k < of.count; ++k) points[k] = {of.planes[k].x, of.planes[k].y};
-    field_.FindNear(of.tile, std::span(points).first(of.count), radius, queries[q].near);
-    queries[q].planes = of.planes;
-    queries[q].count = of.count;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].planes = std::span(groups[q].points).first(groups[q].count);
+    field_.FindNear(groups[q].tile, queries[q].planes, radius, queries[q].near);
   }
   std::array<QuerySupports, kQueriesAtOnce> sums;
-  SumSupports(std::span(queries).first(planes.size()), support_, strip_, sums);
-  for (std::size_t q = 0; q < planes.size(); ++q) {
-    for (std::size_t k = 0; k < planes[q].count; ++k) estimates[q][k] = EstimatesOf(sums[q][k]);
+  SumSupports(std::span(queries).first(groups.size()), support_, strip_, sums);
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    for (std::size_t k = 0; k < groups[q].count; ++k) estimates[q][k] = EstimatesOf(sums[q][k]);
   }
 }
 

@@ -89,11 +89,11 @@ HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& s
                     const StripShape& strip, std::span<QuerySupports> sums) {
   const Shapes shapes(support, strip);
   for (std::size_t q = 0; q < queries.size(); ++q) {
-    for (std::size_t k = 0; k < queries[q].count; ++k) sums[q][k] = {};
+    for (std::size_t k = 0; k < queries[q].planes.size(); ++k) sums[q][k] = {};
   }
   const auto visit = [&](std::size_t q, const NearChunk& chunk, bool) HWY_ATTR {
     const SupportQuery& query = queries[q];
-    for (std::size_t k = 0; k < query.count; ++k) {
+    for (std::size_t k = 0; k < query.planes.size(); ++k) {
       double totals[kSupportSums] = {};
       SumChunk<kWeighted>(query.near, chunk, query.planes[k], shapes).AddTo(totals);
       sums[q][k].distance += totals[kDistance];

@@ -41,8 +41,7 @@ struct SupportSums {
 /// Up to kPointsAtOnce planes, and at least the particles in both discs of each.
 struct SupportQuery {
   NearRows near;
-  std::array<BentPlane, kPointsAtOnce> planes;
-  std::size_t count;  ///< Of planes.
+  std::span<const BentPlane> planes;
 };
 
 /// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce, all or none of them

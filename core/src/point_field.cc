@@ -164,8 +164,10 @@ void PointField::SortRun(const ParticleBins& bins, const Run& run) {
 }
 
 FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
-  PointQuery query{.points = {LatticePoint{x, y}}, .count = 1};
-  FindNear(tile, std::span(query.points).first(1), scale_.kernel_radius, query.near);
+  const LatticePoint point{x, y};
+  PointQuery query;
+  query.points = {&point, 1};
+  FindNear(tile, query.points, scale_.kernel_radius, query.near);
   PointSamples samples;
   SampleAtPoints(scale_, {&query, 1}, samples);
   return {.density = samples.density[0],
@@ -181,20 +183,18 @@ FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
           .has_support = samples.kernel[0] > 0};
 }
 
-void PointField::Sample(std::span<const FieldPoints> places,
+void PointField::Sample(std::span<const FieldPoints> groups,
                         std::span<FieldSamples> samples) const {
   std::array<PointQuery, kQueriesAtOnce> queries;
-  for (std::size_t q = 0; q < places.size(); ++q) {
-    const auto& [tile, points, count] = places[q];
-    FindNear(tile, std::span(points).first(count), scale_.kernel_radius, queries[q].near);
-    queries[q].points = points;
-    queries[q].count = count;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].points = std::span(groups[q].points).first(groups[q].count);
+    FindNear(groups[q].tile, queries[q].points, scale_.kernel_radius, queries[q].near);
   }
   PointSamples at;
-  SampleAtPoints(scale_, std::span(queries).first(places.size()), at);
+  SampleAtPoints(scale_, std::span(queries).first(groups.size()), at);
   std::size_t point = 0;
-  for (std::size_t q = 0; q < places.size(); ++q) {
-    for (std::size_t k = 0; k < places[q].count; ++k, ++point) {
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    for (std::size_t k = 0; k < groups[q].count; ++k, ++point) {
       samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point]};
     }
   }

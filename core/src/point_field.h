@@ -12,6 +12,7 @@
 #include "bucket_grid.h"
 #include "crossings.h"
 #include "near_entries.h"
+#include "point_groups.h"
 #include "point_kernels.h"
 #include "scale.h"
 
@@ -35,18 +36,12 @@ struct FieldPoint {
   double x = 0, y = 0;
 };
 
-/// One or two points of a tile, in cells relative to it.
-struct FieldPoints {
-  std::uint32_t tile = kNoTile;
-  std::array<LatticePoint, kPointsAtOnce> points;
-  std::size_t count = 0;
-};
-
 /// F and grad F at a point.
 struct LevelSetSample {
   double value = 0;
   double gradient_x = 0, gradient_y = 0;
 };
+using FieldPoints = PointGroup<LatticePoint>;
 using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 
 /// Particles near the isoline, each once, sorted into rows of buckets (BucketGrid) that run through
@@ -65,9 +60,9 @@ class PointField {
   /// Cost: the particles of the rows of buckets within a kernel radius.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// The same of points of at most kQueriesAtOnce places, for less than one after the other. Those
-  /// of a place look at the same particles: neighbours at best.
-  void Sample(std::span<const FieldPoints> places, std::span<FieldSamples> samples) const;
+  /// The same of points of at most kQueriesAtOnce groups, for less than one after the other. Those
+  /// of a group look at the same particles: neighbours at best.
+  void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
   /// Whether particles weigh each their own.
   bool HasWeights() const { return !weight_.empty(); }
@@ -77,9 +72,10 @@ class PointField {
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// Sets `near` to the particles within `radius` of any of some points, and some more, for a
-  /// kernel of vectors. All of `points` in cells relative to the tile.
-  void FindNear(std::uint32_t tile, std::span<const LatticePoint> points, double radius,
+  /// Sets `near` to the particles within `radius` of any of some points, which have x and y, and
+  /// some more, for a kernel of vectors. All of `points` in cells relative to the tile.
+  template <typename Point>
+  void FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
                 NearRows& near) const;
 
   /// Index in the frame of the particle of an entry.
@@ -112,6 +108,9 @@ class PointField {
     int first = 0, end = 0;  // Its columns, from the tile's first.
   };
 
+  // sqrt(2) - 1, rounded up: a diagonal is at most its box's longer side and so much of the other.
+  static constexpr double kDiagonal = 0.41422;
+
   // More than floats are off by, in cells: particles that far out add nothing to a sum.
   static constexpr double kDiscMargin = 1e-3;
 
@@ -142,10 +141,12 @@ class PointField {
   std::vector<std::uint32_t> source_;
 };
 
-inline void PointField::FindNear(std::uint32_t tile, std::span<const LatticePoint> points,
-                                 double radius, NearRows& near) const {
-  LatticePoint low = points.front(), high = points.front();
-  for (const LatticePoint& point : points.subspan(1)) {
+template <typename Point>
+void PointField::FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
+                          NearRows& near) const {
+  LatticePoint low{points.front().x, points.front().y};
+  LatticePoint high = low;
+  for (const Point& point : points.subspan(1)) {
     low = {std::min(low.x, point.x), std::min(low.y, point.y)};
     high = {std::max(high.x, point.x), std::max(high.y, point.y)};
   }
@@ -158,8 +159,9 @@ inline void PointField::FindNear(std::uint32_t tile, std::span<const LatticePoin
   near.column = of.column + near.origin_x;
   near.centre_x = static_cast<float>((low.x + high.x) / 2 - near.origin_x);
   near.centre_y = static_cast<float>((low.y + high.y) / 2 - near.origin_y);
-  // Half of what lies between two points is at most this.
-  const double half = (high.x - low.x + high.y - low.y) / 2;
+  // Half the diagonal of the points' box is at most this.
+  const double width = high.x - low.x, height = high.y - low.y;
+  const double half = (std::max(width, height) + kDiagonal * std::min(width, height)) / 2;
   const double disc = radius + half + kDiscMargin;
   near.reach_square = static_cast<float>(disc * disc);
   // What lies on the rim, or nearer to it than positions are to each other, adds nothing to a sum.
@@ -190,7 +192,7 @@ void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radi
                              Visit visit) const {
   const LatticePoint point{x, y};
   NearRows near;
-  FindNear(tile, {&point, 1}, radius + BucketGrid::kStep, near);
+  FindNear(tile, std::span(&point, 1), radius + BucketGrid::kStep, near);
   for (const NearBand& band : std::span(near.bands).first(near.band_count)) {
     for (int row = 0; row < band.rows; ++row) {
       const std::uint32_t* const offsets = band.offsets + row * band.row_stride;

@@ -112,11 +112,11 @@ class SumsAtPoints {
     std::size_t first[kQueriesAtOnce];
     for (std::size_t q = 0; q < queries.size(); ++q) {
       first[q] = count_;
-      count_ += queries[q].count;
+      count_ += queries[q].points.size();
     }
     const auto visit = [&](std::size_t q, const NearChunk& chunk, bool is_all) HWY_ATTR {
       const PointQuery& query = queries[q];
-      for (std::size_t k = 0; k < query.count; ++k) {
+      for (std::size_t k = 0; k < query.points.size(); ++k) {
         PartialSums<kChannels> sums =
             SumChunk<AddSums<kWeighted>>(inverse_square, query.near, chunk, query.points[k]);
         if (count_ > kFewPoints) sums.Store(parts_, first[q] + k);
@@ -192,7 +192,7 @@ HWY_INLINE void Sample(const Scale& scale, std::span<const PointQuery> queries,
   if (gaps == 0) return;
   std::size_t point = 0;
   for (const PointQuery& query : queries) {
-    for (std::size_t k = 0; k < query.count; ++k, ++point) {
+    for (std::size_t k = 0; k < query.points.size(); ++k, ++point) {
       if ((gaps >> point & 1) == 0) continue;
       double third[kThirdSums] = {};
       SumThird(inverse_square, query.near, query.points[k], third);

@@ -16,8 +16,7 @@ namespace partiemc {
 /// least those within R of each.
 struct PointQuery {
   NearRows near;
-  std::array<LatticePoint, kPointsAtOnce> points;
-  std::size_t count;  ///< Of points.
+  std::span<const LatticePoint> points;
 };
 
 /// What the field is at points (FieldSample), those of one query after those of the other.

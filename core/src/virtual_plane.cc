@@ -9,6 +9,7 @@
 #include "parallel.h"
 #include "placement.h"
 #include "plane_estimates.h"
+#include "point_groups.h"
 #include "ring_windows.h"
 
 namespace partiemc {
@@ -221,9 +222,21 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
   float* strips = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, kCurvatureReach * h);
-    // By a few segments, which have two vertices each.
-    PlaneQueries queries(estimator);
+    auto planes = CollectPoints<BentPlane>([&](std::span<const PlaneEstimator::Planes> groups) {
+      std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates;
+      estimator.Estimate(groups, estimates);
+      for (std::size_t q = 0; q < groups.size(); ++q) {
+        for (std::size_t of = 0; of < groups[q].count; ++of) {
+          const std::size_t i = groups[q].vertices[of];
+          const auto [support, strip] = estimates[q][of];
+          ring.shift[i] = kSupportTrust * (static_cast<float>(support) - ring.base[i]);
+          strips[i] = kStripTrust * (static_cast<float>(strip) - ring.base[i]);
+        }
+      }
+    });
+    // Each segment has two vertices.
     for (std::ptrdiff_t k = begin; k < end; k += 2) {
+      if (BeginsGroup(k / 2)) planes.Part();
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
         const double curvature = std::clamp<double>(ring.shift[i], -max_curvature, max_curvature);
         ring.base[i] = steps.curvature ? static_cast<float>(RoundingOf(curvature, h)) : 0;
@@ -233,20 +246,15 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
         if (!steps.support) continue;
         const FieldPoint at = Locate(input, first_segment + k / 2, v.point[2 * first_segment + i]);
         if (at.tile == kNoTile) continue;
-        queries.Add(i, at.tile,
-                    {.x = at.x,
-                     .y = at.y,
-                     .normal_x = ring.normal_x[i],
-                     .normal_y = ring.normal_y[i],
-                     .curvature = curvature});
-      }
-      if (queries.IsFull() || k + 2 >= end) {
-        queries.Run([&](std::ptrdiff_t i, const PlaneEstimates& estimates) {
-          ring.shift[i] = kSupportTrust * (static_cast<float>(estimates.support) - ring.base[i]);
-          strips[i] = kStripTrust * (static_cast<float>(estimates.strip) - ring.base[i]);
-        });
+        planes.Add(i, at.tile,
+                   {.x = at.x,
+                    .y = at.y,
+                    .normal_x = ring.normal_x[i],
+                    .normal_y = ring.normal_y[i],
+                    .curvature = curvature});
       }
     }
+    planes.Finish();
   });
   const double mean_strip = MeanOf(ring, strips);
   double mean = MeanOf(ring, ring.shift) + mean_strip;

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "support/instruction_sets.h"
@@ -84,7 +86,7 @@ double Bump(double d, double reach) {
 
 SupportSums SumSupport(const NearRows& near, const BentPlane& plane, const SupportShape& support,
                        const StripShape& strip) {
-  const SupportQuery query{near, {plane}, 1};
+  const SupportQuery query{near, {&plane, 1}};
   QuerySupports sums;
   SumSupports({&query, 1}, support, strip, {&sums, 1});
   return sums[0];
@@ -173,18 +175,19 @@ TEST(PlaneSupport, OfManyPlanesAtOnceHasTheBitsOfEachAlone) {
     const bool weighted = round % 2 == 1;
     std::vector<Rows> rows;
     for (std::size_t q = 0; q < kQueriesAtOnce; ++q) rows.emplace_back(random);
+    std::vector<std::array<BentPlane, kPointsAtOnce>> planes(rows.size());
     std::vector<SupportQuery> queries;
-    for (const Rows& of : rows) {
-      queries.push_back({of.AsNear(weighted),
-                         {RandomPlane(random), RandomPlane(random)},
-                         1 + random.Below(kPointsAtOnce)});
+    for (std::size_t q = 0; q < rows.size(); ++q) {
+      for (BentPlane& plane : planes[q]) plane = RandomPlane(random);
+      const std::size_t count = 1 + random.Below(kPointsAtOnce);
+      queries.push_back({rows[q].AsNear(weighted), std::span(planes[q]).first(count)});
       queries.back().near.bands[0].rows = static_cast<int>(random.Below(6));
     }
     support::ForEachInstructionSet([&] {
       std::vector<QuerySupports> all(queries.size());
       SumSupports(queries, kShape, kStrip, all);
       for (std::size_t q = 0; q < queries.size(); ++q) {
-        for (std::size_t k = 0; k < queries[q].count; ++k) {
+        for (std::size_t k = 0; k < queries[q].planes.size(); ++k) {
           const SupportSums alone =
               SumSupport(queries[q].near, queries[q].planes[k], kShape, kStrip);
           EXPECT_EQ(all[q][k].distance, alone.distance);

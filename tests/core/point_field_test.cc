@@ -188,17 +188,21 @@ void RunCrowdedBlob(bool weighted, Stages& stages) {
   stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0});
 }
 
+// Of one point each, or of up to kPointsAtOnce.
 std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   support::Random random(9);
   std::vector<FieldPoints> all;
   while (all.size() < 300) {
-    const auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));
+    FieldPoints group{
+        static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size())), 0, {}, {}};
     const LatticePoint first{random.Uniform(0, 32), random.Uniform(0, 32)};
-    const LatticePoint second{first.x + random.Uniform(-1, 1), first.y + random.Uniform(-1, 1)};
-    if (std::min(second.x, second.y) < 0 || std::max(second.x, second.y) >= 32) continue;
-    if (!stages.field.Covers(tile, first.x, first.y)) continue;
-    if (!stages.field.Covers(tile, second.x, second.y)) continue;
-    all.push_back({tile, {first, second}, 1 + random.Below(2)});
+    const std::size_t count = 1 + random.Below(kPointsAtOnce);
+    for (int tries = 0; group.count < count && tries < 20; ++tries) {
+      const LatticePoint next{first.x + random.Uniform(-1, 1), first.y + random.Uniform(-1, 1)};
+      if (std::min(next.x, next.y) < 0 || std::max(next.x, next.y) >= 32) continue;
+      if (stages.field.Covers(group.tile, next.x, next.y)) group.points[group.count++] = next;
+    }
+    if (group.count == count) all.push_back(group);
   }
   return all;
 }
@@ -234,7 +238,7 @@ TEST(PointField, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAt
   }
 }
 
-TEST(PointField, TwoPointsOfAPlaceAgreeWithEachAlone) {
+TEST(PointField, PointsOfAGroupAgreeWithEachAlone) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);
