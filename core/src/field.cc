@@ -98,20 +98,21 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
 // F at nodes of a tile, from the moments there. Returns those that are inside.
 BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                     const AskedNodes& asked, LevelSet& level_set) {
+  const NodeBlocks blocks = BlocksOf(asked.rows);
   MomentSums sums;
-  ClearMoments(asked, sums);
+  std::fill_n(sums.begin(), blocks.count, BlockSums{});
   CellMask mask = MaskOf(asked.rows);
   const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
   const bool masked = reach < kMaskMargin;
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  const AskedColumns columns = ColumnsOf(asked, radius);
   NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)
       .ForEachBlock([&](const NearEntries& near) {
-        ScatterNearMoments(near, radius, columns, asked.has_kernel_sums, sums);
+        AddNearMoments(near, radius, blocks, asked.has_kernel_sums, sums);
       });
-  return EvaluateNodes(asked, sums, WeightOf(bins, scale), scale, level_set.tiles[tile].data());
+  return EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale,
+                       level_set.tiles[tile].data());
 }
 
 // And, while the sums are in the nearest cache, F where the density leaves the side of a node open.

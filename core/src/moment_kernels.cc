@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <bit>
 
-#include "cell_mask.h"
 #include "tile_kernels.h"
 
 // Highway compiles the rest of this file once for each target.
@@ -12,136 +11,106 @@
 #include <hwy/highway.h>
 
 #include "compressor-inl.h"
-#include "kernel_rows-inl.h"
-#include "row_table-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-using Integers = hn::CappedTag<std::int32_t, NearEntries::kPadding>;
+namespace hn = hwy::HWY_NAMESPACE;
 
-// Where kernels begin, and the rows in which they reach asked nodes. Those of as many rows follow
-// each other in `order`, so that the ends of loops over rows need not be guessed.
-struct ReachingKernels {
-  alignas(64) NearEntries::PerEntry<std::int32_t> column, row, row_count;
-  NearEntries::PerEntry<std::int32_t> order;
-  std::array<int, kTileSize + 1> end;  // By number of rows: where they end in `order`.
+using Lanes = hn::CappedTag<float, NodeBlock::kNodes>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+
+// Particles that a step has chosen: their coordinates along the axis that it chose by, and along
+// the other one.
+struct Chosen {
+  alignas(64) NearEntries::PerEntry<float> along, across;
+  int count;
 };
 
-// The place of the highest bit, if the one below it is not set: else a conversion might round up.
-HWY_INLINE hn::Vec<Integers> PlaceOfHighest(hn::Vec<Integers> bits) {
-  const Integers d;
-  const auto as_float = hn::BitCast(d, hn::ConvertTo(hn::RebindToFloat<Integers>(), bits));
-  const auto exponent = hn::Sub(hn::ShiftRight<23>(as_float), hn::Set(d, 127));
-  return hn::IfThenElse(hn::Lt(bits, hn::Zero(d)), hn::Set(d, kTileSize - 1), exponent);
-}
-
-// How many rows there are from the first one to the last one, and which is the first.
-struct RowSpan {
-  hn::Vec<Integers> first, count;
-};
-HWY_INLINE RowSpan SpanOf(hn::Vec<Integers> rows) {
-  const Integers d;
-  const auto half =
-      hn::BitCast(d, hn::ShiftRight<1>(hn::BitCast(hn::RebindToUnsigned<Integers>(), rows)));
-  const auto first = PlaceOfHighest(hn::And(rows, hn::Neg(rows)));
-  const auto last = PlaceOfHighest(hn::AndNot(half, rows));
-  const auto count = hn::Sub(last, hn::Sub(first, hn::Set(d, 1)));
-  return {first, hn::IfThenZeroElse(hn::Eq(rows, hn::Zero(d)), count)};
-}
-
-// Bits of the rows of a tile that kernels reach which begin at `first`. Those that begin farther
-// before the tile than its height, as only wide ones do, are listed as if they began there: what
-// they add beyond their reach is 0.
-HWY_INLINE hn::Vec<Integers> RowsFrom(hn::Vec<Integers> first, int span) {
-  const Integers d;
-  const auto row = hn::Max(first, hn::Set(d, 1 - kTileSize));
-  const hn::RebindToUnsigned<Integers> d_bits;
-  const auto all = hn::Set(d_bits, ~std::uint32_t{0});
-  const auto in_tile = [&](hn::Vec<Integers> count) HWY_ATTR {
-    return hn::BitCast(d_bits, hn::Min(hn::Max(count, hn::Zero(d)), hn::Set(d, kTileSize - 1)));
-  };
-  const auto before = in_tile(row), behind = in_tile(hn::Sub(hn::Set(d, kTileSize - span), row));
-  const auto rows = hn::And(hn::Shl(all, before), hn::Shr(all, behind));
-  // None beyond the tile.
-  const auto is_near = hn::And(hn::Lt(row, hn::Set(d, kTileSize)), hn::Gt(row, hn::Set(d, -span)));
-  return hn::IfThenElseZero(is_near, hn::BitCast(d, rows));
-}
-
-void FindReaching(const NearEntries& near, float radius, const AskedColumns& asked,
-                  ReachingKernels& kernels) {
-  const hn::RebindToFloat<Integers> d;
-  const Integers d_int;
-  const auto step = static_cast<int>(hn::Lanes(d));
-  const RowTable asked_rows(asked.rows);
-  const auto last_column = hn::Set(d_int, kTileSize - 1);
-  for (int e = 0; e < near.count; e += step) {
-    // Lanes behind the last entry hold anything, even what no integer can: they count as 0.
-    const auto is_entry = hn::FirstN(d, static_cast<std::size_t>(near.count - e));
-    const auto first = [&](const float* centres) HWY_ATTR {
-      const auto centre = hn::IfThenElseZero(is_entry, hn::LoadU(d, centres + e));
-      return NodesAfter(d, hn::Sub(centre, hn::Set(d, radius)));
-    };
-    const auto column = first(near.x.data());
-    hn::Store(column, d_int, kernels.column.data() + e);
-    const auto asked_there = asked_rows[hn::Min(hn::Max(column, hn::Zero(d_int)), last_column)];
-    const auto rows = hn::And(asked_there, RowsFrom(first(near.y.data()), asked.span));
-    const auto counts = hn::AndNot(hn::VecFromMask(d_int, hn::Gt(column, last_column)), rows);
-    const RowSpan reached = SpanOf(hn::IfThenElseZero(hn::RebindMask(d_int, is_entry), counts));
-    hn::Store(reached.first, d_int, kernels.row.data() + e);
-    hn::Store(reached.count, d_int, kernels.row_count.data() + e);
+// Chooses particles whose kernels may reach nodes `first` to `first` + kSide - 1 along an axis.
+// Their coordinates along it are relative to that node from then on.
+HWY_INLINE void Choose(const float* along, const float* across, int count, int first, float radius,
+                       Chosen& chosen) {
+  const Lanes d;
+  const hn::RebindToSigned<Lanes> d_bits;
+  constexpr float kMiddle = (NodeBlock::kSide - 1) / 2.0f;
+  const auto origin = hn::Set(d, static_cast<float>(first));
+  const auto middle = hn::Set(d, kMiddle);
+  const auto reach = hn::Set(d, radius + kMiddle);
+  int chosen_count = 0;
+  for (int k = 0; k < count; k += kLanes) {
+    const Vector at = hn::Sub(hn::LoadU(d, along + k), origin);
+    const auto reaches = hn::Lt(hn::Abs(hn::Sub(at, middle)), reach);
+    const auto is_in = hn::And(hn::RebindMask(d_bits, reaches),
+                               hn::FirstN(d_bits, static_cast<std::size_t>(count - k)));
+    const Compressor compress(is_in);
+    hn::StoreU(compress(d, at), d, chosen.along.data() + chosen_count);
+    hn::StoreU(compress(d, hn::LoadU(d, across + k)), d, chosen.across.data() + chosen_count);
+    chosen_count += static_cast<int>(hn::CountTrue(d_bits, is_in));
   }
-  const auto lane = hn::Iota(d_int, 0);
-  int listed = 0;
-  for (int count = 1; count <= asked.MaxRows(); ++count) {
-    for (int e = 0; e < near.count; e += step) {
-      const auto counts = hn::Load(d_int, kernels.row_count.data() + e);
-      const auto is_of = hn::Eq(counts, hn::Set(d_int, count));
-      const Compressor compress(is_of);
-      hn::StoreU(compress(d_int, hn::Add(lane, hn::Set(d_int, e))), d_int,
-                 kernels.order.data() + listed);
-      listed += static_cast<int>(hn::CountTrue(d_int, is_of));
-    }
-    kernels.end[count] = listed;
-  }
+  chosen.count = chosen_count;
 }
 
+// Columns and rows of a block's nodes.
+alignas(64) constexpr float kColumns[] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+alignas(64) constexpr float kRows[] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
+// Adds the moments of particles at x and y of a block's first node. The sums stay in registers.
 template <bool kKernel>
-void ScatterNearMomentsOf(const NearEntries& near, float radius, const AskedColumns& asked,
-                          MomentSums& sums) {
-  const float inverse_square = 1 / (radius * radius);
-  ReachingKernels kernels;
-  FindReaching(near, radius, asked, kernels);
-  int n = 0;
-  for (int count = 1; count <= asked.MaxRows(); ++count) {
-    for (; n < kernels.end[count]; ++n) {
-      const int e = kernels.order[n];
-      const NodeRange columns = {std::max(kernels.column[e], 0),
-                                 std::min(kernels.column[e] + asked.span, kTileSize) - 1};
-      const NodeRange rows = {kernels.row[e], kernels.row[e] + count - 1};
-      ForEachVector(near.x[e], near.y[e], columns, rows, inverse_square,
-                    [&](int column, int row, const ColumnTerms& terms, Vector dy, Vector row_term)
-                        HWY_ATTR {
-                          const Vector k = KernelAt(row_term, terms.term);
-                          const int at = SumIndex(column, row);
-                          if constexpr (kKernel) AddTo(sums.kernel.data() + at, k);
-                          const Vector kx = hn::Mul(k, terms.dx);
-                          const Vector ky = hn::Mul(k, dy);
-                          AddTo(sums.moment_x.data() + at, kx);
-                          AddTo(sums.moment_y.data() + at, ky);
-                          AddTo(sums.xx.data() + at, hn::Mul(kx, terms.dx));
-                          AddTo(sums.xy.data() + at, hn::Mul(kx, dy));
-                          AddTo(sums.yy.data() + at, hn::Mul(ky, dy));
-                        });
+HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inverse_square,
+                           BlockSums& sums) {
+  const Lanes d;
+  const Vector scale = hn::Set(d, inverse_square);
+  const Vector one = hn::Set(d, 1.0f);
+  for (int part = 0; part < NodeBlock::kNodes; part += kLanes) {
+    const Vector column = hn::Load(d, kColumns + part), row = hn::Load(d, kRows + part);
+    const auto sum = [&](BlockSums::Channel& of) HWY_ATTR { return hn::Load(d, of.data() + part); };
+    Vector kernel = sum(sums.kernel), moment_x = sum(sums.moment_x), moment_y = sum(sums.moment_y);
+    Vector xx = sum(sums.xx), xy = sum(sums.xy), yy = sum(sums.yy);
+    for (int e = 0; e < count; ++e) {
+      const Vector dx = hn::Sub(hn::Set(d, x[e]), column);
+      const Vector dy = hn::Sub(hn::Set(d, y[e]), row);
+      const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+      const Vector t = hn::Max(hn::Zero(d), hn::Sub(one, hn::Mul(square, scale)));
+      const Vector k = hn::Mul(hn::Mul(t, t), t);
+      if constexpr (kKernel) kernel = hn::Add(kernel, k);
+      const Vector kx = hn::Mul(k, dx);
+      const Vector ky = hn::Mul(k, dy);
+      moment_x = hn::Add(moment_x, kx);
+      moment_y = hn::Add(moment_y, ky);
+      xx = hn::Add(xx, hn::Mul(kx, dx));
+      xy = hn::Add(xy, hn::Mul(kx, dy));
+      yy = hn::Add(yy, hn::Mul(ky, dy));
     }
+    const auto set = [&](Vector value, BlockSums::Channel& of)
+                         HWY_ATTR { hn::Store(value, d, of.data() + part); };
+    if constexpr (kKernel) set(kernel, sums.kernel);
+    set(moment_x, sums.moment_x);
+    set(moment_y, sums.moment_y);
+    set(xx, sums.xx);
+    set(xy, sums.xy);
+    set(yy, sums.yy);
   }
 }
 
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
-                        bool has_kernel_sums, MomentSums& sums) {
-  has_kernel_sums ? ScatterNearMomentsOf<false>(near, radius, asked, sums)
-                  : ScatterNearMomentsOf<true>(near, radius, asked, sums);
+void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+                    bool has_kernel_sums, MomentSums& sums) {
+  const float inverse_square = 1 / (radius * radius);
+  Chosen of_rows, of_block;
+  int row = -1;
+  for (int b = 0; b < blocks.count; ++b) {
+    const NodeBlock& block = blocks[b];
+    if (block.row != row) {
+      row = block.row;
+      Choose(near.y.data(), near.x.data(), near.count, row, radius, of_rows);
+    }
+    Choose(of_rows.across.data(), of_rows.along.data(), of_rows.count, block.column, radius,
+           of_block);
+    const auto add = has_kernel_sums ? AddMoments<false> : AddMoments<true>;
+    add(of_block.along.data(), of_block.across.data(), of_block.count, inverse_square, sums[b]);
+  }
 }
 
 }  // namespace HWY_NAMESPACE
@@ -151,38 +120,35 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(ScatterNearMoments);
+HWY_EXPORT(AddNearMoments);
 
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
-                        bool has_kernel_sums, MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterNearMoments)(near, radius, asked, has_kernel_sums, sums);
+void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+                    bool has_kernel_sums, MomentSums& sums) {
+  HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, radius, blocks, has_kernel_sums, sums);
 }
 
-AskedColumns ColumnsOf(const AskedNodes& asked, float radius) {
-  const int span = static_cast<int>(std::ceil(2 * radius));
-  // In place of each node all columns from which a kernel reaches it.
-  BitRows within = asked.rows;
-  const int width = std::min(span, kTileSize);
-  for (int reached = 1; reached < width;) {
-    const int step = std::min(reached, width - reached);
-    for (std::uint32_t& row : within) row |= row >> step;
-    reached += step;
+NodeBlocks BlocksOf(const BitRows& asked) {
+  constexpr int kSide = NodeBlock::kSide, kLast = kTileSize - kSide;
+  constexpr std::uint32_t kColumns = (1u << kSide) - 1;
+  NodeBlocks blocks;
+  BitRows left = asked;
+  for (int j = 0; j < kTileSize; ++j) {
+    if (left[j] == 0) continue;
+    const int row = std::min(j, kLast);
+    std::uint32_t any = left[row] | left[row + 1] | left[row + 2] | left[row + 3];
+    while (any != 0) {
+      const int column = std::min(std::countr_zero(any), kLast);
+      any &= ~(kColumns << column);
+      NodeBlock& block = blocks.blocks[blocks.count++];
+      block = {.column = static_cast<std::uint8_t>(column), .row = static_cast<std::uint8_t>(row)};
+      for (int k = 0; k < kSide; ++k) {
+        const std::uint32_t bits = left[row + k] >> column & kColumns;
+        block.asked = static_cast<std::uint16_t>(block.asked | bits << k * kSide);
+        left[row + k] &= ~(kColumns << column);
+      }
+    }
   }
-  return {Transposed(within), span};
-}
-
-void ClearMoments(const AskedNodes& asked, MomentSums& sums) {
-  int first = 0, last = kTileSize - 1;
-  while (asked.rows[first] == 0) ++first;
-  while (asked.rows[last] == 0) --last;
-  const auto clear = [&](NodeSums& channel) {
-    // Vectors that begin in the tile end before its next row does.
-    std::fill(channel.begin() + SumIndex(0, first), channel.begin() + SumIndex(0, last + 1), 0.0f);
-  };
-  if (!asked.has_kernel_sums) clear(sums.kernel);
-  for (NodeSums* const channel : {&sums.moment_x, &sums.moment_y, &sums.xx, &sums.xy, &sums.yy}) {
-    clear(*channel);
-  }
+  return blocks;
 }
 
 }  // namespace partiemc

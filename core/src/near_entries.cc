@@ -39,7 +39,7 @@ using Lanes = hn::CappedTag<float, NearEntries::kPadding>;
 using Indices = hn::RebindToUnsigned<Lanes>;
 using Bits = hn::RebindToSigned<Lanes>;
 
-// Sets `near` to the chosen entries. Reads whole vectors, if need be of the entries behind them.
+// Adds the chosen entries to `near`. Reads whole vectors, if need be of the entries behind them.
 template <NearFields kFields>
 void ChooseFields(const ListPart& part, NearEntries& near) {
   const Lanes d;
@@ -50,7 +50,7 @@ void ChooseFields(const ListPart& part, NearEntries& near) {
   const auto lane = hn::Iota(d_index, 0);
   const auto [entries, start, last, cells, shift_x, shift_y] = part;
   std::uint32_t first = start;
-  int chosen = 0;
+  int chosen = near.count;
   for (; first < last && first + lanes <= entries.size(); first += lanes) {
     hn::Vec<Lanes> x, y, source;
     hn::LoadInterleaved3(d, &entries[first].x, x, y, source);
@@ -125,15 +125,20 @@ NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const BitRows& 
                     .shift_y = 0};
 }
 
-// Chooses the next of a list's entries. Returns false if there are no more.
-bool NearWalk::ChooseMore(List& list) {
+// Chooses entries until the block is full. Returns false if there are no more.
+bool NearWalk::ChooseMore() {
   chosen_.count = 0;
-  while (chosen_.count == 0 && list.next < list.end) {
-    const std::uint32_t last =
-        list.next + std::min<std::uint32_t>(NearEntries::kCapacity, list.end - list.next);
-    const ListPart part{entries_, list.next, last, list.cells, list.shift_x, list.shift_y};
-    HWY_DYNAMIC_DISPATCH(ChooseEntries)(part, fields_, chosen_);
-    list.next = last;
+  for (; list_ < list_count_; ++list_) {
+    List& list = lists_[list_];
+    while (list.next < list.end) {
+      const int room = NearEntries::kCapacity - chosen_.count;
+      if (room < kLeastRoom) return true;
+      const std::uint32_t last =
+          list.next + std::min(static_cast<std::uint32_t>(room), list.end - list.next);
+      const ListPart part{entries_, list.next, last, list.cells, list.shift_x, list.shift_y};
+      HWY_DYNAMIC_DISPATCH(ChooseEntries)(part, fields_, chosen_);
+      list.next = last;
+    }
   }
   return chosen_.count > 0;
 }

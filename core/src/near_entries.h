@@ -15,7 +15,7 @@ namespace partiemc {
 
 /// Particles around a tile, in cells relative to it, one after the other.
 struct NearEntries {
-  static constexpr int kCapacity = 256;
+  static constexpr int kCapacity = 512;
   // A vector of chosen lanes is written whole.
   static constexpr int kPadding = 16;
   template <typename Value>
@@ -43,9 +43,7 @@ class NearWalk {
   /// of Neighbourhood, those of each in the order of the frame.
   template <typename Visit>
   void ForEachBlock(Visit visit) {
-    for (int k = 0; k < list_count_; ++k) {
-      while (ChooseMore(lists_[k])) visit(std::as_const(chosen_));
-    }
+    while (ChooseMore()) visit(std::as_const(chosen_));
   }
 
  private:
@@ -57,12 +55,16 @@ class NearWalk {
   };
   static constexpr int kMaxLists = std::tuple_size_v<Neighbourhood>;
 
-  bool ChooseMore(List& list);
+  // A block is full when no more entries than this could be looked at.
+  static constexpr int kLeastRoom = 64;
+
+  bool ChooseMore();
 
   std::span<const BinEntry> entries_;
   NearFields fields_;
   std::array<List, kMaxLists> lists_;
   int list_count_ = 0;
+  int list_ = 0;  // The one that the next entries come from.
   NearEntries chosen_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
@@ -44,10 +45,11 @@ void ScatterNearKernels(const NearEntries& near, const float* weight, float radi
                     : ScatterNearKernelsOf<false>(near, weight, radius, sums);
 }
 
-HWY_INLINE std::uint32_t BitsOf(hn::Mask<Lanes> mask) {
+template <class D>
+HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
   std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(Lanes(), mask, bytes);
-  return bytes[0];
+  hn::StoreMaskBits(d, mask, bytes);
+  return bytes[0] | std::uint32_t{bytes[1]} << 8;
 }
 
 void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
@@ -64,8 +66,8 @@ void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* valu
       const Vector f = hn::Mul(hn::Set(d, weight), sum);
       const auto is_inside = hn::Gt(f, saturation);
       const auto is_open = hn::AndNot(is_inside, hn::Gt(f, guard));
-      inside_row |= BitsOf(is_inside) << i;
-      open_row |= BitsOf(is_open) << i;
+      inside_row |= BitsOf(d, is_inside) << i;
+      open_row |= BitsOf(d, is_open) << i;
       const Vector branch = hn::IfThenElse(is_inside, saturation, guard);
       const Vector value = hn::Mul(hn::Sub(branch, f), slope);
       const Vector decided = hn::IfThenElse(hn::Eq(f, hn::Zero(d)), void_value, value);
@@ -76,9 +78,13 @@ void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* valu
   }
 }
 
+// A block's nodes, or some rows of them.
+using NodeLanes = hn::CappedTag<float, NodeBlock::kNodes>;
+using NodeVector = hn::Vec<NodeLanes>;
+
 // The branches of F that the density decides.
 struct DensityBranches {
-  Vector guard, saturation;
+  NodeVector guard, saturation;
 };
 
 // LevelSetValue in vectors, of what is known of nodes.
@@ -96,70 +102,90 @@ class NodeFormula {
         void_value_(Constant(scale.VoidValue())),
         inverse_square_(Constant(1 / (scale.kernel_radius * scale.kernel_radius))) {}
 
-  // F at the nodes from `at` on in the sums, which have `value` so far.
-  HWY_INLINE Vector operator()(Vector value, const MomentSums& sums, int at) const {
-    const auto load = [&](const NodeSums& of) HWY_ATTR { return hn::LoadU(d_, of.data() + at); };
-    const Vector k = asked_.has_kernel_sums ? value : load(sums.kernel);
-    const Vector inverse = hn::Div(hn::Set(d_, 1.0f), k);
-    const Vector mean_x = hn::Mul(load(sums.moment_x), inverse);
-    const Vector mean_y = hn::Mul(load(sums.moment_y), inverse);
-    const Vector phi = hn::Sub(Length(mean_x, mean_y), reference_radius_);
-    const Vector share = hn::Mul(inverse_square_, inverse);
-    const Vector xx = hn::Mul(load(sums.xx), share);
-    const Vector xy = hn::Mul(load(sums.xy), share);
-    const Vector yy = hn::Mul(load(sums.yy), share);
-    const Vector half = Constant(0.5);
-    const Vector spread =
+  // F at the nodes of a block from `first` on, which have `value` so far.
+  HWY_INLINE NodeVector operator()(NodeVector value, const BlockSums& sums, int first) const {
+    const auto load = [&](const BlockSums::Channel& of)
+                          HWY_ATTR { return hn::Load(d_, of.data() + first); };
+    const NodeVector k = asked_.has_kernel_sums ? value : load(sums.kernel);
+    const NodeVector inverse = hn::Div(hn::Set(d_, 1.0f), k);
+    const NodeVector mean_x = hn::Mul(load(sums.moment_x), inverse);
+    const NodeVector mean_y = hn::Mul(load(sums.moment_y), inverse);
+    const NodeVector phi = hn::Sub(Length(mean_x, mean_y), reference_radius_);
+    const NodeVector share = hn::Mul(inverse_square_, inverse);
+    const NodeVector xx = hn::Mul(load(sums.xx), share);
+    const NodeVector xy = hn::Mul(load(sums.xy), share);
+    const NodeVector yy = hn::Mul(load(sums.yy), share);
+    const NodeVector half = Constant(0.5);
+    const NodeVector spread =
         hn::Add(hn::Mul(hn::Add(xx, yy), half), Length(hn::Mul(hn::Sub(xx, yy), half), xy));
-    const Vector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
+    const NodeVector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
     const DensityBranches branches = BranchesOf(value);
-    const Vector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
+    const NodeVector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
     // No kernel reaches the node.
     return hn::IfThenElse(hn::Gt(k, hn::Zero(d_)), f, asked_.is_open ? void_value_ : value);
   }
 
  private:
-  static HWY_INLINE Vector Constant(double value) {
-    return hn::Set(Lanes(), static_cast<float>(value));
+  static HWY_INLINE NodeVector Constant(double value) {
+    return hn::Set(NodeLanes(), static_cast<float>(value));
   }
 
-  static HWY_INLINE Vector Length(Vector x, Vector y) {
+  static HWY_INLINE NodeVector Length(NodeVector x, NodeVector y) {
     return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
   }
 
-  HWY_INLINE DensityBranches BranchesOf(Vector value) const {
+  HWY_INLINE DensityBranches BranchesOf(NodeVector value) const {
     if (asked_.is_open) {
-      const Vector f = hn::Mul(weight_, value);
+      const NodeVector f = hn::Mul(weight_, value);
       return {hn::Mul(hn::Sub(guard_, f), slope_), hn::Mul(hn::Sub(saturation_, f), slope_)};
     }
     // The value is the one that has decided the side, which the other then cannot change.
-    const Vector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
+    const NodeVector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
     const auto is_inside = hn::Lt(value, hn::Zero(d_));
     return {hn::IfThenElse(is_inside, hn::Sub(value, between), value),
             hn::IfThenElse(is_inside, value, hn::Add(value, between))};
   }
 
-  const Lanes d_;
+  const NodeLanes d_;
   const AskedNodes& asked_;
-  const Vector weight_, guard_, saturation_, slope_, gap_spread_, gap_slope_, reference_radius_,
+  const NodeVector weight_, guard_, saturation_, slope_, gap_spread_, gap_slope_, reference_radius_,
       void_value_, inverse_square_;
 };
 
-BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
-                      const Scale& scale, float* values) {
-  const Lanes d;
+// Sets the asked ones of a block's values to F. Returns which of them are inside.
+HWY_INLINE unsigned EvaluateBlock(const NodeFormula& formula, const BlockSums& sums, unsigned asked,
+                                  BlockSums::Channel& values) {
+  const NodeLanes d;
+  unsigned inside = 0;
+  for (int node = 0; node < NodeBlock::kNodes; node += static_cast<int>(hn::MaxLanes(d))) {
+    const unsigned bits = asked >> node;
+    const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits),
+                                   static_cast<std::uint8_t>(bits >> 8)};
+    float* const at = values.data() + node;
+    const NodeVector before = hn::Load(d, at);
+    const NodeVector value = formula(before, sums, node);
+    hn::Store(hn::IfThenElse(hn::LoadMaskBits(d, bytes), value, before), d, at);
+    inside |= BitsOf(d, hn::Lt(value, hn::Zero(d))) << node;
+  }
+  return inside & asked;
+}
+
+BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,
+                      float weight, const Scale& scale, float* values) {
+  constexpr int kSide = NodeBlock::kSide;
   const NodeFormula formula(asked, weight, scale);
   BitRows inside{};
-  for (int j = 0; j < kTileSize; ++j) {
-    for (int i = 0; i < kTileSize; i += kLanes) {
-      const auto bits = static_cast<std::uint8_t>(asked.rows[j] >> i & ((1u << kLanes) - 1));
-      if (bits == 0) continue;
-      float* const at = values + j * kTileSize + i;
-      const Vector before = hn::LoadU(d, at);
-      const Vector value = formula(before, sums, SumIndex(i, j));
-      const std::uint8_t bytes[8] = {bits};
-      hn::StoreU(hn::IfThenElse(hn::LoadMaskBits(d, bytes), value, before), d, at);
-      inside[j] |= (BitsOf(hn::Lt(value, hn::Zero(d))) & bits) << i;
+  for (int b = 0; b < blocks.count; ++b) {
+    const NodeBlock& block = blocks[b];
+    float* const first = values + block.row * kTileSize + block.column;
+    alignas(64) BlockSums::Channel of_block;
+    for (int k = 0; k < kSide; ++k) {
+      std::memcpy(of_block.data() + k * kSide, first + k * kTileSize, kSide * sizeof(float));
+    }
+    const unsigned bits = EvaluateBlock(formula, sums[b], block.asked, of_block);
+    for (int k = 0; k < kSide; ++k) {
+      std::memcpy(first + k * kTileSize, of_block.data() + k * kSide, kSide * sizeof(float));
+      inside[block.row + k] |= (bits >> k * kSide & ((1u << kSide) - 1)) << block.column;
     }
   }
   return inside;
@@ -186,9 +212,9 @@ void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* valu
   HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, rows, values, inside, open);
 }
 
-BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
-                      const Scale& scale, float* values) {
-  return HWY_DYNAMIC_DISPATCH(EvaluateNodes)(asked, sums, weight, scale, values);
+BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,
+                      float weight, const Scale& scale, float* values) {
+  return HWY_DYNAMIC_DISPATCH(EvaluateNodes)(asked, blocks, sums, weight, scale, values);
 }
 
 }  // namespace partiemc

@@ -28,16 +28,43 @@ inline constexpr int SumIndex(int i, int j) {
 /// the last particle in the one after it.
 using NodeSums = std::array<float, (kTileSize + 2 * kSumMargin + 2) * kSumColumns>;
 
-/// Kernel sums at the nodes of one tile. The moments are relative to the node, so that the mean
-/// loses no digits where the tile's corner is far.
-struct alignas(64) MomentSums {
-  NodeSums kernel;    ///< sum k; only where the density does not tell it.
-  NodeSums moment_x;  ///< sum k (x_i - x)
-  NodeSums moment_y;
-  NodeSums xx;  ///< sum k (x_i - x)^2, and so on.
-  NodeSums xy;
-  NodeSums yy;
+/// A square of nodes of a tile, some of which are asked for moments.
+///
+///   12 13 14 15
+///    8  9 10 11   Bit k of `asked` stands for node k, the first one is (column, row) of the tile.
+///    4  5  6  7
+///    0  1  2  3
+struct NodeBlock {
+  static constexpr int kSide = 4;
+  static constexpr int kNodes = kSide * kSide;
+  std::uint8_t column = 0, row = 0;
+  std::uint16_t asked = 0;
 };
+
+/// Blocks that together have each asked node of a tile once, those of a row side by side.
+struct NodeBlocks {
+  static constexpr int kMost = kTileNodes / NodeBlock::kNodes;
+  std::array<NodeBlock, kMost> blocks;
+  int count = 0;
+
+  const NodeBlock& operator[](int block) const { return blocks[block]; }
+};
+
+/// Rows and columns of blocks begin at the first asked node that none before them has.
+NodeBlocks BlocksOf(const BitRows& asked);
+
+/// Kernel sums at the nodes of one block. The moments are relative to the node, so that the mean
+/// loses no digits where the tile's corner is far.
+struct alignas(64) BlockSums {
+  using Channel = std::array<float, NodeBlock::kNodes>;
+  Channel kernel;    ///< sum k; only where the density does not tell it.
+  Channel moment_x;  ///< sum k (x_i - x)
+  Channel moment_y;
+  Channel xx;  ///< sum k (x_i - x)^2, and so on.
+  Channel xy;
+  Channel yy;
+};
+using MomentSums = std::array<BlockSums, NodeBlocks::kMost>;
 
 /// The nodes of a tile of which moments are asked.
 struct AskedNodes {
@@ -45,18 +72,6 @@ struct AskedNodes {
   bool is_open;          ///< Whether the density left their sides open, else it has decided them.
   bool has_kernel_sums;  ///< Whether their values so far are sum k (ClassifyNodes).
 };
-
-/// In which rows of a tile kernels of a radius find asked nodes.
-struct AskedColumns {
-  /// By first column of a kernel, 0 for those before the tile: the rows that have asked nodes in
-  /// the columns that it covers.
-  BitRows rows;
-  int span;  ///< Rows and columns of a kernel.
-
-  /// Most rows of the tile that a kernel reaches.
-  int MaxRows() const { return std::min(span, kTileSize); }
-};
-AskedColumns ColumnsOf(const AskedNodes& asked, float radius);
 
 /// The list of one tile. `weight` is null where weights are uniform.
 struct TileEntries {
@@ -74,12 +89,10 @@ NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sum
 /// by entry of the bins, is null where weights are uniform.
 void ScatterNearKernels(const NearEntries& near, const float* weight, float radius, NodeSums& sums);
 
-/// Adds to the moments at the asked nodes; those at other nodes of the tile are anything. The sums
-/// must be cleared first. `sum k` is added up unless it is known. Particles that reach asked nodes
-/// in fewer rows come first, those of as many in their order.
-void ScatterNearMoments(const NearEntries& near, float radius, const AskedColumns& asked,
-                        bool has_kernel_sums, MomentSums& sums);
-void ClearMoments(const AskedNodes& asked, MomentSums& sums);
+/// Adds to the moments at the nodes of blocks, particle after particle. `sum k` is added up unless
+/// it is known.
+void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+                    bool has_kernel_sums, MomentSums& sums);
 
 /// What the density f = weight * sum says of the nodes in some rows of a tile: those that are
 /// inside, those that it leaves open, and, but for the latter, in place of the sums the branch of F
@@ -89,7 +102,7 @@ void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* valu
 
 /// Sets the values of the asked nodes, as ClassifyNodes has left them, to F. Returns those of them
 /// that are inside.
-BitRows EvaluateNodes(const AskedNodes& asked, const MomentSums& sums, float weight,
-                      const Scale& scale, float* values);
+BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,
+                      float weight, const Scale& scale, float* values);
 
 }  // namespace partiemc

@@ -160,47 +160,96 @@ TEST(Field, DensityInsideALatticeIsAboutOneSoThatOnlyTheBoundaryIsNearZero) {
   EXPECT_NEAR(stages.level_set.At(stages.bins.tiles, tile, 10, 10), (0.85 - 1) * 3 / 1.164, 0.01);
 }
 
-TEST(AskedColumns, HaveTheRowsInWhichAKernelThatBeginsThereMeetsAskedNodes) {
-  support::Random random(17);
-  for (const float radius : {0.5f, 1.5f, 3.0f, 11.2f, 20.0f, 31.5f}) {
-    AskedNodes asked{.rows = {}, .is_open = true, .has_kernel_sums = true};
-    for (std::uint32_t& row : asked.rows) {
-      for (std::size_t n = random.Below(3); n > 0; --n)
-        row |= std::uint32_t{1} << random.Below(kTileSize);
+BitRows SomeNodes(support::Random& random, std::size_t in_row) {
+  BitRows nodes{};
+  for (std::uint32_t& row : nodes) {
+    for (std::size_t n = random.Below(in_row + 1); n > 0; --n) {
+      row |= std::uint32_t{1} << random.Below(kTileSize);
     }
-    const AskedColumns columns = ColumnsOf(asked, radius);
-    EXPECT_EQ(columns.span, static_cast<int>(std::ceil(2 * radius)));
-    for (int first = 0; first < kTileSize; ++first) {
-      std::uint32_t expected = 0;
-      for (int j = 0; j < kTileSize; ++j) {
-        for (int i = first; i < std::min(first + columns.span, kTileSize); ++i) {
-          expected |= (asked.rows[j] >> i & 1) << j;
+  }
+  return nodes;
+}
+
+TEST(NodeBlocks, HaveEachAskedNodeOnceAndNoOther) {
+  support::Random random(17);
+  for (std::size_t in_row : {0, 1, 2, 5, 60}) {
+    const BitRows asked = SomeNodes(random, in_row);
+    const NodeBlocks blocks = BlocksOf(asked);
+    BitRows seen{};
+    for (int b = 0; b < blocks.count; ++b) {
+      const NodeBlock& block = blocks[b];
+      EXPECT_NE(block.asked, 0);
+      ASSERT_LE(std::max(block.column, block.row) + NodeBlock::kSide, kTileSize);
+      for (int node = 0; node < NodeBlock::kNodes; ++node) {
+        if ((block.asked >> node & 1) == 0) continue;
+        std::uint32_t& row = seen[block.row + node / NodeBlock::kSide];
+        const std::uint32_t bit = 1u << (block.column + node % NodeBlock::kSide);
+        EXPECT_EQ(row & bit, 0u);
+        row |= bit;
+      }
+    }
+    EXPECT_EQ(seen, asked);
+  }
+}
+
+TEST(NearMoments, AreThoseOfAllParticlesAtEachAskedNodeForAnyRadius) {
+  support::Random random(18);
+  for (const float radius : {0.5f, 1.5f, 3.0f, 11.2f, 31.5f}) {
+    NearEntries near;
+    for (near.count = 0; near.count < 200; ++near.count) {
+      near.x[near.count] = static_cast<float>(random.Uniform(-20, 52));
+      near.y[near.count] = static_cast<float>(random.Uniform(-20, 52));
+    }
+    const NodeBlocks blocks = BlocksOf(SomeNodes(random, 3));
+    support::ForEachInstructionSet([&] {
+      MomentSums sums{};
+      AddNearMoments(near, radius, blocks, false, sums);
+      for (int b = 0; b < blocks.count; ++b) {
+        for (int node = 0; node < NodeBlock::kNodes; ++node) {
+          const int column = blocks[b].column + node % NodeBlock::kSide;
+          const int row = blocks[b].row + node / NodeBlock::kSide;
+          double kernel = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+          for (int e = 0; e < near.count; ++e) {
+            const double dx = double{near.x[e]} - column, dy = double{near.y[e]} - row;
+            const double t = std::max(0.0, 1 - (dx * dx + dy * dy) / (double{radius} * radius));
+            const double k = t * t * t;
+            kernel += k;
+            x += k * dx;
+            y += k * dy;
+            xx += k * dx * dx;
+            xy += k * dx * dy;
+            yy += k * dy * dy;
+          }
+          const double tolerance = 1e-5 * radius * (1 + kernel);
+          EXPECT_NEAR(sums[b].kernel[node], kernel, tolerance);
+          EXPECT_NEAR(sums[b].moment_x[node], x, tolerance);
+          EXPECT_NEAR(sums[b].moment_y[node], y, tolerance);
+          EXPECT_NEAR(sums[b].xx[node], xx, tolerance * radius);
+          EXPECT_NEAR(sums[b].xy[node], xy, tolerance * radius);
+          EXPECT_NEAR(sums[b].yy[node], yy, tolerance * radius);
         }
       }
-      EXPECT_EQ(columns.rows[first], expected) << "radius " << radius << ", column " << first;
-    }
+    });
   }
 }
 
 // Vectors read beyond them: no bit may depend on it, and no conversion of it may be undefined.
 TEST(NearMoments, DoNotDependOnWhatLiesBehindTheLastParticle) {
-  AskedNodes asked{.rows = {}, .is_open = true, .has_kernel_sums = false};
-  asked.rows.fill(~std::uint32_t{0});
-  const float radius = 2.5f;
+  BitRows all;
+  all.fill(~std::uint32_t{0});
+  const NodeBlocks blocks = BlocksOf(all);
   const auto moments_with = [&](float behind) {
     NearEntries near;
     near.x.fill(behind);
     near.y.fill(behind);
     near.count = 3;
     for (int k = 0; k < near.count; ++k) near.x[k] = near.y[k] = 4.25f * static_cast<float>(k);
-    MomentSums sums;
-    ClearMoments(asked, sums);
-    ScatterNearMoments(near, radius, ColumnsOf(asked, radius), asked.has_kernel_sums, sums);
+    MomentSums sums{};
+    AddNearMoments(near, 2.5f, blocks, false, sums);
     std::vector<float> at_nodes;
-    for (int j = 0; j < kTileSize; ++j) {
-      for (int i = 0; i < kTileSize; ++i) {
-        at_nodes.push_back(sums.kernel[SumIndex(i, j)]);
-        at_nodes.push_back(sums.xy[SumIndex(i, j)]);
+    for (int b = 0; b < blocks.count; ++b) {
+      for (const auto& channel : {sums[b].kernel, sums[b].xy}) {
+        at_nodes.insert(at_nodes.end(), channel.begin(), channel.end());
       }
     }
     return at_nodes;
