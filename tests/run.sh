@@ -44,6 +44,8 @@ done
 passed=0
 failed=0
 failures=()
+details=$(mktemp)  # What the failed tests wrote.
+trap 'rm -f "$details"' EXIT
 
 headline() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
 
@@ -65,6 +67,17 @@ check() {
   fi
 }
 
+# What each failed test wrote, of a log of CTest's: its line of the result and what follows it.
+failed_tests() {
+  awk '/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: / { shown = /\*\*\*/ }
+       /^[0-9]+% tests passed/ { exit }
+       shown && !/^ +Start +[0-9]+: / { print substr($0, 1, 500) }' "$1"
+}
+
+names_of_failed_tests() {
+  failed_tests "$1" | sed -n -E 's|^ *[0-9]+/[0-9]+ Test +#[0-9]+: ([^ ]+) .*|\1|p' | paste -sd ' '
+}
+
 # run_ctest NAME DIRECTORY [OPTION...]: runs the tests of a build directory, or those that CTest's
 # options choose, and adds CTest's own figures to the sum.
 run_ctest() {
@@ -76,7 +89,10 @@ run_ctest() {
   local summary='^[0-9]+% tests passed, ([0-9]+) tests failed out of ([0-9]+)$'
   if [[ $(grep -E "$summary" "$log") =~ $summary ]]; then
     passed=$((passed + BASH_REMATCH[2] - BASH_REMATCH[1]))
-    ((BASH_REMATCH[1] == 0)) || record_failure "${BASH_REMATCH[1]}" "$name: see the list by CTest"
+    if ((BASH_REMATCH[1] != 0)); then
+      failed_tests "$log" >>"$details"
+      record_failure "${BASH_REMATCH[1]}" "$name: $(names_of_failed_tests "$log")"
+    fi
   else
     record_failure 1 "$name: CTest gave no result"
   fi
@@ -167,6 +183,11 @@ for step in "${steps[@]}"; do
   "step_$step"
 done
 
+# Again, next to the result: by now it is far up.
+if [[ -s $details ]]; then
+  headline "failed tests"
+  head -n 200 "$details"
+fi
 headline "result"
 ((failed == 0)) || printf 'FAILED: %s\n' "${failures[@]}"
 echo "$passed passed, $failed failed"
