@@ -123,13 +123,16 @@ absl::StatusOr<std::optional<CallOpener::Opened>> CallOpener::OpenAgain(
       }
       if (now >= attempt_until_) {
         Drop(lock, std::move(attempt_));
-        TryNext(NotAccepted(address(), "stream", options_.connect_timeout));
+        // One that was cut short by the end says nothing: what there was before it is told.
+        if (attempt_until_ < give_up_at) {
+          TryNext(NotAccepted(address(), "stream", options_.connect_timeout));
+        }
         continue;
       }
     } else if (now >= give_up_at) {
-      return absl::Status(refusal_.code(), absl::StrCat("the stream could not go on within ",
-                                                        Seconds(options_.reconnect.give_up_after),
-                                                        ": ", refusal_.message()));
+      return absl::UnavailableError(absl::StrCat("the stream could not go on within ",
+                                                 Seconds(options_.reconnect.give_up_after), ": ",
+                                                 refusal_.message()));
     } else if (now >= attempt_at_) {
       lock.unlock();
       auto channel = MakeChannel(address(), options_.credentials);

@@ -226,6 +226,24 @@ TEST(Resume, GivesUpInTimeWithTheLastError) {
   EXPECT_EQ((*stream)->Send(kFrame, 1).status().code(), absl::StatusCode::kUnavailable);
 }
 
+TEST(Resume, AnAttemptThatIsCutShortByGivingUpLeavesTheErrorBeforeIt) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    if (++calls > 1) return WaitForCancel(context);
+    AcceptResumable(rpc, 1);
+    return grpc::Status(grpc::StatusCode::UNAVAILABLE, "out for lunch");
+  });
+  StreamOptions options = Options();
+  options.reconnect.give_up_after = kShort;
+  const auto stream = Stream::Open(server.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  Event event;
+  const auto received = (*stream)->Receive(event);
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kUnavailable) << received.status();
+  EXPECT_THAT(std::string(received.status().message()), HasSubstr("out for lunch"));
+}
+
 TEST(Resume, ACallThatIsOnlyAcceptedAgainAndAgainIsNoProgress) {
   std::atomic<int> calls = 0;
   FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
