@@ -133,10 +133,13 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
   return total;
 }
 
-// Where lists are more than the nearest caches keep lines for, the one that a particle is written
-// to is asked for so many particles before.
+// Where lists are more than the nearest caches keep lines for, a particle asks for the line behind
+// the one that it will be written to: its list goes on there after a few thousand particles, in
+// which even memory far away has answered. The particle itself is looked at so many before it is
+// written.
 constexpr std::size_t kNearHomes = 2048;
 constexpr std::size_t kFillAhead = 24;
+constexpr std::size_t kNextLine = 64 / sizeof(BinEntry) + 1;
 
 // Second pass over a stretch: writes its entries.
 void FillEntries(std::size_t first, std::size_t last, std::span<const float> volumes,
@@ -154,7 +157,7 @@ void FillEntries(std::size_t first, std::size_t last, std::span<const float> vol
     std::size_t k = first;
     if (stretch.homes.size() > kNearHomes) {
       for (; k + kFillAhead < last; ++k) {
-        hwy::Prefetch(entries + next[home[k + kFillAhead]]);
+        hwy::Prefetch(entries + next[home[k + kFillAhead]] + kNextLine);
         fill_one(k);
       }
     }
