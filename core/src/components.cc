@@ -49,7 +49,12 @@ void Components::UniteRuns(const TileDirectory& directory, const Crossings& cros
   const bool full = IsFull(rows);
   // One node of each stretch that two rows share joins their runs.
   const auto unite_rows = [&](int j, std::uint32_t upper_tile, int upper_j) {
-    std::uint32_t shared = rows[j] & crossings.tiles[upper_tile].inside[upper_j];
+    const std::uint32_t upper_row = crossings.tiles[upper_tile].inside[upper_j];
+    std::uint32_t shared = rows[j] & upper_row;
+    if (shared != 0 && IsOneRun(rows[j]) && IsOneRun(upper_row)) {
+      Unite(first_run_[tile * kTileSize + j], first_run_[upper_tile * kTileSize + upper_j]);
+      return;
+    }
     while (shared != 0) {
       const int i = std::countr_zero(shared);
       Unite(RunAt(crossings, {tile, i, j}), RunAt(crossings, {upper_tile, i, upper_j}));

@@ -78,6 +78,9 @@ inline bool IsFull(const BitRows& rows) {
 /// The bits of a row at which a run of ones begins.
 inline std::uint32_t RunStarts(std::uint32_t row) { return row & ~(row << 1); }
 
+/// Whether the ones of a row are one run. Requires: there are some.
+inline bool IsOneRun(std::uint32_t row) { return (RunStarts(row) & (RunStarts(row) - 1)) == 0; }
+
 /// The run of ones of `row` that begins at its lowest set bit.
 inline std::uint32_t LowestRun(std::uint32_t row) { return row & ~(row + (row & -row)); }
 

@@ -28,7 +28,8 @@ struct TouchingPairsBuffers {
   };
   std::vector<Run> runs;
   std::vector<Box> ring_boxes;
-  std::vector<std::uint8_t> is_apart;  // By ring.
+  /// By ring: 1 only where its box touches no other ring's. Says nothing where there is no point.
+  std::vector<std::uint8_t> is_apart;
   BoxesApartScratch boxes_apart;
   std::vector<std::uint32_t> slots;
 

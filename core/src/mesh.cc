@@ -13,6 +13,10 @@
 namespace partiemc {
 namespace {
 
+// A ring that has more than one in so many of all segments is long: a few threads would wait for
+// its sweep. To begin with it early costs next to nothing where they would not.
+constexpr std::uint32_t kLongShare = 4;
+
 // Builds one mesh. Points of the connectivity: the points of the rings (for `farthest-particle`:
 // the middles of all segments), then the nodes of the lattice that triangles name. Where these are
 // not known yet when loops are triangulated, the corners of the staircases stand in for them.
@@ -96,20 +100,19 @@ void MeshBuilder::ForEachRectangle(Visit visit) const {
 // there has two neighbours, or all, of the four cells around it. Those around a corner, one or
 // three that are interior, or two across from each other, cannot be paired like that.
 void MeshBuilder::FillRectangles() {
-  const Fill fill = input_.parameters.fill;
-  interior_cells_ = CountInteriorCells();
   scratch_.rectangles.clear();
-  if (fill == Fill::kGreedy) {
+  if (input_.parameters.fill == Fill::kGreedy) {
     MergeCells(input_.directory, scratch_.interior, scratch_.merge, scratch_.rectangles);
   }
+  interior_cells_ = CountInteriorCells();
   NodeVertices& nodes = scratch_.nodes;
   nodes.Clear(input_.directory.size());
   ForEachRectangle([&](const CellRectangle& rectangle) {
     for (const TilePlace& corner : CornersOf(input_.directory, rectangle)) nodes.Add(corner);
   });
   nodes.Number(static_cast<std::uint32_t>(ring_points_));
-  scratch_.triangles.resize(6 *
-                            (fill == Fill::kGrid ? interior_cells_ : scratch_.rectangles.size()));
+  scratch_.triangles.resize(
+      6 * (input_.parameters.fill == Fill::kGrid ? interior_cells_ : scratch_.rectangles.size()));
   std::uint32_t* next = scratch_.triangles.data();
   ForEachRectangle([&](const CellRectangle& rectangle) {
     std::array<std::uint32_t, 4> corners;
@@ -213,8 +216,8 @@ bool MeshBuilder::TriangulateByLoops() {
   return TriangulateLoops(TriangleClass::kInterior);
 }
 
-// Whether one ring is so long that the sweep of its component is most of what has to be done, and
-// there is a thread that may fill rectangles meanwhile.
+// Whether one ring is so long that others wait for the sweep of its component, and there is a
+// thread that may fill rectangles meanwhile.
 bool MeshBuilder::OneSweepIsLong() const {
   if (!HasBand() || ThreadCount() == 1) return false;
   const std::vector<std::uint32_t>& offsets = input_.topology.offsets;
@@ -222,7 +225,7 @@ bool MeshBuilder::OneSweepIsLong() const {
   for (std::size_t ring = 0; ring + 1 < offsets.size(); ++ring) {
     longest = std::max(longest, offsets[ring + 1] - offsets[ring]);
   }
-  return longest > offsets.back() / 2;
+  return longest > offsets.back() / kLongShare;
 }
 
 // Finds the shapes of the interior and triangulates everything, in whichever order is faster: both
@@ -282,6 +285,13 @@ void MeshBuilder::MoveVertices() {
 
 std::uint64_t MeshBuilder::CountInteriorCells() const {
   std::uint64_t count = 0;
+  if (input_.parameters.fill == Fill::kGreedy) {
+    for (const CellRectangle& rectangle : scratch_.rectangles) {
+      count += static_cast<std::uint64_t>(rectangle.width) *
+               static_cast<std::uint64_t>(rectangle.height);
+    }
+    return count;
+  }
   for (const BitRows& rows : scratch_.interior) {
     for (const std::uint32_t row : rows) count += CountBits(row);
   }

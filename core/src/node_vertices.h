@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "bits.h"
@@ -63,10 +64,12 @@ inline void NodeVertices::Number(std::uint32_t first) {
   std::uint32_t next = first;
   for (Tile& tile : tiles_) {
     tile.first = next;
+    std::array<std::uint16_t, kTileSize> counts;
     for (int j = 0; j < kTileSize; ++j) {
-      tile.before_row[j] = static_cast<std::uint16_t>(next - tile.first);
-      next += static_cast<std::uint32_t>(CountBits(tile.named[j]));
+      counts[j] = static_cast<std::uint16_t>(CountBits(tile.named[j]));
     }
+    std::exclusive_scan(counts.begin(), counts.end(), tile.before_row.begin(), std::uint16_t{0});
+    next += std::uint32_t{tile.before_row.back()} + counts.back();
   }
   count_ = next - first;
 }

@@ -1,7 +1,6 @@
 #include "repair.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "measure.h"
 #include "parallel.h"
@@ -72,20 +71,29 @@ void MeasureRings(Rings& rings) {
 }
 
 // Marks the rings that are turned inside out or lie on the wrong side of others, with those
-// around them. Requires: rings were measured. Of rings that do not cross, one is in its place if
-// and only if the others wind around its leftmost point as often as around the region outside of an
-// outer ring (0), or around the fluid that a hole lies in (1).
+// around them. Requires: rings were measured, and searched for pairs. Of rings that do not cross,
+// one is in its place if and only if the others wind around its leftmost point as often as around
+// the region outside of an outer ring (0), or around the fluid that a hole lies in (1). What
+// touches no other ring's box has none around it, and is around none.
 bool MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   const std::size_t count = rings.RingCount();
+  bool has_found = false;
   scratch.boxes.resize(count);
-  for (std::size_t ring = 0; ring < count; ++ring) scratch.boxes[ring] = BoxOf(rings, ring);
-  scratch.order.resize(count);
-  std::iota(scratch.order.begin(), scratch.order.end(), 0u);
+  scratch.order.clear();
+  for (std::uint32_t ring = 0; ring < count; ++ring) {
+    const bool is_hole = rings.outer_of[ring] != kNoRing;
+    if (scratch.pairs.is_apart[ring] == 0 || is_hole) {
+      scratch.boxes[ring] = BoxOf(rings, ring);
+      scratch.order.push_back(ring);
+    } else if (rings.measures[ring].area < 0) {
+      MarkRing(rings, ring, scratch.is_marked);
+      has_found = true;
+    }
+  }
   std::sort(scratch.order.begin(), scratch.order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return scratch.boxes[a].x0 != scratch.boxes[b].x0 ? scratch.boxes[a].x0 < scratch.boxes[b].x0
                                                       : a < b;
   });
-  bool has_found = false;
   scratch.open.clear();  // Rings that begin left of the sweep and end right of it.
   for (const std::uint32_t ring : scratch.order) {
     const Point point = PointAt(rings, scratch.boxes[ring].leftmost);

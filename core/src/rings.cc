@@ -19,6 +19,9 @@ static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into 
 // Segments that a task takes at least.
 constexpr std::size_t kSegmentGrain = 512;
 
+// Rings that a task takes at least.
+constexpr std::size_t kRingGrain = 64;
+
 // How many segments before its turn a cell's values are asked for: as long as memory takes.
 constexpr std::size_t kFetchedAhead = 16;
 
@@ -102,15 +105,23 @@ double AreaOf(const RingTopology& rings, std::size_t ring) {
   return twice_area / 2;
 }
 
+void MeasureAreas(const RingTopology& rings, RingScratch& scratch) {
+  scratch.area.resize(rings.offsets.size() - 1);
+  ParallelForRanges(scratch.area.size(), kRingGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t ring = first; ring < last; ++ring) scratch.area[ring] = AreaOf(rings, ring);
+  });
+}
+
 // Clears the nodes of components without a particle.
 void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopology& rings) {
+  rings.dropped_components = static_cast<std::uint64_t>(
+      std::count(scratch.particle_count.begin(), scratch.particle_count.end(), 0u));
+  if (rings.dropped_components == 0) return;
   scratch.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
         // ForEachRun has already read this row: clearing its bits does not disturb it.
         if (scratch.particle_count[component] == 0) crossings.tiles[tile].inside[j] &= ~mask;
       });
-  rings.dropped_components = static_cast<std::uint64_t>(
-      std::count(scratch.particle_count.begin(), scratch.particle_count.end(), 0u));
 }
 
 // Sets every node that the ring encloses. The ring crosses a row of the lattice in pairs of
@@ -139,7 +150,7 @@ void FillRing(const TileDirectory& directory, const RingTopology& rings, std::si
 }
 
 // Removes the rings that no longer separate an inside node from an outside one.
-void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings,
+void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings, RingScratch& scratch,
                    RingTopology& rings) {
   std::size_t kept = 0;
   std::uint32_t end = 0;
@@ -152,11 +163,13 @@ void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings,
               rings.segments.begin() + end);
     std::copy(rings.entries.begin() + first, rings.entries.begin() + last,
               rings.entries.begin() + end);
+    scratch.area[kept] = scratch.area[ring];
     rings.offsets[kept++] = end;
     end += last - first;
   }
   rings.segments.resize(end);
   rings.entries.resize(end);
+  scratch.area.resize(kept);
   rings.offsets.resize(kept + 1);
   rings.offsets[kept] = end;
 }
@@ -172,16 +185,16 @@ void CountComponents(const ParticleBins& bins, const Crossings& crossings, RingS
 void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, RingScratch& scratch,
            RingTopology& rings) {
   DropEmptyComponents(scratch, crossings, rings);
-  if (rings.dropped_components > 0) KeepSurvivors(bins.tiles, crossings, rings);
+  if (rings.dropped_components > 0) KeepSurvivors(bins.tiles, crossings, scratch, rings);
   const double min_area = kMinHoleParticles * scale.spacing * scale.spacing;
   for (std::size_t ring = 0; ring + 1 < rings.offsets.size(); ++ring) {
-    const double area = AreaOf(rings, ring);
+    const double area = scratch.area[ring];
     if (area < 0 && -area < min_area) {
       FillRing(bins.tiles, rings, ring, crossings, scratch.edges);
       ++rings.dropped_holes;
     }
   }
-  if (rings.dropped_holes > 0) KeepSurvivors(bins.tiles, crossings, rings);
+  if (rings.dropped_holes > 0) KeepSurvivors(bins.tiles, crossings, scratch, rings);
   if (rings.dropped_holes + rings.dropped_components > 0) {
     MarkInteriorCells(bins.tiles, crossings);
     CountComponents(bins, crossings, scratch);
@@ -194,12 +207,10 @@ void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scr
   const std::size_t ring_count = rings.offsets.size() - 1;
   scratch.outer_ring.assign(scratch.components.size(), kNoRing);
   scratch.component_of_ring.resize(ring_count);
-  scratch.area.resize(ring_count);
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
     const EdgeNodes nodes = EntryNodes(bins.tiles, crossings, rings.segments[rings.offsets[ring]]);
     const std::uint32_t component = scratch.components.At(crossings, nodes.inside);
     scratch.component_of_ring[ring] = component;
-    scratch.area[ring] = AreaOf(rings, ring);
     if (scratch.area[ring] >= 0) scratch.outer_ring[component] = static_cast<std::uint32_t>(ring);
   }
   rings.outer_of.assign(ring_count, kNoRing);
@@ -273,7 +284,7 @@ void DropSpray(const ParticleBins& bins, const Scale& scale,
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
         if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
       });
-  KeepSurvivors(bins.tiles, crossings, rings);
+  KeepSurvivors(bins.tiles, crossings, scratch, rings);
   MarkInteriorCells(bins.tiles, crossings);
   CountComponents(bins, crossings, scratch);
   Nest(bins, crossings, scratch, rings);
@@ -291,6 +302,7 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
       [&] {
         Trace(bins.tiles, crossings, scratch.next_segment, rings);
         FindEntries(bins.tiles, level_set, crossings, rings);
+        MeasureAreas(rings, scratch);
       },
       [&] { CountComponents(bins, crossings, scratch); });
   if (*parameters.clean) Clean(bins, scale, crossings, scratch, rings);
