@@ -252,7 +252,7 @@ TEST(Resume, ACallThatIsOnlyAcceptedAgainAndAgainIsNoProgress) {
     return Lost(grpc::StatusCode::UNAVAILABLE);  // As a server that a frame brings down.
   });
   StreamOptions options = Options();
-  options.reconnect = {.give_up_after = milliseconds(500), .first_pause = milliseconds(20)};
+  options.reconnect = {.give_up_after = milliseconds(1500), .first_pause = milliseconds(20)};
   const auto stream = Stream::Open(server.address(), options);
   ASSERT_TRUE(stream.ok()) << stream.status();
   ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
