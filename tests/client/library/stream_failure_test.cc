@@ -18,6 +18,7 @@ namespace partiemc::client {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 using ::testing::Not;
 
 constexpr std::chrono::milliseconds kShort(200);
@@ -61,14 +62,18 @@ TEST(StreamFailure, AnAddressThatIsNoneIsNamedWithTheFormsThatAre) {
 
 TEST(StreamFailure, NoServerThereIsOneLineThatSaysWhatToDo) {
   const DeafPort port;
-  const auto stream = Stream::Open(port.address(), {.connect_timeout = kShort});
-  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnavailable);
-  ExpectOneLine(stream.status());
-  EXPECT_EQ(stream.status().message(),
-            "no server at " + port.address() +
-                " (Connection refused): start one with `partiemc-server --address " +
-                port.address() + "`");
-  EXPECT_EQ(GetServerInfo(port.address(), kShort).status(), stream.status());
+  for (const absl::Status& status :
+       {Stream::Open(port.address(), {.connect_timeout = kShort}).status(),
+        GetServerInfo(port.address(), kShort).status()}) {
+    EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
+    ExpectOneLine(status);
+    // On a busy machine an attempt may be over before it is refused.
+    EXPECT_THAT(std::string(status.message()),
+                MatchesRegex("no server at " + port.address() +
+                             " .(Connection refused|tcp handshaker shutdown).: start one with "
+                             "`partiemc-server --address " +
+                             port.address() + "`"));
+  }
 }
 
 TEST(StreamFailure, AMissingUnixSocketIsNoServerEither) {
