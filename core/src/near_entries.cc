@@ -62,8 +62,6 @@ void ChooseFields(const ListPart& part, NearEntries& near) {
     hn::StoreU(compress(d, hn::Add(x, hn::Set(d, shift_x))), d, near.x.data() + chosen);
     hn::StoreU(compress(d, hn::Add(y, hn::Set(d, shift_y))), d, near.y.data() + chosen);
     if constexpr (kFields == NearFields::kAll) {
-      hn::StoreU(compress(d_index, hn::BitCast(d_index, source)), d_index,
-                 near.source.data() + chosen);
       hn::StoreU(compress(d_index, hn::Add(hn::Set(d_index, first), lane)), d_index,
                  near.entry.data() + chosen);
     }
@@ -73,7 +71,6 @@ void ChooseFields(const ListPart& part, NearEntries& near) {
     const BinEntry& entry = entries[first];
     near.x[chosen] = entry.x + shift_x;
     near.y[chosen] = entry.y + shift_y;
-    near.source[chosen] = entry.source;
     near.entry[chosen] = first;
     chosen += LiesIn(entry, cells);
   }

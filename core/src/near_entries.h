@@ -22,8 +22,7 @@ struct NearEntries {
   using PerEntry = std::array<Value, kCapacity + kPadding>;
 
   PerEntry<float> x, y;
-  PerEntry<std::uint32_t> entry;   ///< Index into ParticleBins::entries.
-  PerEntry<std::uint32_t> source;  ///< Index in the frame.
+  PerEntry<std::uint32_t> entry;  ///< Index into ParticleBins::entries.
   int count = 0;
 };
 

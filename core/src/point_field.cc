@@ -61,18 +61,18 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
 }
 
 void PointField::Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
-                       double wander) {
+                       double wander, bool tells_sources) {
   scale_ = scale;
   grid_ = BucketGrid(scale.kernel_radius);
   MarkTiles(bins, crossings, wander);
-  FindRuns(bins);
+  FindRuns(bins, tells_sources);
   ParallelFor(runs_.size(), [&](std::size_t run) { SortRun(bins, runs_[run]); });
   ParallelFor(static_cast<std::uint32_t>(tiles_.size()),
               [&](std::uint32_t tile) { LinkRuns(bins.tiles, tile); });
 }
 
 // Joins wanted tiles to runs, and makes room for what these hold.
-void PointField::FindRuns(const ParticleBins& bins) {
+void PointField::FindRuns(const ParticleBins& bins, bool tells_sources) {
   runs_.clear();
   run_of_.assign(tiles_.size(), kNoRun);
   std::uint32_t entry_count = 0;
@@ -100,7 +100,9 @@ void PointField::FindRuns(const ParticleBins& bins) {
   bucket_offsets_.resize(bucket_count);
   x_.resize(entry_count + kRowPadding);
   y_.resize(entry_count + kRowPadding);
-  source_.resize(entry_count);
+  chosen_.resize(entry_count);
+  chosen_end_.resize(tiles_.size());
+  source_.resize(tells_sources ? entry_count : 0);
   weight_.resize(bins.weight.empty() ? 0 : entry_count + kRowPadding);
 }
 
@@ -127,38 +129,40 @@ void PointField::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
 
 // Sorts the wanted particles of a run by bucket.
 void PointField::SortRun(const ParticleBins& bins, const Run& run) {
-  // Calls visit(near, bucket_of, column) for blocks of particles of a tile: bucket_of(k) is that
-  // of the k-th, and `column` where their tile begins.
-  const auto for_each_block = [&](NearFields fields, auto visit) {
-    for (std::uint32_t tile = run.first_tile; tile <= run.last_tile; ++tile) {
-      if (run_of_[tile] == kNoRun) continue;
-      const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
-      const auto first = static_cast<std::uint32_t>(columns);
-      NearWalk(bins, tile, wanted_[tile], fields).ForEachBlock([&](const NearEntries& near) {
-        const auto bucket_of = [&](int k) {
-          return grid_.rows.InTile(near.y[k]) * run.row_stride + first +
-                 grid_.columns.InTile(near.x[k]);
-        };
-        visit(near, bucket_of, tiles_[tile].column);
-      });
-    }
-  };
   // The counts of buckets stand two places behind them, then where the next entry of a bucket goes
   // one place behind it, and in the end is where the next bucket starts.
   const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);
-  for_each_block(NearFields::kPositions, [&](const NearEntries& near, auto bucket_of, float) {
-    for (int k = 0; k < near.count; ++k) ++offsets[bucket_of(k) + 2];
+  const auto for_each_tile = [&](auto visit) {
+    for (std::uint32_t tile = run.first_tile; tile <= run.last_tile; ++tile) {
+      if (run_of_[tile] != kNoRun) visit(tile);
+    }
+  };
+  std::uint32_t chosen = run.first_entry;
+  for_each_tile([&](std::uint32_t tile) {
+    const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
+    const auto first = static_cast<std::uint32_t>(columns);
+    NearWalk(bins, tile, wanted_[tile], NearFields::kAll).ForEachBlock([&](const auto& near) {
+      for (int k = 0; k < near.count; ++k) {
+        const std::uint32_t bucket =
+            grid_.rows.InTile(near.y[k]) * run.row_stride + first + grid_.columns.InTile(near.x[k]);
+        chosen_[chosen++] = {bucket, near.entry[k]};
+        ++offsets[bucket + 2];
+      }
+    });
+    chosen_end_[tile] = chosen;
   });
   std::uint32_t next = run.first_entry;
   for (std::uint32_t& offset : offsets) offset = next += offset;
-  for_each_block(NearFields::kAll, [&](const NearEntries& near, auto bucket_of, float column) {
-    for (int k = 0; k < near.count; ++k) {
-      const std::uint32_t to = offsets[bucket_of(k) + 1]++;
-      x_[to] = column + near.x[k];
-      y_[to] = near.y[k];
-      source_[to] = near.source[k];
-      if (!bins.weight.empty()) weight_[to] = bins.weight[near.entry[k]];
+  chosen = run.first_entry;
+  for_each_tile([&](std::uint32_t tile) {
+    for (; chosen < chosen_end_[tile]; ++chosen) {
+      const auto& [bucket, entry] = chosen_[chosen];
+      const std::uint32_t to = offsets[bucket + 1]++;
+      x_[to] = tiles_[tile].column + bins.entries[entry].x;
+      y_[to] = bins.entries[entry].y;
+      if (!source_.empty()) source_[to] = bins.entries[entry].source;
+      if (!bins.weight.empty()) weight_[to] = bins.weight[entry];
     }
   });
 }

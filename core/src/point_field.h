@@ -51,8 +51,9 @@ class PointField {
   /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
   /// cells away from one, along each axis. Cost: linear in the entries of the tiles around those
   /// cells; in all entries where kernel and `wander` together reach farther than kMaskMargin.
+  /// SourceOf can be asked if `tells_sources`.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
-             double wander);
+             double wander, bool tells_sources);
 
   /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
   /// Requires: the tile is indexed. Particles miss where Covers is false.
@@ -78,7 +79,7 @@ class PointField {
   void FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
                 NearRows& near) const;
 
-  /// Index in the frame of the particle of an entry.
+  /// Index in the frame of the particle of an entry. Requires: built to tell it.
   std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
@@ -126,7 +127,7 @@ class PointField {
   std::uint32_t OffsetCount(const Run& run) const {
     return run.row_stride * static_cast<std::uint32_t>(grid_.rows.size()) + 2;
   }
-  void FindRuns(const ParticleBins& bins);
+  void FindRuns(const ParticleBins& bins, bool tells_sources);
   void LinkRuns(const TileDirectory& directory, std::uint32_t tile);
   void SortRun(const ParticleBins& bins, const Run& run);
 
@@ -137,6 +138,12 @@ class PointField {
   std::vector<Run> runs_;
   std::vector<std::uint32_t> run_of_;  // By tile; kNoRun where there is none.
   std::vector<std::uint32_t> bucket_offsets_;
+  // Those of each run as they are found: tile after tile, which end at chosen_end_.
+  struct Chosen {
+    std::uint32_t bucket, entry;
+  };
+  std::vector<Chosen> chosen_;
+  std::vector<std::uint32_t> chosen_end_;
   std::vector<float> x_, y_, weight_;
   std::vector<std::uint32_t> source_;
 };

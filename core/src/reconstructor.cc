@@ -141,7 +141,8 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
   const bool farthest = parameters.placement == Placement::kFarthestParticle;
   {
     const StageScope scope(observer, Stage::kNormals);
-    b.point_field.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale));
+    b.point_field.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale),
+                        farthest);
     EstimateNormals(b.bins, b.crossings, b.topology, b.point_field, parameters, previous.normals,
                     b.normal_scratch, b.planes, b.next_normals);
   }

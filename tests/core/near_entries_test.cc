@@ -16,7 +16,7 @@ namespace {
 
 // An entry as a walk hands it out.
 struct Seen {
-  std::uint32_t source, entry;
+  std::uint32_t entry;
   float x, y;
 
   bool operator==(const Seen&) const = default;
@@ -27,7 +27,7 @@ std::vector<Seen> InOrder(const ParticleBins& bins, std::uint32_t tile, const Ce
   NearWalk(bins, tile, mask, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
     EXPECT_GT(near.count, 0);
     for (int k = 0; k < near.count; ++k) {
-      seen.push_back({near.source[k], near.entry[k], near.x[k], near.y[k]});
+      seen.push_back({near.entry[k], near.x[k], near.y[k]});
     }
   });
   return seen;
@@ -61,7 +61,7 @@ std::vector<Seen> Expected(const ParticleBins& bins, std::uint32_t tile, const C
         if (std::min(column, row) < 0 || std::max(column, row) >= 64) continue;
         if (((*mask)[row] >> column & 1) == 0) continue;
       }
-      expected.push_back({bins.entries[e].source, e, x, y});
+      expected.push_back({e, x, y});
     }
   }
   return expected;
@@ -134,7 +134,7 @@ TEST(NearEntries, OfATileAloneAreThoseOfAMaskThatHasNoCellsElsewhere) {
     std::vector<Seen> own;
     NearWalk(bins, tile, cells, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
       for (int k = 0; k < near.count; ++k) {
-        own.push_back({near.source[k], near.entry[k], near.x[k], near.y[k]});
+        own.push_back({near.entry[k], near.x[k], near.y[k]});
       }
     });
     EXPECT_EQ(own, Expected(bins, tile, &mask));
