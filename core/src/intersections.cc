@@ -53,6 +53,9 @@ class PairSearch {
   PairSearch(std::span<const double> points, TouchingPairsBuffers& buffers)
       : points_(points), buffers_(buffers) {}
 
+  void CollectRuns(std::span<const std::uint32_t> ring_offsets);
+  void SettleRuns(std::span<const std::uint8_t> is_moved);
+  /// Requires: runs were collected, and settled if this is not the first search for them.
   std::size_t Count(std::span<const std::uint32_t> ring_offsets);
 
  private:
@@ -64,7 +67,7 @@ class PairSearch {
     return (i == run.ring_begin ? run.ring_end : i) - 1;
   }
 
-  void CollectRuns(std::span<const std::uint32_t> ring_offsets);
+  void MeasureRuns();
   void Measure(Run& run) const;
   void FindLoneRuns(std::span<const std::uint32_t> ring_offsets);
   HashGrids MakeGrids() const;
@@ -99,7 +102,29 @@ void PairSearch::CollectRuns(std::span<const std::uint32_t> ring_offsets) {
                       .ring_end = end});
     }
   }
-  ParallelFor(runs.size(), [&](std::size_t k) { Measure(runs[k]); });
+  MeasureRuns();
+}
+
+/// Finds out which rings are as they were, and measures the runs of the others.
+void PairSearch::SettleRuns(std::span<const std::uint8_t> is_moved) {
+  std::uint32_t ring = kNone;  // Where it begins.
+  bool is_settled = false;
+  for (Run& run : buffers_.runs) {
+    if (run.ring_begin != ring) {
+      ring = run.ring_begin;
+      const auto points = is_moved.subspan(ring, run.ring_end - ring);
+      is_settled = std::ranges::all_of(points, [](std::uint8_t moved) { return moved == 0; });
+    }
+    run.is_settled = is_settled;
+  }
+  MeasureRuns();
+}
+
+void PairSearch::MeasureRuns() {
+  ParallelFor(buffers_.runs.size(), [&](std::size_t k) {
+    Run& run = buffers_.runs[k];
+    if (!run.is_settled) Measure(run);
+  });
 }
 
 void PairSearch::Measure(Run& run) const {
@@ -265,17 +290,19 @@ void PairSearch::ForEachPair(const HashGrids& grids, std::uint32_t index, Visit 
 /// Finds out which runs find pairs; returns whether any does.
 bool PairSearch::FindPairs(const HashGrids& grids) {
   std::atomic<bool> has_pair = false;
-  ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t run) {
+  ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t index) {
+    Run& run = buffers_.runs[index];
+    // Where all that it could meet is as it was, it still finds none.
+    if (run.is_settled && run.is_alone && !run.finds_pair) return;
     bool finds_pair = false;
-    ForEachPair(grids, run, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
-    buffers_.runs[run].finds_pair = finds_pair;
+    ForEachPair(grids, index, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
+    run.finds_pair = finds_pair;
     if (finds_pair) has_pair.store(true, std::memory_order_relaxed);
   });
   return has_pair;
 }
 
 std::size_t PairSearch::Count(std::span<const std::uint32_t> ring_offsets) {
-  CollectRuns(ring_offsets);
   buffers_.pairs.clear();
   if (buffers_.runs.empty()) return 0;
   FindLoneRuns(ring_offsets);
@@ -303,7 +330,18 @@ std::size_t PairSearch::Count(std::span<const std::uint32_t> ring_offsets) {
 std::size_t CountTouchingPairs(std::span<const double> points,
                                std::span<const std::uint32_t> ring_offsets,
                                TouchingPairsBuffers& buffers) {
-  return PairSearch(points, buffers).Count(ring_offsets);
+  PairSearch search(points, buffers);
+  search.CollectRuns(ring_offsets);
+  return search.Count(ring_offsets);
+}
+
+std::size_t CountTouchingPairsAgain(std::span<const double> points,
+                                    std::span<const std::uint32_t> ring_offsets,
+                                    std::span<const std::uint8_t> is_moved,
+                                    TouchingPairsBuffers& buffers) {
+  PairSearch search(points, buffers);
+  search.SettleRuns(is_moved);
+  return search.Count(ring_offsets);
 }
 
 }  // namespace partiemc

@@ -12,7 +12,7 @@
 namespace partiemc {
 
 /// Buffers of CountTouchingPairs, kept warm from call to call; they carry nothing from one to the
-/// next. Memory: about 20 bytes per segment, whatever the input.
+/// next, but to CountTouchingPairsAgain. Memory: about 20 bytes per segment, whatever the input.
 struct TouchingPairsBuffers {
   /// Successive segments of a ring, each named by the point that it begins at.
   struct Run {
@@ -23,6 +23,7 @@ struct TouchingPairsBuffers {
     std::uint32_t next_in_slot = 0;      // A list of runs whose cells share a slot.
     std::uint8_t level = 0;              // Of its grid (intersections.cc).
     std::uint8_t directions = 0;         // In which all of its segments go (intersections.cc).
+    bool is_settled = false;             // Its ring is as it was (CountTouchingPairsAgain).
     bool is_alone = false;               // Its ring is searched by itself (intersections.cc).
     bool finds_pair = false;             // Whether it is the earlier one of a pair that counts.
   };
@@ -55,5 +56,14 @@ struct TouchingPairsBuffers {
 std::size_t CountTouchingPairs(std::span<const double> points,
                                std::span<const std::uint32_t> ring_offsets,
                                TouchingPairsBuffers& buffers);
+
+/// The same, with the same results, where of the points of the last call on these buffers only
+/// those with is_moved[k] != 0 have changed, and `ring_offsets` have not: rings that are apart,
+/// touched nothing and did not move are not searched again. Requires: a call on these buffers
+/// before.
+std::size_t CountTouchingPairsAgain(std::span<const double> points,
+                                    std::span<const std::uint32_t> ring_offsets,
+                                    std::span<const std::uint8_t> is_moved,
+                                    TouchingPairsBuffers& buffers);
 
 }  // namespace partiemc

@@ -136,9 +136,14 @@ bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratc
 
 void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings) {
   for (int round = 0;; ++round) {
+    // Only what the round before has marked may have moved.
+    const std::size_t touching =
+        round == 0 ? CountTouchingPairs(rings.points, rings.offsets, scratch.pairs)
+                   : CountTouchingPairsAgain(rings.points, rings.offsets, scratch.is_marked,
+                                             scratch.pairs);
     scratch.is_marked.assign(rings.PointCount(), 0);
     bool all_the_way = round >= kGentleRounds;
-    if (CountTouchingPairs(rings.points, rings.offsets, scratch.pairs) > 0) {
+    if (touching > 0) {
       for (const auto& [first, second] : scratch.pairs.pairs) {
         MarkSegment(rings, first, scratch.is_marked);
         MarkSegment(rings, second, scratch.is_marked);

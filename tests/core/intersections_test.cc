@@ -172,5 +172,41 @@ TEST(CountTouchingPairs, BuffersCarryNothingFromOneCallToTheNext) {
   }
 }
 
+/// Rings come near each other and part again, as a whole or by single points.
+TEST(CountTouchingPairsAgain, FindsWhatASearchOfAllFindsWhateverHasMoved) {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    Random random(seed);
+    Region rings;
+    for (int k = 0; k < 12; ++k) {
+      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % (k % 4 == 0 ? 600 : 60));
+      for (Point& point : ring) point.x += 30 * k;
+      rings.AddLoop(ring);
+    }
+    TouchingPairsBuffers buffers;
+    CountTouchingPairs(rings.points, rings.loop_offsets, buffers);
+    for (int round = 0; round < 20; ++round) {
+      std::vector<std::uint8_t> is_moved(rings.points.size() / 2, 0);
+      for (std::size_t moves = random() % 3; moves > 0; --moves) {
+        const std::size_t ring = random() % rings.LoopCount();
+        const std::uint32_t begin = rings.loop_offsets[ring], end = rings.loop_offsets[ring + 1];
+        const bool moves_all = random() % 2 == 0;
+        const std::uint32_t only = begin + static_cast<std::uint32_t>(random() % (end - begin));
+        const double shift = testing::Uniform(random, -1, 1) * (moves_all ? 40 : 10);
+        for (std::uint32_t k = begin; k < end; ++k) {
+          if (!moves_all && k != only) continue;
+          rings.points[2 * k] += shift;
+          is_moved[k] = 1;
+        }
+      }
+      TouchingPairsBuffers fresh;
+      const std::size_t expected = CountTouchingPairs(rings.points, rings.loop_offsets, fresh);
+      EXPECT_EQ(CountTouchingPairsAgain(rings.points, rings.loop_offsets, is_moved, buffers),
+                expected)
+          << "seed " << seed << ", round " << round;
+      EXPECT_EQ(buffers.pairs, fresh.pairs) << "seed " << seed << ", round " << round;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace partiemc
