@@ -133,12 +133,8 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
   return total;
 }
 
-// Where lists are more than the nearest caches keep lines for, a particle asks for the line behind
-// the one that it will be written to: its list goes on there after a few thousand particles, in
-// which even memory far away has answered. The particle itself is looked at so many before it is
-// written.
-constexpr std::size_t kNearHomes = 2048;
-constexpr std::size_t kFillAhead = 24;
+// A particle asks for the line behind its own: its list goes on there after hundreds or thousands
+// of others, in which even memory far away has answered.
 constexpr std::size_t kNextLine = 64 / sizeof(BinEntry) + 1;
 
 // Second pass over a stretch: writes its entries.
@@ -149,19 +145,12 @@ void FillEntries(std::size_t first, std::size_t last, std::span<const float> vol
   std::uint32_t* const next = stretch.entries.data();
   BinEntry* const entries = bins.entries.data();
   const auto fill = [&](auto set_weight) {
-    const auto fill_one = [&](std::size_t k) {
+    for (std::size_t k = first; k < last; ++k) {
       const std::uint32_t entry = next[home[k]]++;
+      hwy::Prefetch(entries + entry + kNextLine);
       entries[entry] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
       set_weight(entry, k);
-    };
-    std::size_t k = first;
-    if (stretch.homes.size() > kNearHomes) {
-      for (; k + kFillAhead < last; ++k) {
-        hwy::Prefetch(entries + next[home[k + kFillAhead]] + kNextLine);
-        fill_one(k);
-      }
     }
-    for (; k < last; ++k) fill_one(k);
   };
   if (volumes.empty()) {
     fill([](std::uint32_t, std::size_t) {});
