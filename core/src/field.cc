@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include "near_entries.h"
 #include "parallel.h"
+#include "prefetch.h"
 #include "tile_kernels.h"
 
 namespace partiemc {
@@ -42,6 +44,9 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
   const auto radius = static_cast<float>(scale.kernel_radius);
   const bool fits = radius <= kSumMargin;
   if (fits && bins.CountOf(tile) == 0) return;
+  // Written to as soon as the sums are known, which takes longer than memory far away.
+  PrefetchLines(std::span<const float>(values));
+  if (fits) level_set.rims.Prefetch(tile);
   alignas(64) NodeSums sums;
   sums.fill(0);
   NodeRange rows = kAllNodes;

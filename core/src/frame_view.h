@@ -1,8 +1,6 @@
 // The numbers of a frame: how they are read, and whether they are usable.
 #pragma once
 
-#include <hwy/cache_control.h>
-
 #include <cstddef>
 #include <span>
 #include <string>
@@ -13,6 +11,7 @@
 #include "distinct_ids.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
+#include "prefetch.h"
 
 namespace partiemc {
 
@@ -49,10 +48,7 @@ class PositionReader {
 
   /// Asks the memory for the numbers of `count` particles from `first` on.
   void Prefetch(std::size_t first, std::size_t count) const {
-    constexpr std::size_t kPerLine = 64 / sizeof(Real);
-    for (std::size_t k = first * components_; k < (first + count) * components_; k += kPerLine) {
-      hwy::Prefetch(first_ + k);
-    }
+    PrefetchLines(std::span(first_ + first * components_, count * components_));
   }
 
   using Number = Real;

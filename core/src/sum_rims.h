@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bins.h"
+#include "prefetch.h"
 #include "tile_kernels.h"
 
 namespace partiemc {
@@ -22,6 +24,12 @@ class SumRims {
  public:
   /// Makes room for kernels of a radius of at most kSumMargin.
   void Prepare(const ParticleBins& bins, float radius);
+
+  /// Asks the memory for where the margins of a tile will be kept. Requires: it holds particles.
+  void Prefetch(std::uint32_t tile) const {
+    PrefetchLines(std::span(values_).subspan(std::size_t{rim_[tile]} * Size(),
+                                             static_cast<std::size_t>(Size())));
+  }
 
   /// Keeps the margins of a tile's sums, in the rows that are not 0. Requires: the tile holds
   /// particles.
