@@ -174,15 +174,13 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   planes.resize(rings.segments.size());
   scratch.normal.assign(crossings.cells.size(), {0, 0});
   std::atomic<bool> any_is_weak = false;
-  const auto set_normal = [&](std::size_t k) {
-    CellPlane& plane = planes[k];
+  const auto set_normal = [&](std::uint32_t cell, CellPlane& plane) {
     plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
                     kWeakGradientSquare;
     if (plane.is_weak) {
       any_is_weak.store(true, std::memory_order_relaxed);
       return;
     }
-    const std::uint32_t cell = crossings.segments[rings.segments[k]].cell;
     SetNormal(plane.gradient_x, plane.gradient_y, plane);
     Orient(previous_of(cell), plane);
     Keep(plane.cell, cell, plane, scratch);
@@ -195,33 +193,39 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
         SetSample(groups[q].vertices[k], samples[q][k], planes);
       }
     }
-    for (const FieldPoints& group : groups) {
-      for (const std::size_t vertex : std::span(group.vertices).first(group.count)) {
-        if (vertex % 2 == 1) set_normal(vertex / 2);
-      }
-    }
   };
   const bool at_entries = parameters.placement == Placement::kVirtualPlane;
-  ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t from, std::size_t to) {
-    const std::size_t first = GroupOf(rings, from);
-    const std::size_t last = GroupOf(rings, to);
+  const auto estimate = [&](std::size_t first, std::size_t last) {
+    // Cells lie anywhere in memory: all are looked up before anything waits for one of them.
+    std::array<std::uint32_t, kSegmentsAtOnce + 1> cells;
+    std::array<bool, kSegmentsAtOnce + 1> begins_group;
+    for (std::size_t k = first; k < last; ++k) {
+      cells[k - first] = crossings.segments[rings.segments[k]].cell;
+    }
     auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
-    auto groups = CollectPoints<LatticePoint>(sample);
     for (std::size_t k = first; k < last; ++k) {
       if (k == *end) ++end;
-      CellPlane& plane = planes[k];
-      plane.cell = crossings.cells[crossings.segments[rings.segments[k]].cell];
-      plane.entry = rings.entries[k];
-      plane.exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
-      if (parameters.placement == Placement::kFarthestParticle) {
-        SampleAtMean(bins.tiles, field, plane);
-        set_normal(k);
-        continue;
-      }
-      if (BeginsGroup(k - *(end - 1))) groups.Part();
-      AddPoints(bins.tiles, k, at_entries, plane, groups);
+      planes[k].cell = crossings.cells[cells[k - first]];
+      planes[k].entry = rings.entries[k];
+      planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
+      begins_group[k - first] = BeginsGroup(k - *(end - 1));
     }
-    groups.Finish();
+    if (parameters.placement == Placement::kFarthestParticle) {
+      for (std::size_t k = first; k < last; ++k) SampleAtMean(bins.tiles, field, planes[k]);
+    } else {
+      auto groups = CollectPoints<LatticePoint>(sample);
+      for (std::size_t k = first; k < last; ++k) {
+        if (begins_group[k - first]) groups.Part();
+        AddPoints(bins.tiles, k, at_entries, planes[k], groups);
+      }
+      groups.Finish();
+    }
+    for (std::size_t k = first; k < last; ++k) set_normal(cells[k - first], planes[k]);
+  };
+  ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; k += kSegmentsAtOnce) {
+      estimate(GroupOf(rings, k), GroupOf(rings, std::min(k + kSegmentsAtOnce, end)));
+    }
   });
   if (any_is_weak) {
     for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {

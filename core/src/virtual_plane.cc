@@ -10,6 +10,7 @@
 #include "placement.h"
 #include "plane_estimates.h"
 #include "point_groups.h"
+#include "prefetch.h"
 #include "ring_windows.h"
 
 namespace partiemc {
@@ -22,6 +23,9 @@ constexpr double kMaxEdgeStep = 0.3;
 // Newton steps longer than this may cross from one branch of F to another, in cells: at corners and
 // where bodies are near each other. The gradient is asked for again at their ends.
 constexpr double kLongStep = 0.07;
+
+// Segments between one and that whose memory is asked for.
+constexpr std::size_t kAskedAhead = 24;
 
 // Shorter rings stay at their roots: the windows below would meet their own ends.
 // Where drops form and vanish, refining short ones costs more calm than it gains shape.
@@ -125,7 +129,12 @@ void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) 
   const std::size_t begin = input.topology.offsets[ring];
   const std::size_t count = input.topology.offsets[ring + 1] - begin;
   const auto find = [&](std::size_t first, std::size_t last) {
-    for (std::size_t k = first; k < last; ++k) FindRoots(input, begin + k, v);
+    for (std::size_t k = begin + first; k < begin + last; ++k) {
+      if (const std::size_t later = k + kAskedAhead; later < input.planes.size()) {
+        PrefetchLines(std::span(input.planes).subspan(later, 1));
+      }
+      FindRoots(input, k, v);
+    }
   };
   count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
 }
