@@ -65,9 +65,9 @@ void AddPoints(const TileDirectory& directory, std::size_t k, bool with_entry, C
 void SetSample(std::size_t vertex, const LevelSetSample& sample, std::span<CellPlane> planes) {
   CellPlane& plane = planes[vertex / 2];
   const bool at_middle = vertex % 2 == 1;
-  (at_middle ? plane.value : plane.entry_value) = sample.value;
-  (at_middle ? plane.gradient_x : plane.entry_gradient_x) = sample.gradient_x;
-  (at_middle ? plane.gradient_y : plane.entry_gradient_y) = sample.gradient_y;
+  (at_middle ? plane.value : plane.entry_value) = static_cast<float>(sample.value);
+  (at_middle ? plane.gradient_x : plane.entry_gradient_x) = static_cast<float>(sample.gradient_x);
+  (at_middle ? plane.gradient_y : plane.entry_gradient_y) = static_cast<float>(sample.gradient_y);
 }
 
 // The segment, or the one before it, with which a group begins.
@@ -87,7 +87,7 @@ void SampleAtMean(const TileDirectory& directory, const PointField& field, CellP
   const LatticePoint origin = CellOrigin(directory, cell);
   plane.point = {origin.x + 0.5 + centre.mean_x, origin.y + 0.5 + centre.mean_y};
   plane.gradient_x = plane.gradient_y = 0;
-  plane.value = centre.value;
+  plane.value = static_cast<float>(centre.value);
   const double mean_x = centre_x + centre.mean_x;
   const double mean_y = centre_y + centre.mean_y;
   const int i = static_cast<int>(std::floor(mean_x));
@@ -95,8 +95,8 @@ void SampleAtMean(const TileDirectory& directory, const PointField& field, CellP
   const TilePlace place = Normalise(directory, cell.tile, i, j);
   if (place.tile == kNoTile) return;
   const FieldSample mean = field.Sample(place.tile, place.i + (mean_x - i), place.j + (mean_y - j));
-  plane.gradient_x = mean.phi_x;
-  plane.gradient_y = mean.phi_y;
+  plane.gradient_x = static_cast<float>(mean.phi_x);
+  plane.gradient_y = static_cast<float>(mean.phi_y);
 }
 
 void Orient(const CellNormal* reference, CellPlane& plane) {

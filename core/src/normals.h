@@ -18,17 +18,18 @@ namespace partiemc {
 
 /// What is known at the representative point of one segment. The point is the weighted mean at the
 /// cell's centre for `farthest-particle` (the paper's), the middle of the segment for the others.
+/// What comes of sums of floats is kept as floats: planes are more than a cache holds.
 struct CellPlane {
   ActiveCell cell;           ///< Of the segment: along a ring, cells lie anywhere in memory.
+  bool is_weak = false;      ///< The gradient was too small; the normal is a fallback.
   LatticePoint point;        ///< Lattice coordinates of the world, in cells.
   LatticePoint entry, exit;  ///< The segment's ends: linear crossings of lattice edges.
-  double value = 0;          ///< F at the point.
-  double gradient_x = 0, gradient_y = 0;  ///< Of F; of phi for `farthest-particle`.
-  double normal_x = 0, normal_y = 0;      ///< Unit, oriented (Eq. 11).
-  bool is_weak = false;                   ///< The gradient was too small; the normal is a fallback.
+  float value = 0;           ///< F at the point.
+  float gradient_x = 0, gradient_y = 0;  ///< Of F; of phi for `farthest-particle`.
+  double normal_x = 0, normal_y = 0;     ///< Unit, oriented (Eq. 11).
   /// `virtual-plane` only: F and its gradient at `entry`.
-  double entry_value = 0;
-  double entry_gradient_x = 0, entry_gradient_y = 0;
+  float entry_value = 0;
+  float entry_gradient_x = 0, entry_gradient_y = 0;
 
   /// Outward direction of the segment itself, not normalised: the inside lies on its left.
   double OutwardX() const { return exit.y - entry.y; }

@@ -100,9 +100,9 @@ CellPlane RandomPlane(Random& random, const Stages& stages, const Segment& segme
   plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
   const double slope = std::pow(10, random.Uniform(-2, 6));
   const double angle = random.Uniform(0, 6.2832);
-  plane.gradient_x = slope * std::cos(angle);
-  plane.gradient_y = slope * std::sin(angle);
-  plane.value = random.Uniform(-1, 1) * std::pow(10, random.Uniform(-9, 9));
+  plane.gradient_x = static_cast<float>(slope * std::cos(angle));
+  plane.gradient_y = static_cast<float>(slope * std::sin(angle));
+  plane.value = static_cast<float>(random.Uniform(-1, 1) * std::pow(10, random.Uniform(-9, 9)));
   plane.is_weak = random.Chance(0.1);
   return plane;
 }

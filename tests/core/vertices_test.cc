@@ -125,7 +125,8 @@ TEST(Vertices,
 }
 
 TEST(Vertices, OfTheVirtualPlaneTakeOneStepOfAtMostHalfACellAlongTheGradient) {
-  const auto vertex = [](double value, double gx, double gy, bool weak = false) {
+  constexpr double kRounding = 1e-7;  // Of F and its gradient.
+  const auto vertex = [](float value, float gx, float gy, bool weak = false) {
     CellPlane plane;
     plane.point = {10, 20};
     plane.value = value;
@@ -135,16 +136,16 @@ TEST(Vertices, OfTheVirtualPlaneTakeOneStepOfAtMostHalfACellAlongTheGradient) {
     return VirtualPlaneVertex(plane);
   };
   // F = value + g . d is zero at -value g / |g|^2.
-  const LatticePoint plain = vertex(0.1, 0.6, 0.8);
-  EXPECT_NEAR(plain.x, 10 - 0.06, 1e-12);
-  EXPECT_NEAR(plain.y, 20 - 0.08, 1e-12);
-  const LatticePoint inward = vertex(-0.2, 0, 2);
+  const LatticePoint plain = vertex(0.1f, 0.6f, 0.8f);
+  EXPECT_NEAR(plain.x, 10 - 0.06, kRounding);
+  EXPECT_NEAR(plain.y, 20 - 0.08, kRounding);
+  const LatticePoint inward = vertex(-0.2f, 0, 2);
   EXPECT_NEAR(inward.x, 10, 1e-12);
-  EXPECT_NEAR(inward.y, 20.1, 1e-12);
+  EXPECT_NEAR(inward.y, 20.1, kRounding);
   const LatticePoint longest = vertex(5, 1, 0);
   EXPECT_NEAR(longest.x, 9.5, 1e-12);
   EXPECT_NEAR(longest.y, 20, 1e-12);
-  const LatticePoint weak = vertex(0.1, 1, 1, true);
+  const LatticePoint weak = vertex(0.1f, 1, 1, true);
   EXPECT_EQ(weak.x, 10);
   EXPECT_EQ(weak.y, 20);
 }
