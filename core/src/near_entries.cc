@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "prefetch.h"
+
 #ifndef PARTIEMC_NEAR_ENTRIES_ONCE
 #define PARTIEMC_NEAR_ENTRIES_ONCE
 namespace partiemc {
@@ -15,6 +17,9 @@ struct ListPart {
   const BitRows& cells;
   float shift_x, shift_y;
 };
+
+// Entries between those that are looked at and those whose memory is asked for.
+constexpr std::uint32_t kAskedAhead = 128;
 
 }  // namespace
 }  // namespace partiemc
@@ -52,6 +57,8 @@ void ChooseFields(const ListPart& part, NearEntries& near) {
   std::uint32_t first = start;
   int chosen = near.count;
   for (; first < last && first + lanes <= entries.size(); first += lanes) {
+    const std::size_t later = std::min<std::size_t>(first + kAskedAhead, entries.size() - lanes);
+    PrefetchLines(entries.subspan(later, lanes));
     hn::Vec<Lanes> x, y, source;
     hn::LoadInterleaved3(d, &entries[first].x, x, y, source);
     // Truncation rounds down: nothing is before its tile.

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "cell_mask.h"
 #include "near_entries.h"
 #include "parallel.h"
+#include "prefetch.h"
 
 namespace partiemc {
 namespace {
@@ -25,6 +27,7 @@ constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) /
 void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
   tiles_.resize(tiles);
+  asked_.resize(tiles);
   wanted_.resize(tiles);
   const auto is_active = [&](std::uint32_t tile) {
     if (tile == kNoTile) return false;
@@ -48,14 +51,15 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
   ParallelFor(tiles, [&](std::uint32_t index) {
     const Neighbourhood& near = bins.tiles.neighbours(index);
     Tile& tile = tiles_[index];
-    tile.asked = {};
+    BitRows& asked = asked_[index];
+    asked = {};
     wanted_[index] = reach > kMaskMargin ? all_cells : BitRows{};
     if (std::any_of(near.begin(), near.end(), is_active)) {
       CellMask mask = CellsAround(bins.tiles, index, margin, active_of);
-      tile.asked = distance > kMaskMargin ? all_cells : mark(mask, distance);
+      asked = distance > kMaskMargin ? all_cells : mark(mask, distance);
       if (reach <= kMaskMargin) wanted_[index] = mark(mask, reach - distance);
     }
-    tile.is_asked = !IsEmpty(tile.asked);
+    tile.is_asked = !IsEmpty(asked);
     tile.column = static_cast<float>(bins.tiles[index].x & (kPeriodTiles - 1)) * kTileSize;
   });
 }
@@ -139,7 +143,17 @@ void PointField::SortRun(const ParticleBins& bins, const Run& run) {
     }
   };
   std::uint32_t chosen = run.first_entry;
+  // Where those of a tile, if all are wanted, are written: asked for while they are found.
+  std::uint32_t room = run.first_entry;
   for_each_tile([&](std::uint32_t tile) {
+    const std::uint32_t count = bins.CountOf(tile);
+    const auto ask = [&](const auto& values) {
+      PrefetchLines(std::span(values).subspan(room, count));
+    };
+    ask(std::as_const(chosen_));
+    ask(std::as_const(x_));
+    ask(std::as_const(y_));
+    room += count;
     const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
     const auto first = static_cast<std::uint32_t>(columns);
     NearWalk(bins, tile, wanted_[tile], NearFields::kAll).ForEachBlock([&](const auto& near) {

@@ -86,8 +86,7 @@ class PointField {
 
   /// Whether a point of a tile, 0 <= x, y < 32, is near enough to an active cell.
   bool Covers(std::uint32_t tile, double x, double y) const {
-    return IsIndexed(tile) &&
-           (tiles_[tile].asked[static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
+    return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
   }
 
  private:
@@ -118,8 +117,7 @@ class PointField {
   struct Tile {
     std::array<RunBeside, 3> runs;  // From below to above.
     float column;                   // Of its first node (kColumnPeriod).
-    bool is_asked;                  // Whether any of `asked`.
-    BitRows asked;                  // The cells in which points may lie.
+    bool is_asked;                  // Whether points may lie in any of its cells.
   };
 
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
@@ -134,7 +132,8 @@ class PointField {
   Scale scale_;
   BucketGrid grid_;
   std::vector<Tile> tiles_;
-  std::vector<BitRows> wanted_;  // By tile: the cells that a kernel reaches from `asked`.
+  std::vector<BitRows> asked_;   // By tile: the cells in which points may lie.
+  std::vector<BitRows> wanted_;  // By tile: the cells that a kernel reaches from those.
   std::vector<Run> runs_;
   std::vector<std::uint32_t> run_of_;  // By tile; kNoRun where there is none.
   std::vector<std::uint32_t> bucket_offsets_;

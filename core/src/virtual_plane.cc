@@ -92,7 +92,7 @@ FieldPoint Locate(const VertexInput& input, std::size_t segment, const LatticePo
   if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
     return LocateBeyond(input, cell.tile, x, y);
   }
-  return {input.field.IsIndexed(cell.tile) ? cell.tile : kNoTile, x, y};
+  return {cell.tile, x, y};  // Indexed, as it has an active cell.
 }
 
 // Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
