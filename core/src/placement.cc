@@ -6,10 +6,6 @@
 namespace partiemc {
 namespace {
 
-// Vertices keep this share of a cell away from its sides, so that neighbouring vertices neither
-// meet nor change sides when they are rounded to world coordinates.
-constexpr double kCellMargin = 1.0 / 1024;
-
 // Longest Newton step of a cell's vertex, in cells: beyond it the gradient at the middle of the
 // segment no longer speaks for the level set.
 constexpr double kMaxNewtonStep = 0.5;
@@ -40,26 +36,21 @@ Direction NormalAt(const PointField& field, const TileDirectory& directory, cons
 
 }  // namespace
 
-LatticePoint ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
-                         const Segment& segment, LatticePoint point) {
-  const LatticePoint origin = CellOrigin(directory, cell);
-  double u = std::clamp(point.x - origin.x, kCellMargin, 1 - kCellMargin);
-  double v = std::clamp(point.y - origin.y, kCellMargin, 1 - kCellMargin);
-  if (cell.IsSaddle()) {
-    const int corner = CornerOf(segment);
-    const bool right = corner == 1 || corner == 2;
-    const bool upper = corner >= 2;
-    if (right) u = 1 - u;
-    if (upper) v = 1 - v;
-    const double excess = u + v - (1 - 2 * kCellMargin);
-    if (excess > 0) {
-      u = std::clamp(u - excess / 2, kCellMargin, 1 - 3 * kCellMargin);
-      v = 1 - 2 * kCellMargin - u;
-    }
-    if (right) u = 1 - u;
-    if (upper) v = 1 - v;
+LatticePoint ClampToHalf(const Segment& segment, LatticePoint point) {
+  auto [u, v] = point;
+  const int corner = CornerOf(segment);
+  const bool right = corner == 1 || corner == 2;
+  const bool upper = corner >= 2;
+  if (right) u = 1 - u;
+  if (upper) v = 1 - v;
+  const double excess = u + v - (1 - 2 * kCellMargin);
+  if (excess > 0) {
+    u = std::clamp(u - excess / 2, kCellMargin, 1 - 3 * kCellMargin);
+    v = 1 - 2 * kCellMargin - u;
   }
-  return {origin.x + u, origin.y + v};
+  if (right) u = 1 - u;
+  if (upper) v = 1 - v;
+  return {u, v};
 }
 
 LatticePoint VirtualPlaneVertex(const CellPlane& plane) {

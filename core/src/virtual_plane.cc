@@ -83,17 +83,28 @@ FieldPoint LocateBeyond(const VertexInput& input, std::uint32_t tile, double x, 
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
-// A point in or next to the cell of a segment: in most cases in the tile of that.
-FieldPoint Locate(const VertexInput& input, std::size_t segment, const LatticePoint& point) {
-  const ActiveCell& cell = input.planes[segment].cell;
-  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
-  const double x = point.x - origin.x + cell.i;
-  const double y = point.y - origin.y + cell.j;
-  if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
-    return LocateBeyond(input, cell.tile, x, y);
+// Tells where points in or next to the cell of a segment are: in most cases in the tile of that.
+class SegmentLocator {
+ public:
+  SegmentLocator(const VertexInput& input, std::size_t segment)
+      : input_(input),
+        cell_(input.planes[segment].cell),
+        origin_(CellOrigin(input.bins.tiles, cell_)) {}
+
+  FieldPoint Locate(const LatticePoint& point) const {
+    const double x = point.x - origin_.x + cell_.i;
+    const double y = point.y - origin_.y + cell_.j;
+    if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
+      return LocateBeyond(input_, cell_.tile, x, y);
+    }
+    return {cell_.tile, x, y};  // Indexed, as it has an active cell.
   }
-  return {cell.tile, x, y};  // Indexed, as it has an active cell.
-}
+
+ private:
+  const VertexInput& input_;
+  const ActiveCell& cell_;
+  LatticePoint origin_;
+};
 
 // Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
 // that of a distance stays the same: unless a step is long, normals are those of the points that it
@@ -111,7 +122,7 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
     const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
     if (Dot(step, step) > kLongStep * kLongStep) {
-      const FieldPoint at = Locate(input, segment, v.point[i]);
+      const FieldPoint at = SegmentLocator(input, segment).Locate(v.point[i]);
       const FieldSample sample =
           at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
       gradient = {sample.gradient_x, sample.gradient_y};
@@ -246,6 +257,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
     // Each segment has two vertices.
     for (std::ptrdiff_t k = begin; k < end; k += 2) {
       if (BeginsGroup(k / 2)) planes.Part();
+      const SegmentLocator locator(input, first_segment + k / 2);
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
         const double curvature = std::clamp<double>(ring.shift[i], -max_curvature, max_curvature);
         ring.base[i] = steps.curvature ? static_cast<float>(RoundingOf(curvature, h)) : 0;
@@ -253,7 +265,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
         ring.shift[i] = steps.support ? kSupportTrust * -ring.base[i] : 0;
         strips[i] = steps.support ? kStripTrust * -ring.base[i] : 0;
         if (!steps.support) continue;
-        const FieldPoint at = Locate(input, first_segment + k / 2, v.point[2 * first_segment + i]);
+        const FieldPoint at = locator.Locate(v.point[2 * first_segment + i]);
         if (at.tile == kNoTile) continue;
         planes.Add(i, at.tile,
                    {.x = at.x,
