@@ -70,11 +70,12 @@ void SetSample(std::size_t vertex, const LevelSetSample& sample, std::span<CellP
   (at_middle ? plane.gradient_y : plane.entry_gradient_y) = static_cast<float>(sample.gradient_y);
 }
 
-// The segment, or the one before it, with which a group begins.
+// The segment with which the group of a segment begins.
 std::size_t GroupOf(const RingTopology& rings, std::size_t segment) {
   if (segment == rings.segments.size()) return segment;
   const auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), segment);
-  return BeginsGroup(segment - *(end - 1)) ? segment : segment - 1;
+  const std::size_t first = *(end - 1);
+  return first + BeginOfGroup(segment - first);
 }
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
@@ -197,8 +198,8 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   const bool at_entries = parameters.placement == Placement::kVirtualPlane;
   const auto estimate = [&](std::size_t first, std::size_t last) {
     // Cells lie anywhere in memory: all are looked up before anything waits for one of them.
-    std::array<std::uint32_t, kSegmentsAtOnce + 1> cells;
-    std::array<bool, kSegmentsAtOnce + 1> begins_group;
+    std::array<std::uint32_t, kSegmentsAtOnce + kSegmentsOfGroup> cells;
+    std::array<bool, kSegmentsAtOnce + kSegmentsOfGroup> begins_group;
     for (std::size_t k = first; k < last; ++k) {
       cells[k - first] = crossings.segments[rings.segments[k]].cell;
     }

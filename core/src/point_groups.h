@@ -69,9 +69,15 @@ PointGroups<Point, Sink> CollectPoints(Sink sink) {
   return PointGroups<Point, Sink>(sink);
 }
 
-/// Whether a group begins with a segment, by its index in its ring: points of two successive ones
-/// share a group. Those of more would lie so far apart that each looks at too many of the others'
-/// particles.
-constexpr bool BeginsGroup(std::size_t segment_of_ring) { return segment_of_ring % 2 == 0; }
+/// Points of so many successive segments share a group. Those of more would lie so far apart that
+/// each looks at too many of the others' particles.
+inline constexpr std::size_t kSegmentsOfGroup = 4;
+static_assert(2 * kSegmentsOfGroup <= kPointsAtOnce, "a segment has two points");
+
+/// The segment with which the group of a segment begins, both by their index in the ring.
+constexpr std::size_t BeginOfGroup(std::size_t segment) {
+  return segment - segment % kSegmentsOfGroup;
+}
+constexpr bool BeginsGroup(std::size_t segment) { return BeginOfGroup(segment) == segment; }
 
 }  // namespace partiemc

@@ -252,8 +252,9 @@ TEST(PointField, PointsOfAGroupAgreeWithEachAlone) {
           ExpectSameBits(samples[k], alone);
           continue;
         }
-        // They sum the same particles in another order.
-        EXPECT_NEAR(samples[k].value, alone.value, 1e-5);
+        // They sum the same particles in another order, in floats: far inside, F is the density,
+        // of which a crowd has a lot.
+        EXPECT_NEAR(samples[k].value, alone.value, 1e-5 + 3e-7 * std::abs(alone.value));
         const double distance = std::hypot(alone.mean_x, alone.mean_y);
         const double tolerance = 1e-4 * std::max(1.0, 0.1 / distance);
         EXPECT_NEAR(samples[k].gradient_x, alone.gradient_x, tolerance);

@@ -68,16 +68,16 @@ TEST(PointGroups, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
     for (const Group& group : all) {
       ASSERT_GT(group.count, 0u);
       ASSERT_LE(group.count, kPointsAtOnce);
-      const std::size_t pair = segment_of[next] / 2;
+      const std::size_t begin = BeginOfGroup(segment_of[next]);
       // Nothing that could have joined the group before begins one of its own.
       if (before != nullptr) {
-        EXPECT_FALSE(before->tile == group.tile && segment_of[next - 1] / 2 == pair);
+        EXPECT_FALSE(before->tile == group.tile && BeginOfGroup(segment_of[next - 1]) == begin);
       }
       for (std::size_t k = 0; k < group.count; ++k, ++next) {
         EXPECT_EQ(group.vertices[k], next);
         EXPECT_EQ(group.points[k].x, static_cast<double>(next));
         EXPECT_EQ(group.tile, points.tiles[next]);
-        EXPECT_EQ(segment_of[next] / 2, pair);
+        EXPECT_EQ(BeginOfGroup(segment_of[next]), begin);
       }
       before = &group;
     }
@@ -92,8 +92,7 @@ TEST(PointGroups, AreTheSameWhereverCollectingBegins) {
     support::Random random(seed);
     const Points points(random);
     const std::size_t last = points.count_of.size();
-    std::size_t cut = random.Below(last);
-    if (!BeginsGroup(cut)) --cut;
+    const std::size_t cut = BeginOfGroup(random.Below(last));
     std::vector<std::size_t> at_once;
     const std::vector<Group> all = GroupsOf(points, 0, last, at_once);
     std::vector<Group> parts = GroupsOf(points, 0, cut, at_once);
