@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "bits.h"
+#include "entry_counts.h"
 #include "parallel.h"
 
 namespace partiemc {
@@ -154,9 +155,7 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
     cells[j] = rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1];
   }
   TileShare share{component, 0, 0};
-  for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    share.count += LiesIn(bins.entries[e], cells);
-  }
+  share.count = CountEntriesIn(cells, bins.entries, bins.offsets[tile], bins.offsets[tile + 1]);
   if (bins.weight.empty()) return share;
   for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
     if (LiesIn(bins.entries[e], cells)) share.weight += bins.weight[e];
