@@ -45,9 +45,6 @@ constexpr EdgePair kSaddles[2][2][2] = {
     {{{kBottom, kLeft}, {kTop, kRight}}, {{kBottom, kRight}, {kTop, kLeft}}},   // 5: parted, joined
     {{{kRight, kBottom}, {kLeft, kTop}}, {{kLeft, kBottom}, {kRight, kTop}}}};  // 10
 
-// A crossing keeps at least this share of its edge between itself and either node.
-constexpr double kEdgeMargin = 1.0 / 4096;
-
 // Whether the inside corners of a saddle are joined: the sign of F where its bilinear interpolant
 // is stationary, (F0 F2 - F1 F3) / (F0 + F2 - F1 - F3). 0 counts as outside, here too.
 bool AreInsideCornersJoined(const std::array<float, 4>& f, unsigned corners) {
@@ -206,23 +203,6 @@ std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& cross
   const std::uint32_t next = crossings.cells[CellAt(crossings, place)].first_segment;
   const std::uint8_t entry = (here.exit + 2) & 3;
   return crossings.segments[next].entry == entry ? next : next + 1;
-}
-
-LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
-                          const ActiveCell& cell, int edge) {
-  // Every edge is walked from its lower or left node, so that both cells compute the same.
-  constexpr int kNodeX[4] = {0, 1, 0, 0};
-  constexpr int kNodeY[4] = {0, 0, 1, 0};
-  const int i = cell.i + kNodeX[edge];
-  const int j = cell.j + kNodeY[edge];
-  const bool horizontal = edge == kBottom || edge == kTop;
-  const double a = level_set.At(directory, cell.tile, i, j);
-  const double b = level_set.At(directory, cell.tile, i + horizontal, j + !horizontal);
-  const double t = std::clamp(a / (a - b), kEdgeMargin, 1 - kEdgeMargin);
-  LatticePoint point = CellOrigin(directory, cell);
-  point.x += kNodeX[edge] + (horizontal ? t : 0);
-  point.y += kNodeY[edge] + (horizontal ? 0 : t);
-  return point;
 }
 
 }  // namespace partiemc

@@ -9,6 +9,7 @@
 //                (Nielson and Hamann 1991) tells whether they join or part the inside corners.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -90,17 +91,33 @@ std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
 std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,
                           std::uint32_t segment);
 
-/// Where the isoline crosses `edge` of `cell` by linear interpolation of F. The two cells that
-/// share an edge get the same bits. Kept 2^-12 away from the nodes, so that no rounding to world
-/// coordinates can move it onto or past one.
-LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
-                          const ActiveCell& cell, int edge);
-
 /// Lower left node of a cell.
 inline LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
   const TileCoordinate& tile = directory[cell.tile];
   return {static_cast<double>((std::int64_t{tile.x} << kTileShift) + cell.i),
           static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
+}
+
+/// A crossing keeps at least this share of its edge between itself and either node.
+inline constexpr double kEdgeMargin = 1.0 / 4096;
+
+/// Where the isoline crosses `edge` of `cell` by linear interpolation of F. The two cells that
+/// share an edge get the same bits. Kept 2^-12 away from the nodes, so that no rounding to world
+/// coordinates can move it onto or past one.
+/// Inline, and without a branch on which edge it is: those of many cells are found at a time, each
+/// of which waits for memory.
+inline LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
+                                 const ActiveCell& cell, int edge) {
+  // Every edge is walked from its lower or left node, so that both cells compute the same.
+  const int right = edge == 1, up = edge == 2;
+  const int along_x = ~edge & 1, along_y = edge & 1;
+  const int i = cell.i + right;
+  const int j = cell.j + up;
+  const double a = level_set.At(directory, cell.tile, i, j);
+  const double b = level_set.At(directory, cell.tile, i + along_x, j + along_y);
+  const double t = std::clamp(a / (a - b), kEdgeMargin, 1 - kEdgeMargin);
+  const LatticePoint origin = CellOrigin(directory, cell);
+  return {origin.x + (right + along_x * t), origin.y + (up + along_y * t)};
 }
 
 }  // namespace partiemc

@@ -187,13 +187,18 @@ std::uint32_t MeshBuilder::OuterRingAt(const TilePlace& inside_node) const {
 
 void MeshBuilder::AddStaircaseLoops(bool reversed) {
   const Staircases& staircases = scratch_.staircases;
-  for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
+  const std::size_t count = staircases.offsets.size() - 1;
+  // The corners of interior cells are inside, in one component: cells stay on their side of every
+  // ring, or were excluded. Looked up for all loops in a row, as each waits for memory.
+  scratch_.staircase_rings.resize(count);
+  for (std::size_t loop = 0; loop < count; ++loop) {
+    scratch_.staircase_rings[loop] = OuterRingAt(staircases.corners[staircases.offsets[loop]]);
+  }
+  const std::span<const std::uint32_t> numbers = scratch_.corner_numbers;
+  for (std::size_t loop = 0; loop < count; ++loop) {
     const std::uint32_t first = staircases.offsets[loop];
-    const std::uint32_t count = staircases.offsets[loop + 1] - first;
-    scratch_.loops.AddPoints(std::span(scratch_.corner_numbers).subspan(first, count));
-    // The corners of interior cells are inside, in one component: cells stay on their side of every
-    // ring, or were excluded.
-    scratch_.loops.EndLoop(OuterRingAt(staircases.corners[first]), reversed);
+    scratch_.loops.AddPoints(numbers.subspan(first, staircases.offsets[loop + 1] - first));
+    scratch_.loops.EndLoop(scratch_.staircase_rings[loop], reversed);
   }
 }
 

@@ -80,13 +80,18 @@ void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
   const std::size_t count = rings.segments.size();
   rings.entries.resize(count);
   ParallelForRanges(count, kSegmentGrain, [&](std::size_t first, std::size_t last) {
+    const auto segment_of = [&](std::size_t k) -> const Segment& {
+      return crossings.segments[rings.segments[k]];
+    };
     const auto cell_of = [&](std::size_t k) -> const ActiveCell& {
-      return crossings.cells[crossings.segments[rings.segments[k]].cell];
+      return crossings.cells[segment_of(k).cell];
     };
     for (std::size_t k = first; k < last; ++k) {
+      // What tells where the values lie, and what tells where that lies, as long before each.
+      if (k + 3 * kFetchedAhead < last) hwy::Prefetch(&segment_of(k + 3 * kFetchedAhead));
+      if (k + 2 * kFetchedAhead < last) hwy::Prefetch(&cell_of(k + 2 * kFetchedAhead));
       if (k + kFetchedAhead < last) FetchCorners(level_set, cell_of(k + kFetchedAhead));
-      rings.entries[k] = EdgeCrossing(directory, level_set, cell_of(k),
-                                      crossings.segments[rings.segments[k]].entry);
+      rings.entries[k] = EdgeCrossing(directory, level_set, cell_of(k), segment_of(k).entry);
     }
   });
 }
