@@ -166,7 +166,12 @@ void PairSearch::FindLoneRuns(std::span<const std::uint32_t> ring_offsets) {
   for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
     const std::uint32_t count = RunsUpTo(ring_offsets[ring + 1], ring_offsets[ring]);
     const bool is_alone = buffers_.is_apart[ring] != 0 && count <= kShortRingRuns;
-    for (const std::size_t end = next + count; next < end; ++next) runs[next].is_alone = is_alone;
+    for (const std::size_t end = next + count; next < end; ++next) {
+      Run& run = runs[next];
+      // Which run of a pair finds it depends on whether they are alone.
+      run.is_settled = run.is_settled && run.is_alone;
+      run.is_alone = is_alone;
+    }
   }
 }
 

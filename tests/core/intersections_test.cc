@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -205,6 +208,42 @@ TEST(CountTouchingPairsAgain, FindsWhatASearchOfAllFindsWhateverHasMoved) {
           << "seed " << seed << ", round " << round;
       EXPECT_EQ(buffers.pairs, fresh.pairs) << "seed " << seed << ", round " << round;
     }
+  }
+}
+
+/// A ring that was searched with others is alone as soon as the last of these has left it. Its long
+/// segments come first and short ones cross them: which of the two find their pairs is then
+/// another.
+TEST(CountTouchingPairsAgain, FindsWhatCrossesInARingThatIsLeftAlone) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    Random random(seed);
+    std::vector<Point> ring;
+    constexpr int kLong = 16, kShort = 15;
+    for (int k = 0; k < kLong; ++k) {
+      const double angle = 2 * std::numbers::pi * k / (kLong + 1);
+      ring.push_back({10 * std::cos(angle), 10 * std::sin(angle)});
+    }
+    const Point middle{(ring[0].x + ring[1].x) / 2, (ring[0].y + ring[1].y) / 2};
+    for (int k = 0; k < kShort; ++k) {
+      ring.push_back({middle.x + testing::Uniform(random, -.1, .1),
+                      middle.y + testing::Uniform(random, -.1, .1)});
+    }
+    Region rings;
+    rings.AddLoop(ring);
+    rings.AddLoop({{9, 0}, {11, 0}, {11, 1}, {9, 1}});
+    TouchingPairsBuffers buffers;
+    CountTouchingPairs(rings.points, rings.loop_offsets, buffers);
+    std::vector<std::uint8_t> is_moved(rings.points.size() / 2, 0);
+    for (std::uint32_t k = rings.loop_offsets[1]; k < rings.loop_offsets[2]; ++k) {
+      rings.points[2 * k] += 100;
+      is_moved[k] = 1;
+    }
+    TouchingPairsBuffers fresh;
+    const std::size_t expected = CountTouchingPairs(rings.points, rings.loop_offsets, fresh);
+    EXPECT_EQ(CountTouchingPairsAgain(rings.points, rings.loop_offsets, is_moved, buffers),
+              expected)
+        << "seed " << seed;
+    EXPECT_EQ(buffers.pairs, fresh.pairs) << "seed " << seed;
   }
 }
 
