@@ -80,6 +80,10 @@ struct ReconstructionParameters {
   /// Orient the cell normals by those of the frame before (Eq. 11); otherwise by the isoline alone.
   bool normal_memory = true;
 
+  /// `virtual-plane` only: where particles have ids, let them carry the outline of the last frame
+  /// along, and move vertices towards it. Calmer outlines; without ids it does nothing.
+  bool outline_memory = true;
+
   /// Drop holes smaller than six particles and components that hold no particle. Absent: as the
   /// placement wants it (on for `virtual-plane`, off for the others).
   std::optional<bool> clean = std::nullopt;

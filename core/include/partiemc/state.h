@@ -65,6 +65,25 @@ struct RingHistory {
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
 
+/// A particle of the last frame that was near its outline.
+struct NearParticle {
+  std::uint64_t hash = 0;  ///< Of its id, as ParticleSample::hash.
+  double x = 0, y = 0;     ///< In cells from the origin.
+
+  friend bool operator==(const NearParticle&, const NearParticle&) = default;
+};
+
+/// The outline of the last frame before it was matched to an area, and the particles that carry it
+/// into the next one (core/METHOD.md, "The default placement", step 6). Empty where particles have
+/// no ids. Its size follows the length of the outline and the particles beside it.
+struct KnownOutline {
+  std::vector<std::uint32_t> offsets;   ///< Ring k has points [offsets[k], offsets[k + 1]).
+  std::vector<double> points;           ///< x, y of each, in cells from the origin.
+  std::vector<NearParticle> particles;  ///< By hash.
+
+  friend bool operator==(const KnownOutline&, const KnownOutline&) = default;
+};
+
 /// Everything that a stream remembers between frames, and nothing else. A default-constructed
 /// State is that of a stream that has seen no frame. Reconstruction is a pure function of frame
 /// and state, so that a stream goes on from a restored State bit for bit as if it had never
@@ -81,6 +100,7 @@ struct State {
   /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
   std::vector<CellNormal> normals;
   RingHistory history;
+  KnownOutline outline;
 
   friend bool operator==(const State&, const State&) = default;
 };
