@@ -23,7 +23,7 @@ constexpr std::size_t kChecksumBytes = 8;
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Names each part, so that a new one does not compile until it is bound, too.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
-               surface_offset, normal_memory, clean, steps, min_component_area,
+               surface_offset, normal_memory, outline_memory, clean, steps, min_component_area,
                min_component_particles, plane] = parameters;
   const auto& [edge_vertices, normals, curvature, support, smoothing, area] = steps;
   std::string bytes;
@@ -41,6 +41,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   put_optional(reference_radius);
   PutNumber(surface_offset, bytes);
   put_small(normal_memory);
+  put_small(outline_memory);
   put_small(clean ? (*clean ? 2 : 1) : 0);
   for (const bool step : {edge_vertices, normals, curvature, support, smoothing, area}) {
     put_small(step);

@@ -107,7 +107,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(9, BlobParameters());
+  std::vector<ReconstructionParameters> others(10, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -115,8 +115,9 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[4].cell_size = 0.5;
   others[5].reference_radius = 1.25;
   others[6].normal_memory = false;
-  others[7].clean = false;
-  others[8].min_component_particles = 1;
+  others[7].outline_memory = false;
+  others[8].clean = false;
+  others[9].min_component_particles = 1;
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto refused = Session::Resume(others[k], kLimits, checkpoint);
     ASSERT_FALSE(refused.ok()) << k;
