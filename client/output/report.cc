@@ -202,6 +202,9 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
     lines.emplace_back("surface offset", spacings(parameters.surface_offset));
   }
   lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
+  if (parameters.placement == Placement::kVirtualPlane) {
+    lines.emplace_back("outline memory", yes_no(parameters.outline_memory));
+  }
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
   if (parameters.min_component_area > 0) {
     lines.emplace_back("smallest area",

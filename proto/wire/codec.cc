@@ -221,6 +221,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (message.has_reference_radius()) parameters.reference_radius = message.reference_radius();
   if (message.has_surface_offset()) parameters.surface_offset = message.surface_offset();
   if (message.has_normal_memory()) parameters.normal_memory = message.normal_memory();
+  if (message.has_outline_memory()) parameters.outline_memory = message.outline_memory();
   if (message.has_clean()) parameters.clean = message.clean();
   if (message.has_min_component_area()) {
     parameters.min_component_area = message.min_component_area();
@@ -243,6 +244,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   if (parameters.reference_radius) message.set_reference_radius(*parameters.reference_radius);
   message.set_surface_offset(parameters.surface_offset);
   message.set_normal_memory(parameters.normal_memory);
+  message.set_outline_memory(parameters.outline_memory);
   if (parameters.clean) message.set_clean(*parameters.clean);
   message.set_plane(ToWire(parameters.plane));
   message.set_min_component_area(parameters.min_component_area);

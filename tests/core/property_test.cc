@@ -3,11 +3,14 @@
 // from that one. What was seen is printed at the end, by placement.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <iomanip>
 #include <iostream>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
@@ -25,9 +28,55 @@ std::uint64_t NumberFromEnvironment(const char* name, std::uint64_t otherwise) {
 }
 
 struct Trial {
-  Particles particles;
+  std::vector<Particles> frames;  // Of one stream.
   ReconstructionParameters parameters;
 };
+
+// The next frame of a stream whose particles have ids: they drift, turn and shear, with noise or
+// without, now and then in leaps; some vanish, others appear, and they come in another order.
+Particles NextFrame(const Particles& before, double spacing, support::Random& random) {
+  if (before.size() == 0) return before;
+  const double reach = spacing * (random.Chance(0.1) ? 20 : 0.5);
+  const double noise = random.Chance(0.5) ? 0 : 0.2 * spacing;
+  const double lost_share = random.Chance(0.5) ? 0 : random.Uniform(0, 0.3);
+  const double dx = random.Uniform(-reach, reach), dy = random.Uniform(-reach, reach);
+  double slopes[4];
+  for (double& slope : slopes) slope = random.Uniform(-0.03, 0.03);
+  std::uint64_t next_id = 0;
+  Particles after;
+  const auto add = [&](double x, double y, std::size_t like, std::uint64_t id) {
+    after.Add(x, y);
+    if (!before.volumes.empty()) after.volumes.push_back(before.volumes[like]);
+    after.ids.push_back(id);
+  };
+  for (std::size_t k = 0; k < before.size(); ++k) {
+    next_id = std::max(next_id, before.ids[k] + 1);
+    if (random.Chance(lost_share)) continue;
+    const double x = before.x(k) - before.x(0), y = before.y(k) - before.y(0);
+    add(before.x(k) + dx + slopes[0] * x + slopes[1] * y + random.Uniform(-noise, noise),
+        before.y(k) + dy + slopes[2] * x + slopes[3] * y + random.Uniform(-noise, noise), k,
+        before.ids[k]);
+  }
+  for (std::size_t more = random.Below(10); more > 0; --more) {
+    const std::size_t beside = random.Below(before.size());
+    add(before.x(beside) + random.Uniform(-2, 2) * spacing,
+        before.y(beside) + random.Uniform(-2, 2) * spacing, beside, next_id++);
+  }
+  return support::Permuted(after, random);
+}
+
+// The scene and what becomes of it: without ids it moves a little, so that the second frame has a
+// memory of normals; with ids there is a third one, so that a carried outline is carried on.
+std::vector<Particles> MakeFrames(Particles scene, double spacing, std::uint64_t seed) {
+  support::Random moves(seed ^ 0x5eed3);
+  if (scene.size() == 0 || moves.Chance(0.4)) {
+    return {scene, support::Shifted(scene, 0.3 * spacing, -0.3 * spacing)};
+  }
+  for (std::size_t k = 0; k < scene.size(); ++k) scene.ids.push_back(k);
+  std::vector<Particles> frames = {std::move(scene)};
+  while (frames.size() < 3) frames.push_back(NextFrame(frames.back(), spacing, moves));
+  return frames;
+}
 
 Trial MakeTrial(std::uint64_t seed) {
   support::Random random(seed ^ 0x5eed);
@@ -41,16 +90,17 @@ Trial MakeTrial(std::uint64_t seed) {
   }
   constexpr double kSpacings[] = {1, 0.0303, 1e-9, 1e7};
   const double spacing = kSpacings[random.Below(4)];
-  trial.particles = support::Scaled(support::RandomScene(seed), spacing);
+  trial.frames = MakeFrames(support::Scaled(support::RandomScene(seed), spacing), spacing, seed);
   // Noise and clusters have no spacing worth the name: most frames are given theirs, and those
   // with volumes always.
-  if (!trial.particles.volumes.empty() || random.Chance(0.7)) trial.parameters.spacing = spacing;
+  if (!trial.frames[0].volumes.empty() || random.Chance(0.7)) trial.parameters.spacing = spacing;
   // What changes the rings of a few frames only.
   support::Random rare(seed ^ 0x5eed2);
   if (rare.Chance(0.1)) trial.parameters.min_component_area = rare.Uniform(0, 40);
   if (rare.Chance(0.1)) trial.parameters.min_component_particles = rare.Below(20);
   if (rare.Chance(0.1)) trial.parameters.spacing_rule = SpacingRule::kEveryFrame;
   if (rare.Chance(0.1)) trial.parameters.surface_offset = rare.Uniform(-1, 1);
+  trial.parameters.outline_memory = !rare.Chance(0.2);
   return trial;
 }
 
@@ -76,8 +126,7 @@ std::ostream& operator<<(std::ostream& out, const Tally& tally) {
   return out;
 }
 
-// Runs two frames with each fill, so that the second one has a memory; the second is the first,
-// moved a little. A frame that reaches too many tiles is refused.
+// Runs all frames with each fill. A frame that reaches too many tiles is refused.
 void CheckPlacement(const Trial& trial, Placement placement, Tally& tally) {
   ReconstructionParameters parameters = trial.parameters;
   parameters.placement = placement;
@@ -91,9 +140,7 @@ void CheckPlacement(const Trial& trial, Placement placement, Tally& tally) {
     EXPECT_TRUE(reconstructor.ok()) << reconstructor.status();
     State state;
     Result result;
-    for (const double shift : {0.0, 0.3}) {
-      const double distance = shift * parameters.spacing.value_or(0);
-      const Particles particles = support::Shifted(trial.particles, distance, -distance);
+    for (const Particles& particles : trial.frames) {
       const absl::Status status =
           reconstructor->Reconstruct(particles.AsFrame(), state, workspace, result);
       if (absl::IsResourceExhausted(status)) {

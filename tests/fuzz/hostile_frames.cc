@@ -58,6 +58,13 @@ double HostileRatio(Choices& choices, double low, double usual, double high) {
   }
 }
 
+// The id of particle `k`: mostly its number, so that successive frames share their particles; else
+// any byte, which repeats an id or belonged to another particle now and then.
+std::uint64_t HostileId(Choices& choices, std::size_t k) {
+  const auto byte = choices.Take<std::uint8_t>();
+  return byte % 16 == 15 ? byte : k;
+}
+
 void RequireGuarantees(const ReconstructionParameters& parameters, const Result& result) {
   if (parameters.placement == Placement::kFarthestParticle) return;
   RequireOk(Validate(result, parameters.fill),
@@ -90,7 +97,7 @@ HostileFrame::HostileFrame(Choices& choices, double spacing) {
     doubles_.push_back(HostileCoordinate(choices, y * spacing, spacing));
     if (components_ == 3) doubles_.push_back(shape & 128 ? HostileCoordinate(choices, 0, 1) : 0);
     if (shape & 8) volumes_.push_back(static_cast<float>(spacing * spacing));
-    if (shape & 16) ids_.push_back(choices.Take<std::uint8_t>());
+    if (shape & 16) ids_.push_back(HostileId(choices, k));
     if (shape & 32) {
       for (int axis = 0; axis < components_; ++axis) velocities_.push_back(choices.Take<float>());
     }
@@ -129,6 +136,7 @@ ReconstructionParameters HostileParameters(Choices& choices) {
   parameters.spacing_rule = flags & 2 ? SpacingRule::kEveryFrame : SpacingRule::kFirstFrame;
   parameters.normal_memory = !(flags & 4);
   if (flags & 8) parameters.clean = (flags & 16) != 0;
+  parameters.outline_memory = (flags & 24) != 16;  // The value of `clean` is free without one.
   parameters.plane = flags & 32 ? Plane::kYz : Plane::kXy;
   if (flags & 64) parameters.min_component_area = choices.Take<std::uint8_t>();
   if (flags & 128) parameters.min_component_particles = choices.Take<std::uint8_t>();

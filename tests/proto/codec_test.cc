@@ -66,6 +66,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.reference_radius = 1.25;
   parameters.surface_offset = -0.5;
   parameters.normal_memory = false;
+  parameters.outline_memory = false;
   parameters.clean = false;
   parameters.min_component_area = 2.5;
   parameters.min_component_particles = 3'000'000'000'000;
@@ -74,6 +75,13 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   const auto decoded = DecodeParameters(message);
   ASSERT_TRUE(decoded.ok());
   EXPECT_EQ(*decoded, parameters);
+}
+
+TEST(Parameters, WhatIsAbsentTakesItsDefault) {
+  const auto decoded = DecodeParameters({});
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_EQ(*decoded, ReconstructionParameters{});
+  EXPECT_TRUE(decoded->outline_memory);
 }
 
 TEST(Parameters, AZeroThatIsGivenIsNotTakenForAbsent) {

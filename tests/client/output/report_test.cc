@@ -13,9 +13,11 @@ namespace partiemc::client {
 namespace {
 
 using nlohmann::json;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Key;
 using ::testing::Not;
 
 /// What is between `begin` and `end`, for each `begin` of the text.
@@ -252,6 +254,15 @@ TEST(Report, ParametersAreDescribedUnderTheirNames) {
                   std::pair("surface offset", "0 spacings"), std::pair("normal memory", "on"),
                   std::pair("clean", "off"), std::pair("smallest area", "2.5 squared spacings"),
                   std::pair("fewest particles", "3")));
+}
+
+TEST(Report, TheMemoryOfTheOutlineIsToldOfThePlacementThatHasOne) {
+  using Line = std::pair<std::string, std::string>;
+  EXPECT_THAT(DescribeParameters({}), Contains(Line("outline memory", "on")));
+  EXPECT_THAT(DescribeParameters({.outline_memory = false}),
+              Contains(Line("outline memory", "off")));
+  EXPECT_THAT(DescribeParameters({.placement = Placement::kQef}),
+              Not(Contains(Key("outline memory"))));
 }
 
 TEST(ReportGeometry, RingsMeshAndParticlesComeBackWithinHalfAStep) {
