@@ -64,6 +64,7 @@ absl::StatusOr<StudyPlan> PlanOf(const EvaluateFlags& flags, std::vector<std::st
     if (!recording.ok()) return recording.status();
     plan.recordings.push_back(*std::move(recording));
   }
+  plan.ids = flags.ids;
   if (flags.volumes) plan.told.front() = evaluation::Knowledge::kVolumes;
   plan.threads = flags.threads > 0 ? static_cast<std::size_t>(flags.threads)
                                    : std::max(1u, std::thread::hardware_concurrency());
@@ -147,6 +148,8 @@ CLI::App* AddEvaluate(CLI::App& app, EvaluateFlags& flags) {
   verb->add_flag("--steps", flags.steps, "Also virtual-plane with each step switched off in turn");
   verb->add_flag("--volumes", flags.volumes,
                  "Tell the methods volumes per particle, not the spacing alone");
+  verb->add_flag("--ids", flags.ids,
+                 "Tell the methods which particle is which in scenes, too; recordings always do");
   verb->add_option("--output-dir", flags.output_dir,
                    "Write evaluation.html, evaluation.csv and evaluation.json here")
       ->type_name("DIR");

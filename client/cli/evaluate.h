@@ -16,6 +16,7 @@ struct EvaluateFlags {
   std::vector<std::string> methods;  ///< Empty: all.
   bool steps = false;
   bool volumes = false;
+  bool ids = false;
   std::string output_dir;
   int threads = 0;  ///< 0: one for each processor.
   bool quiet = false;

@@ -96,16 +96,20 @@ Outline UnionOutline(const std::vector<Body>& bodies, std::size_t frame) {
   return outline;
 }
 
-std::vector<Point> UnionParticles(const std::vector<Body>& bodies,
-                                  const std::vector<std::vector<Point>>& samples,
-                                  std::size_t frame) {
-  std::vector<Point> particles;
+KnownParticles UnionParticles(const std::vector<Body>& bodies,
+                              const std::vector<std::vector<Point>>& samples, std::size_t frame) {
+  KnownParticles particles;
+  std::uint64_t id = 0;
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     for (const Point& sample : samples[k]) {
       const Point p = bodies[k].CenterAt(frame) + sample;
       const bool taken = std::any_of(bodies.begin(), bodies.begin() + static_cast<long>(k),
                                      [&](const Body& b) { return b.Distance(frame, p) < 0; });
-      if (!taken) particles.push_back(p);
+      if (!taken) {
+        particles.points.push_back(p);
+        particles.ids.push_back(id);
+      }
+      ++id;
     }
   }
   return particles;

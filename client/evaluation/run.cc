@@ -79,10 +79,11 @@ double TriangleDeviation(std::span<const FrameNumbers> numbers) {
   }));
 }
 
-Frame FrameOf(const SequenceFrame& frame, Knowledge knowledge) {
+Frame FrameOf(const SequenceFrame& frame, Knowledge knowledge, bool ids) {
   Frame view;
   view.positions = std::span<const double>(frame.positions);
   if (knowledge == Knowledge::kVolumes) view.volumes = frame.volumes;
+  if (ids) view.ids = frame.ids;
   return view;
 }
 
@@ -158,13 +159,14 @@ absl::StatusOr<std::vector<Result>> Evaluator::Reconstruct(
   }
   const auto reconstructor = Reconstructor::Create(parameters);
   if (!reconstructor.ok()) return reconstructor.status();
+  const bool ids = TellsIds(options);
   State state;
   Workspace workspace;
   std::vector<Result> results(sequence_.frames.size());
   numbers.assign(sequence_.frames.size(), {});
   for (std::size_t t = 0; t < results.size(); ++t) {
     StageClock clock(numbers[t].stage_ms);
-    const Frame frame = FrameOf(sequence_.frames[t], options.knowledge);
+    const Frame frame = FrameOf(sequence_.frames[t], options.knowledge, ids);
     const absl::Status status =
         reconstructor->Reconstruct(frame, state, workspace, results[t], &clock);
     if (!status.ok()) {
@@ -179,6 +181,10 @@ absl::StatusOr<std::vector<Result>> Evaluator::Reconstruct(const Method& method,
                                                            const RunOptions& options) const {
   std::vector<FrameNumbers> numbers;
   return Reconstruct(method, options, numbers);
+}
+
+bool Evaluator::TellsIds(const RunOptions& options) const {
+  return (options.ids || sequence_.group == Group::kRecording) && sequence_.HasIds();
 }
 
 double Evaluator::TrueArea(std::size_t frame) const {
@@ -241,6 +247,7 @@ absl::StatusOr<Row> Evaluator::Run(const Method& method, const RunOptions& optio
   Row row = Summary(numbers);
   row.method = method.name;
   row.knowledge = options.knowledge;
+  row.ids = TellsIds(options);
   row.frames = std::move(numbers);
   return row;
 }

@@ -85,6 +85,7 @@ struct Row {
   Group group = Group::kRigid;
   bool judged = true;
   Knowledge knowledge = Knowledge::kVolumes;
+  bool ids = false;                         ///< Whether the method was told ids.
   std::array<double, kMetricCount> values;  ///< By Metric; kAbsent where there is nothing to say.
   std::vector<FrameNumbers> frames;
 
@@ -93,6 +94,8 @@ struct Row {
 
 struct RunOptions {
   Knowledge knowledge = Knowledge::kSpacing;
+  /// Tell the ids of scenes, too. Those of recordings are always told: they are what a stream has.
+  bool ids = false;
   /// Tell the spacing that the particles had before they were thinned, not the one that they have.
   bool original_spacing = false;
 };
@@ -128,6 +131,7 @@ class Evaluator {
                FrameNumbers& numbers) const;
   void MeasureJitter(std::size_t frame, const Outline& before, const Curve& contour,
                      FrameNumbers& numbers) const;
+  bool TellsIds(const RunOptions& options) const;
   double TrueArea(std::size_t frame) const;
   Row Summary(const std::vector<FrameNumbers>& numbers) const;
 

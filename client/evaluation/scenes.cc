@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "evaluation/bodies.h"
@@ -33,6 +35,7 @@ constexpr double kBodyDepth = 7.3;
 struct Snapshot {
   Outline outline;
   std::vector<Point> particles;
+  std::vector<std::uint64_t> ids;  // Empty: particle k is the same one in every frame.
 };
 
 struct Draft {
@@ -212,7 +215,9 @@ Draft Merging(const SceneRecipe& recipe, Random& random) {
   }
   Draft draft;
   for (std::size_t t = 0; t < recipe.frames; ++t) {
-    draft.snapshots.push_back({UnionOutline(bodies, t), UnionParticles(bodies, samples, t)});
+    KnownParticles particles = UnionParticles(bodies, samples, t);
+    draft.snapshots.push_back(
+        {UnionOutline(bodies, t), std::move(particles.points), std::move(particles.ids)});
   }
   draft.motion = BodiesMotion(std::move(bodies));
   return draft;
@@ -230,6 +235,11 @@ SequenceFrame InWorld(const Snapshot& snapshot, const Similarity& units, double 
   }
   const auto count = static_cast<double>(snapshot.particles.size());
   frame.volumes.assign(snapshot.particles.size(), static_cast<float>(frame.area / count));
+  frame.ids = snapshot.ids;
+  if (frame.ids.empty()) {
+    frame.ids.resize(frame.ParticleCount());
+    std::iota(frame.ids.begin(), frame.ids.end(), std::uint64_t{0});
+  }
   return frame;
 }
 

@@ -1,6 +1,7 @@
 // What is evaluated: a sequence of particle frames, synthetic with exact truth, or recorded.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -31,7 +32,7 @@ struct SequenceFrame {
   double time = 0;
   std::vector<double> positions;   ///< x, y per particle, world units.
   std::vector<float> volumes;      ///< Area per particle: in scenes exact area / particles.
-  std::vector<std::uint64_t> ids;  ///< Stable identities; empty where there are none.
+  std::vector<std::uint64_t> ids;  ///< Of a particle the same in all frames; empty: not known.
   std::vector<double> velocities;  ///< x, y per particle; empty where there are none.
   Outline truth;                   ///< The true boundary; empty in recordings.
   double area = 0;                 ///< Of the true region; in recordings the sum of volumes, or 0.
@@ -60,6 +61,11 @@ struct Sequence {
 
   SharedMotion motion;               ///< Of scenes: how the region's points move. Null: recorded.
   bool truth_follows_motion = true;  ///< False where outlines appear or vanish (topology).
+
+  /// Whether particles have ids in any frame.
+  bool HasIds() const {
+    return std::ranges::any_of(frames, [](const SequenceFrame& f) { return !f.ids.empty(); });
+  }
 };
 
 /// The second reference, in world units: the curve half a spacing inside the true boundary, on

@@ -18,14 +18,21 @@ StudyMethod Plain(Placement placement, std::string remark) {
   return {std::move(method), std::move(remark)};
 }
 
-bool Applies(const StudyMethod& method, Knowledge knowledge) {
-  return knowledge != Knowledge::kNothing || !method.needs_spacing;
+bool Applies(const StudyMethod& method, Knowledge knowledge, bool ids) {
+  return (knowledge != Knowledge::kNothing || !method.needs_spacing) && (ids || !method.needs_ids);
 }
 
-std::size_t RunsPerSequence(const StudyPlan& plan) {
+// Whether methods are told ids. Of recordings all have the same rows, so that means are those of
+// the same ones for every method: some with ids are enough.
+bool TellsIds(const StudyPlan& plan, bool recordings) {
+  return recordings ? std::ranges::any_of(plan.recordings, &Sequence::HasIds) : plan.ids;
+}
+
+std::size_t RunsPerSequence(const StudyPlan& plan, bool recordings) {
+  const bool ids = TellsIds(plan, recordings);
   std::size_t runs = 0;
   for (const StudyMethod& method : plan.methods) {
-    for (const Knowledge knowledge : plan.told) runs += Applies(method, knowledge) ? 1 : 0;
+    for (const Knowledge knowledge : plan.told) runs += Applies(method, knowledge, ids) ? 1 : 0;
   }
   return runs;
 }
@@ -36,6 +43,7 @@ class StudyRunner {
   StudyRunner(StudyPlan plan, const StudyProgress& progress)
       : plan_(std::move(plan)),
         progress_(progress),
+        recorded_ids_(TellsIds(plan_, true)),
         rows_(plan_.recipes.size() + plan_.recordings.size()) {}
 
   absl::StatusOr<Study> Run() {
@@ -61,13 +69,14 @@ class StudyRunner {
 
   void RunSequence(std::size_t serial) {
     const std::size_t scenes = plan_.recipes.size();
+    const bool ids = serial < scenes ? plan_.ids : recorded_ids_;
     const Evaluator evaluator(serial < scenes ? MakeScene(plan_.recipes[serial])
                                               : std::move(plan_.recordings[serial - scenes]),
                               true);
     for (const StudyMethod& method : plan_.methods) {
       for (const Knowledge knowledge : plan_.told) {
-        if (ended_ || !Applies(method, knowledge)) continue;
-        auto row = evaluator.Run(method.method, {knowledge});
+        if (ended_ || !Applies(method, knowledge, ids)) continue;
+        auto row = evaluator.Run(method.method, {.knowledge = knowledge, .ids = plan_.ids});
         Report(row.status(), evaluator.sequence().frames.size());
         if (row.ok()) rows_[serial].push_back(*std::move(row));
       }
@@ -83,6 +92,7 @@ class StudyRunner {
 
   StudyPlan plan_;
   const StudyProgress& progress_;
+  const bool recorded_ids_;             // Known before recordings go to the workers.
   std::vector<std::vector<Row>> rows_;  // By sequence; each is one worker's own.
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> ended_ = false;
@@ -100,12 +110,17 @@ std::vector<StudyMethod> StudyMethods() {
       Plain(Placement::kFarthestParticle, "the paper's method to the letter"),
       Plain(Placement::kVirtualPlane, "the default"),
       Plain(Placement::kVirtualPlane, "the default without its area step"),
+      Plain(Placement::kVirtualPlane,
+            "the default without the memory of its outline; only where methods are told ids"),
   };
   methods[1].method.name += "-clean";
   methods[1].method.parameters.clean = true;
   methods[5].method.name += "-no-volumes";
   methods[5].method.parameters.steps.area = false;
   methods[5].needs_spacing = true;
+  methods[6].method.name += "-no-memory";
+  methods[6].method.parameters.outline_memory = false;
+  methods[6].needs_ids = true;
   return methods;
 }
 
@@ -135,10 +150,10 @@ std::vector<StudyMethod> StepMethods() {
 }
 
 std::size_t FrameTotal(const StudyPlan& plan) {
-  std::size_t frames = 0;
-  for (const SceneRecipe& recipe : plan.recipes) frames += recipe.frames;
-  for (const Sequence& recording : plan.recordings) frames += recording.frames.size();
-  return frames * RunsPerSequence(plan);
+  std::size_t scenes = 0, recordings = 0;
+  for (const SceneRecipe& recipe : plan.recipes) scenes += recipe.frames;
+  for (const Sequence& recording : plan.recordings) recordings += recording.frames.size();
+  return scenes * RunsPerSequence(plan, false) + recordings * RunsPerSequence(plan, true);
 }
 
 std::vector<Row> Study::Of(std::string_view method, Knowledge knowledge, bool recordings) const {
@@ -154,6 +169,12 @@ std::vector<Row> Study::Of(std::string_view method, Knowledge knowledge, bool re
 
 bool Study::HasRecordings() const {
   return std::ranges::any_of(rows, [](const Row& r) { return r.group == Group::kRecording; });
+}
+
+bool Study::ToldIds(bool recordings) const {
+  return std::ranges::any_of(rows, [recordings](const Row& row) {
+    return row.ids && (row.group == Group::kRecording) == recordings;
+  });
 }
 
 double MeanOver(std::span<const Row> rows, Metric metric) {

@@ -21,13 +21,15 @@ inline constexpr std::string_view kBaseline = "marching-squares";
 /// A method in a study.
 struct StudyMethod {
   Method method;
-  std::string remark;          ///< What is special about it, for people; may be empty.
-  bool is_step = false;        ///< The default with a step switched off: a table of its own.
-  bool needs_spacing = false;  ///< Without a spacing it is the same as another one: left out there.
+  std::string remark;    ///< What is special about it, for people; may be empty.
+  bool is_step = false;  ///< The default with a step switched off: a table of its own.
+  // Without a spacing, or without ids, it is the same as another one: left out there.
+  bool needs_spacing = false, needs_ids = false;
 };
 
-/// The baseline, the other placements, and two rows of their own: `marching-squares-clean`
-/// (with the cleaning of the default) and `virtual-plane-no-volumes` (without its area step).
+/// The baseline, the other placements, and three rows of their own: `marching-squares-clean`
+/// (with the cleaning of the default), `virtual-plane-no-volumes` (without its area step) and
+/// `virtual-plane-no-memory` (without the memory of its outline, for frames with ids).
 std::vector<StudyMethod> StudyMethods();
 
 /// `virtual-plane` with each of its steps switched off in turn: "virtual-plane-without-curvature",
@@ -39,6 +41,7 @@ struct StudyPlan {
   std::vector<Sequence> recordings;
   std::vector<StudyMethod> methods;  ///< The baseline first.
   std::vector<Knowledge> told = {Knowledge::kSpacing, Knowledge::kNothing};
+  bool ids = false;  ///< Tell the ids of scenes, too; see RunOptions.
   std::size_t threads = 1;
 };
 
@@ -53,6 +56,8 @@ struct Study {
   /// Rows of one method and knowledge, of recordings or of synthetic sequences.
   std::vector<Row> Of(std::string_view method, Knowledge knowledge, bool recordings) const;
   bool HasRecordings() const;
+  /// Whether methods were told ids, in any of the recordings or in the synthetic sequences.
+  bool ToldIds(bool recordings) const;
 };
 
 /// Mean over the judged rows that have the metric; kAbsent without any.

@@ -131,8 +131,41 @@ TEST(Report, CsvHasALinePerRowAndACellPerMetric) {
   const std::string csv = EvaluationCsv(Small().study);
   EXPECT_EQ(std::ranges::count(csv, '\n'), 1 + std::ssize(Small().study.rows));
   const std::string head = csv.substr(0, csv.find('\n'));
-  EXPECT_EQ(std::ranges::count(head, ','), 5 + static_cast<std::ptrdiff_t>(kMetricCount));
+  EXPECT_EQ(std::ranges::count(head, ','), 6 + static_cast<std::ptrdiff_t>(kMetricCount));
   EXPECT_THAT(csv, HasSubstr("\"a \"\"disc\"\" <&>\",rigid"));
+}
+
+TEST(Report, EveryFormSaysWhetherMethodsWereToldIds) {
+  for (const bool told : {false, true}) {
+    SCOPED_TRACE(told);
+    Evaluation evaluation = Small();
+    for (Row& row : evaluation.study.rows) row.ids = told;
+    Row recorded = evaluation.study.rows[0];
+    recorded.group = Group::kRecording;
+    evaluation.study.rows.push_back(recorded);
+    evaluation.notes = {"the last <note>"};
+    const auto notes = NotesOf(evaluation);
+    ASSERT_EQ(notes.size(), 3u);
+    EXPECT_THAT(notes[0], HasSubstr(told ? "were told" : "were not told"));
+    EXPECT_THAT(notes[1], HasSubstr(told ? "has ids" : "none has ids"));
+    const auto json = nlohmann::json::parse(EvaluationJson(evaluation));
+    EXPECT_EQ(json["notes"], notes);
+    EXPECT_EQ(json["rows"][0]["ids"], told);
+    const std::string text = EvaluationText(evaluation), page = EvaluationHtml(evaluation);
+    for (const std::string& note : notes) {
+      EXPECT_THAT(text, HasSubstr(note));
+      EXPECT_THAT(page, HasSubstr(client::EscapeHtml(note)));
+    }
+    const auto csv = EvaluationCsv(evaluation.study);
+    EXPECT_THAT(csv, HasSubstr("judged,method,knowledge,ids,"));
+    EXPECT_THAT(csv,
+                HasSubstr(told ? ",marching-squares,spacing,1," : ",marching-squares,spacing,0,"));
+    // What the memory does stands where methods were told ids, and only there.
+    for (const char* words :
+         {"close to how jitter is measured here", "what that costs and gains"}) {
+      EXPECT_EQ(page.find(words) != std::string::npos, told) << words;
+    }
+  }
 }
 
 TEST(Report, TextAndPageShowTheSameTable) {

@@ -87,6 +87,7 @@ TEST(Run, RecordingsHaveJitterByVelocitiesAndAreaByVolumes) {
     SequenceFrame& frame = recording.frames[t];
     frame.truth = {};
     frame.area = 0;
+    frame.ids.clear();
     if (t + 1 == recording.frames.size()) break;
     const auto& next = recording.frames[t + 1].positions;
     for (std::size_t k = 0; k < next.size(); ++k) {
@@ -133,6 +134,54 @@ TEST(Run, KnowsTheMotionOfRecordingsWhateverTheMethod) {
     EXPECT_GT((*row)[Metric::kKnownShare], 0.4);
     EXPECT_LT((*row)[Metric::kKnownShare], 0.55);
   }
+}
+
+// The core refuses a frame with a repeated id, but only one that it is told.
+Sequence WithARepeatedId() {
+  Sequence sequence = MakeScene(LatticeSquare());
+  sequence.frames[1].ids[7] = sequence.frames[1].ids[3];
+  return sequence;
+}
+
+TEST(Run, ScenesTellTheirIdsOnRequestOnly) {
+  const Method method = MethodOf(Placement::kMarchingSquares);
+  const Evaluator evaluator(WithARepeatedId());
+  const auto untold = evaluator.Run(method, {});
+  ASSERT_TRUE(untold.ok()) << untold.status();
+  EXPECT_FALSE(untold->ids);
+  const auto told = evaluator.Run(method, {.ids = true});
+  EXPECT_NE(told.status().message().find("square, frame 1, marching-squares: ids"),
+            std::string::npos)
+      << told.status();
+}
+
+TEST(Run, RecordingsAlwaysTellTheirIds) {
+  Sequence recording = WithARepeatedId();
+  recording.group = Group::kRecording;
+  const Method method = MethodOf(Placement::kMarchingSquares);
+  EXPECT_FALSE(Evaluator(recording).Run(method, {}).ok());
+  for (SequenceFrame& frame : recording.frames) frame.ids.clear();
+  const auto without = Evaluator(recording).Run(method, {.ids = true});
+  ASSERT_TRUE(without.ok()) << without.status();
+  EXPECT_FALSE(without->ids);
+}
+
+TEST(Run, JitterOfScenesIsThatOfTheTrueMotionWhoeverKnowsIds) {
+  Sequence scene = MakeScene(LatticeSquare());
+  const Method method = MethodOf(Placement::kMarchingSquares);
+  const Evaluator evaluator(scene);
+  for (SequenceFrame& frame : scene.frames) frame.ids.clear();
+  const auto untold = Evaluator(scene).Run(method, {});
+  const auto told = evaluator.Run(method, {.ids = true});
+  ASSERT_TRUE(untold.ok() && told.ok());
+  EXPECT_FALSE(untold->ids);
+  EXPECT_TRUE(told->ids);
+  // Ids change no outline of marching squares, and nothing that is measured of one.
+  for (const Metric metric : {Metric::kHausdorff, Metric::kMeanDeviation, Metric::kHausdorffJitter,
+                              Metric::kMeanJitter}) {
+    EXPECT_EQ((*untold)[metric], (*told)[metric]) << Name(metric);
+  }
+  EXPECT_TRUE(std::isnan((*told)[Metric::kKnownMeanJitter]));
 }
 
 TEST(Run, SaysWhichSequenceAndFrameWasRefused) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -79,8 +80,76 @@ TEST(Study, ReportsAsManyFramesAsItAnnounced) {
   });
   ASSERT_TRUE(study.ok());
   EXPECT_EQ(frames, FrameTotal(plan));
-  // Six methods, of which one needs a spacing and is left out where there is none.
+  // Seven methods, of which one needs ids, and one a spacing: left out where there is none.
   EXPECT_EQ(study->rows.size(), 3u * (6 + 5));
+}
+
+TEST(Study, TheMethodWithoutMemoryIsTheDefaultWithoutItAndNothingElse) {
+  ReconstructionParameters without;
+  without.outline_memory = false;
+  const auto methods = StudyMethods();
+  const auto found = std::ranges::find(methods, "virtual-plane-no-memory",
+                                       [](const StudyMethod& m) { return m.method.name; });
+  ASSERT_NE(found, methods.end());
+  EXPECT_EQ(found->method.parameters, without);
+  EXPECT_TRUE(found->needs_ids);
+}
+
+TEST(Study, ScenesThatTellIdsShowWhatTheMemoryIsWorth) {
+  StudyPlan plan = SmallPlan();
+  plan.ids = true;
+  std::size_t frames = 0;
+  const auto study = RunStudy(plan, [&](std::size_t more) {
+    frames += more;
+    return true;
+  });
+  ASSERT_TRUE(study.ok()) << study.status();
+  EXPECT_EQ(frames, FrameTotal(plan));
+  EXPECT_EQ(study->rows.size(), 3u * (7 + 6));
+  EXPECT_TRUE(study->ToldIds(false));
+  for (const Knowledge knowledge : plan.told) {
+    EXPECT_EQ(study->Of("virtual-plane-no-memory", knowledge, false).size(), 3u);
+  }
+}
+
+// A disc in a recording of its own, with ids or without.
+Sequence RecordedDisc(bool ids) {
+  Sequence recording =
+      MakeScene({.name = ids ? "known" : "unknown", .particles = 200, .frames = 3});
+  recording.group = Group::kRecording;
+  recording.motion = nullptr;
+  for (SequenceFrame& frame : recording.frames) {
+    frame.truth = {};
+    if (!ids) frame.ids.clear();
+  }
+  return recording;
+}
+
+TEST(Study, RecordingsHaveTheMethodWithoutMemoryWhereSomeHaveIds) {
+  for (const bool some : {false, true}) {
+    SCOPED_TRACE(some);
+    StudyPlan plan = SmallPlan();
+    plan.recipes.resize(1);
+    plan.recordings = {RecordedDisc(false), RecordedDisc(some)};
+    std::size_t frames = 0;
+    const auto study = RunStudy(plan, [&](std::size_t more) {
+      frames += more;
+      return true;
+    });
+    ASSERT_TRUE(study.ok()) << study.status();
+    EXPECT_EQ(frames, FrameTotal(plan));
+    EXPECT_FALSE(study->ToldIds(false));
+    EXPECT_EQ(study->ToldIds(true), some);
+    const auto rows = [&](bool recordings) {
+      return study->Of("virtual-plane-no-memory", Knowledge::kSpacing, recordings);
+    };
+    EXPECT_TRUE(rows(false).empty());
+    // Both or none, so that means are over the same recordings as those of other methods.
+    ASSERT_EQ(rows(true).size(), some ? 2u : 0u);
+    if (!some) continue;
+    EXPECT_FALSE(rows(true)[0].ids);
+    EXPECT_TRUE(rows(true)[1].ids);
+  }
 }
 
 TEST(Study, EndsWhereItIsToldTo) {

@@ -93,6 +93,27 @@ Series SeriesOf(Placement placement, std::string_view suffix, std::vector<double
   return {Concat(Name(placement), suffix), std::string(Style(placement)), std::move(values)};
 }
 
+constexpr std::string_view kAboutScenes =
+    "Every ratio is one of means over the sequences; every method has its own calibration, the "
+    "field and its guard are the same.";
+constexpr std::string_view kAboutRecordings =
+    "There is no true boundary: areas are compared with the sum of the particles' volumes, "
+    "contours "
+    "with the one before, carried along by the particles. Where particles scatter, nobody knows "
+    "how "
+    "a contour should move, and what is measured there is that. 'Motion known' leaves out such "
+    "places: whether one is told is for the particles around it to say, not for the contour.";
+constexpr std::string_view kMemoryOnRecordings =
+    " Where particles have ids, virtual-plane remembers: it lets them carry its last outline along "
+    "and moves towards that, which is close to how jitter is measured here. "
+    "virtual-plane-no-memory "
+    "does without. What the memory costs and gains against a known truth is for the synthetic "
+    "sequences to say, with --ids.";
+constexpr std::string_view kMemoryOnScenes =
+    " Methods were told which particle is which (--ids), so that virtual-plane lets the particles "
+    "carry its last outline along; beside virtual-plane-no-memory it shows what that costs and "
+    "gains. Jitter is measured by the true motion, which no method knows.";
+
 std::string MethodSections(const Evaluation& evaluation) {
   const Study& study = evaluation.study;
   std::string out;
@@ -118,16 +139,12 @@ std::string MethodSections(const Evaluation& evaluation) {
       }
       content += "</details>\n";
     }
+    const std::string_view about = recordings ? kAboutRecordings : kAboutScenes;
+    const std::string_view memory = !study.ToldIds(recordings) ? ""
+                                    : recordings               ? kMemoryOnRecordings
+                                                               : kMemoryOnScenes;
     out += Section(recordings ? "Methods on recordings" : "Methods on synthetic sequences",
-                   recordings ? "There is no true boundary: areas are compared with the sum of the "
-                                "particles' volumes, contours with the one before, carried along "
-                                "by the particles. Where particles scatter, nobody knows how a "
-                                "contour should move, and what is measured there is that. "
-                                "'Motion known' leaves out such places: whether one is told is "
-                                "for the particles around it to say, not for the contour."
-                              : "Every ratio is one of means over the sequences; every method has "
-                                "its own calibration, the field and its guard are the same.",
-                   content);
+                   Concat(about, memory), content);
   }
   return out;
 }
@@ -262,7 +279,7 @@ std::string NotesSection(const Evaluation& evaluation) {
       "area. Outermost centres: the curve half a spacing inside it. A claim reproduces if at least "
       "nine tenths of the paper&#39;s effect are there; it is weaker if the direction is right and "
       "more than 2 % are left of it.</p>\n";
-  for (const std::string& note : evaluation.notes) {
+  for (const std::string& note : NotesOf(evaluation)) {
     AppendAll(content, "<p class=\"headline\">", EscapeHtml(note), "</p>\n");
   }
   content += "<div class=\"wide\"><table class=\"parameters\"><tbody>\n";

@@ -31,7 +31,8 @@ void AppendArray(std::string& out, const Items& items, AppendItem append) {
 void AppendRow(std::string& out, const Row& row) {
   AppendAll(out, "{\"sequence\":", JsonString(row.sequence), ",\"group\":\"", Name(row.group),
             "\",\"shape\":", JsonString(row.shape), ",\"judged\":", row.judged ? "true" : "false",
-            ",\"method\":", JsonString(row.method), ",\"knowledge\":\"", Name(row.knowledge), '"');
+            ",\"method\":", JsonString(row.method), ",\"knowledge\":\"", Name(row.knowledge),
+            "\",\"ids\":", row.ids ? "true" : "false");
   for (std::size_t k = 0; k < kMetricCount; ++k) {
     const auto metric = static_cast<Metric>(k);
     AppendAll(out, ",\"", Name(metric), "\":", JsonNumber(row[metric]));
@@ -143,6 +144,22 @@ std::vector<Table> StudyTables(const Study& study) {
 
 }  // namespace
 
+std::vector<std::string> NotesOf(const Evaluation& evaluation) {
+  std::vector<std::string> notes = {
+      evaluation.study.ToldIds(false)
+          ? "Synthetic sequences: methods were told which particle is which (--ids)."
+          : "Synthetic sequences: methods were not told which particle is which; --ids tells "
+            "them."};
+  if (evaluation.study.HasRecordings()) {
+    notes.emplace_back(
+        evaluation.study.ToldIds(true)
+            ? "Recordings: methods were told which particle is which where a recording has ids."
+            : "Recordings: none has ids; methods were not told which particle is which.");
+  }
+  notes.insert(notes.end(), evaluation.notes.begin(), evaluation.notes.end());
+  return notes;
+}
+
 std::string EvaluationText(const Evaluation& evaluation) {
   std::string out;
   for (const Table& table : StudyTables(evaluation.study)) out += AsText(table);
@@ -152,12 +169,12 @@ std::string EvaluationText(const Evaluation& evaluation) {
   for (const Claim& claim : evaluation.claims) {
     AppendAll(out, claim.about, ", ", claim.subject, ": ", claim.sentence, "\n");
   }
-  for (const std::string& note : evaluation.notes) AppendAll(out, note, "\n");
+  for (const std::string& note : NotesOf(evaluation)) AppendAll(out, note, "\n");
   return out;
 }
 
 std::string EvaluationCsv(const Study& study) {
-  std::string out = "sequence,group,shape,judged,method,knowledge";
+  std::string out = "sequence,group,shape,judged,method,knowledge,ids";
   for (std::size_t k = 0; k < kMetricCount; ++k) {
     AppendAll(out, ',', Name(static_cast<Metric>(k)));
   }
@@ -172,7 +189,8 @@ std::string EvaluationCsv(const Study& study) {
   };
   for (const Row& row : study.rows) {
     AppendAll(out, quoted(row.sequence), ',', Name(row.group), ',', quoted(row.shape), ',',
-              row.judged ? '1' : '0', ',', row.method, ',', Name(row.knowledge));
+              row.judged ? '1' : '0', ',', row.method, ',', Name(row.knowledge), ',',
+              row.ids ? '1' : '0');
     for (const double value : row.values) {
       out += ',';
       if (std::isfinite(value)) client::AppendNumber(out, value);
@@ -189,7 +207,7 @@ std::string EvaluationJson(const Evaluation& evaluation) {
   };
   AppendArray(out, evaluation.recordings, append_string);
   out += ",\n\"notes\":";
-  AppendArray(out, evaluation.notes, append_string);
+  AppendArray(out, NotesOf(evaluation), append_string);
   out += ",\n\"methods\":";
   AppendArray(out, evaluation.study.methods, [&](std::string& text, const StudyMethod& method) {
     AppendAll(text, "{\"name\":", JsonString(method.method.name),

@@ -20,14 +20,18 @@ struct Evaluation {
   std::vector<Claim> claims;
 };
 
+/// Whether methods were told which particle is which, then the notes of the evaluation.
+std::vector<std::string> NotesOf(const Evaluation& evaluation);
+
 /// The tables and the claims, for a terminal: synthetic sequences first, then recordings.
 std::string EvaluationText(const Evaluation& evaluation);
 
-/// A line per sequence, method and knowledge, with all metrics; absent ones are empty.
+/// A line per sequence, method and knowledge, with all metrics; absent ones are empty. `ids` is 1
+/// where the method was told which particle is which.
 std::string EvaluationCsv(const Study& study);
 
-/// One object: set, methods, rows, comparisons, claims, film, thinned, fills. Absent numbers are
-/// null.
+/// One object: set, recordings, notes, methods, rows, comparisons, claims, film, thinned, fills.
+/// Absent numbers are null.
 std::string EvaluationJson(const Evaluation& evaluation);
 
 /// One page that needs nothing else, no script either.

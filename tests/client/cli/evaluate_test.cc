@@ -28,10 +28,12 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
   EXPECT_THAT(FilesIn(output), ElementsAre("evaluation.csv", "evaluation.html", "evaluation.json"));
 
   const auto json = nlohmann::json::parse(Content(output + "/evaluation.json"));
-  std::set<std::string> sequences, methods;
+  std::set<std::string> sequences, methods, on_scenes;
   for (const auto& row : json["rows"]) {
     sequences.insert(row["sequence"]);
     methods.insert(row["method"]);
+    if (row["group"] != "recording") on_scenes.insert(row["method"]);
+    EXPECT_EQ(row["ids"], row["group"] == "recording") << row;
     EXPECT_GT(row["vertices"], 3) << row;
     EXPECT_EQ(row["spurious_components"], 0) << row;
     if (row["method"] != "farthest-particle") {
@@ -39,7 +41,8 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
     }
   }
   EXPECT_EQ(sequences.size(), 8u) << "one of each group, and the recording";
-  EXPECT_EQ(methods.size(), 12u);
+  EXPECT_EQ(on_scenes.size(), 12u);
+  EXPECT_EQ(methods.size(), 13u) << "virtual-plane-no-memory is for the recording, which has ids";
   const std::string csv = Content(output + "/evaluation.csv");
   EXPECT_EQ(std::ranges::count(csv, '\n'), 1 + std::ssize(json["rows"]));
 
@@ -52,6 +55,22 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
     EXPECT_THAT(page, HasSubstr(part));
   }
   EXPECT_THAT(page, Not(HasSubstr("nan")));
+}
+
+TEST(Evaluate, ScenesTellIdsWhereTheyAreAskedTo) {
+  const support::TemporaryFolder directory;
+  const Ran ran = RunPartiemc({"evaluate", "--ids", "--quiet", "--methods",
+                               "virtual-plane-no-memory", "--output-dir", directory.Path("out")});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.out, HasSubstr("methods were told which particle is which (--ids)"));
+  const auto json = nlohmann::json::parse(Content(directory.Path("out/evaluation.json")));
+  std::set<std::string> methods;
+  for (const auto& row : json["rows"]) {
+    methods.insert(row["method"]);
+    EXPECT_EQ(row["ids"], true) << row;
+  }
+  EXPECT_THAT(methods, ElementsAre("farthest-particle", "marching-squares", "qef", "virtual-plane",
+                                   "virtual-plane-no-memory"));
 }
 
 TEST(Evaluate, AWrongWordIsOneLineAndNothingIsMade) {
