@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,12 +30,15 @@ std::string ReasonOf(const absl::Status& status) {
   return violation ? violation->reason : status.ToString();
 }
 
-// Answers the frame that comes next.
-Digests Answer(Session& session, Worker& worker) {
+// Answers the frame that comes next; its particles have ids or none.
+Digests Answer(Session& session, Worker& worker, bool has_ids = false) {
   const std::uint64_t sequence = session.next_sequence();
   const std::vector<double> positions = MovingBlob(kSeed, sequence);
+  std::vector<std::uint64_t> ids(has_ids ? positions.size() / 2 : 0);
+  std::iota(ids.begin(), ids.end(), 0);
   Frame frame;
   frame.positions = std::span<const double>(positions);
+  frame.ids = ids;
   Digests digests;
   const absl::Status status =
       session.Answer(sequence, frame, worker, [&](const Result& result, auto&) {
@@ -56,14 +60,16 @@ std::string CheckpointAfter(std::uint64_t frames) {
   return session.Checkpoint();
 }
 
-TEST(Checkpoint, ASessionGoesOnFromAnyFrameBitForBit) {
+class ResumedSession : public testing::TestWithParam<bool> {};
+
+TEST_P(ResumedSession, GoesOnFromAnyFrameBitForBit) {
   Session undisturbed = *Session::Open(BlobParameters(), kLimits);
   Worker worker;
   std::vector<std::string> checkpoints;
   std::vector<Digests> expected;
   for (std::uint64_t k = 0; k < kFrames; ++k) {
     checkpoints.push_back(undisturbed.Checkpoint());
-    expected.push_back(Answer(undisturbed, worker));
+    expected.push_back(Answer(undisturbed, worker, GetParam()));
   }
   for (std::uint64_t k = 0; k < kFrames; ++k) {
     auto resumed = Resume(checkpoints[k]);
@@ -71,11 +77,16 @@ TEST(Checkpoint, ASessionGoesOnFromAnyFrameBitForBit) {
     ASSERT_EQ(resumed->next_sequence(), k + 1);
     Worker other_worker;
     for (std::uint64_t i = k; i < kFrames; ++i) {
-      EXPECT_EQ(Answer(*resumed, other_worker), expected[i]) << "frame " << i << " from " << k;
+      EXPECT_EQ(Answer(*resumed, other_worker, GetParam()), expected[i])
+          << "frame " << i << " from " << k;
     }
     EXPECT_EQ(resumed->Checkpoint(), undisturbed.Checkpoint());
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Checkpoint, ResumedSession, testing::Bool(), [](const auto& instance) {
+  return instance.param ? "WithIds" : "WithoutIds";
+});
 
 TEST(Checkpoint, NoBytesAreTheBeginningOfTheStream) {
   const auto session = Resume("");

@@ -105,8 +105,9 @@ struct State {
   friend bool operator==(const State&, const State&) = default;
 };
 
-/// Bytes with a version and a checksum; the same on every machine. Size: 88 bytes, 16 per normal,
-/// 32 per ring, 16 per run and 20 per sample.
+/// Bytes with a version and a checksum; the same on every machine. Size: 112 bytes, 16 per normal,
+/// 32 per ring, 16 per run and 20 per sample; of the outline 4 per offset, 16 per point and 24 per
+/// particle.
 std::string Serialize(const State& state);
 
 /// The state that Serialize wrote. Errors: INVALID_ARGUMENT (reason CORRUPT_STATE) for anything
