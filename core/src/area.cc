@@ -24,7 +24,7 @@ constexpr double kFadeTo = 1.6;
 
 // Share of the difference to the wish that a frame makes good. Each tenth less leaves more of the
 // area behind, each tenth more costs calm where bodies merge (core/METHOD.md, "The default
-// placement", 6).
+// placement", 7).
 constexpr double kFollow = 0.9;
 
 double Smoothstep(double low, double high, double x) {

@@ -16,6 +16,9 @@ namespace partiemc {
 inline constexpr int kMaskMargin = kTileSize / 2;
 using CellMask = std::array<std::uint64_t, kTileSize + 2 * kMaskMargin>;
 
+/// Of a tile in its own Neighbourhood.
+inline constexpr int kOwnPlace = 4;
+
 inline bool IsEmpty(const BitRows& rows) {
   std::uint32_t any = 0;
   for (const std::uint32_t row : rows) any |= row;

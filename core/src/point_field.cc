@@ -15,9 +15,6 @@ namespace {
 // Marks tiles without a run.
 constexpr std::uint32_t kNoRun = 0xffffffff;
 
-// Of a tile in its own Neighbourhood.
-constexpr int kOwnPlace = 4;
-
 // After so many tiles positions along x begin anew.
 constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
 

@@ -150,7 +150,7 @@ absl::Status Contour(const ReconstructionParameters& parameters, const Frame& fr
     const StageScope scope(observer, Stage::kVertices);
     PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.point_field, b.planes,
                    parameters, scale},
-                  b.next_area_offset, b.placed, result.rings);
+                  {previous.outline, b.next_outline, b.next_area_offset}, b.placed, result.rings);
     ContinueRings({frame, parameters.plane, b.bins, b.crossings, b.ring_scratch, b.topology,
                    b.placed, scale.cell_size},
                   previous.history, b.identity_scratch, b.next_history, result.rings);
@@ -220,6 +220,7 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
   state.area_offset = buffers.next_area_offset;
   std::swap(state.normals, buffers.next_normals);
   std::swap(state.history, buffers.next_history);
+  std::swap(state.outline, buffers.next_outline);
   return absl::OkStatus();
 }
 

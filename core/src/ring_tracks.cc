@@ -3,20 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 #include <tuple>
+
+#include "id_hash.h"
 
 namespace partiemc {
 namespace {
-
-// A permutation of the 64-bit numbers that leaves no pattern of them: the finaliser of SplitMix64
-// (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
-std::uint64_t HashOf(std::uint64_t id) {
-  id += 0x9e3779b97f4a7c15u;
-  id = (id ^ (id >> 30)) * 0xbf58476d1ce4e5b9u;
-  id = (id ^ (id >> 27)) * 0x94d049bb133111ebu;
-  return id ^ (id >> 31);
-}
 
 bool HasLessHash(const ParticleSample& a, const ParticleSample& b) { return a.hash < b.hash; }
 
@@ -48,33 +40,6 @@ void TakeSample(const ParticleSample& sample, RingTracks& t) {
   first[count++] = sample;
   std::push_heap(first, first + count, HasLessHash);
 }
-
-// Finds the samples of the last frame by hash: by its leading bits, of which there are about as
-// many values as samples, then by halving.
-class SampleIndex {
- public:
-  SampleIndex(const std::vector<ParticleSample>& samples, std::vector<std::uint32_t>& bucket)
-      : samples_(samples),
-        bucket_(bucket),
-        shift_(64 - static_cast<int>(std::bit_width(samples.size() | 1))) {
-    bucket_.assign((std::size_t{1} << (64 - shift_)) + 1, 0);
-    for (const ParticleSample& sample : samples) ++bucket_[(sample.hash >> shift_) + 1];
-    std::partial_sum(bucket_.begin(), bucket_.end(), bucket_.begin());
-  }
-
-  /// The sample with this hash, or null.
-  const ParticleSample* Find(const ParticleSample& sample) const {
-    const auto first = samples_.begin() + bucket_[sample.hash >> shift_];
-    const auto last = samples_.begin() + bucket_[(sample.hash >> shift_) + 1];
-    const auto found = std::lower_bound(first, last, sample, HasLessHash);
-    return found != last && found->hash == sample.hash ? &*found : nullptr;
-  }
-
- private:
-  const std::vector<ParticleSample>& samples_;
-  std::vector<std::uint32_t>& bucket_;
-  int shift_;
-};
 
 // Velocities as integers: in units of a power of two, so small that the largest of them times the
 // number of particles fits into 62 bits. Sums are then exact, hence the same in any order.
@@ -114,7 +79,7 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous, RingT
   if (has_ids) ReserveSamples(input.particle_count, t);
   t.sum_x.assign(rings, 0);
   t.sum_y.assign(rings, 0);
-  const SampleIndex known(previous.samples, t.bucket);
+  const HashIndex<ParticleSample> known(previous.samples, t.bucket);
   const VelocityUnits units(frame);
 
   const auto follow_id = [&](std::uint32_t tile, std::uint32_t entry, std::uint32_t ring) {
@@ -123,7 +88,7 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous, RingT
                              NearestNode(origin.x, input.bins.entries[entry].x),
                              NearestNode(origin.y, input.bins.entries[entry].y), ring};
     TakeSample(now, t);
-    if (const ParticleSample* const before = known.Find(now)) {
+    if (const ParticleSample* const before = known.Find(now.hash)) {
       t.found.push_back(
           {before->ring,
            ring,

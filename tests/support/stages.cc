@@ -92,8 +92,9 @@ void Stages::RunFromRings(std::span<const CellNormal> previous) {
                   next_normals);
   const Frame frame = particles.AsFrame();
   std::optional<double> area_offset;
+  KnownOutline outline;
   PlaceVertices({frame, bins, level_set, crossings, topology, field, planes, parameters, scale},
-                area_offset, placed, result.rings);
+                {{}, outline, area_offset}, placed, result.rings);
   const absl::Status status = BuildMesh({bins.tiles, crossings, ring_scratch, topology, planes,
                                          placed, result.rings, parameters, scale},
                                         mesh_scratch, result.mesh, result.statistics);

@@ -15,7 +15,7 @@
 namespace partiemc {
 
 /// Changes whenever the same frames and parameters would give other digests than before.
-inline constexpr std::uint32_t kMethodVersion = 5;
+inline constexpr std::uint32_t kMethodVersion = 6;
 
 /// Buffers that are kept warm from frame to frame. Belongs to a worker, not to a stream: any
 /// workspace serves any reconstructor, and its history never changes a result.

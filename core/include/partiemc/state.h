@@ -81,6 +81,12 @@ struct KnownOutline {
   std::vector<double> points;           ///< x, y of each, in cells from the origin.
   std::vector<NearParticle> particles;  ///< By hash.
 
+  void Clear() {
+    offsets.clear();
+    points.clear();
+    particles.clear();
+  }
+
   friend bool operator==(const KnownOutline&, const KnownOutline&) = default;
 };
 
@@ -95,7 +101,7 @@ struct State {
   /// Spacing in use, world units.
   std::optional<double> spacing;
   /// How far the last frame's outline was moved to match its area, in spacings (core/METHOD.md,
-  /// "The default placement", step 6).
+  /// "The default placement", step 7).
   std::optional<double> area_offset;
   /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
   std::vector<CellNormal> normals;
