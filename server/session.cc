@@ -80,7 +80,10 @@ absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver de
       reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result, &clock);
   if (status.ok()) status = deliver(worker.result, clock);
   if (!status.ok()) return status;
-  std::swap(state_, worker.next_state);
+  // Another copy: the worker's own has room for the largest stream that it served, which would pass
+  // from stream to stream. Memory that runs out here leaves the state as it was.
+  State next = worker.next_state;
+  state_ = std::move(next);
   if (worker.observer != nullptr) {
     worker.observer->FrameReconstructed(frame.ParticleCount(), clock);
   }

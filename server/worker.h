@@ -52,7 +52,7 @@ class DoorBuffers {
 struct Worker {
   Workspace workspace;
   Result result;
-  State next_state;  ///< Becomes the stream's state once the frame has been answered.
+  State next_state;  ///< Copied to the stream once the frame has been answered.
   std::unique_ptr<DoorBuffers> door_buffers;
   WarmSize particles;                 ///< Of the frames that it has worked on.
   FrameObserver* observer = nullptr;  ///< Told of each frame; none: nobody asks.

@@ -2,6 +2,7 @@
 #include "server/session.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <oneapi/tbb/global_control.h>
 
 #include <limits>
@@ -190,6 +191,39 @@ TEST(Session, TheWorkerThatComputesMakesNoDifference) {
     ASSERT_TRUE(status.ok()) << status;
     EXPECT_EQ(digests, expected);
   }
+}
+
+// Bytes that malloc has given out; 0 under sanitizers, which have their own.
+std::size_t HeldBytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
+TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
+  constexpr std::size_t kSessions = 20, kMaxBytesEach = 100 << 10;
+  constexpr FrameLimits kLarge{.max_particles = 5000, .max_tiles = 5000};
+  std::vector<double> spray, pair = {0, 0, kBlobSpacing, 0};
+  for (int k = 0; k < 4000; ++k) {  // Each with an outline of its own.
+    spray.push_back(k % 64 * 10 * kBlobSpacing);
+    spray.push_back(k / 64 * 10 * kBlobSpacing);
+  }
+  const auto ignore = [](auto&, auto&) { return absl::OkStatus(); };
+  Worker worker;
+  std::vector<Session> small;
+  for (std::size_t k = 0; k <= kSessions; ++k) {
+    small.push_back(*Session::Open(BlobParameters(), kLarge));
+  }
+  Session large = *Session::Open(BlobParameters(), kLarge);
+  std::size_t before = 0;
+  for (std::size_t k = 0; k <= kSessions; ++k) {
+    if (k == 1) before = HeldBytes();  // All is warm.
+    ASSERT_TRUE(large.Answer(k + 1, FrameOf(spray), worker, ignore).ok());
+    ASSERT_TRUE(small[k].Answer(1, FrameOf(pair), worker, ignore).ok());
+  }
+  const std::size_t after = HeldBytes();
+  if (after == 0) GTEST_SKIP() << "malloc tells nothing";
+  ASSERT_GT(large.Checkpoint().size(), 4 * kMaxBytesEach);
+  EXPECT_LE(after, before + kSessions * kMaxBytesEach);
 }
 
 TEST(Session, TheClockOfAResultHasATimeForEveryStageAndForTheWhole) {

@@ -15,10 +15,12 @@ template <typename T>
 void PutNumber(T value, std::string& bytes) {
   auto bits =
       std::bit_cast<std::conditional_t<sizeof(T) == 8, std::uint64_t, std::uint32_t>>(value);
-  for (std::size_t k = 0; k < sizeof(T); ++k) {
-    bytes.push_back(static_cast<char>(bits & 0xff));
+  char text[sizeof(T)];
+  for (char& byte : text) {
+    byte = static_cast<char>(bits & 0xff);
     bits >>= 8;
   }
+  bytes.append(text, sizeof(T));
 }
 
 /// Takes the number that `bytes` begins with. Requires: there are sizeof(T) bytes.
