@@ -184,6 +184,30 @@ TEST(Run, JitterOfScenesIsThatOfTheTrueMotionWhoeverKnowsIds) {
   EXPECT_TRUE(std::isnan((*told)[Metric::kKnownMeanJitter]));
 }
 
+void ExpectTheSameNumbers(const Row& a, const Row& b) {
+  for (std::size_t k = 0; k < kMetricCount; ++k) {
+    const auto metric = static_cast<Metric>(k);
+    if (metric == Metric::kMilliseconds || std::isnan(a[metric])) continue;
+    EXPECT_EQ(a[metric], b[metric]) << Name(metric);
+  }
+}
+
+TEST(Run, TheMemoryOfTheOutlineIsWorthSomethingWhereIdsAreToldAndNothingElsewhere) {
+  const Evaluator evaluator(
+      MakeScene({.name = "star", .shape = "star", .seed = 4, .particles = 400}));
+  const Method with = MethodOf(Placement::kVirtualPlane);
+  Method without = with;
+  without.parameters.outline_memory = false;
+  const auto with_told = evaluator.Run(with, {.ids = true});
+  const auto with_untold = evaluator.Run(with, {});
+  const auto without_told = evaluator.Run(without, {.ids = true});
+  const auto without_untold = evaluator.Run(without, {});
+  ASSERT_TRUE(with_told.ok() && with_untold.ok() && without_told.ok() && without_untold.ok());
+  EXPECT_LT((*with_told)[Metric::kMeanJitter], 0.95 * (*without_told)[Metric::kMeanJitter]);
+  ExpectTheSameNumbers(*with_untold, *without_untold);
+  ExpectTheSameNumbers(*without_told, *without_untold);
+}
+
 TEST(Run, SaysWhichSequenceAndFrameWasRefused) {
   Sequence broken = MakeScene(LatticeSquare());
   broken.frames[2].positions[5] = std::nan("");
