@@ -25,8 +25,8 @@ constexpr double kRememberedReach = 2;
 // A vertex goes this share of its way to the carried outline, less of a longer way, nothing of one
 // as long as the reach. In spacings. More is calmer and later to follow what changes
 // (core/METHOD.md).
-constexpr double kShare = 0.8;
-constexpr double kReach = 1.25;
+constexpr double kShare = 0.7;
+constexpr double kReach = 1.5;
 
 // Sides longer than this have been torn: nothing was seen of what is between their ends. Spacings.
 constexpr double kLongestSide = 2;
