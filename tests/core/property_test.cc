@@ -1,6 +1,6 @@
-// The guarantees of result.h over random frames. PARTIEMC_FRAMES sets how many: the default is for
-// every day, 10000 for a release. Each frame prints its seed when it fails; PARTIEMC_SEED starts
-// from that one. What was seen is printed at the end, by placement.
+// The guarantees of result.h over random frames. PARTIEMC_FRAMES sets how many, each with one or
+// two that follow it: the default is for every day, 10000 for a release. Each prints its seed when
+// it fails; PARTIEMC_SEED starts from that one. What was seen is printed at the end, by placement.
 #include <gtest/gtest.h>
 
 #include <algorithm>
