@@ -23,8 +23,8 @@ constexpr double kCarrierReach = 3;
 constexpr double kRememberedReach = 2;
 
 // A vertex goes this share of its way to the carried outline, less of a longer way, nothing of one
-// as long as the reach. In spacings. More is calmer and later to follow what changes
-// (core/METHOD.md).
+// as long as the reach, in spacings. More is calmer, rougher, and later to follow what changes
+// (core/METHOD.md, "What the memory of the outline is worth").
 constexpr double kShare = 0.7;
 constexpr double kReach = 1.5;
 
