@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace partiemc {
 namespace {
@@ -16,6 +17,11 @@ namespace {
 constexpr double kExpectedStrain = 0.07;
 constexpr double kLeastRidge = 0.003;
 constexpr double kLargestRidge = 0.04;
+
+// Of a crowd, the movers heard of in a square as wide as the reach, where about nine are usual. All
+// of them would tell no more, and the frame after a state that somebody made up, with crowds of
+// points among crowds of movers, would cost the product of both.
+constexpr std::uint32_t kMostInSquare = 128;
 
 // Numbers of a plane's affine map, which a fit takes from the noise of so few movers.
 constexpr double kFitted = 3;
@@ -92,14 +98,15 @@ std::optional<Point> ParticleMotion::Carry(Point p) const {
   const double reach_square = reach_ * reach_;
   Moments m;
   Point common;  // Way of the first mover: what all do loses no digits of what each does.
-  movers_.ForEachNear(p, [&](const Mover& mover) {
+  const auto hear_of = [&](const Mover& mover) {
     const auto& [at, way] = mover;
     const Point arm{at.x - p.x, at.y - p.y};
     const double rest = 1 - (arm.x * arm.x + arm.y * arm.y) / reach_square;
     if (!(rest > 0)) return;
     if (m.weight == 0) common = way;
     m.Add(arm, {way.x - common.x, way.y - common.y}, rest * rest * rest);
-  });
+  };
+  movers_.ForEachNear(p, hear_of, kMostInSquare);
   if (!(m.weight > 0)) return std::nullopt;
   m.Centre();
 

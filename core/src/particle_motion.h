@@ -25,8 +25,8 @@ class ParticleMotion {
   void Build(std::span<const Mover> movers, double reach);
 
   /// Where a point goes; nothing without a mover in reach. Movers weigh (1 - (d / reach)^2)^3. What
-  /// moves as a rigid body is carried exactly but for what the ridge takes from its turn. Cost: the
-  /// movers in reach.
+  /// moves as a rigid body is carried exactly but for what the ridge takes from its turn. Of a
+  /// crowd those are heard of that came first to Build. Cost: the movers in reach, bounded.
   std::optional<Point> Carry(Point p) const;
 
  private:

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -39,9 +40,11 @@ class PointBuckets {
   }
 
   /// Calls visit(thing) for all that are at most a cell's width from `p` along each axis, and for
-  /// others. The order depends on the things, theirs, and `p` only.
+  /// others; of those that share a bucket for the first `most`. The order depends on the things,
+  /// theirs, and `p` only.
   template <typename Visit>
-  void ForEachNear(Point p, Visit visit) const {
+  void ForEachNear(Point p, Visit visit,
+                   std::uint32_t most = std::numeric_limits<std::uint32_t>::max()) const {
     const std::int64_t column = CellAlong(p.x);
     const std::int64_t row = CellAlong(p.y);
     // Cells may share a bucket: each is looked into once.
@@ -52,7 +55,9 @@ class PointBuckets {
         const std::uint32_t bucket = BucketOf(i, j);
         if (std::find(buckets.begin(), end, bucket) != end) continue;
         *end++ = bucket;
-        for (std::uint32_t k = offsets_[bucket]; k < offsets_[bucket + 1]; ++k) visit(things_[k]);
+        const std::uint32_t first = offsets_[bucket];
+        const std::uint32_t last = first + std::min(most, offsets_[bucket + 1] - first);
+        for (std::uint32_t k = first; k < last; ++k) visit(things_[k]);
       }
     }
   }
