@@ -28,7 +28,8 @@ constexpr double kRememberedReach = 2;
 constexpr double kShare = 0.7;
 constexpr double kReach = 1.5;
 
-// Sides longer than this have been torn: nothing was seen of what is between their ends. Spacings.
+// Sides longer than this have been torn: nothing was seen of what is between their ends. In
+// spacings, or in cells where those are larger.
 constexpr double kLongestSide = 2;
 
 // No outline bends more tightly, in 1 / spacings.
@@ -88,7 +89,7 @@ void CarryPoints(const KnownOutline& outline, double spacing, OutlineMemoryScrat
 // Sides between carried points, found again by their middles.
 void SortSides(const KnownOutline& outline, double spacing, OutlineMemoryScratch& s) {
   s.sides.clear();
-  const double longest = kLongestSide * spacing;
+  const double longest = kLongestSide * std::max(spacing, 1.0);
   for (std::size_t ring = 0; ring + 1 < outline.offsets.size(); ++ring) {
     const std::size_t first = outline.offsets[ring];
     const std::size_t count = outline.offsets[ring + 1] - first;

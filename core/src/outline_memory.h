@@ -21,7 +21,7 @@ void RecallOutline(const VertexInput& input, const KnownOutline& outline,
                    OutlineMemoryScratch& scratch, Rings& rings);
 
 /// Sets `outline` to what the next frame needs of this one: its rings, and its particles in
-/// cells within three spacings of an active one. Empty if the particles have no ids. Cost: linear
+/// cells within two spacings of an active one. Empty if the particles have no ids. Cost: linear
 /// in the vertices and the particles of tiles near them.
 void RememberOutline(const VertexInput& input, const Rings& rings, OutlineMemoryScratch& scratch,
                      KnownOutline& outline);

@@ -39,9 +39,10 @@ class PointBuckets {
     for (std::size_t k = things.size(); k-- > 0;) things_[--offsets_[bucket_of_[k]]] = things[k];
   }
 
-  /// Calls visit(thing) for all that are at most a cell's width from `p` along each axis, and for
-  /// others; of those that share a bucket for the first `most`. The order depends on the things,
-  /// theirs, and `p` only.
+  /// Calls visit(thing) once for all that are less than a cell's width from `p` along each axis,
+  /// but for a rounding of the coordinates, and for others; of those that share a bucket for the
+  /// `most` that came first to Build. The order depends on the things, theirs, and `p` only.
+  /// Requires: Build before.
   template <typename Visit>
   void ForEachNear(Point p, Visit visit,
                    std::uint32_t most = std::numeric_limits<std::uint32_t>::max()) const {
