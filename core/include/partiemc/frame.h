@@ -31,8 +31,8 @@ struct Frame {
   /// Simulation time. Velocities count between frames of which the later one has the larger time.
   double time = 0;
 
-  // Ids, velocities and time decide identities of rings and nothing else (core/METHOD.md,
-  // "Identities"): outlines, meshes and digests are the same without them.
+  // Ids, velocities and time decide identities of rings (core/METHOD.md, "Identities"), ids carry
+  // the memory of the outline ("The default placement", 6); nothing else depends on them.
 
   std::size_t ParticleCount() const {
     return std::visit([](auto view) { return view.size(); }, positions) /
