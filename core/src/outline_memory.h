@@ -2,13 +2,9 @@
 // (core/METHOD.md, "The default placement", step 6).
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
-#include "particle_motion.h"
+#include "outline_memory_scratch.h"
 #include "partiemc/result.h"
 #include "partiemc/state.h"
-#include "point_buckets.h"
 #include "vertices.h"
 
 namespace partiemc {

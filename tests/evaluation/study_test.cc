@@ -24,6 +24,17 @@ StudyPlan SmallPlan() {
   return plan;
 }
 
+// Runs a study that has to report as many frames as it announced.
+absl::StatusOr<Study> RunAnnounced(const StudyPlan& plan) {
+  std::size_t frames = 0;
+  auto study = RunStudy(plan, [&](std::size_t more) {
+    frames += more;
+    return true;
+  });
+  EXPECT_EQ(frames, FrameTotal(plan));
+  return study;
+}
+
 TEST(Study, HasTheBaselineFirstAndEveryPlacement) {
   const auto methods = StudyMethods();
   EXPECT_EQ(methods.front().method.name, kBaseline);
@@ -73,13 +84,8 @@ TEST(Study, RowsAreTheSameForOneAndThreeThreads) {
 
 TEST(Study, ReportsAsManyFramesAsItAnnounced) {
   const StudyPlan plan = SmallPlan();
-  std::size_t frames = 0;
-  const auto study = RunStudy(plan, [&](std::size_t more) {
-    frames += more;
-    return true;
-  });
+  const auto study = RunAnnounced(plan);
   ASSERT_TRUE(study.ok());
-  EXPECT_EQ(frames, FrameTotal(plan));
   // Seven methods, of which one needs ids, and one a spacing: left out where there is none.
   EXPECT_EQ(study->rows.size(), 3u * (6 + 5));
 }
@@ -98,13 +104,8 @@ TEST(Study, TheMethodWithoutMemoryIsTheDefaultWithoutItAndNothingElse) {
 TEST(Study, ScenesThatTellIdsShowWhatTheMemoryIsWorth) {
   StudyPlan plan = SmallPlan();
   plan.ids = true;
-  std::size_t frames = 0;
-  const auto study = RunStudy(plan, [&](std::size_t more) {
-    frames += more;
-    return true;
-  });
+  const auto study = RunAnnounced(plan);
   ASSERT_TRUE(study.ok()) << study.status();
-  EXPECT_EQ(frames, FrameTotal(plan));
   EXPECT_EQ(study->rows.size(), 3u * (7 + 6));
   EXPECT_TRUE(study->ToldIds(false));
   for (const Knowledge knowledge : plan.told) {
@@ -131,13 +132,8 @@ TEST(Study, RecordingsHaveTheMethodWithoutMemoryWhereSomeHaveIds) {
     StudyPlan plan = SmallPlan();
     plan.recipes.resize(1);
     plan.recordings = {RecordedDisc(false), RecordedDisc(some)};
-    std::size_t frames = 0;
-    const auto study = RunStudy(plan, [&](std::size_t more) {
-      frames += more;
-      return true;
-    });
+    const auto study = RunAnnounced(plan);
     ASSERT_TRUE(study.ok()) << study.status();
-    EXPECT_EQ(frames, FrameTotal(plan));
     EXPECT_FALSE(study->ToldIds(false));
     EXPECT_EQ(study->ToldIds(true), some);
     const auto rows = [&](bool recordings) {
