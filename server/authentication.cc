@@ -21,30 +21,47 @@ absl::Status TurnedAway(std::string_view reason, std::string value) {
                          "must be \"Bearer \" and a token of this server's --token-file"});
 }
 
+// What `asked` leaves open is as in `otherwise`.
+CallerQuota Completed(const CallerQuota& asked, const CallerQuota& otherwise) {
+  const auto either = [](const auto& one, const auto& other) { return one ? one : other; };
+  return {.calls = either(asked.calls, otherwise.calls),
+          .streams = either(asked.streams, otherwise.streams),
+          .watchers = either(asked.watchers, otherwise.watchers),
+          .bytes = either(asked.bytes, otherwise.bytes)};
+}
+
 }  // namespace
 
 void Authentication::Set(BearerTokens tokens) {
-  auto next = std::make_shared<const BearerTokens>(std::move(tokens));
+  const auto before = Current();
+  auto next = std::make_shared<Known>();
+  for (const auto& [digest, terms] : tokens.clients()) {
+    auto account = before && before->accounts.contains(digest) ? before->accounts.at(digest)
+                                                               : std::make_shared<CallerAccount>();
+    account->SetQuota(Completed(terms->quota, quota_));
+    next->accounts.emplace(digest, std::move(account));
+  }
+  next->tokens = std::move(tokens);
   const std::lock_guard lock(mutex_);
-  tokens_.swap(next);
+  known_ = std::move(next);
 }
 
-std::shared_ptr<const BearerTokens> Authentication::Current() const {
+std::shared_ptr<const Authentication::Known> Authentication::Current() const {
   const std::lock_guard lock(mutex_);
-  return tokens_;
+  return known_;
 }
 
-absl::StatusOr<std::string> Authentication::Authenticate(
-    std::optional<std::string_view> authorization) const {
-  const auto tokens = Current();
-  if (tokens == nullptr) return std::string();
+absl::StatusOr<Caller> Authentication::Authenticate(std::optional<std::string_view> authorization,
+                                                    std::string_view peer) const {
+  const auto known = Current();
+  if (known == nullptr) return Anybody(peer);
   if (!authorization) return TurnedAway(kReasonTokenMissing, "absent");
   if (!IsBearer(*authorization)) {
     return TurnedAway(kReasonTokenMissing, "of another scheme");
   }
-  auto client = tokens->ClientOf(authorization->substr(kScheme.size()));
-  if (!client) return TurnedAway(kReasonTokenUnknown, "a token that is not known");
-  return *std::move(client);
+  const auto* const client = known->tokens.Find(authorization->substr(kScheme.size()));
+  if (client == nullptr) return TurnedAway(kReasonTokenUnknown, "a token that is not known");
+  return Caller(client->terms, known->accounts.at(client->digest));
 }
 
 }  // namespace partiemc::server

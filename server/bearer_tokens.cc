@@ -4,7 +4,9 @@
 #include <openssl/sha.h>
 
 #include <algorithm>
+#include <iterator>
 #include <sstream>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
@@ -15,25 +17,20 @@ namespace {
 // A token shorter than this can be guessed; a longer one than that is no token.
 constexpr std::size_t kMinTokenBytes = 16;
 constexpr std::size_t kMaxTokenBytes = 512;
-constexpr std::size_t kMaxNameBytes = 64;
 // Each call is compared with all of them.
 constexpr std::size_t kMaxTokens = 1000;
 
-bool Consists(std::string_view text, std::string_view of) {
-  return std::all_of(text.begin(), text.end(), [of](char c) {
-    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || of.find(c) != of.npos;
-  });
-}
-
 bool IsToken(std::string_view text) {
+  constexpr std::string_view kOthers = "-._~+/=";
   return text.size() >= kMinTokenBytes && text.size() <= kMaxTokenBytes &&
-         Consists(text, "-._~+/=");
+         std::ranges::all_of(text, [kOthers](char c) {
+           return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
+                  kOthers.find(c) != kOthers.npos;
+         });
 }
-
-bool IsName(std::string_view text) { return text.size() <= kMaxNameBytes && Consists(text, "._-"); }
 
 absl::Status Wrong(std::size_t line, const std::string& rule) {
-  return absl::InvalidArgumentError(absl::StrCat("line ", line, ": ", rule));
+  return absl::InvalidArgumentError(absl::StrCat("line ", line, ", ", rule));
 }
 
 }  // namespace
@@ -50,21 +47,21 @@ absl::StatusOr<BearerTokens> BearerTokens::Parse(std::string_view text) {
   std::size_t number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
-    std::istringstream words(line);
-    std::string token, name, more;
-    if (!(words >> token) || token.front() == '#') continue;
-    words >> name >> more;
-    if (!IsToken(token)) {
-      return Wrong(number, "must begin with a token of 16 to 512 characters of [A-Za-z0-9-._~+/=]");
+    std::istringstream split(line);
+    const std::vector<std::string> words(std::istream_iterator<std::string>(split), {});
+    if (words.empty() || words[0].front() == '#') continue;
+    if (!IsToken(words[0])) {
+      return Wrong(number, "word 1: must be a token of 16 to 512 characters of [A-Za-z0-9-._~+/=]");
     }
-    if (!IsName(name) || !more.empty()) {
-      return Wrong(number,
-                   "after the token may stand one name of at most 64 characters of [A-Za-z0-9._-]");
+    const Digest digest = DigestOf(words[0]);
+    if (tokens.Find(digest) != nullptr) return Wrong(number, "word 1: must not repeat a token");
+    if (tokens.clients_.size() == kMaxTokens) {
+      return Wrong(number, "word 1: must be at most 1,000 tokens");
     }
-    const Digest digest = DigestOf(token);
-    if (tokens.Find(digest) != nullptr) return Wrong(number, "must not repeat a token");
-    if (tokens.size() == kMaxTokens) return Wrong(number, "must be at most 1,000 tokens");
-    tokens.clients_.push_back({digest, name.empty() ? absl::StrCat("token-", number) : name});
+    auto terms = ParseCallerTerms(std::span(words).subspan(1));
+    if (!terms.ok()) return Wrong(number, std::string(terms.status().message()));
+    if (terms->name.empty()) terms->name = absl::StrCat("token-", number);
+    tokens.clients_.push_back({digest, std::make_shared<const CallerTerms>(*std::move(terms))});
   }
   if (tokens.clients_.empty()) {
     return absl::InvalidArgumentError("no token; must have one a line");
@@ -79,12 +76,6 @@ const BearerTokens::Client* BearerTokens::Find(const Digest& digest) const {
     found = same ? &client : found;
   }
   return found;
-}
-
-std::optional<std::string> BearerTokens::ClientOf(std::string_view token) const {
-  const Client* const client = Find(DigestOf(token));
-  if (client == nullptr) return std::nullopt;
-  return client->name;
 }
 
 }  // namespace partiemc::server

@@ -3,12 +3,13 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/caller_terms.h"
 
 namespace partiemc::server {
 
@@ -16,25 +17,27 @@ namespace partiemc::server {
 /// time.
 class BearerTokens {
  public:
-  /// `text` has a token a line, and after blanks the name of its client for the log (without one:
-  /// "token-LINE"); blank lines and lines that begin with '#' count for nothing. A token is 16 to
-  /// 512 characters of [A-Za-z0-9-._~+/=], a name 1 to 64 of [A-Za-z0-9._-].
-  /// Errors: INVALID_ARGUMENT, which names the line and the rule and never a token: something that
-  /// is neither, a token twice, no token at all, more than 1,000.
-  static absl::StatusOr<BearerTokens> Parse(std::string_view text);
-
-  /// The client that has this token, if any. Takes as long for every token of the same length: all
-  /// are compared with, to their last byte.
-  std::optional<std::string> ClientOf(std::string_view token) const;
-
-  std::size_t size() const { return clients_.size(); }
-
- private:
   using Digest = std::array<std::uint8_t, 32>;
   struct Client {
     Digest digest;
-    std::string name;
+    std::shared_ptr<const CallerTerms> terms;
   };
+
+  /// `text` has a token a line, and after it, with blanks between them, the words of
+  /// ParseCallerTerms: without a name the client's is "token-LINE", without anything else it may
+  /// everything. Blank lines and lines that begin with '#' count for nothing. A token is 16 to 512
+  /// characters of [A-Za-z0-9-._~+/=].
+  /// Errors: INVALID_ARGUMENT, which tells line, word and rule and shows no word: one that is not
+  /// as said, a token twice, no token at all, more than 1,000.
+  static absl::StatusOr<BearerTokens> Parse(std::string_view text);
+
+  /// The client that has this token; null if there is none. Takes as long for every token of the
+  /// same length: all are compared with, to their last byte.
+  const Client* Find(std::string_view token) const { return Find(DigestOf(token)); }
+
+  const std::vector<Client>& clients() const { return clients_; }
+
+ private:
   static Digest DigestOf(std::string_view token);
   const Client* Find(const Digest& digest) const;
 

@@ -3,10 +3,12 @@
 #include <grpc/grpc.h>
 
 #include <optional>
+#include <string>
 #include <string_view>
+#include <utility>
 
-#include "partiemc/v1/reconstruction.grpc.pb.h"
 #include "server/logging.h"
+#include "server/unary_requests.h"
 
 namespace partiemc::server {
 namespace {
@@ -19,6 +21,17 @@ using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerInterceptorFactoryInterface;
 using grpc::experimental::ServerRpcInfo;
 
+absl::StatusOr<Caller> Authenticate(const Authentication& authentication,
+                                    const grpc::ServerContextBase& context) {
+  const auto [begin, end] = context.client_metadata().equal_range(kHeader);
+  std::optional<std::string_view> authorization;
+  // Of several headers none counts: who is meant would depend on their order.
+  if (begin != end && std::next(begin) == end) {
+    authorization.emplace(begin->second.data(), begin->second.size());
+  }
+  return authentication.Authenticate(authorization, context.peer());
+}
+
 // Ends a refused call before its method has read anything.
 class Guard final : public Interceptor {
  public:
@@ -29,6 +42,7 @@ class Guard final : public Interceptor {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
       const auto client = Authenticate(authentication_, context_);
       if (!client.ok()) {
+        LogRefusal("call refused", context_.peer(), client.status());
         grpc_call_cancel_with_status(context_.c_call(), GRPC_STATUS_UNAUTHENTICATED,
                                      std::string(client.status().message()).c_str(), nullptr);
       }
@@ -47,9 +61,10 @@ class GuardFactory final : public ServerInterceptorFactoryInterface {
 
   Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
     const std::string_view method = call->method();
-    const std::string ours =
-        std::string("/") + v1::ReconstructionService::service_full_name() + "/";
-    if (method.starts_with("/grpc.health.v1.Health/") || method.starts_with(ours)) return nullptr;
+    if (method.starts_with("/grpc.health.v1.Health/") ||
+        method.starts_with("/" + ServiceName() + "/")) {
+      return nullptr;
+    }
     return new Guard(authentication_, *call->server_context());
   }
 
@@ -57,19 +72,27 @@ class GuardFactory final : public ServerInterceptorFactoryInterface {
   const Authentication& authentication_;
 };
 
+absl::StatusOr<AdmittedCall> WithPlace(Caller caller) {
+  auto place = caller.account()->Take(CallerAccount::Kind::kCall);
+  if (!place.ok()) return place.status();
+  return AdmittedCall{std::move(caller), *std::move(place)};
+}
+
 }  // namespace
 
-absl::StatusOr<std::string> Authenticate(const Authentication& authentication,
-                                         const grpc::ServerContextBase& context) {
-  const auto [begin, end] = context.client_metadata().equal_range(kHeader);
-  std::optional<std::string_view> authorization;
-  // Of several headers none counts: who is meant would depend on their order.
-  if (begin != end && std::next(begin) == end) {
-    authorization.emplace(begin->second.data(), begin->second.size());
+absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication,
+                                   const grpc::ServerContextBase& context, Permission permission) {
+  auto caller = Authenticate(authentication, context);
+  if (!caller.ok()) return caller.status();
+  if (permission != nullptr) {
+    if (auto status = ((*caller).*permission)(); !status.ok()) return status;
   }
-  auto client = authentication.Authenticate(authorization);
-  if (!client.ok()) LogRefusal("call refused", context.peer(), client.status());
-  return client;
+  return WithPlace(*std::move(caller));
+}
+
+absl::StatusOr<AdmittedCall> AdmitAnybody(const Authentication& authentication,
+                                          const grpc::ServerContextBase& context) {
+  return WithPlace(authentication.Anybody(context.peer()));
 }
 
 std::unique_ptr<ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(

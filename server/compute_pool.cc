@@ -14,16 +14,17 @@ namespace partiemc::server {
 // runners as the arena has places: small frames then run side by side, and a large one that is
 // alone gets every place for its pieces.
 ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
-                         FrameObserver* observer)
-    : warm_time_(warm_time),
+                         FrameObserver* observer, MemoryBudget* budget)
+    : threads_(std::max(threads, 1u)),
+      warm_time_(warm_time),
       observer_(observer),
-      parallelism_(oneapi::tbb::global_control::max_allowed_parallelism, std::max(threads, 1u)),
-      arena_(std::max(threads, 1u)),
+      budget_(budget),
+      parallelism_(oneapi::tbb::global_control::max_allowed_parallelism, threads_),
+      arena_(threads_),
       busy_(warm_time) {
-  runners_.reserve(std::max(threads, 1u));
-  for (unsigned i = 0; i < std::max(threads, 1u); ++i) {
-    runners_.emplace_back([this] { Run(); });
-  }
+  running_.reserve(threads_);
+  runners_.reserve(threads_);
+  for (unsigned i = 0; i < threads_; ++i) runners_.emplace_back([this] { Run(); });
 }
 
 ComputePool::~ComputePool() {
@@ -35,49 +36,53 @@ ComputePool::~ComputePool() {
   for (std::thread& runner : runners_) runner.join();
 }
 
-void ComputePool::Submit(Job job, Afterwards afterwards, BusyStreams::Mark* stream) {
+void ComputePool::Submit(Job job, Afterwards afterwards, BusyStreams::Mark* stream,
+                         const CallerAccount* caller) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.push_back({std::move(job), std::move(afterwards), stream});
+    tasks_.Push(caller, stream, Task{std::move(job), std::move(afterwards), stream, caller});
+    ++waiting_;
+    recent_.Came(caller, WarmSize::Clock::now());
   }
   task_came_.notify_one();
 }
 
 std::size_t ComputePool::QueueLength() const {
   const std::lock_guard lock(mutex_);
-  return tasks_.size();
+  return waiting_;
 }
 
 void ComputePool::Run() {
   // Threads that oneTBB starts for the pieces of a frame have it from this one.
   pthread_setname_np(pthread_self(), "compute");
+  std::optional<Arena> narrow;  // For jobs of callers who share.
   std::unique_lock lock(mutex_);
-  for (;;) {
-    WaitForTask(lock);
-    if (tasks_.empty()) return;
-    {
-      const Task task = std::move(tasks_.front());
-      tasks_.pop_front();
-      std::unique_ptr<Worker> worker = TakeWorker();
-      lock.unlock();
-      arena_.Execute([&] { task.job(*worker); });
-      lock.lock();
-      PutBack(std::move(worker), task.stream);
-      lock.unlock();
-      task.afterwards();
-    }
+  while (std::optional<Task> task = WaitForTask(lock)) {
+    Begin(*task);
+    const bool shares = Shares(task->caller);
+    std::unique_ptr<Worker> worker = TakeWorker();
+    lock.unlock();
+    if (shares && !narrow) narrow.emplace(threads_ - 1);
+    (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
+    lock.lock();
+    PutBack(std::move(worker), task->stream);
+    End(*task);
+    lock.unlock();
+    task->afterwards();
+    task.reset();  // With all that it holds, without the lock.
     lock.lock();
     GiveBack(TakeOutlived(), WarmSize::Clock::now() - gave_back_ >= warm_time_, lock);
   }
 }
 
-// Returns when there is a task, or never will be.
-void ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
-  const auto over = [this] { return stopping_ || !tasks_.empty(); };
-  while (!over()) {
+// Returns when there is a task that may run, or with none when there never will be.
+std::optional<ComputePool::Task> ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
+  for (;;) {
+    if (auto task = NextTask()) return task;
+    if (stopping_) return std::nullopt;
     const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
     if (warm) {
-      task_came_.wait_for(lock, warm_time_, over);
+      task_came_.wait_for(lock, warm_time_);
     } else {
       task_came_.wait(lock);
     }
@@ -85,13 +90,33 @@ void ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
   }
 }
 
+// The first whose caller may have one more, if any.
+std::optional<ComputePool::Task> ComputePool::NextTask() {
+  auto task = tasks_.PopOf([this](const CallerAccount* caller) {
+    const auto running = std::ranges::count(running_, caller);
+    return stopping_ || running < std::ptrdiff_t{threads_} - (Shares(caller) ? 1 : 0);
+  });
+  if (task) --waiting_;
+  return task;
+}
+
+// Whether a thread is to stay free of this caller.
+bool ComputePool::Shares(const CallerAccount* caller) const {
+  return threads_ > 1 && recent_.AnybodyBut(caller, WarmSize::Clock::now() - kSharingTime);
+}
+
+void ComputePool::Begin(const Task& task) { running_.push_back(task.caller); }
+
+void ComputePool::End(const Task& task) {
+  running_.erase(std::ranges::find(running_, task.caller));
+  recent_.Came(task.caller, WarmSize::Clock::now());
+  // Its caller may have one more, and, once alone, all threads.
+  if (waiting_ > 0) task_came_.notify_one();
+}
+
 std::unique_ptr<Worker> ComputePool::TakeWorker() {
   ++working_;
-  if (idle_.empty()) {
-    auto worker = std::make_unique<Worker>();
-    worker->observer = observer_;
-    return worker;
-  }
+  if (idle_.empty()) return std::make_unique<Worker>(observer_, budget_);
   std::unique_ptr<Worker> worker = std::move(idle_.back());
   idle_.pop_back();
   return worker;

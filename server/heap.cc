@@ -1,6 +1,10 @@
 #include "server/heap.h"
 
+#include <fcntl.h>
 #include <features.h>
+#include <unistd.h>
+
+#include <cstdlib>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -31,5 +35,18 @@ void KeepFreedMemory() {}
 void GiveBackFreedMemory() {}
 
 #endif
+
+std::uint64_t ResidentBytes() {
+  const int file = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  if (file < 0) return 0;
+  char text[128];
+  const ssize_t size = ::read(file, text, sizeof text - 1);
+  ::close(file);
+  if (size <= 0) return 0;
+  text[size] = 0;
+  char* end = nullptr;
+  std::strtoull(text, &end, 10);  // Pages: all, then the resident ones.
+  return std::strtoull(end, nullptr, 10) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
 
 }  // namespace partiemc::server

@@ -9,17 +9,21 @@ namespace {
 using std::chrono::milliseconds;
 
 // For as long one that comes only now cannot have waited for too long.
-milliseconds ShortestLimit(const IdleLimits& limits) {
-  if (limits.opening <= milliseconds(0)) return limits.streaming;
-  if (limits.streaming <= milliseconds(0)) return limits.opening;
-  return std::min(limits.opening, limits.streaming);
+milliseconds ShortestLimit(const ServerLimits& limits) {
+  milliseconds shortest = milliseconds::max();
+  for (const milliseconds limit :
+       {limits.idle.opening, limits.idle.streaming, limits.unary.request, limits.unary.answer}) {
+    if (limit > milliseconds(0)) shortest = std::min(shortest, limit);
+  }
+  return shortest;
 }
 
 }  // namespace
 
-IdleTimer::IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, const IdleLimits& limits)
-    : streams_(streams), watchers_(watchers), limits_(limits) {
-  if (ShortestLimit(limits) > milliseconds(0)) thread_ = std::thread([this] { Run(); });
+IdleTimer::IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
+                     const ServerLimits& limits)
+    : streams_(streams), watchers_(watchers), calls_(calls), limits_(limits) {
+  if (ShortestLimit(limits) < milliseconds::max()) thread_ = std::thread([this] { Run(); });
 }
 
 IdleTimer::~IdleTimer() {
@@ -36,9 +40,9 @@ void IdleTimer::Run() {
   while (!stopping_) {
     lock.unlock();
     const auto now = std::chrono::steady_clock::now();
-    const auto next =
-        std::min({streams_.EndIdle(limits_, now), watchers_.EndSilent(limits_.opening, now),
-                  now + ShortestLimit(limits_)});
+    const auto next = std::min({streams_.EndIdle(limits_.idle, now),
+                                watchers_.EndSilent(limits_.idle.opening, now),
+                                calls_.EndIdle(limits_.unary, now), now + ShortestLimit(limits_)});
     lock.lock();
     stop_came_.wait_until(lock, next, [this] { return stopping_; });
   }

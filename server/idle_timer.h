@@ -1,20 +1,23 @@
-// The one thread that ends streams and watches whose clients keep them waiting.
+// The one thread that ends calls whose clients keep them waiting.
 #pragma once
 
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 
+#include "server/limits.h"
 #include "server/stream_registry.h"
+#include "server/unary_registry.h"
 #include "server/watch_registry.h"
 
 namespace partiemc::server {
 
-/// Sleeps until the first of them may have waited for too long. No thread where nothing is limited.
+/// Sleeps until the first of them may have waited for too long.
 class IdleTimer {
  public:
   /// The registries live longer.
-  IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, const IdleLimits& limits);
+  IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
+            const ServerLimits& limits);
   ~IdleTimer();
   IdleTimer(const IdleTimer&) = delete;
   IdleTimer& operator=(const IdleTimer&) = delete;
@@ -24,7 +27,8 @@ class IdleTimer {
 
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
-  const IdleLimits limits_;
+  UnaryRegistry& calls_;
+  const ServerLimits limits_;
   std::mutex mutex_;
   std::condition_variable stop_came_;
   bool stopping_ = false;  // Guarded by mutex_.

@@ -1,18 +1,23 @@
 #include "server/logging.h"
 
 #include <grpc/support/log.h>
+#include <signal.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
+#include <cstdlib>
 #include <ctime>
 #include <iterator>
-#include <memory>
+#include <mutex>
+#include <utility>
 
+#include "partiemc/printable.h"
 #include "partiemc/status.h"
+#include "server/log_writer.h"
+#include "server/rate_limit.h"
 
 namespace partiemc::server {
 namespace {
@@ -20,17 +25,27 @@ namespace {
 // Begins the payload of a line whose fields are JSON already; nothing else can begin with it.
 constexpr char kFieldsFollow = '\x1e';
 
-std::atomic<LogFormat> log_format = LogFormat::kText;
+constexpr std::uint32_t kRefusalsPerSecond = 20;
+constexpr std::chrono::milliseconds kPatienceOnAbort(500);
 
+std::atomic<LogFormat> log_format = LogFormat::kText;
+RateLimit refusals(kRefusalsPerSecond);
+std::shared_ptr<LogWriter> writer;  // Since SetUpLogging.
+
+// Valid JSON, whatever comes: bytes that are no UTF-8 become U+FFFD.
 void AppendEscaped(std::string_view text, std::string& out) {
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
+  while (!text.empty()) {
+    const std::string_view before = text;
+    const auto character = TakeCharacter(text);
+    if (character == U'"' || character == U'\\') {
       out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+      out += before.front();
+    } else if (!character) {
+      out += "\\ufffd";
+    } else if (IsControl(*character)) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(*character));
     } else {
-      out += c;
+      out += before.substr(0, before.size() - text.size());
     }
   }
 }
@@ -82,8 +97,44 @@ class JsonFormatter final : public spdlog::formatter {
   }
 };
 
-// What gRPC says is about its own insides; what went wrong for a user is told in our own words.
-void LogFromGrpc(gpr_log_func_args* message) { spdlog::debug("grpc: {}", message->message); }
+// Errors are about gRPC's own insides; what went wrong for a user is told in our own words. What it
+// says below that level is for its developers, and may show what travels.
+void LogFromGrpc(gpr_log_func_args* message) {
+  if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
+  LogEvent(spdlog::level::debug, "grpc", {{"says", std::string(message->message)}});
+}
+
+class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit WriterSink(std::shared_ptr<LogWriter> to) : to_(std::move(to)) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    to_->Write({line.data(), line.size()});
+  }
+  void flush_() override {}
+
+  const std::shared_ptr<LogWriter> to_;
+};
+
+// Lines about lines that are missing.
+void TellLosses() {
+  if (const auto count = refusals.TakeHeldBack(); count > 0) {
+    LogEvent(spdlog::level::warn, "more refusals", {{"count", count}});
+  }
+  static std::atomic<std::uint64_t> told = 0;
+  const std::uint64_t dropped = LossesOfLog().dropped_lines;
+  if (const auto before = told.exchange(dropped); dropped > before) {
+    LogEvent(spdlog::level::warn, "log lines dropped", {{"count", dropped - before}});
+  }
+}
+
+void OnAbort(int signal) {
+  if (writer) writer->FlushInSignal(kPatienceOnAbort);
+  raise(signal);  // By default again (SA_RESETHAND).
+}
 
 }  // namespace
 
@@ -106,6 +157,7 @@ void LogEvent(spdlog::level::level_enum level, std::string_view event,
 }
 
 void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status) {
+  if (!refusals.Allow(RateLimit::Clock::now())) return;
   const auto violation = FindViolation(status);
   LogEvent(spdlog::level::warn, event,
            {{"peer", peer},
@@ -116,13 +168,40 @@ void LogRefusal(std::string_view event, const std::string& peer, const absl::Sta
 
 void SetUpLogging(const std::string& level, LogFormat format) {
   log_format = format;
-  auto logger = std::make_shared<spdlog::logger>("partiemc-server",
-                                                 std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  writer = std::make_shared<LogWriter>(LogWriter::Options{.every_second = &TellLosses});
+  auto logger =
+      std::make_shared<spdlog::logger>("partiemc-server", std::make_shared<WriterSink>(writer));
   logger->set_formatter(MakeLogFormatter(format));
   logger->set_level(spdlog::level::from_str(level));
-  logger->flush_on(spdlog::level::trace);
   spdlog::set_default_logger(std::move(logger));
+  // Before what it logs to goes.
+  static const int registered = std::atexit([] {
+    FlushLog();
+    writer.reset();
+  });
+  static_cast<void>(registered);
   gpr_set_log_function(&LogFromGrpc);
 }
+
+void RefuseTraces() {
+  if (std::getenv("GRPC_TRACE") == nullptr) return;
+  unsetenv("GRPC_TRACE");
+  LogEvent(spdlog::level::warn, "GRPC_TRACE ignored",
+           {{"error", "gRPC's traces print tokens; the log holds none"}});
+}
+
+void FlushLogOnAbort() {
+  struct sigaction action = {};
+  action.sa_handler = OnAbort;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGABRT, &action, nullptr);
+}
+
+void FlushLog(std::chrono::milliseconds patience) {
+  TellLosses();
+  if (writer) writer->Flush(patience);
+}
+
+LogLosses LossesOfLog() { return {writer ? writer->dropped() : 0, refusals.held_back_in_all()}; }
 
 }  // namespace partiemc::server

@@ -1,12 +1,16 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include "absl/synchronization/mutex.h"
 #include "server/health_check.h"
@@ -20,9 +24,22 @@ namespace {
 
 constexpr std::chrono::seconds kHealthCheckTimeout{3};
 
+// What is still going on at the end of the grace time has this long to see that it was cancelled.
+constexpr std::chrono::milliseconds kTimeToEnd{500};
+constexpr int kCutOff = 1;  // The exit code where it has not.
+
 int Fail(const absl::Status& status) {
   std::fprintf(stderr, "partiemc-server: %s\n", std::string(status.message()).c_str());
   return 1;
+}
+
+// gRPC's listener ends for good when a connection finds no descriptor left (CVE-2023-4785), so the
+// server has as many as it may.
+void TakeAllDescriptors() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 // Under a temporary name first: who waits for the file must not read half of it.
@@ -40,8 +57,36 @@ absl::Status WritePortFile(const std::string& path, const Address& address) {
   return absl::OkStatus();
 }
 
+// One of these, or 0 after `time`.
+int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
+  const auto until = std::chrono::steady_clock::now() + time;
+  for (;;) {
+    const auto left = std::chrono::duration_cast<std::chrono::nanoseconds>(
+        until - std::chrono::steady_clock::now());
+    if (left.count() <= 0) return 0;
+    const timespec timeout{.tv_sec = static_cast<time_t>(left.count() / 1'000'000'000),
+                           .tv_nsec = static_cast<long>(left.count() % 1'000'000'000)};
+    const int signal = sigtimedwait(&signals, nullptr, &timeout);
+    if (signal > 0) return signal;
+  }
+}
+
+// Whoever sets it first decides how the process ends: the drain, or what cuts it short.
+std::atomic<bool> leaving = false;
+
+// Ends the process, whatever goes on in it, at a further signal or when the grace time is over.
+void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
+  const int signal = WaitForSignal(signals, grace + kTimeToEnd);
+  if (leaving.exchange(true)) return;
+  LogEvent(spdlog::level::warn, "cut off",
+           {{"at", signal != 0 ? strsignal(signal) : "the end of the grace time"}});
+  FlushLog();
+  _exit(signal != 0 ? 128 + signal : kCutOff);
+}
+
 int Serve(const CommandLine& line) {
   KeepFreedMemory();
+  TakeAllDescriptors();
   // Distributions build abseil with its search for deadlocks, which every lock of gRPC pays for.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   // Before gRPC starts threads, so that these signals wait for sigwait and interrupt nobody.
@@ -51,7 +96,11 @@ int Serve(const CommandLine& line) {
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
+  signal(SIGPIPE, SIG_IGN);  // Whoever reads the log may go.
+
   SetUpLogging(line.log_level, line.log_format);
+  FlushLogOnAbort();
+  RefuseTraces();
   auto server = Server::Start(line.server);
   if (!server.ok()) return Fail(server.status());
   if (line.port_file) {
@@ -70,9 +119,14 @@ int Serve(const CommandLine& line) {
             {"metrics", metrics ? metrics->ToString() : "off"}});
   int signal = 0;
   sigwait(&signals, &signal);
-  spdlog::info("draining after {}", strsignal(signal));
+  LogEvent(spdlog::level::info, std::string("draining after ") + strsignal(signal), {});
+  std::thread(CutDrainShort, signals, line.grace).detach();
   (*server)->Drain(line.grace);
-  spdlog::info("stopped");
+  server->reset();
+  // Drained in the very moment in which it is cut short.
+  while (leaving.exchange(true)) std::this_thread::sleep_for(kTimeToEnd);
+  LogEvent(spdlog::level::info, "stopped", {});
+  FlushLog();
   return 0;
 }
 
@@ -89,6 +143,7 @@ int main(int argc, char** argv) {
   const auto& line = std::get<CommandLine>(parsed);
   if (!line.health_check) return Serve(line);
   SetUpLogging("off", LogFormat::kText);  // gRPC would tell standard error of every attempt.
+  RefuseTraces();
   const auto status =
       CheckHealth(*line.health_check, kHealthCheckTimeout, line.health_check_security);
   return status.ok() ? 0 : Fail(status);

@@ -1,30 +1,56 @@
 #include "server/memory_budget.h"
 
+#include <set>
 #include <utility>
 #include <vector>
 
 namespace partiemc::server {
+namespace {
 
-void MemoryBudget::Take(std::uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
-  held_ += bytes;
+using Fit = FairShare::Fit;
+
+std::uint64_t MostOf(const CallerAccount* caller) {
+  return caller == nullptr ? FairShare::kNoLimit
+                           : caller->quota().bytes.value_or(FairShare::kNoLimit);
 }
 
-bool MemoryBudget::TryTake(std::uint64_t bytes) {
+}  // namespace
+
+void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
   const std::lock_guard lock(mutex_);
-  if (!wishes_.empty() || !HasRoom(bytes)) return false;
-  held_ += bytes;
-  return true;
+  share_.Take(caller, bytes);
 }
 
-bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter) {
-  const std::lock_guard lock(mutex_);
-  if (wishes_.empty() && HasRoom(bytes)) {
-    held_ += bytes;
-    return true;
+// Whether nobody who came before is to have it first.
+Fit MemoryBudget::FitsNow(const Wish& wish) const {
+  for (const Wish& before : wishes_) {
+    const Fit fit = Fits(before);
+    if (fit == Fit::kNoRoom || before.caller == wish.caller) {
+      return fit == Fit::kMoreThanShare ? fit : Fit::kNoRoom;
+    }
   }
-  wishes_.push_back({waiter, bytes});
-  return false;
+  return Fits(wish);
+}
+
+Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
+  const std::uint64_t most = MostOf(caller);
+  const std::lock_guard lock(mutex_);
+  const Fit fit = FitsNow({{}, bytes, caller, most});
+  if (fit == Fit::kYes) share_.Take(caller, bytes);
+  return fit;
+}
+
+bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
+                              const CallerAccount* caller) {
+  Wish wish{waiter, bytes, caller, MostOf(caller)};
+  const std::lock_guard lock(mutex_);
+  const bool fits = FitsNow(wish) == Fit::kYes;
+  if (fits) {
+    share_.Take(caller, bytes);
+  } else {
+    wishes_.push_back(std::move(wish));
+  }
+  return fits;
 }
 
 void MemoryBudget::StopWaiting(const std::shared_ptr<Waiter>& waiter) {
@@ -37,10 +63,10 @@ void MemoryBudget::StopWaiting(const std::shared_ptr<Waiter>& waiter) {
   Grant();  // It may have stood before somebody who wants less.
 }
 
-void MemoryBudget::GiveBack(std::uint64_t bytes) {
+void MemoryBudget::GiveBack(std::uint64_t bytes, const CallerAccount* caller) {
   {
     const std::lock_guard lock(mutex_);
-    held_ -= bytes;
+    share_.GiveBack(caller, bytes);
   }
   Grant();
 }
@@ -49,12 +75,21 @@ void MemoryBudget::Grant() {
   std::vector<std::pair<std::shared_ptr<Waiter>, std::uint64_t>> granted;
   {
     const std::lock_guard lock(mutex_);
-    while (!wishes_.empty() && HasRoom(wishes_.front().bytes)) {
-      if (auto waiter = wishes_.front().waiter.lock()) {
-        held_ += wishes_.front().bytes;
-        granted.emplace_back(std::move(waiter), wishes_.front().bytes);
+    std::set<const CallerAccount*> waiting;  // Callers whose first wish has to wait.
+    for (auto wish = wishes_.begin(); wish != wishes_.end();) {
+      auto waiter = wish->waiter.lock();
+      const Fit fit = waiter == nullptr ? Fit::kYes : Fits(*wish);
+      if (fit == Fit::kNoRoom) break;
+      if (fit == Fit::kMoreThanShare) waiting.insert(wish->caller);
+      if (waiter != nullptr && waiting.contains(wish->caller)) {
+        ++wish;
+        continue;
       }
-      wishes_.pop_front();
+      if (waiter != nullptr) {
+        share_.Take(wish->caller, wish->bytes);
+        granted.emplace_back(std::move(waiter), wish->bytes);
+      }
+      wish = wishes_.erase(wish);
     }
   }
   for (const auto& [waiter, bytes] : granted) waiter->Granted(bytes);
@@ -62,7 +97,7 @@ void MemoryBudget::Grant() {
 
 std::uint64_t MemoryBudget::held() const {
   const std::lock_guard lock(mutex_);
-  return held_;
+  return share_.held();
 }
 
 }  // namespace partiemc::server

@@ -9,8 +9,10 @@
 namespace partiemc::server {
 namespace {
 
-prometheus::Counter& AddCounter(prometheus::Registry& registry, const std::string& name,
-                                const std::string& help) {
+using prometheus::MetricType;
+
+prometheus::Counter& MakeCounter(prometheus::Registry& registry, const std::string& name,
+                                 const std::string& help) {
   return prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add({});
 }
 
@@ -24,9 +26,9 @@ const std::vector<double>& SecondsBuckets() {
 }
 
 Metrics::Metrics()
-    : frames_(AddCounter(registry_, "partiemc_frames_total", "Frames answered by a result.")),
+    : frames_(MakeCounter(registry_, "partiemc_frames_total", "Frames answered by a result.")),
       particles_(
-          AddCounter(registry_, "partiemc_particles_total", "Particles of frames_total frames.")),
+          MakeCounter(registry_, "partiemc_particles_total", "Particles of frames_total frames.")),
       frame_errors_(prometheus::BuildCounter()
                         .Name("partiemc_frame_errors_total")
                         .Help("Frames refused, by the reason that their client was told.")
@@ -66,13 +68,19 @@ void Metrics::FrameRefused(std::string_view reason) {
 }
 
 void Metrics::AddGauge(std::string name, std::string help, std::function<double()> value) {
-  gauges_.push_back({std::move(name), std::move(help), std::move(value)});
+  asked_.push_back({std::move(name), std::move(help), MetricType::Gauge, std::move(value)});
+}
+
+void Metrics::AddCounter(std::string name, std::string help, std::function<double()> value) {
+  asked_.push_back({std::move(name), std::move(help), MetricType::Counter, std::move(value)});
 }
 
 std::vector<prometheus::MetricFamily> Metrics::Collect() const {
   std::vector<prometheus::MetricFamily> families = registry_.Collect();
-  for (const AskedGauge& gauge : gauges_) {
-    families.push_back(GaugeFamily(gauge.name, gauge.help, gauge.value()));
+  for (const Asked& asked : asked_) {
+    families.push_back({asked.name, asked.help, asked.type, {}});
+    prometheus::ClientMetric& metric = families.back().metric.emplace_back();
+    (asked.type == MetricType::Counter ? metric.counter.value : metric.gauge.value) = asked.value();
   }
   std::ranges::move(ProcessFamilies(), std::back_inserter(families));
   return families;

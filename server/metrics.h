@@ -20,9 +20,9 @@
 
 namespace partiemc::server {
 
-/// Counters and histograms are kept as things happen, at some hundred nanoseconds a frame; gauges
-/// are asked for when somebody reads. No label has a value that a client could choose, so that the
-/// number of series is bounded. Safe from any thread.
+/// Counters and histograms are kept as things happen, at some hundred nanoseconds a frame; gauges,
+/// and counters of others, are asked for when somebody reads. No label has a value that a client
+/// could choose, so that the number of series is bounded. Safe from any thread.
 class Metrics final : public prometheus::Collectable, public FrameObserver {
  public:
   Metrics();
@@ -32,6 +32,8 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
 
   /// A gauge whose value is asked for at each reading. Before anybody reads.
   void AddGauge(std::string name, std::string help, std::function<double()> value);
+  /// The same for what only grows.
+  void AddCounter(std::string name, std::string help, std::function<double()> value);
 
   /// For counters of other parts.
   prometheus::Registry& registry() { return registry_; }
@@ -40,8 +42,9 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
   std::vector<prometheus::MetricFamily> Collect() const override;
 
  private:
-  struct AskedGauge {
+  struct Asked {
     std::string name, help;
+    prometheus::MetricType type;
     std::function<double()> value;
   };
 
@@ -51,7 +54,7 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
   prometheus::Family<prometheus::Counter>& frame_errors_;
   prometheus::Histogram& frame_seconds_;
   std::array<prometheus::Histogram*, kStageCount> stage_seconds_{};
-  std::vector<AskedGauge> gauges_;
+  std::vector<Asked> asked_;
 };
 
 /// Buckets for times from a tenth of a millisecond to ten seconds.

@@ -24,13 +24,20 @@ constexpr char kDescription[] =
     "  partiemc-server --address 0.0.0.0:50051 --insecure   for a network that is trusted\n"
     "  partiemc-server --health-check                    is one running? Exit code 0 or 1\n"
     "\n"
-    "SIGTERM or SIGINT drains it: what clients have sent is answered, then it leaves.\n";
+    "SIGTERM or SIGINT drains it: what clients have sent is answered, then it leaves. A second "
+    "one\n"
+    "ends it at once.\n";
 
 constexpr char kFooter[] =
     "\nEvery option can also stand in the file of --config (TOML or INI, `max-streams = 8`) or in "
     "the\n"
     "environment variable that is named with it. The command line counts most, then the file.\n"
-    "Exit codes: 0 good, 1 failed, 2 wrong command line.";
+    "GRPC_TRACE is ignored: gRPC's traces print tokens. Clients that give no sign of life for 25 "
+    "s\n"
+    "are taken for gone.\n"
+    "Exit codes: 0 good, 1 failed or cut off after --grace-seconds, 2 wrong command line, 128 + N "
+    "ended\n"
+    "by a second signal N.";
 
 // What the flags fill in, before it is checked as a whole.
 struct Raw {
@@ -41,6 +48,7 @@ struct Raw {
   double grace_seconds = 4;
   double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
   std::string token_file;
+  std::string checkpoint_key_file;
   std::string metrics;
   TlsFiles tls;
   std::string log_format = "text";
@@ -49,6 +57,11 @@ struct Raw {
 
 // Beyond this the receive limit of 1.25 times would not fit into gRPC's int.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
+
+// A frame is in memory before it is counted, so a small budget wants small frames; but a budget
+// that is next to nothing still lets streams go on, one frame after the other.
+constexpr std::uint64_t kFramesInBudget = 8;
+constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 
 void AddServingOptions(CLI::App& app, Raw& raw) {
   app.add_option("--address", raw.address,
@@ -66,8 +79,9 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_THREADS");
-  app.add_option("--grace-seconds", raw.grace_seconds,
-                 "After SIGTERM, cancel what is not done within this time")
+  app.add_option(
+         "--grace-seconds", raw.grace_seconds,
+         "After SIGTERM, cancel what is not done within this time, and end a second after it")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->type_name("SECONDS")
@@ -95,10 +109,19 @@ void AddSecurity(CLI::App& app, Raw& raw) {
       ->envname("PARTIEMC_TLS_CLIENT_CA")
       ->group(kGroup);
   app.add_option("--token-file", raw.token_file,
-                 "Take only calls with a bearer token of this file; a line is TOKEN, or TOKEN and "
-                 "the NAME that the log has for its client. Health checks need none")
+                 "Take only calls with a bearer token of this file; a line is TOKEN [NAME] "
+                 "[may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N] "
+                 "[bytes=64MB]: NAME is its client's in the log, what is left out is not limited. "
+                 "Health checks need none")
       ->type_name("FILE")
       ->envname("PARTIEMC_TOKEN_FILE")
+      ->group(kGroup);
+  app.add_option("--checkpoint-key-file", raw.checkpoint_key_file,
+                 "Sign the checkpoints that streams are resumed from, and take only signed ones: a "
+                 "key, the same for all servers that share streams; a second line has a key that "
+                 "is still, or already, taken")
+      ->type_name("FILE")
+      ->envname("PARTIEMC_CHECKPOINT_KEY_FILE")
       ->group(kGroup);
   app.add_flag("--insecure", raw.line.server.insecure,
                "Listen on an address that other machines reach, although all travels in the clear")
@@ -146,7 +169,8 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->envname("PARTIEMC_MAX_PARTICLES")
       ->group(kGroup);
   app.add_option("--max-tiles", limits.frame.max_tiles,
-                 "Tiles of 32 x 32 lattice nodes that one frame may reach, 10 kB of memory each")
+                 "Tiles of 32 x 32 lattice nodes that one frame may reach, 10 kB of memory each "
+                 "and more where drops are many")
       ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostTiles))
       ->capture_default_str()
       ->type_name("N")
@@ -154,7 +178,7 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
   app.add_option("--max-frame-bytes", raw.max_frame_bytes,
                  "Bytes of one serialised frame, units as in 200MB allowed (default: 48 for each "
-                 "of --max-particles)")
+                 "of --max-particles, but at most an eighth of --memory-budget)")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::Range(std::uint64_t{1}, kMaxFrameBytes))
       ->type_name("BYTES")
@@ -231,6 +255,9 @@ std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
   }
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
   if (!raw.token_file.empty()) raw.line.server.token_file = raw.token_file;
+  if (!raw.checkpoint_key_file.empty()) {
+    raw.line.server.checkpoint_key_file = raw.checkpoint_key_file;
+  }
   raw.line.health_check_security.tls = raw.line.server.tls.has_value();
   if (!raw.tls.client_ca.empty()) {
     raw.line.health_check_security.certificate_file = raw.tls.certificate;
@@ -244,7 +271,8 @@ std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
   limits.max_frame_bytes =
       raw.max_frame_bytes != 0
           ? raw.max_frame_bytes
-          : std::min(ServerLimits::DefaultFrameBytes(limits.frame.max_particles), kMaxFrameBytes);
+          : std::min({ServerLimits::DefaultFrameBytes(limits.frame.max_particles), kMaxFrameBytes,
+                      std::max(limits.memory_budget / kFramesInBudget, kLeastFrameBytes)});
   return raw.line;
 }
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "server/grpc_status.h"
+#include "partiemc/status.h"
 #include "server/logging.h"
 
 namespace partiemc::server {
@@ -33,28 +33,29 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
 }  // namespace
 
 ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
-                                       const ServerLimits& limits, StreamRegistry& registry,
-                                       MemoryBudget& budget, ComputePool& pool, WatchPump& pump,
-                                       std::string client)
-    : context_(context),
-      client_(std::move(client)),
+                                       absl::StatusOr<AdmittedCall> admission,
+                                       const ServerLimits& limits, OpeningCalls& opening,
+                                       StreamRegistry& registry, MemoryBudget& budget,
+                                       ComputePool& pool, WatchPump& pump,
+                                       const CurrentCheckpointKeys& checkpoint_keys)
+    : ByteCall(context, std::move(admission)),
       registry_(registry),
-      messages_(limits, registry, pump),
+      messages_(limits, registry, pump, checkpoint_keys),
       flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget,
-                                         limits.frames_in_flight)) {
-  if (auto status = registry_.Enter(flow_); !status.ok()) {
-    Finish(status);
-  } else {
-    flow_->Start();
-  }
+                                         limits.frames_in_flight, caller().account())) {
+  absl::Status status = this->admission();
+  if (status.ok()) status = registry_.Enter(flow_, caller());
+  if (status.ok()) MayGiveWay(opening, flow_);
+  flow_->Start(std::move(status));
 }
 
 void ReconstructReactor::OnReadDone(bool ok) {
+  RequestCame();
   if (ok) {
     flow_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
   } else {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (context_.IsCancelled()) flow_->Cancelled();
+    if (IsCancelled()) flow_->Cancelled();
     flow_->ReadEnded();
   }
 }
@@ -66,10 +67,7 @@ void ReconstructReactor::OnWriteDone(bool ok) {
 
 void ReconstructReactor::OnCancel() { flow_->Cancelled(); }
 
-void ReconstructReactor::OnDone() {
-  registry_.Leave(*flow_);
-  delete this;
-}
+void ReconstructReactor::Left() { registry_.Leave(*flow_); }
 
 void ReconstructReactor::StartRead(std::size_t slot) {
   read_slot_ = slot;
@@ -89,25 +87,25 @@ absl::Status ReconstructReactor::Open(std::size_t slot) {
   LogEvent(spdlog::level::info, "stream opened",
            {{"id", stream->id},
             {"name", description.name},
-            {"peer", context_.peer()},
-            {"client", client_},
+            {"peer", peer()},
+            {"client", caller().name()},
             {"placement", std::string(Name(description.parameters.placement))},
             {"fill", std::string(Name(description.parameters.fill))}});
   return absl::OkStatus();
 }
 
 Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
-  return messages_.Answer(slot, worker);
+  return messages_.Answer(slot, worker, flow_->cancelled());
 }
 
-void ReconstructReactor::Cut() { context_.TryCancel(); }
+void ReconstructReactor::Cut() { CancelCall(); }
 
 void ReconstructReactor::Finish(const absl::Status& status) {
   // Closed first: a client that sees the end may open the same name again at once.
   const auto stream = registry_.Close(*flow_);
-  LogEnd(stream, context_.peer(), status);
+  LogEnd(stream, peer(), status);
   if (stream) stream->description.hub->End(WatchEnd::OfStream(status));
-  ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
+  End(status);
 }
 
 }  // namespace partiemc::server

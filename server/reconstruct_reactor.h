@@ -2,14 +2,13 @@
 // Messages pass as bytes: a frame is parsed where it is computed, into memory that is warm.
 #pragma once
 
-#include <grpcpp/support/byte_buffer.h>
-#include <grpcpp/support/server_callback.h>
-
 #include <cstddef>
 #include <memory>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/byte_call.h"
 #include "server/compute_pool.h"
 #include "server/limits.h"
 #include "server/memory_budget.h"
@@ -19,19 +18,17 @@
 
 namespace partiemc::server {
 
-/// Deletes itself when gRPC is done with it. No callback of it blocks.
-class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
-                                 private StreamDoor {
+class ReconstructReactor final : public ByteCall, private StreamDoor {
  public:
-  /// What is passed by reference outlives the call. `client` is the caller's name for the log.
-  ReconstructReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-                     StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool,
-                     WatchPump& pump, std::string client);
+  /// What is passed by reference outlives the call.
+  ReconstructReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
+                     const ServerLimits& limits, OpeningCalls& opening, StreamRegistry& registry,
+                     MemoryBudget& budget, ComputePool& pool, WatchPump& pump,
+                     const CurrentCheckpointKeys& checkpoint_keys);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
-  void OnDone() override;
 
  private:
   void StartRead(std::size_t slot) override;
@@ -40,9 +37,8 @@ class ReconstructReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   Answered Answer(std::size_t slot, Worker& worker) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
+  void Left() override;
 
-  grpc::CallbackServerContext& context_;
-  const std::string client_;
   StreamRegistry& registry_;
   StreamMessages messages_;
   std::size_t read_slot_ = 0;  // Of the read that is going on.

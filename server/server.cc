@@ -2,7 +2,6 @@
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -15,9 +14,12 @@
 #include "absl/strings/str_cat.h"
 #include "server/call_guard.h"
 #include "server/call_metrics.h"
+#include "server/health_service.h"
+#include "server/heap.h"
 #include "server/logging.h"
 #include "server/service.h"
 #include "server/tls_credentials.h"
+#include "server/worker_memory.h"
 
 namespace partiemc::server {
 namespace {
@@ -32,7 +34,16 @@ int ReceiveLimit(std::uint64_t max_frame_bytes) {
   return static_cast<int>(std::min<std::uint64_t>(limit, std::numeric_limits<int>::max()));
 }
 
+// Of one call, in its connection.
+constexpr int kUnreadBytes = 256 << 10;
+
+// A connection that does not get as far as HTTP/2 (and TLS) ends after this.
+constexpr int kHandshakeTimeoutMs = 10'000;
+
 constexpr std::chrono::milliseconds kTimeToCut(250);
+// For the last words to arrive, and connections to close in the orderly way. gRPC itself waits
+// until each client has answered, which one that has no call looks at every few seconds only.
+constexpr std::chrono::milliseconds kTimeToClose(500);
 // Several times as long as a call takes to come in.
 constexpr std::chrono::milliseconds kQuiet(50);
 
@@ -45,15 +56,23 @@ absl::Status CheckSecurity(const ServerOptions& options) {
       "--insecure if the network is trusted"));
 }
 
-absl::StatusOr<BearerTokens> ReadTokens(const std::string& path) {
-  const auto text = ReadSmallFile("--token-file", path);
+// What `parse` makes of the file that `flag` names.
+template <typename Parse>
+auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
+    -> decltype(parse(std::string())) {
+  const auto text = ReadSmallFile(flag, path);
   if (!text.ok()) return text.status();
-  auto tokens = BearerTokens::Parse(*text);
-  if (!tokens.ok()) {
+  auto secrets = parse(*text);
+  if (!secrets.ok()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("--token-file ", path, ": ", tokens.status().message()));
+        absl::StrCat(flag, " ", path, ": ", secrets.status().message()));
   }
-  return tokens;
+  return secrets;
+}
+
+// What the process may hold: the budget, what it has begun with, and its workers.
+std::uint64_t MostResidentBytes(const ServerOptions& options) {
+  return options.limits.memory_budget + ResidentBytes() + options.threads * kWorkerBytes;
 }
 
 // For watchers to be told that the server drains; one that does not read is cut then.
@@ -64,14 +83,20 @@ constexpr std::chrono::milliseconds kWatchPatience(500);
 Server::Server(const ServerOptions& options)
     : options_(options),
       address_(options.address),
+      authentication_(CallerQuota{.calls = options.limits.CallsOfOneCaller()}),
       tls_identity_(std::make_unique<CurrentTlsIdentity>()),
+      opening_(options.limits.MaxOpeningCalls()),
       watchers_(options.limits.max_watchers),
       registry_(options.limits.max_streams),
+      calls_(options.limits.max_streams),
       budget_(options.limits.memory_budget),
-      pool_(options.threads, kWarmTime, metrics_.get()),
-      idle_timer_(registry_, watchers_, options.limits.idle),
-      service_(std::make_unique<Service>(options_.limits, authentication_, registry_, budget_,
-                                         pool_, watchers_, pump_)) {}
+      pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
+      idle_timer_(registry_, watchers_, calls_, options.limits),
+      intake_guard_(opening_, MostResidentBytes(options), {ResidentBytes, GiveBackFreedMemory}),
+      service_(std::make_unique<Service>(options_.limits, authentication_, opening_, registry_,
+                                         calls_, budget_, pool_, watchers_, pump_,
+                                         checkpoint_keys_)),
+      health_(std::make_unique<HealthService>(authentication_, opening_, calls_, budget_)) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
   if (auto status = CheckSecurity(options); !status.ok()) return status;
@@ -105,9 +130,19 @@ absl::Status Server::LoadFiles() {
   }
   if (options_.token_file) {
     auto status = reloader_.Add("tokens", {*options_.token_file}, [this] {
-      auto tokens = ReadTokens(*options_.token_file);
+      auto tokens = ReadSecrets("--token-file", *options_.token_file, BearerTokens::Parse);
       if (!tokens.ok()) return tokens.status();
       authentication_.Set(*std::move(tokens));
+      return absl::OkStatus();
+    });
+    if (!status.ok()) return status;
+  }
+  if (options_.checkpoint_key_file) {
+    auto status = reloader_.Add("checkpoint keys", {*options_.checkpoint_key_file}, [this] {
+      auto keys = ReadSecrets("--checkpoint-key-file", *options_.checkpoint_key_file,
+                              CheckpointKeys::Parse);
+      if (!keys.ok()) return keys.status();
+      checkpoint_keys_.Set(*std::move(keys));
       return absl::OkStatus();
     });
     if (!status.ok()) return status;
@@ -136,6 +171,13 @@ void Server::AddGauges() {
       "Results that watchers have not taken yet, counted for each although they share them; "
       "outside of the budget.",
       [this] { return watchers_.held_bytes(); });
+  const auto count = [this](const char* name, const char* help, std::uint64_t LogLosses::*value) {
+    metrics_->AddCounter(name, help, [value] { return static_cast<double>(LossesOfLog().*value); });
+  };
+  count("partiemc_log_lines_dropped_total", "Lines that standard error was too slow for.",
+        &LogLosses::dropped_lines);
+  count("partiemc_log_refusals_held_back_total", "Refusals beyond what the log tells in a second.",
+        &LogLosses::refusals_held_back);
   if (!options_.tls) return;
   add("partiemc_tls_certificate_not_after_seconds", "When the server's certificate expires (Unix).",
       [this] {
@@ -144,7 +186,6 @@ void Server::AddGauges() {
 }
 
 absl::Status Server::Listen() {
-  grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
@@ -158,11 +199,27 @@ absl::Status Server::Listen() {
   if (options_.metrics) interceptors.push_back(MakeCallMetrics(*metrics_));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   builder.RegisterService(service_.get());
+  builder.RegisterService(health_.get());
   builder.SetMaxReceiveMessageSize(ReceiveLimit(options_.limits.max_frame_bytes));
   // Clients ask a connection for a sign of life this often at most, whether it carries data or not.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                              kShortestPingIntervalMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  // What has left without a word (a frozen program, a cut cable) would hold its stream for hours.
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS,
+                             static_cast<int>(options_.keepalive.interval.count()));
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
+                             static_cast<int>(options_.keepalive.timeout.count()));
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // As many as it takes.
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
+  // What a client may send before it is read: windows that grow with the connection's speed, as
+  // gRPC's do by itself, let a hundred bodies that nobody will read hold 70 MiB. A read that goes
+  // on has all of its message let in, so that large frames come as fast, but for one round trip.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
+  // A caller has no more calls, in however many connections.
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(options_.limits.CallsOfOneCaller()));
   // Otherwise two servers share a port without noticing, and clients reach one of them.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   server_ = builder.BuildAndStart();
@@ -171,8 +228,7 @@ absl::Status Server::Listen() {
                                                ": gRPC refuses it; choose another --address"));
   }
   if (address_.unix_path.empty()) address_.port = static_cast<std::uint16_t>(port);
-  server_->GetHealthCheckService()->SetServingStatus(v1::ReconstructionService::service_full_name(),
-                                                     true);
+  health_->SetServing(true);
   return absl::OkStatus();
 }
 
@@ -201,17 +257,20 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
 void Server::Drain(std::chrono::milliseconds grace) {
   // Cutting those who do not take their answers takes a moment of the grace time too.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
-  server_->GetHealthCheckService()->SetServingStatus(false);
+  health_->SetServing(false);
   registry_.Drain();
+  calls_.Drain();
   // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
   // to the last word: a connection that closes with requests unread takes back what was just
   // written.
   registry_.WaitUntilEmpty(deadline);
+  calls_.WaitUntilEmpty(deadline);
   pump_.Flush();  // So that watchers hear of the last results before they are sent home.
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
-  const auto left = std::max(deadline - std::chrono::steady_clock::now(),
-                             std::chrono::steady_clock::duration::zero());
+  const auto left = std::clamp<std::chrono::steady_clock::duration>(
+      deadline - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration::zero(),
+      kTimeToClose);
   server_->Shutdown(std::chrono::system_clock::now() + left);
   server_->Wait();
   metrics_endpoint_.reset();  // Last, so that the drain can be watched.

@@ -9,15 +9,19 @@
 #include "absl/status/statusor.h"
 #include "server/address.h"
 #include "server/authentication.h"
+#include "server/checkpoint_keys.h"
 #include "server/compute_pool.h"
 #include "server/file_reloader.h"
 #include "server/idle_timer.h"
+#include "server/intake_guard.h"
 #include "server/limits.h"
 #include "server/memory_budget.h"
 #include "server/metrics.h"
 #include "server/metrics_endpoint.h"
+#include "server/opening_calls.h"
 #include "server/stream_registry.h"
 #include "server/tls_identity.h"
+#include "server/unary_registry.h"
 #include "server/watch_pump.h"
 #include "server/watch_registry.h"
 
@@ -30,7 +34,18 @@ class ServerCredentials;
 namespace partiemc::server {
 
 class CurrentTlsIdentity;
+class HealthService;
 class Service;
+
+/// How a server finds out that a connection is dead although nobody closed it. The name of a
+/// producer that vanished is free after both times.
+struct Keepalive {
+  /// A connection without a sign of life for this time is asked for one.
+  std::chrono::milliseconds interval{15'000};
+  /// It is closed if it gives none within this time. Longer than the 5 s in which a gRPC client
+  /// that waits for nothing looks at its connections.
+  std::chrono::milliseconds timeout{10'000};
+};
 
 struct ServerOptions {
   Address address{.host = "127.0.0.1", .port = 50051, .unix_path = {}};
@@ -40,6 +55,8 @@ struct ServerOptions {
   std::optional<TlsFiles> tls;
   /// Lets in only callers with a token of this file (BearerTokens::Parse), health checks apart.
   std::optional<std::string> token_file;
+  /// Signs checkpoints and takes only those signed by a key of this file (CheckpointKeys::Parse).
+  std::optional<std::string> checkpoint_key_file;
   /// How soon a change of those files counts: for connections and calls that begin after it.
   std::chrono::milliseconds reload_interval{1000};
   /// Where metrics are served over HTTP; they hold no names and no data of streams.
@@ -47,14 +64,15 @@ struct ServerOptions {
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
+  Keepalive keepalive;
 };
 
 class Server {
  public:
   /// Listens and serves when it returns.
   /// Errors: INVALID_ARGUMENT for an address beyond this machine with neither `tls` nor
-  /// `insecure`, and for files of `tls` or tokens that do not hold what they should; UNAVAILABLE
-  /// where it cannot listen; a line that says what, where and what to do.
+  /// `insecure`, and for files of `tls`, tokens or keys that do not hold what they should;
+  /// UNAVAILABLE where it cannot listen; a line that says what, where and what to do.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
 
   /// Stops at once if it was not drained.
@@ -71,8 +89,8 @@ class Server {
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
   /// Takes no new call, tells the streams, answers what they have sent, ends watches, and stops.
-  /// What is not done shortly before the end of `grace` is cancelled. Returns when nothing goes on
-  /// any more.
+  /// What is not done shortly before the end of `grace` is cancelled; connections without a call of
+  /// ours are not waited for. Returns when nothing goes on any more.
   void Drain(std::chrono::milliseconds grace);
 
  private:
@@ -87,15 +105,20 @@ class Server {
   Address address_;
   const std::shared_ptr<Metrics> metrics_ = std::make_shared<Metrics>();
   Authentication authentication_;
+  CurrentCheckpointKeys checkpoint_keys_;
   std::unique_ptr<CurrentTlsIdentity> tls_identity_;
   std::shared_ptr<grpc::ServerCredentials> credentials_;
+  OpeningCalls opening_;
   WatchPump pump_;
   WatchRegistry watchers_;
   StreamRegistry registry_;
+  UnaryRegistry calls_;
   MemoryBudget budget_;
   ComputePool pool_;
   IdleTimer idle_timer_;
+  IntakeGuard intake_guard_;
   std::unique_ptr<Service> service_;
+  std::unique_ptr<HealthService> health_;
   std::unique_ptr<grpc::Server> server_;
   // The last two stop before what they load into and read from goes.
   FileReloader reloader_;

@@ -4,50 +4,51 @@
 #include <charconv>
 #include <chrono>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
 #include "server/call_guard.h"
-#include "server/grpc_status.h"
 #include "server/reconstruct_reactor.h"
 #include "server/stream_messages.h"
+#include "server/unary_requests.h"
 #include "server/watch_reactor.h"
+#include "wire/message_bytes.h"
 
 namespace partiemc::server {
 namespace {
 
 constexpr std::int32_t kMaxPageSize = 1000;
 
-absl::Status AnswerCall(const v1::ReconstructFrameRequest& request, const ServerLimits& limits,
-                        Worker& worker, v1::ReconstructFrameResponse& response) {
+// Beside its frame, a request has parameters and outputs only.
+std::uint64_t MaxCallBytes(const ServerLimits& limits) {
+  return limits.max_frame_bytes + limits.max_frame_bytes / 4;
+}
+
+absl::StatusOr<grpc::ByteBuffer> AnswerFrameCall(grpc::ByteBuffer& bytes,
+                                                 const ServerLimits& limits, Worker& worker,
+                                                 const std::atomic<bool>& cancelled) {
+  v1::ReconstructFrameRequest request;
+  if (auto status = ParseRequest(bytes, MaxCallBytes(limits), request); !status.ok()) return status;
   const auto parameters = wire::DecodeParameters(request.parameters());
   if (!parameters.ok()) return parameters.status();
   const auto outputs = wire::DecodeOutputs(request.outputs(), request.has_outputs());
   if (!outputs.ok()) return outputs.status();
   auto session = Session::Open(*parameters, limits.frame);
   if (!session.ok()) return session.status();
+  v1::ReconstructFrameResponse response;
   wire::EncodeParameters(session->parameters(), *response.mutable_parameters());
-  return AnswerFrame(DecodeFrameWithin(request.frame(), limits), session->next_sequence(), *outputs,
-                     *session, worker, *response.mutable_frame());
+  const absl::Status status =
+      AnswerFrame(DecodeFrameWithin(request.frame(), limits), session->next_sequence(), *outputs,
+                  *session, worker, cancelled, *response.mutable_frame());
+  if (!status.ok()) return status;
+  return wire::ToBytes(response);
 }
 
-// RESOURCE_EXHAUSTED with the Violation of what is not let in.
-absl::Status Refused(std::string_view reason, std::string field, std::string value,
+absl::Status BadPage(std::string_view reason, std::string field, std::string value,
                      std::string rule) {
-  return ViolationError(absl::StatusCode::kResourceExhausted,
+  return ViolationError(absl::StatusCode::kInvalidArgument,
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
-}
-
-// Ends a call as soon as it comes.
-class RefusedStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
- public:
-  explicit RefusedStream(const grpc::Status& status) { Finish(status); }
-  void OnDone() override { delete this; }
-};
-
-grpc::ServerUnaryReactor* Refuse(const absl::Status& status, grpc::CallbackServerContext& context) {
-  grpc::ServerUnaryReactor* reactor = context.DefaultReactor();
-  reactor->Finish(ToGrpcStatus(status, context));
-  return reactor;
 }
 
 void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_point now,
@@ -70,122 +71,131 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 
 }  // namespace
 
-grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Reconstruct(
-    grpc::CallbackServerContext* context) {
-  auto client = Authenticate(authentication_, *context);
-  if (!client.ok()) return new RefusedStream(ToGrpcStatus(client.status(), *context));
-  return new ReconstructReactor(*context, limits_, registry_, budget_, pool_, pump_,
-                                *std::move(client));
-}
-
-absl::Status Service::LetCallIn(std::uint64_t bytes) {
-  if (auto status = registry_.CheckServing(); !status.ok()) return status;
-  if (++calls_ > limits_.max_streams) {
-    --calls_;
-    return Refused(kReasonTooManyCalls, "calls of ReconstructFrame",
-                   absl::StrCat(limits_.max_streams, " going on"),
-                   absl::StrCat("must be at most ", limits_.max_streams, "; try again later"));
-  }
-  if (!budget_.TryTake(bytes)) {
-    --calls_;
-    return Refused(kReasonMemoryBudget, "request", absl::StrCat(bytes, " bytes"),
-                   absl::StrCat("must fit with what is being worked on into ", budget_.bytes(),
-                                " bytes; try again later, or start the server with a larger "
-                                "--memory-budget"));
-  }
-  return absl::OkStatus();
-}
-
-grpc::ServerUnaryReactor* Service::ReconstructFrame(grpc::CallbackServerContext* context,
-                                                    const v1::ReconstructFrameRequest* request,
-                                                    v1::ReconstructFrameResponse* response) {
-  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return Refuse(client.status(), *context);
-  }
-  const std::uint64_t bytes = request->ByteSizeLong();
-  if (auto status = LetCallIn(bytes); !status.ok()) return Refuse(status, *context);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  pool_.Submit([=, this](Worker& worker) {
-    const auto status = context->IsCancelled() ? absl::CancelledError("the client went away")
-                                               : AnswerCall(*request, limits_, worker, *response);
-    --calls_;
-    budget_.GiveBack(bytes);
-    reactor->Finish(ToGrpcStatus(status, *context));
+Service::Service(const ServerLimits& limits, const Authentication& authentication,
+                 OpeningCalls& opening, StreamRegistry& registry, UnaryRegistry& calls,
+                 MemoryBudget& budget, ComputePool& pool, WatchRegistry& watchers, WatchPump& pump,
+                 const CurrentCheckpointKeys& checkpoint_keys)
+    : limits_(limits),
+      authentication_(authentication),
+      opening_(opening),
+      registry_(registry),
+      calls_(calls),
+      budget_(budget),
+      pool_(pool),
+      watchers_(watchers),
+      pump_(pump),
+      checkpoint_keys_(checkpoint_keys) {
+  const auto serve = [this](const char* method, Method handler) {
+    Serve(absl::StrCat("/", ServiceName(), "/", method), std::move(handler));
+  };
+  serve("Reconstruct", [this](grpc::CallbackServerContext* context) {
+    return new ReconstructReactor(
+        *context, Admit(authentication_, *context, &Caller::CheckMayProduce), limits_, opening_,
+        registry_, budget_, pool_, pump_, checkpoint_keys_);
   });
-  return reactor;
+  serve("ReconstructFrame",
+        [this](grpc::CallbackServerContext* context) { return ReconstructFrame(*context); });
+  serve("WatchStream", [this](grpc::CallbackServerContext* context) {
+    return new WatchReactor(*context, Admit(authentication_, *context, &Caller::CheckMayWatch),
+                            limits_, opening_, registry_, watchers_);
+  });
+  serve("ListStreams", [this](grpc::CallbackServerContext* context) {
+    return Information<v1::ListStreamsRequest>(
+        *context, &Caller::CheckMayList,
+        [this](const auto& request, const Caller& caller) { return ListStreams(request, caller); });
+  });
+  serve("GetServerInfo", [this](grpc::CallbackServerContext* context) {
+    return Information<v1::GetServerInfoRequest>(*context, nullptr, [this](const auto&, auto&) {
+      return absl::StatusOr<v1::GetServerInfoResponse>(GetServerInfo());
+    });
+  });
 }
 
-grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::WatchStream(
-    grpc::CallbackServerContext* context) {
-  auto client = Authenticate(authentication_, *context);
-  if (!client.ok()) return new RefusedStream(ToGrpcStatus(client.status(), *context));
-  return new WatchReactor(*context, limits_, registry_, watchers_, *std::move(client));
+Service::Reactor* Service::ReconstructFrame(grpc::CallbackServerContext& context) {
+  auto admission = Admit(authentication_, context, &Caller::CheckMayProduce);
+  if (auto status = registry_.CheckServing(); admission.ok() && !status.ok()) admission = status;
+  return new UnaryReactor(
+      context, std::move(admission), UnaryKind::kFrame, opening_, calls_, budget_, &pool_,
+      [this](grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled) {
+        return AnswerFrameCall(request, limits_, *worker, cancelled);
+      });
 }
 
-grpc::ServerUnaryReactor* Service::ListStreams(grpc::CallbackServerContext* context,
-                                               const v1::ListStreamsRequest* request,
-                                               v1::ListStreamsResponse* response) {
-  if (auto client = Authenticate(authentication_, *context); !client.ok()) {
-    return Refuse(client.status(), *context);
+template <typename Request, typename Answer>
+Service::Reactor* Service::Information(grpc::CallbackServerContext& context, Permission permission,
+                                       Answer answer) {
+  auto admission = Admit(authentication_, context, permission);
+  const Caller caller = admission.ok() ? admission->caller : Caller();
+  return new UnaryReactor(
+      context, std::move(admission), UnaryKind::kInformation, opening_, calls_, budget_, nullptr,
+      [answer, caller](grpc::ByteBuffer& bytes, Worker*,
+                       auto&) -> absl::StatusOr<grpc::ByteBuffer> {
+        Request request;
+        if (auto status = ParseRequest(bytes, kMaxInformationBytes, request); !status.ok())
+          return status;
+        const auto response = answer(request, caller);
+        if (!response.ok()) return response.status();
+        return wire::ToBytes(*response);
+      });
+}
+
+absl::StatusOr<v1::ListStreamsResponse> Service::ListStreams(const v1::ListStreamsRequest& request,
+                                                             const Caller& caller) const {
+  if (request.page_size() < 0) {
+    return BadPage(kReasonOutOfRange, "page_size", absl::StrCat(request.page_size()),
+                   "must be at least 0");
   }
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   // A token is the number of the last stream that was listed.
-  const std::string& token = request->page_token();
+  const std::string& token = request.page_token();
   std::uint64_t after = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), after);
   if (!token.empty() && (error != std::errc() || end != token.data() + token.size())) {
-    reactor->Finish({grpc::StatusCode::INVALID_ARGUMENT,
-                     "page_token: not from here; must be the next_page_token of an answer"});
-    return reactor;
+    return BadPage(kReasonPageToken, "page_token", absl::StrCat(token.size(), " characters"),
+                   "must be the next_page_token of an answer");
   }
-  const std::int32_t asked = request->page_size() > 0 ? request->page_size() : kMaxPageSize;
+  const std::int32_t asked = request.page_size() > 0 ? request.page_size() : kMaxPageSize;
   const auto page_size = static_cast<std::size_t>(std::min(asked, kMaxPageSize));
-  const auto streams = registry_.List(after, page_size + 1);
+  const auto streams = registry_.List(after, page_size + 1, caller);
   const auto now = std::chrono::steady_clock::now();
+  v1::ListStreamsResponse response;
   for (std::size_t i = 0; i < std::min(streams.size(), page_size); ++i) {
-    EncodeSummary(streams[i], now, *response->add_streams());
+    EncodeSummary(streams[i], now, *response.add_streams());
   }
   if (streams.size() > page_size) {
-    response->set_next_page_token(absl::StrCat(streams[page_size - 1].number));
+    response.set_next_page_token(absl::StrCat(streams[page_size - 1].number));
   }
-  reactor->Finish(grpc::Status::OK);
-  return reactor;
+  return response;
 }
 
-grpc::ServerUnaryReactor* Service::GetServerInfo(grpc::CallbackServerContext* context,
-                                                 const v1::GetServerInfoRequest*,
-                                                 v1::GetServerInfoResponse* response) {
-  const auto client = Authenticate(authentication_, *context);
-  if (!client.ok()) return Refuse(client.status(), *context);
-  response->set_version(PARTIEMC_VERSION);
-  response->set_method_version(kMethodVersion);
-  EncodeLimits(limits_, *response->mutable_limits());
-  response->set_frames_in_flight(limits_.frames_in_flight);
-  response->set_compute_threads(pool_.threads());
+v1::GetServerInfoResponse Service::GetServerInfo() const {
+  v1::GetServerInfoResponse response;
+  response.set_version(PARTIEMC_VERSION);
+  response.set_method_version(kMethodVersion);
+  EncodeLimits(limits_, *response.mutable_limits());
+  response.set_frames_in_flight(limits_.frames_in_flight);
+  response.set_compute_threads(pool_.threads());
   // Those that this build of the core accepts.
   for (const Placement placement : AllPlacements()) {
     ReconstructionParameters parameters;
     parameters.placement = placement;
-    if (Reconstructor::Create(parameters).ok()) response->add_placements(wire::ToWire(placement));
+    if (Reconstructor::Create(parameters).ok()) response.add_placements(wire::ToWire(placement));
   }
   for (const Fill fill : AllFills()) {
     ReconstructionParameters parameters;
     parameters.fill = fill;
-    if (Reconstructor::Create(parameters).ok()) response->add_fills(wire::ToWire(fill));
+    if (Reconstructor::Create(parameters).ok()) response.add_fills(wire::ToWire(fill));
   }
-  response->add_capabilities("resume");
-  response->add_capabilities("watch");
-  response->set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
-  response->set_draining(registry_.draining());
-  v1::ServerLoad& load = *response->mutable_load();
+  response.add_capabilities("resume");
+  response.add_capabilities("watch");
+  response.set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
+  response.set_draining(registry_.draining());
+  v1::ServerLoad& load = *response.mutable_load();
   load.set_watchers(static_cast<std::uint32_t>(watchers_.count()));
   load.set_frames_waiting(pool_.QueueLength());
   load.set_memory_held(budget_.held());
   load.set_memory_budget(budget_.bytes());
   load.set_watched_bytes(watchers_.held_bytes());
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(grpc::Status::OK);
-  return reactor;
+  return response;
 }
 
 }  // namespace partiemc::server

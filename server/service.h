@@ -1,74 +1,52 @@
-// partiemc.v1.ReconstructionService over gRPC's callback API.
+// partiemc.v1.ReconstructionService over gRPC's callback API, every method as a stream of bytes.
 #pragma once
 
-#include <atomic>
-#include <cstdint>
-#include <string_view>
-
-#include "partiemc/v1/reconstruction.grpc.pb.h"
+#include "absl/status/statusor.h"
+#include "partiemc/v1/reconstruction.pb.h"
 #include "server/authentication.h"
+#include "server/byte_service.h"
+#include "server/call_guard.h"
+#include "server/checkpoint_keys.h"
 #include "server/compute_pool.h"
 #include "server/limits.h"
 #include "server/memory_budget.h"
+#include "server/opening_calls.h"
 #include "server/stream_registry.h"
+#include "server/unary_reactor.h"
+#include "server/unary_registry.h"
 #include "server/watch_pump.h"
 #include "server/watch_registry.h"
 
 namespace partiemc::server {
 
-/// The reason of RESOURCE_EXHAUSTED for a ReconstructFrame too many (proto/PROTOCOL.md).
-inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
-
-/// The generated service, in which Reconstruct and WatchStream pass messages as bytes.
-using ServiceBase = v1::ReconstructionService::WithRawCallbackMethod_Reconstruct<
-    v1::ReconstructionService::WithCallbackMethod_ReconstructFrame<
-        v1::ReconstructionService::WithRawCallbackMethod_WatchStream<
-            v1::ReconstructionService::WithCallbackMethod_ListStreams<
-                v1::ReconstructionService::WithCallbackMethod_GetServerInfo<
-                    v1::ReconstructionService::Service>>>>>;
-
-/// Every method authenticates its caller first (server/call_guard.h).
-class Service final : public ServiceBase {
+/// Every method admits its caller first (server/call_guard.h), before anything of a request is
+/// read.
+class Service final : public ByteService {
  public:
   /// The arguments outlive the service.
-  Service(const ServerLimits& limits, const Authentication& authentication,
-          StreamRegistry& registry, MemoryBudget& budget, ComputePool& pool,
-          WatchRegistry& watchers, WatchPump& pump)
-      : limits_(limits),
-        authentication_(authentication),
-        registry_(registry),
-        budget_(budget),
-        pool_(pool),
-        watchers_(watchers),
-        pump_(pump) {}
-
-  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Reconstruct(
-      grpc::CallbackServerContext* context) override;
-  grpc::ServerUnaryReactor* ReconstructFrame(grpc::CallbackServerContext* context,
-                                             const v1::ReconstructFrameRequest* request,
-                                             v1::ReconstructFrameResponse* response) override;
-  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* WatchStream(
-      grpc::CallbackServerContext* context) override;
-  grpc::ServerUnaryReactor* ListStreams(grpc::CallbackServerContext* context,
-                                        const v1::ListStreamsRequest* request,
-                                        v1::ListStreamsResponse* response) override;
-  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
-                                          const v1::GetServerInfoRequest* request,
-                                          v1::GetServerInfoResponse* response) override;
+  Service(const ServerLimits& limits, const Authentication& authentication, OpeningCalls& opening,
+          StreamRegistry& registry, UnaryRegistry& calls, MemoryBudget& budget, ComputePool& pool,
+          WatchRegistry& watchers, WatchPump& pump, const CurrentCheckpointKeys& checkpoint_keys);
 
  private:
-  // Errors: UNAVAILABLE (DRAINING), RESOURCE_EXHAUSTED (TOO_MANY_CALLS, MEMORY_BUDGET); else it
-  // counts, with its bytes.
-  absl::Status LetCallIn(std::uint64_t bytes);
+  Reactor* ReconstructFrame(grpc::CallbackServerContext& context);
+  // A call for information: `answer` makes its response, on gRPC's own thread.
+  template <typename Request, typename Answer>
+  Reactor* Information(grpc::CallbackServerContext& context, Permission permission, Answer answer);
+  absl::StatusOr<v1::ListStreamsResponse> ListStreams(const v1::ListStreamsRequest& request,
+                                                      const Caller& caller) const;
+  v1::GetServerInfoResponse GetServerInfo() const;
 
   const ServerLimits& limits_;
   const Authentication& authentication_;
+  OpeningCalls& opening_;
   StreamRegistry& registry_;
+  UnaryRegistry& calls_;
   MemoryBudget& budget_;
   ComputePool& pool_;
   WatchRegistry& watchers_;
   WatchPump& pump_;
-  std::atomic<std::uint32_t> calls_ = 0;  // Of ReconstructFrame, going on.
+  const CurrentCheckpointKeys& checkpoint_keys_;
 };
 
 }  // namespace partiemc::server

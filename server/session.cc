@@ -6,9 +6,23 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/checkpoint.h"
 
 namespace partiemc::server {
+namespace {
+
+// The account of a worker, for one frame.
+class FrameMemory final : public MemoryGuard {
+ public:
+  FrameMemory(WorkerMemory& account, std::size_t particles)
+      : account_(account), particles_(particles) {}
+  bool Reserve(std::uint64_t bytes) override { return account_.Reserve(bytes, particles_); }
+
+ private:
+  WorkerMemory& account_;
+  const std::size_t particles_;
+};
+
+}  // namespace
 
 absl::Status OutOfMemory(std::string value) {
   return ViolationError(
@@ -24,24 +38,25 @@ absl::StatusOr<Session> Session::Open(const ReconstructionParameters& parameters
   return Session(*std::move(reconstructor));
 }
 
-absl::StatusOr<Session> Session::Resume(const ReconstructionParameters& parameters,
-                                        const FrameLimits& limits, std::string_view checkpoint) {
-  auto session = Open(parameters, limits);
-  if (!session.ok()) return session;
-  auto restored = ParseCheckpoint(checkpoint, session->parameters());
-  if (!restored.ok()) return restored.status();
-  session->next_sequence_ = restored->next_sequence;
-  session->state_ = std::move(restored->state);
-  return session;
+void Session::GoOnFrom(Checkpoint checkpoint) {
+  next_sequence_ = checkpoint.next_sequence;
+  state_ = std::move(checkpoint.state);
 }
 
-std::string Session::Checkpoint() const {
-  return Serialize(server::Checkpoint{next_sequence_, state_}, parameters());
+std::string Session::MakeCheckpoint(const StreamTerms& terms, const CheckpointKeys* keys,
+                                    std::uint64_t max_bytes) const {
+  if (SerializedBytes(state_) + kMaxCheckpointOverhead > max_bytes) return {};
+  return Serialize(next_sequence_, state_, parameters(), terms, keys);
 }
 
 absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
-                             Worker& worker, Deliver deliver) {
-  absl::Status status = TryAnswer(sequence, frame, worker, deliver);
+                             Worker& worker, Deliver deliver, const std::atomic<bool>* cancelled) {
+  absl::Status status = TryAnswer(sequence, frame, worker, deliver, cancelled);
+  if (absl::IsCancelled(status)) {
+    --next_sequence_;
+    worker.Empty();
+    return status;
+  }
   if (!status.ok() && worker.observer != nullptr) {
     const auto violation = FindViolation(status);
     worker.observer->FrameRefused(violation ? std::string_view(violation->reason) : "INTERNAL");
@@ -50,7 +65,8 @@ absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>
 }
 
 absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
-                                Worker& worker, Deliver deliver) {
+                                Worker& worker, Deliver deliver,
+                                const std::atomic<bool>* cancelled) {
   if (sequence != next_sequence_) {
     const bool gap = sequence > next_sequence_;
     return ViolationError(
@@ -63,21 +79,23 @@ absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Fra
   ++next_sequence_;
   if (!frame.ok()) return frame.status();
   try {
-    return Reconstruct(*frame, worker, deliver);
+    return Reconstruct(*frame, worker, deliver, cancelled);
   } catch (const std::bad_alloc&) {
-    // What the workspace holds is anybody's guess now, and its memory is wanted.
-    worker = Worker{.observer = worker.observer};
+    worker.Empty();  // Its memory is wanted.
     return OutOfMemory(absl::StrCat(frame->ParticleCount(), " particles"));
   }
 }
 
-absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver) {
+absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver,
+                                  const std::atomic<bool>* cancelled) {
   worker.particles.Used(frame.ParticleCount(), WarmSize::Clock::now());
   // The core commits a frame that it accepts, but `deliver` may still refuse it: work on a copy.
   worker.next_state = state_;
   StageClock clock;
+  FrameMemory memory(worker.memory, frame.ParticleCount());
   absl::Status status =
-      reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result, &clock);
+      reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result,
+                                 {.observer = &clock, .memory = &memory, .cancelled = cancelled});
   if (status.ok()) status = deliver(worker.result, clock);
   if (!status.ok()) return status;
   // Another copy: the worker's own has room for the largest stream that it served, which would pass

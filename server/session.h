@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -17,6 +18,7 @@
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
 #include "partiemc/state.h"
+#include "server/checkpoint.h"
 #include "server/worker.h"
 
 namespace partiemc::server {
@@ -24,7 +26,6 @@ namespace partiemc::server {
 /// The reasons that sessions give, beside the core's (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonSequenceGap = "SEQUENCE_GAP";
 inline constexpr std::string_view kReasonSequenceDuplicate = "SEQUENCE_DUPLICATE";
-inline constexpr std::string_view kReasonOutOfMemory = "OUT_OF_MEMORY";
 
 /// RESOURCE_EXHAUSTED with the Violation of a frame, of size `value`, that memory is lacking for.
 absl::Status OutOfMemory(std::string value);
@@ -63,22 +64,25 @@ class Session {
   static absl::StatusOr<Session> Open(const ReconstructionParameters& parameters,
                                       const FrameLimits& limits);
 
-  /// Goes on after the frame that `checkpoint` was made after, bit for bit as if the stream had
-  /// never stopped. Errors: also those of ParseCheckpoint.
-  static absl::StatusOr<Session> Resume(const ReconstructionParameters& parameters,
-                                        const FrameLimits& limits, std::string_view checkpoint);
+  /// Goes on after the frame that the checkpoint was made after, bit for bit as if the stream had
+  /// never stopped.
+  void GoOnFrom(Checkpoint checkpoint);
 
-  /// What Resume takes, after the last frame. Costs and takes as much as the state.
-  std::string Checkpoint() const;
+  /// What ParseCheckpoint takes, after the last frame. Costs and takes as much as the state. Empty
+  /// where it might have more than `max_bytes`.
+  std::string MakeCheckpoint(const StreamTerms& terms, const CheckpointKeys* keys,
+                             std::uint64_t max_bytes) const;
 
   /// Reconstructs the frame and hands the result to `deliver`. `frame` is an error where the frame
   /// could not be decoded.
   /// Errors, each with a Violation, after which the state is as if the frame had never come:
   ///   a `sequence` other than next_sequence() (SEQUENCE_GAP, SEQUENCE_DUPLICATE) uses up nothing;
-  ///   the error of `frame`, of the core or of `deliver`, or memory that ran out (OUT_OF_MEMORY)
-  ///   uses up the sequence number.
+  ///   the error of `frame`, of the core or of `deliver`, or memory that ran out or that the worker
+  ///   may not have (OUT_OF_MEMORY) uses up the sequence number;
+  ///   CANCELLED, without a Violation, once `cancelled` is set (FrameControl), uses up nothing: the
+  ///   same frame may come again.
   absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
-                      Deliver deliver);
+                      Deliver deliver, const std::atomic<bool>* cancelled = nullptr);
 
   /// 1 for a new stream.
   std::uint64_t next_sequence() const { return next_sequence_; }
@@ -89,8 +93,9 @@ class Session {
   explicit Session(Reconstructor reconstructor) : reconstructor_(std::move(reconstructor)) {}
 
   absl::Status TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
-                         Deliver deliver);
-  absl::Status Reconstruct(const Frame& frame, Worker& worker, Deliver deliver);
+                         Deliver deliver, const std::atomic<bool>* cancelled);
+  absl::Status Reconstruct(const Frame& frame, Worker& worker, Deliver deliver,
+                           const std::atomic<bool>* cancelled);
 
   Reconstructor reconstructor_;
   State state_;

@@ -51,10 +51,11 @@ absl::Status DrainingError() {
 }
 
 StreamFlow::StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget,
-                       std::size_t window)
+                       std::size_t window, std::shared_ptr<const CallerAccount> caller)
     : door_(door),
       pool_(pool),
       budget_(budget),
+      caller_(std::move(caller)),
       window_(std::max<std::size_t>(window, 1)),
       slot_bytes_(window_) {}
 
@@ -70,8 +71,10 @@ void StreamFlow::On(Event event) {
   Perform(std::move(actions));
 }
 
-void StreamFlow::Start() {
-  On([] {});
+void StreamFlow::Start(absl::Status admission) {
+  On([&] {
+    if (!admission.ok()) End(std::move(admission));
+  });
 }
 
 void StreamFlow::ReadDone(RequestKind kind, std::uint64_t bytes) {
@@ -83,13 +86,16 @@ void StreamFlow::ReadDone(RequestKind kind, std::uint64_t bytes) {
     surplus_ += std::exchange(set_aside_, 0);  // Now it is known what there is.
     open = opening_;
   });
-  if (open) Open();
+  if (!open) return;
+  if (bytes <= kQuickOpenBytes) return Open();
+  pool_.Submit([self = shared_from_this()](Worker&) { self->Open(); }, [] {}, nullptr,
+               caller_.get());
 }
 
 void StreamFlow::TakeRequest(RequestKind kind, std::uint64_t bytes) {
   if (phase_ == Phase::kOpening) {
     opening_ = kind == RequestKind::kOpen;
-    if (opening_) return;
+    if (opening_) return SetSlotBytes(0, bytes);
     End(BrokenProtocol(Name(kind), "the first must be `open`"));
   } else if (phase_ == Phase::kStreaming) {
     switch (kind) {
@@ -109,9 +115,10 @@ void StreamFlow::TakeRequest(RequestKind kind, std::uint64_t bytes) {
 }
 
 void StreamFlow::Open() {
-  absl::Status status = door_.Open(0);
+  absl::Status status = cancelled_ ? ClientGone() : door_.Open(0);
   On([&] {
     opening_ = false;
+    SetSlotBytes(0, 0);
     if (!status.ok()) {
       End(std::move(status));
     } else if (phase_ == Phase::kOpening) {
@@ -158,6 +165,12 @@ void StreamFlow::TakenOver() {
                                                         "resumed by its producer in another call",
                                                         "must be read where it was resumed"}));
     owes_cut_ = writing_;  // Whoever takes no answers would keep it from ending.
+  });
+}
+
+void StreamFlow::GiveWay(const absl::Status& status) {
+  On([&] {
+    if (phase_ == Phase::kOpening && !opening_) End(status);
   });
 }
 
@@ -231,13 +244,14 @@ void StreamFlow::Abandon(absl::Status status) {
   if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kAbandoned;
   status_ = std::move(status);
+  cancelled_ = true;
 }
 
 // Counts what frame number `frame`, from 0, holds now instead of what it held before.
 void StreamFlow::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
   std::uint64_t& held = slot_bytes_[frame % window_];
   if (bytes > held) {
-    budget_.Take(bytes - held);
+    budget_.Take(bytes - held, caller_.get());
   } else {
     surplus_ += held - bytes;
   }
@@ -280,7 +294,7 @@ bool StreamFlow::MayRead(Actions& actions) {
   }
   if (set_aside_ > 0) return true;
   if (waiting_) return false;
-  if (budget_.TakeOrWait(last_bytes_, shared_from_this())) {
+  if (budget_.TakeOrWait(last_bytes_, shared_from_this(), caller_.get())) {
     set_aside_ = last_bytes_;
     return true;
   }
@@ -321,10 +335,10 @@ void StreamFlow::Perform(Actions actions) {
   for (;;) {
     // Before anything that may end the stream elsewhere: it ends with nothing held.
     if (actions.stop_waiting) budget_.StopWaiting(self);
-    if (actions.give_back > 0) budget_.GiveBack(actions.give_back);
+    if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
     if (actions.compute) {
       pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
-                   [self] { self->Computed(); }, &busy_mark_);
+                   [self] { self->Computed(); }, &busy_mark_, caller_.get());
     }
     if (actions.write) door_.StartWrite(*actions.write, actions.write_slot);
     if (actions.cut) door_.Cut();

@@ -2,6 +2,7 @@
 // neither what the messages are nor how they travel; a door (gRPC, or a test's memory) does.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -24,6 +25,8 @@ inline constexpr std::string_view kReasonProtocol = "PROTOCOL";
 inline constexpr std::string_view kReasonDraining = "DRAINING";
 inline constexpr std::string_view kReasonTakenOver = "TAKEN_OVER";
 inline constexpr std::string_view kReasonIdle = "IDLE";
+/// Of a call, and of a frame, whose bytes are not the message that they should be.
+inline constexpr std::string_view kReasonMalformed = "MALFORMED";
 
 /// UNAVAILABLE with the Violation that a draining server gives everybody.
 absl::Status DrainingError();
@@ -46,6 +49,9 @@ struct Answered {
   std::function<void()> afterwards = {};
 };
 
+/// A larger `open`, which brings a checkpoint, takes a time that no thread of gRPC has.
+inline constexpr std::uint64_t kQuickOpenBytes = 64 << 10;
+
 /// Where a stream's messages come in and go out. It has `window` slots, each a request and the
 /// answer to it. StreamFlow never has more than one read, one write and one computation going on,
 /// these on different slots, and never calls the door with a lock held.
@@ -57,8 +63,8 @@ class StreamDoor {
   virtual void StartRead(std::size_t slot) = 0;
   /// Begins to write; ends in StreamFlow::WriteDone. `slot` counts for kAnswer only.
   virtual void StartWrite(Outgoing what, std::size_t slot) = 0;
-  /// Opens the stream as the request in `slot` asks and prepares Outgoing::kOpened. Quick. An
-  /// error ends the stream.
+  /// Opens the stream as the request in `slot` asks and prepares Outgoing::kOpened. Quick, but for
+  /// a request of more than kQuickOpenBytes, which a worker opens. An error ends the stream.
   virtual absl::Status Open(std::size_t slot) = 0;
   /// Turns the frame in `slot` into its answer. Called by a worker, one frame of a stream at a time
   /// and in their order.
@@ -95,18 +101,23 @@ struct StreamCounts {
 /// its answer's writing, so that a client that does not read its answers is not read from either.
 /// Ending answers what was read; abandoned answers nothing more. Safe from any thread.
 ///
-/// Memory: the bytes of requests that were read and of answers that are not written count against
-/// the budget of all streams. While something of a stream is in flight, another frame is read only
-/// when the budget has room for one of the size of the last. A stream of which nothing is in flight
-/// always reads one frame, so that none stands still for the sake of another.
+/// Memory: the bytes of requests that were read, `open` among them, and of answers that are not
+/// written count against the budget of all streams. While something of a stream is in flight,
+/// another frame is read only when the budget has room for one of the size of the last. A stream of
+/// which nothing is in flight always reads one frame, so that none stands still for the sake of
+/// another.
 class StreamFlow final : public MemoryBudget::Waiter,
                          public std::enable_shared_from_this<StreamFlow> {
  public:
   /// `door` lives until its Finish returns, `pool` and `budget` longer. Held by shared_ptr only.
-  StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget, std::size_t window);
+  /// `caller` is whose share of pool and budget it takes.
+  StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget, std::size_t window,
+             std::shared_ptr<const CallerAccount> caller = nullptr);
 
-  /// Begins with the first read. Called once.
-  void Start();
+  /// Begins with the first read, or, where `admission` is an error, ends with it at once. Called
+  /// once. Every end of a stream goes through this state machine, that of a refused one too, so
+  /// that StreamDoor::Finish is called exactly once, whatever the client does meanwhile.
+  void Start(absl::Status admission = absl::OkStatus());
 
   /// The read that was begun last has brought a request of this kind and size.
   void ReadDone(RequestKind kind, std::uint64_t bytes);
@@ -118,6 +129,8 @@ class StreamFlow final : public MemoryBudget::Waiter,
   /// The client goes on with this stream in another call, and its connection may be dead: answers
   /// nothing more and ends with ABORTED.
   void TakenOver();
+  /// Ends a stream that has not sent its `open` with this error; others go on.
+  void GiveWay(const absl::Status& status);
   /// The server is going away: reads no further frame, sends Outgoing::kDraining, answers what was
   /// read and ends the stream with UNAVAILABLE.
   void Drain();
@@ -129,6 +142,8 @@ class StreamFlow final : public MemoryBudget::Waiter,
                                                   std::chrono::steady_clock::time_point now);
 
   StreamCounts counts() const;
+  /// Becomes true when nobody waits for answers any more.
+  const std::atomic<bool>& cancelled() const { return cancelled_; }
 
   void Granted(std::uint64_t bytes) override;
 
@@ -165,10 +180,12 @@ class StreamFlow final : public MemoryBudget::Waiter,
   StreamDoor& door_;
   ComputePool& pool_;
   MemoryBudget& budget_;
+  const std::shared_ptr<const CallerAccount> caller_;
   const std::size_t window_;
 
   BusyStreams::Mark busy_mark_;       // The pool's.
   std::optional<Answered> answered_;  // From Compute to Computed, which it precedes.
+  std::atomic<bool> cancelled_ = false;
 
   mutable std::mutex mutex_;  // Guards everything below.
   Phase phase_ = Phase::kOpening;

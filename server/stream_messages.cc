@@ -14,6 +14,9 @@
 namespace partiemc::server {
 namespace {
 
+// Not worth giving up.
+constexpr std::size_t kSmallBuffers = std::size_t{4} << 20;
+
 // What a worker keeps warm of messages: a frame's arrays are views into `request`.
 struct FrameMessages final : DoorBuffers {
   v1::ReconstructRequest request;
@@ -27,17 +30,57 @@ std::unique_ptr<FrameMessages> TakeMessages(Worker& worker) {
   return std::unique_ptr<FrameMessages>(static_cast<FrameMessages*>(worker.door_buffers.release()));
 }
 
-// Parses a request that holds a frame into `request`, whose buffers are used again.
+// Parses a request that holds a frame into `request`, whose buffers are used again. What is not
+// known of it is passed over, and kept nowhere.
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request) {
   request.mutable_frame()->Clear();
   try {
-    if (wire::MergeBytes(bytes, request)) return absl::OkStatus();
+    if (wire::HasFewFields(bytes, *request.GetDescriptor()) && wire::MergeBytes(bytes, request)) {
+      request.DiscardUnknownFields();
+      return absl::OkStatus();
+    }
   } catch (const std::bad_alloc&) {
     return OutOfMemory(absl::StrCat(bytes.Length(), " bytes"));
   }
-  return ViolationError(absl::StatusCode::kInvalidArgument,
-                        {std::string(kReasonMalformed), "frame",
-                         absl::StrCat(bytes.Length(), " bytes"), "must be a ParticleFrame"});
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonMalformed), "frame", absl::StrCat(bytes.Length(), " bytes"),
+       absl::StrCat("must be a ParticleFrame of at most ", wire::kMaxFields, " fields")});
+}
+
+absl::Status TooLargeOpen(std::size_t bytes, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOpenBytes), "open", absl::StrCat(bytes, " bytes"), std::move(rule)});
+}
+
+// Parses a request that holds an `open`, and gives its bytes up.
+absl::Status ParseOpen(grpc::ByteBuffer& bytes, std::uint64_t max_bytes,
+                       v1::ReconstructRequest& request) {
+  const std::size_t size = bytes.Length();
+  if (size > max_bytes) {
+    return TooLargeOpen(size, absl::StrCat("must be at most ", max_bytes, " bytes"));
+  }
+  const bool parsed =
+      wire::HasFewFields(bytes, *request.GetDescriptor()) && wire::MergeBytes(bytes, request);
+  bytes.Clear();
+  if (!parsed) {
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonProtocol), "request", "malformed",
+         absl::StrCat("must be a ReconstructRequest of at most ", wire::kMaxFields, " fields")});
+  }
+  if (size > kQuickOpenBytes + request.open().resume().checkpoint().size()) {
+    return TooLargeOpen(
+        size, absl::StrCat("must be at most ", kQuickOpenBytes, " bytes beside its checkpoint"));
+  }
+  return absl::OkStatus();
+}
+
+// Gives up buffers that have grown far beyond the request that they were last used for: fields that
+// take turns at being large would add up.
+void ShrinkBuffers(std::uint64_t bytes, v1::ReconstructRequest& request) {
+  if (request.SpaceUsedLong() > 4 * bytes + kSmallBuffers) request = {};
 }
 
 }  // namespace
@@ -65,19 +108,20 @@ absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame,
 
 absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
                          const wire::Outputs& outputs, Session& session, Worker& worker,
-                         v1::ReconstructedFrame& message) {
+                         const std::atomic<bool>& cancelled, v1::ReconstructedFrame& message) {
   const auto deliver = [&](const Result& result, const StageClock& clock) {
     return wire::EncodeResult(result, {clock.stages_ms(), clock.TotalMs()}, outputs, message);
   };
-  auto status = session.Answer(sequence, frame, worker, deliver);
+  auto status = session.Answer(sequence, frame, worker, deliver, &cancelled);
   if (status.ok()) message.set_time(frame->time);
   return status;
 }
 
 StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,
-                               WatchPump& pump)
+                               WatchPump& pump, const CurrentCheckpointKeys& checkpoint_keys)
     : limits_(limits),
       registry_(registry),
+      checkpoint_keys_(checkpoint_keys),
       hub_(std::make_shared<WatchHub>(pump,
                                       WatchHub::Limits{.tap_bytes = limits.max_watcher_bytes,
                                                        .kept_bytes = limits.KeptResultBytes()})),
@@ -118,25 +162,24 @@ grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
 
 absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
   v1::ReconstructRequest request;
-  const bool parsed = wire::MergeBytes(requests_[slot], request);
-  requests_[slot].Clear();
-  if (!parsed) {
-    return ViolationError(
-        absl::StatusCode::kInvalidArgument,
-        {std::string(kReasonProtocol), "request", "malformed", "must be a ReconstructRequest"});
+  if (auto status = ParseOpen(requests_[slot], limits_.MaxOpenBytes(), request); !status.ok()) {
+    return status;
   }
   const v1::OpenStream& open = request.open();
   const auto parameters = wire::DecodeParameters(open.parameters());
   if (!parameters.ok()) return parameters.status();
   const auto outputs = wire::DecodeOutputs(open.outputs(), open.has_outputs());
   if (!outputs.ok()) return outputs.status();
-  auto session = open.has_resume()
-                     ? Session::Resume(*parameters, limits_.frame, open.resume().checkpoint())
-                     : Session::Open(*parameters, limits_.frame);
+  auto session = Session::Open(*parameters, limits_.frame);
   if (!session.ok()) return session.status();
   const std::string token = open.has_resume() ? open.resume().stream_token() : NewStreamToken();
+  StreamTerms terms = TermsOf(open, *outputs, token);
+  if (open.has_resume()) {
+    auto status = Resume(open.resume(), limits_, checkpoint_keys_, *session, terms);
+    if (!status.ok()) return status;
+  }
   auto stream = registry_.Open(flow,
-                               {.name = open.stream_name(),
+                               {.name = terms.name,
                                 .labels = {open.labels().begin(), open.labels().end()},
                                 .parameters = session->parameters(),
                                 .hub = hub_},
@@ -144,7 +187,8 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
   if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
   outputs_ = *outputs;
-  checkpoint_interval_ = open.checkpoint_interval();
+  terms_ = std::move(terms);
+  terms_.name = stream->description.name;
 
   v1::ReconstructResponse response;
   v1::StreamOpened& opened = *response.mutable_opened();
@@ -158,9 +202,11 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
   return stream;
 }
 
-Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
+Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
+                                const std::atomic<bool>& cancelled) {
   std::unique_ptr<FrameMessages> messages = TakeMessages(worker);
   Answered answered;
+  const std::uint64_t request_bytes = requests_[slot].Length();
   const absl::Status parsed = ParseFrame(requests_[slot], messages->request);
   if (!outputs_.echo_particles) requests_[slot].Clear();
   const v1::ParticleFrame& request = messages->request.frame();
@@ -168,28 +214,23 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
   const std::uint64_t next_sequence = session_->next_sequence();
   const absl::Status status =
       AnswerFrame(parsed.ok() ? DecodeFrameWithin(request, limits_) : parsed, request.sequence(),
-                  outputs_, *session_, worker, result);
-  const bool used_number = session_->next_sequence() > next_sequence;
-  const bool has_checkpoint =
-      checkpoint_interval_ > 0 && used_number && next_sequence % checkpoint_interval_ == 0;
+                  outputs_, *session_, worker, cancelled, result);
+  std::string checkpoint =
+      CheckpointAfter(next_sequence, *session_, terms_, limits_, checkpoint_keys_);
   if (status.ok()) {
     result.set_sequence(request.sequence());
-    if (has_checkpoint) {
-      result.set_checkpoint(session_->Checkpoint());
-    } else {
-      result.clear_checkpoint();
-    }
+    messages->result.set_checkpoint(std::move(checkpoint));
     answers_[slot] = wire::ToBytes(messages->result);
-    if (ShowWatchers(slot, result, request))
-      answered.afterwards = [hub = hub_] { hub->Announce(); };
+    if (ShowWatchers(slot, request)) answered.afterwards = [hub = hub_] { hub->Announce(); };
   } else {
     v1::ReconstructResponse error;
     wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
                            *error.mutable_error());
-    if (has_checkpoint) error.mutable_error()->set_checkpoint(session_->Checkpoint());
+    error.set_checkpoint(std::move(checkpoint));
     answers_[slot] = wire::ToBytes(error);
     messages->request.Clear();  // Nothing has checked its size.
   }
+  ShrinkBuffers(request_bytes, messages->request);
   requests_[slot].Clear();
   worker.door_buffers = std::move(messages);
   answered.is_result = status.ok();
@@ -199,9 +240,8 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker) {
 }
 
 // They share the bytes of the answer, and of the request where particles are echoed.
-bool StreamMessages::ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
-                                  const v1::ParticleFrame& request) {
-  wire::WatchedBytes bytes(answers_[slot], result);
+bool StreamMessages::ShowWatchers(std::size_t slot, const v1::ParticleFrame& request) {
+  wire::WatchedBytes bytes(answers_[slot]);
   if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
   return hub_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
 }

@@ -3,6 +3,7 @@
 
 #include <grpcpp/support/byte_buffer.h>
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "absl/status/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
 #include "server/limits.h"
+#include "server/resume.h"
 #include "server/session.h"
 #include "server/stream_flow.h"
 #include "server/stream_registry.h"
@@ -21,9 +23,9 @@
 
 namespace partiemc::server {
 
-/// Beside the reasons of sessions, of the core and of the codec (proto/PROTOCOL.md).
+/// Beside the reasons of streams, of sessions, of the core and of the codec (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonFrameBytes = "FRAME_BYTES";
-inline constexpr std::string_view kReasonMalformed = "MALFORMED";
+inline constexpr std::string_view kReasonOpenBytes = "OPEN_BYTES";
 
 void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
 
@@ -35,7 +37,7 @@ absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const Se
 /// into `message`. Errors: those of Session::Answer.
 absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
                          const wire::Outputs& outputs, Session& session, Worker& worker,
-                         v1::ReconstructedFrame& message);
+                         const std::atomic<bool>& cancelled, v1::ReconstructedFrame& message);
 
 /// Slots hold messages as bytes, and only from their reading or until their writing: what a frame
 /// needs besides belongs to the worker that answers it, so that an idle stream holds next to
@@ -44,7 +46,8 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 class StreamMessages {
  public:
   /// One slot for each of limits.frames_in_flight.
-  StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchPump& pump);
+  StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchPump& pump,
+                 const CurrentCheckpointKeys& checkpoint_keys);
 
   grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
   RequestKind Kind(std::size_t slot);
@@ -54,23 +57,23 @@ class StreamMessages {
 
   /// As StreamDoor::Open and StreamDoor::Answer; gives the stream as it was opened.
   absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamFlow& flow);
-  Answered Answer(std::size_t slot, Worker& worker);
+  Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled);
 
  private:
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
   // True if somebody watches and is to be told.
-  bool ShowWatchers(std::size_t slot, const v1::ReconstructedFrame& result,
-                    const v1::ParticleFrame& request);
+  bool ShowWatchers(std::size_t slot, const v1::ParticleFrame& request);
 
   const ServerLimits& limits_;
   StreamRegistry& registry_;
+  const CurrentCheckpointKeys& checkpoint_keys_;
   const std::shared_ptr<WatchHub> hub_;
   std::vector<grpc::ByteBuffer> requests_;
   std::vector<grpc::ByteBuffer> answers_;
   grpc::ByteBuffer opened_;
   grpc::ByteBuffer draining_;
   std::optional<Session> session_;  // Once open.
-  std::uint32_t checkpoint_interval_ = 0;
+  StreamTerms terms_;
   wire::Outputs outputs_;
 };
 

@@ -7,6 +7,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "partiemc/printable.h"
 #include "partiemc/status.h"
 #include "server/stream_token.h"
 
@@ -52,16 +53,12 @@ absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
       return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels", Quoted(key),
                      "must have a key and a value of at most 128 bytes each");
     }
+    if (!IsPrintable(key) || !IsPrintable(value)) {
+      return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels", Quoted(key),
+                     "must have a key and a value of UTF-8 without control characters");
+    }
   }
   return absl::OkStatus();
-}
-
-absl::Status CheckToken(std::string_view token) {
-  if (IsStreamToken(token)) return absl::OkStatus();
-  // What was given is nobody's business, and may be a secret of something else.
-  return Refused(absl::StatusCode::kInvalidArgument, kReasonStreamToken, "open.resume.stream_token",
-                 absl::StrCat(token.size(), " characters"),
-                 "must be the stream_token of StreamOpened");
 }
 
 }  // namespace
@@ -70,22 +67,14 @@ StreamRegistry::StreamRegistry(std::uint32_t max_streams)
     : max_streams_(max_streams),
       id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
 
-absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow) {
+absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow, Caller caller) {
   const std::lock_guard lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
-  if (opening_ >= max_streams_) return TooMany("opening", opening_);
   const StreamFlow* key = flow.get();
-  entries_[key].flow = std::move(flow);
-  ++opening_;
+  Entry& entry = entries_[key];
+  entry.flow = std::move(flow);
+  entry.caller = std::move(caller);
   return absl::OkStatus();
-}
-
-absl::Status StreamRegistry::TooMany(absl::string_view what, std::uint32_t count) const {
-  return Refused(absl::StatusCode::kResourceExhausted, kReasonTooManyStreams, "streams",
-                 absl::StrCat(count, " ", what),
-                 absl::StrCat("must be at most ", max_streams_,
-                              "; try again when one has ended, or start the server with a larger "
-                              "--max-streams"));
 }
 
 absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
@@ -93,36 +82,29 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
                                                    std::string token) {
   if (auto status = CheckName(description.name); !status.ok()) return status;
   if (auto status = CheckLabels(description.labels); !status.ok()) return status;
-  if (auto status = CheckToken(token); !status.ok()) return status;
+  if (auto status = CheckStreamToken(token); !status.ok()) return status;
 
   std::unique_lock lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
+  Entry& entry = entries_.at(&flow);
   Entry* const former = FindOpen(token);
   if (former != nullptr && description.name.empty()) {
     description.name = former->stream->description.name;
   }
-  std::uint32_t open_streams = 0;
-  for (const auto& [key, entry] : entries_) {
-    if (!entry.IsOpen() || &entry == former) continue;
-    ++open_streams;
-    if (!description.name.empty() && entry.stream->description.name == description.name) {
-      return Refused(absl::StatusCode::kAlreadyExists, kReasonNameInUse, "open.stream_name",
-                     Quoted(description.name),
-                     "must not be the name of an open stream; choose another, or none");
-    }
+  const std::string id = absl::StrCat(id_prefix_, opened_ + 1);
+  const bool is_named = !description.name.empty();
+  if (!is_named) description.name = absl::StrCat("stream-", id);
+  if (auto status = entry.caller.CheckMayUse(description.name); !status.ok()) return status;
+  if (auto status = CheckPlace(former, is_named ? description.name : ""); !status.ok()) {
+    return status;
   }
-  if (open_streams >= max_streams_) return TooMany("open", open_streams);
-  Entry& entry = entries_.at(&flow);
-  opening_ -= std::exchange(entry.opening, false) ? 1 : 0;
+  if (auto status = TakePlace(entry, former); !status.ok()) return status;
   entry.stream.emplace();
   entry.stream->number = ++opened_;
-  entry.stream->id = absl::StrCat(id_prefix_, entry.stream->number);
+  entry.stream->id = id;
   entry.stream->lineage = LineageOf(token);
   entry.stream->opened = std::chrono::steady_clock::now();
   entry.stream->description = std::move(description);
-  if (entry.stream->description.name.empty()) {
-    entry.stream->description.name = absl::StrCat("stream-", entry.stream->id);
-  }
   entry.token = std::move(token);
   StreamSummary opened = *entry.stream;
   if (former == nullptr) return opened;
@@ -131,6 +113,36 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
   lock.unlock();  // A flow may leave at once.
   former_flow->TakenOver();
   return opened;
+}
+
+absl::Status StreamRegistry::CheckPlace(const Entry* former, const std::string& name) const {
+  std::uint32_t open_streams = 0;
+  for (const auto& [key, entry] : entries_) {
+    if (!entry.IsOpen() || &entry == former) continue;
+    ++open_streams;
+    if (!name.empty() && entry.stream->description.name == name) {
+      return Refused(absl::StatusCode::kAlreadyExists, kReasonNameInUse, "open.stream_name",
+                     Quoted(name),
+                     "must not be the name of an open stream; choose another, or none");
+    }
+  }
+  if (open_streams < max_streams_) return absl::OkStatus();
+  return Refused(absl::StatusCode::kResourceExhausted, kReasonTooManyStreams, "streams",
+                 absl::StrCat(open_streams, " open"),
+                 absl::StrCat("must be at most ", max_streams_,
+                              "; try again when one has ended, or start the server with a larger "
+                              "--max-streams"));
+}
+
+absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
+  CallerAccount& account = *entry.caller.account();
+  if (former != nullptr && former->place.account() == &account) {
+    entry.place = std::move(former->place);
+    return absl::OkStatus();
+  }
+  auto place = account.Take(CallerAccount::Kind::kStream);
+  if (place.ok()) entry.place = *std::move(place);
+  return place.status();
 }
 
 StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {
@@ -146,7 +158,7 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
     const std::lock_guard lock(mutex_);
     const auto found = entries_.find(&flow);
     if (found != entries_.end()) {
-      opening_ -= std::exchange(found->second.opening, false) ? 1 : 0;
+      found->second.place = {};
       summary.swap(found->second.stream);
     }
   }
@@ -158,13 +170,14 @@ void StreamRegistry::Leave(const StreamFlow& flow) {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(&flow);
   if (found == entries_.end()) return;  // It was not let in.
-  if (found->second.opening) --opening_;
   entries_.erase(found);
   // With the lock held: whoever waits for the last flow may take the registry away after that.
   left_.notify_all();
 }
 
-absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name) const {
+absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
+                                                   const Caller& caller) const {
+  if (auto status = caller.CheckMayUse(name); !status.ok()) return status;
   const std::lock_guard lock(mutex_);
   for (const auto& [flow, entry] : entries_) {
     if (!entry.IsOpen() || entry.stream->description.name != name) continue;
@@ -176,11 +189,13 @@ absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name) cons
                  "must be the name of an open stream; ListStreams tells them");
 }
 
-std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count) const {
+std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count,
+                                                const Caller& caller) const {
   std::vector<StreamSummary> summaries;
   const std::lock_guard lock(mutex_);
   for (const auto& [flow, entry] : entries_) {
     if (!entry.IsOpen() || entry.stream->number <= after) continue;
+    if (!caller.MayUse(entry.stream->description.name)) continue;
     summaries.push_back(*entry.stream);
     summaries.back().counts = flow->counts();
   }

@@ -15,6 +15,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "partiemc/parameters.h"
+#include "server/caller.h"
 #include "server/stream_flow.h"
 #include "server/watch_hub.h"
 
@@ -26,6 +27,8 @@ inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
 inline constexpr std::string_view kReasonLabels = "LABELS";
 inline constexpr std::string_view kReasonTooManyStreams = "TOO_MANY_STREAMS";
 inline constexpr std::string_view kReasonNoSuchStream = "NO_SUCH_STREAM";
+/// Of a ListStreams that wants a page that is none.
+inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
 
 struct StreamDescription {
   std::string name;  ///< Empty: the registry makes one up.
@@ -48,14 +51,15 @@ class StreamRegistry {
  public:
   explicit StreamRegistry(std::uint32_t max_streams);
 
-  /// A flow comes in, not open yet. Errors: UNAVAILABLE (DRAINING); RESOURCE_EXHAUSTED
-  /// (TOO_MANY_STREAMS) where as many as may be open are still opening.
-  absl::Status Enter(std::shared_ptr<StreamFlow> flow);
+  /// A flow of `caller` comes in, not open yet: those are counted elsewhere (OpeningCalls).
+  /// Errors: UNAVAILABLE (DRAINING).
+  absl::Status Enter(std::shared_ptr<StreamFlow> flow, Caller caller = {});
 
   /// Opens the stream of a flow that has entered. Where an open stream has the same `token`, the
   /// new one takes over from it: its place, its name if none is given, and its flow ends.
-  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN), ALREADY_EXISTS
-  /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS), UNAVAILABLE (DRAINING).
+  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN),
+  /// PERMISSION_DENIED (NOT_PERMITTED: the name is not one of the caller's), ALREADY_EXISTS
+  /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS), UNAVAILABLE (DRAINING).
   absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description,
                                      std::string token);
 
@@ -64,10 +68,14 @@ class StreamRegistry {
   /// The flow has gone: its last word has been sent.
   void Leave(const StreamFlow& flow);
 
-  /// The open stream of that name. Errors: NOT_FOUND (NO_SUCH_STREAM).
-  absl::StatusOr<StreamSummary> Find(const std::string& name) const;
-  /// The open streams in the order of their numbers: at most `count`, with numbers above `after`.
-  std::vector<StreamSummary> List(std::uint64_t after, std::size_t count) const;
+  /// The open stream of that name, for `caller` to watch. Errors: PERMISSION_DENIED (NOT_PERMITTED)
+  /// for a name that is not one of the caller's, whether there is such a stream or not; NOT_FOUND
+  /// (NO_SUCH_STREAM).
+  absl::StatusOr<StreamSummary> Find(const std::string& name, const Caller& caller = {}) const;
+  /// Of the open streams those whose names `caller` may use, in the order of their numbers: at most
+  /// `count`, with numbers above `after`.
+  std::vector<StreamSummary> List(std::uint64_t after, std::size_t count,
+                                  const Caller& caller = {}) const;
   std::size_t OpenCount() const;
 
   /// Lets nobody in any more and drains every flow.
@@ -87,7 +95,8 @@ class StreamRegistry {
  private:
   struct Entry {
     std::shared_ptr<StreamFlow> flow;
-    bool opening = true;                  // Until it is open or closed.
+    Caller caller;
+    CallerAccount::Place place;           // While open.
     std::optional<StreamSummary> stream;  // While open; its counts are asked of the flow.
     std::string token;                    // Of the stream.
     bool taken_over = false;  // By another entry: the stream is not this one's any more.
@@ -95,9 +104,12 @@ class StreamRegistry {
     bool IsOpen() const { return stream && !taken_over; }
   };
 
-  absl::Status TooMany(absl::string_view what, std::uint32_t count) const;
   // With the lock held:
   absl::Status CheckServingLocked();
+  // Whether there is a place, that of `former` counted as free, and whether `name` is free.
+  absl::Status CheckPlace(const Entry* former, const std::string& name) const;
+  // Of the caller of `entry`, where `former` has none to pass on.
+  static absl::Status TakePlace(Entry& entry, Entry* former);
   std::vector<std::shared_ptr<StreamFlow>> Flows() const;
   Entry* FindOpen(std::string_view token);
 
@@ -108,7 +120,6 @@ class StreamRegistry {
   std::condition_variable left_;
   std::map<const StreamFlow*, Entry> entries_;
   std::uint64_t opened_ = 0;
-  std::uint32_t opening_ = 0;  // Entries that are.
   bool draining_ = false;
   std::uint64_t turned_away_ = 0;
 };

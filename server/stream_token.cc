@@ -10,6 +10,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
 
 namespace partiemc::server {
 namespace {
@@ -29,6 +30,15 @@ bool IsStreamToken(std::string_view text) {
   return text.size() == kDigits && std::all_of(text.begin(), text.end(), [](unsigned char c) {
            return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
          });
+}
+
+absl::Status CheckStreamToken(std::string_view text) {
+  if (IsStreamToken(text)) return absl::OkStatus();
+  // What was given is nobody's business, and may be a secret of something else.
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonStreamToken), "open.resume.stream_token",
+       absl::StrCat(text.size(), " characters"), "must be the stream_token of StreamOpened"});
 }
 
 std::string LineageOf(std::string_view token) {

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "absl/status/status.h"
+
 namespace partiemc::server {
 
 /// The reason of INVALID_ARGUMENT for a token of another form (proto/PROTOCOL.md).
@@ -14,6 +16,9 @@ std::string NewStreamToken();
 
 /// Whether `text` could be one. A server takes what another one has given.
 bool IsStreamToken(std::string_view text);
+
+/// INVALID_ARGUMENT (STREAM_TOKEN) for what could not be one; never shows it.
+absl::Status CheckStreamToken(std::string_view text);
 
 /// What may be told of a token: the same for the same one, on every server; 32 hexadecimal digits
 /// from which nobody finds the token.

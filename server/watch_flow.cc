@@ -1,5 +1,6 @@
 #include "server/watch_flow.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -68,8 +69,10 @@ void WatchFlow::On(Event event) {
   Perform(std::move(actions));
 }
 
-void WatchFlow::Start() {
-  On([] {});
+void WatchFlow::Start(absl::Status admission) {
+  On([&] {
+    if (!admission.ok()) Refuse(std::move(admission));
+  });
 }
 
 void WatchFlow::ReadDone(const WatchRequest& request) {
@@ -173,6 +176,7 @@ void WatchFlow::Take(const Published& published) {
   }
   pending_.push_back(published);
   held_bytes_ += bytes;
+  counts_.most_held_bytes = std::max(counts_.most_held_bytes, held_bytes_);
 }
 
 void WatchFlow::StreamEnded(const WatchEnd& end) {
@@ -207,6 +211,12 @@ std::chrono::steady_clock::time_point WatchFlow::EndIfSilent(
     }
   });
   return look_again;
+}
+
+void WatchFlow::GiveWay(const absl::Status& status) {
+  On([&] {
+    if (phase_ == Phase::kOpening && !opening_) Refuse(status);
+  });
 }
 
 void WatchFlow::Cut() {

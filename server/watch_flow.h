@@ -79,8 +79,9 @@ class WatchDoor {
 
 /// Frames count from the first that was offered on.
 struct WatchCounts {
-  std::uint64_t frames = 0;   ///< Given to the door.
-  std::uint64_t dropped = 0;  ///< Never to be.
+  std::uint64_t frames = 0;         ///< Given to the door.
+  std::uint64_t dropped = 0;        ///< Never to be.
+  std::size_t most_held_bytes = 0;  ///< At any one time, of those not taken yet.
 };
 
 /// The state machine of one watcher:
@@ -100,8 +101,10 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   /// `max_bytes` ends the watch.
   WatchFlow(WatchDoor& door, std::size_t max_bytes) : door_(door), max_bytes_(max_bytes) {}
 
-  /// Begins with the first read. Called once.
-  void Start();
+  /// Begins with the first read, or, where `admission` is an error, ends with it at once. Called
+  /// once. Every end of a watch goes through this state machine, that of a refused one too, so that
+  /// WatchDoor::Finish is called exactly once, whatever the watcher does meanwhile.
+  void Start(absl::Status admission = absl::OkStatus());
 
   /// The read that was begun last has brought this request.
   void ReadDone(const WatchRequest& request);
@@ -121,6 +124,8 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   /// 0: for ever. Gives the time before which there is no need to look again.
   std::chrono::steady_clock::time_point EndIfSilent(std::chrono::milliseconds limit,
                                                     std::chrono::steady_clock::time_point now);
+  /// Ends a watch that has not sent its `open` with this error; others go on.
+  void GiveWay(const absl::Status& status);
   /// Ends at once, said or not.
   void Cut();
 

@@ -4,7 +4,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/grpc_status.h"
 #include "server/logging.h"
 #include "server/watch_hub.h"
 #include "wire/codec.h"
@@ -32,26 +31,25 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
 
 }  // namespace
 
-WatchReactor::WatchReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-                           StreamRegistry& streams, WatchRegistry& watchers, std::string client)
-    : context_(context),
-      client_(std::move(client)),
+WatchReactor::WatchReactor(grpc::CallbackServerContext& context,
+                           absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
+                           OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers)
+    : ByteCall(context, std::move(admission)),
       streams_(streams),
       watchers_(watchers),
       flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), limits.max_watcher_bytes)) {
-  auto status = streams_.CheckServing();
+  absl::Status status = this->admission();
+  if (status.ok()) status = streams_.CheckServing();
   if (status.ok()) status = watchers_.Enter(flow_);
-  if (!status.ok()) {
-    Finish(status);
-  } else {
-    flow_->Start();
-  }
+  if (status.ok()) MayGiveWay(opening, flow_);
+  flow_->Start(std::move(status));
 }
 
 void WatchReactor::OnReadDone(bool ok) {
+  RequestCame();
   if (!ok) {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (context_.IsCancelled()) flow_->Cancelled();
+    if (IsCancelled()) flow_->Cancelled();
     return flow_->ReadEnded();
   }
   WatchRequest request;
@@ -74,10 +72,7 @@ void WatchReactor::OnWriteDone(bool ok) {
 
 void WatchReactor::OnCancel() { flow_->Cancelled(); }
 
-void WatchReactor::OnDone() {
-  watchers_.Leave(*flow_);
-  delete this;
-}
+void WatchReactor::Left() { watchers_.Leave(*flow_); }
 
 void WatchReactor::StartRead() { ServerBidiReactor::StartRead(&request_); }
 
@@ -90,8 +85,9 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
         absl::StatusCode::kInvalidArgument,
         {std::string(kReasonOutOfRange), "open.credits", "0", "must be at least 1"});
   }
-  const auto stream = streams_.Find(open.stream_name());
+  const auto stream = streams_.Find(open.stream_name(), caller());
   if (!stream.ok()) return stream.status();
+  if (auto status = watchers_.Open(*flow_, caller()); !status.ok()) return status;
   const StreamDescription& description = stream->description;
   stream_name_ = description.name;
   v1::WatchOpened& opened = *opened_.mutable_opened();
@@ -103,8 +99,8 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
            {{"stream", stream->id},
             {"name", stream_name_},
             {"mode", *mode == WatchMode::kEvery ? "every" : "latest"},
-            {"peer", context_.peer()},
-            {"client", client_}});
+            {"peer", peer()},
+            {"client", caller().name()}});
   return WatchTerms{.hub = description.hub, .mode = *mode, .credit = open.credits()};
 }
 
@@ -128,17 +124,17 @@ void WatchReactor::Write(grpc::ByteBuffer response) {
   StartWrite(&response_);
 }
 
-void WatchReactor::Cut() { context_.TryCancel(); }
+void WatchReactor::Cut() { CancelCall(); }
 
 void WatchReactor::Finish(const absl::Status& status) {
   watchers_.Close(*flow_);  // Who hears of the end may come again at once.
   LogEnd(status);
-  ServerBidiReactor::Finish(ToGrpcStatus(status, context_));
+  End(status);
 }
 
 void WatchReactor::LogEnd(const absl::Status& status) const {
   if (stream_name_.empty()) {
-    LogRefusal("watch refused", context_.peer(), status);
+    LogRefusal("watch refused", peer(), status);
     return;
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;
@@ -148,6 +144,7 @@ void WatchReactor::LogEnd(const absl::Status& status) const {
             {"name", stream_name_},
             {"frames", counts.frames},
             {"dropped", counts.dropped},
+            {"most_held_bytes", std::uint64_t{counts.most_held_bytes}},
             {"seconds", open.count()},
             {"reason", end_reason_.empty() ? "LEFT" : end_reason_},
             {"status", absl::StatusCodeToString(status.code())}});

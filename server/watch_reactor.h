@@ -2,9 +2,6 @@
 // bytes that all watchers of a stream share.
 #pragma once
 
-#include <grpcpp/support/byte_buffer.h>
-#include <grpcpp/support/server_callback.h>
-
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -13,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "partiemc/v1/reconstruction.pb.h"
+#include "server/byte_call.h"
 #include "server/limits.h"
 #include "server/stream_registry.h"
 #include "server/watch_flow.h"
@@ -30,18 +28,16 @@ class WatchedResult final : public WatchFrame {
   const wire::WatchedBytes bytes;
 };
 
-/// Deletes itself when gRPC is done with it. No callback of it blocks.
-class WatchReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
-                           private WatchDoor {
+class WatchReactor final : public ByteCall, private WatchDoor {
  public:
-  /// The arguments outlive the call.
-  WatchReactor(grpc::CallbackServerContext& context, const ServerLimits& limits,
-               StreamRegistry& streams, WatchRegistry& watchers, std::string client);
+  /// What is passed by reference outlives the call.
+  WatchReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
+               const ServerLimits& limits, OpeningCalls& opening, StreamRegistry& streams,
+               WatchRegistry& watchers);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
-  void OnDone() override;
 
  private:
   void StartRead() override;
@@ -51,12 +47,11 @@ class WatchReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
+  void Left() override;
 
   void Write(grpc::ByteBuffer response);
   void LogEnd(const absl::Status& status) const;
 
-  grpc::CallbackServerContext& context_;
-  const std::string client_;
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
   grpc::ByteBuffer request_, response_;

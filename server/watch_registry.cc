@@ -13,6 +13,13 @@ namespace partiemc::server {
 absl::Status WatchRegistry::Enter(std::shared_ptr<WatchFlow> watcher) {
   const std::lock_guard lock(mutex_);
   if (draining_) return DrainingError();
+  const WatchFlow* key = watcher.get();
+  watchers_[key] = std::move(watcher);
+  return absl::OkStatus();
+}
+
+absl::Status WatchRegistry::Open(const WatchFlow& watcher, const Caller& caller) {
+  const std::lock_guard lock(mutex_);
   if (placed_.size() >= max_watchers_) {
     return ViolationError(
         absl::StatusCode::kResourceExhausted,
@@ -21,9 +28,9 @@ absl::Status WatchRegistry::Enter(std::shared_ptr<WatchFlow> watcher) {
                       "; try again when one has left, or start the server with a larger "
                       "--max-watchers")});
   }
-  const WatchFlow* key = watcher.get();
-  watchers_[key] = std::move(watcher);
-  placed_.insert(key);
+  auto place = caller.account()->Take(CallerAccount::Kind::kWatcher);
+  if (!place.ok()) return place.status();
+  placed_.emplace(&watcher, *std::move(place));
   return absl::OkStatus();
 }
 

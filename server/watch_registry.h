@@ -7,11 +7,11 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "server/caller.h"
 #include "server/watch_flow.h"
 
 namespace partiemc::server {
@@ -23,9 +23,12 @@ class WatchRegistry {
  public:
   explicit WatchRegistry(std::uint32_t max_watchers) : max_watchers_(max_watchers) {}
 
-  /// A watcher comes in, before it has said what it wants to watch. Errors, each with a Violation:
-  /// UNAVAILABLE (DRAINING), RESOURCE_EXHAUSTED (TOO_MANY_WATCHERS).
+  /// A watcher comes in, before it has said what it wants to watch: those are counted elsewhere
+  /// (OpeningCalls). Errors, with a Violation: UNAVAILABLE (DRAINING).
   absl::Status Enter(std::shared_ptr<WatchFlow> watcher);
+  /// It has said so, and gets a place. Errors, each with a Violation: RESOURCE_EXHAUSTED
+  /// (TOO_MANY_WATCHERS, CALLER_WATCHERS).
+  absl::Status Open(const WatchFlow& watcher, const Caller& caller = {});
   /// Its last word is about to be sent: its place is free.
   void Close(const WatchFlow& watcher);
   /// Its last word has been sent.
@@ -53,7 +56,7 @@ class WatchRegistry {
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
   std::map<const WatchFlow*, std::shared_ptr<WatchFlow>> watchers_;
-  std::set<const WatchFlow*> placed_;  // Those of them that have not been closed.
+  std::map<const WatchFlow*, CallerAccount::Place> placed_;  // Open, not closed.
   bool draining_ = false;
 };
 

@@ -11,6 +11,7 @@
 #include "partiemc/result.h"
 #include "partiemc/state.h"
 #include "server/frame_observer.h"
+#include "server/worker_memory.h"
 
 namespace partiemc::server {
 
@@ -50,12 +51,26 @@ class DoorBuffers {
 
 /// What a worker keeps warm from frame to frame, whichever stream they belong to.
 struct Worker {
+  WorkerMemory memory;  ///< What all of these hold; given back once they are gone.
   Workspace workspace;
   Result result;
   State next_state;  ///< Copied to the stream once the frame has been answered.
   std::unique_ptr<DoorBuffers> door_buffers;
   WarmSize particles;                 ///< Of the frames that it has worked on.
   FrameObserver* observer = nullptr;  ///< Told of each frame; none: nobody asks.
+
+  explicit Worker(FrameObserver* told = nullptr, MemoryBudget* budget = nullptr)
+      : memory(budget), observer(told) {}
+
+  /// Frees all buffers.
+  void Empty() {
+    workspace = Workspace();
+    result = Result();
+    next_state = State();
+    door_buffers.reset();
+    particles = WarmSize();
+    memory.GiveBack();
+  }
 };
 
 }  // namespace partiemc::server

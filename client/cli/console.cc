@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "partiemc/printable.h"
+
 namespace partiemc::client {
 namespace {
 
@@ -24,7 +26,7 @@ std::string OneLine(std::string_view text) {
       line += c == '\r' || c == '\t' ? ' ' : c;
     }
   }
-  return line;
+  return Printable(line);
 }
 
 std::string OneLine(const absl::Status& status) {

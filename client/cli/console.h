@@ -13,7 +13,8 @@ namespace partiemc::client {
 int Complain(ExitCode code, std::string_view message);
 int Complain(ExitCode code, const absl::Status& status);
 
-/// One line for a status: line breaks in names become \n.
+/// One line that a terminal shows and does not obey, whoever the text came from: line breaks become
+/// \n, other control characters and what is no UTF-8 escapes (Printable).
 std::string OneLine(std::string_view text);
 std::string OneLine(const absl::Status& status);
 

@@ -12,8 +12,8 @@
 #include "cli/console.h"
 #include "cli/evaluate_recording.h"
 #include "evaluation/report/report.h"
-#include "evaluation/scenes.h"
-#include "evaluation/shapes.h"
+#include "evaluation/scenes/scenes.h"
+#include "evaluation/scenes/shapes.h"
 #include "output/atomic_file.h"
 #include "output/progress.h"
 #include "output/text.h"
@@ -25,17 +25,22 @@ using evaluation::Evaluation;
 using evaluation::StudyMethod;
 using evaluation::StudyPlan;
 
-std::vector<StudyMethod> AllMethods(bool steps) {
+std::vector<StudyMethod> AllMethods(bool steps, bool sensitivity) {
   std::vector<StudyMethod> methods = evaluation::StudyMethods();
   if (steps) {
     for (StudyMethod& method : evaluation::StepMethods()) methods.push_back(std::move(method));
+  }
+  if (sensitivity) {
+    for (StudyMethod& method : evaluation::SensitivityMethods()) {
+      methods.push_back(std::move(method));
+    }
   }
   return methods;
 }
 
 // The named ones; the four placements are what the paper's tables need, and always stay.
 absl::StatusOr<std::vector<StudyMethod>> MethodsOf(const EvaluateFlags& flags) {
-  std::vector<StudyMethod> methods = AllMethods(flags.steps);
+  std::vector<StudyMethod> methods = AllMethods(flags.steps, flags.sensitivity);
   std::string known;
   for (const StudyMethod& method : methods) {
     AppendAll(known, known.empty() ? "" : ", ", method.method.name);
@@ -59,7 +64,13 @@ absl::StatusOr<StudyPlan> PlanOf(const EvaluateFlags& flags, std::vector<std::st
   if (!methods.ok()) return methods.status();
   plan.methods = *std::move(methods);
   plan.recipes = evaluation::Set(flags.set);
-  for (const std::string& input : flags.recordings) {
+  std::vector<std::string> recordings = flags.recordings;
+  if (!flags.recordings_dir.empty()) {
+    auto found = RecordingsIn(flags.recordings_dir);
+    if (!found.ok()) return found.status();
+    recordings.insert(recordings.end(), found->begin(), found->end());
+  }
+  for (const std::string& input : recordings) {
     auto recording = ReadRecording(input, flags.sequence, notes);
     if (!recording.ok()) return recording.status();
     plan.recordings.push_back(*std::move(recording));
@@ -124,15 +135,18 @@ absl::StatusOr<Evaluation> Measure(const EvaluateFlags& flags, StudyPlan plan) {
 CLI::App* AddEvaluate(CLI::App& app, EvaluateFlags& flags) {
   CLI::App* verb = app.add_subcommand(
       "evaluate", "Measure every method, and check what of the paper reproduces");
-  verb->add_option("--set", flags.set, "Synthetic sequences: smoke, tuning or validation")
+  verb->add_option("--set", flags.set, "Synthetic sequences: smoke, tuning, validation or discs")
       ->type_name("NAME")
-      ->check(CLI::IsMember({"smoke", "tuning", "validation"}))
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(evaluation::kSetNames),
+                                                     std::end(evaluation::kSetNames))))
       ->capture_default_str();
   verb->add_option("--recording", flags.recordings,
                    "Recorded frames to measure too, again for each; the first is also the film of "
                    "the paper's figures")
       ->type_name("INPUT")
       ->allow_extra_args(false);
+  verb->add_option("--recordings", flags.recordings_dir, "Measure all .pemc files of a folder, too")
+      ->type_name("DIR");
   verb->add_option("--frames", flags.sequence.frames,
                    "Frames A to B - 1 of each recording, counted from 0: A:B")
       ->type_name("A:B");
@@ -146,6 +160,8 @@ CLI::App* AddEvaluate(CLI::App& app, EvaluateFlags& flags) {
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_flag("--steps", flags.steps, "Also virtual-plane with each step switched off in turn");
+  verb->add_flag("--sensitivity", flags.sensitivity,
+                 "Also virtual-plane with each of its constants times 0.7 and 1.4");
   verb->add_flag("--volumes", flags.volumes,
                  "Tell the methods volumes per particle, not the spacing alone");
   verb->add_flag("--ids", flags.ids,

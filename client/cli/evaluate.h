@@ -12,9 +12,11 @@ namespace partiemc::client {
 struct EvaluateFlags {
   std::string set = "smoke";
   std::vector<std::string> recordings;
+  std::string recordings_dir;        ///< All of its recordings, too.
   SequenceOptions sequence;          ///< Of the recordings.
   std::vector<std::string> methods;  ///< Empty: all.
   bool steps = false;
+  bool sensitivity = false;
   bool volumes = false;
   bool ids = false;
   std::string output_dir;

@@ -1,10 +1,16 @@
 #include "cli/evaluate_recording.h"
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numeric>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "cli/input_source.h"
+#include "evaluation/metrics/recorded_truth.h"
 #include "output/text.h"
 #include "partiemc/reconstructor.h"
 
@@ -22,7 +28,7 @@ evaluation::SequenceFrame FrameOf(const RecordedFrame& recorded) {
   return frame;
 }
 
-// The spacing that a stream without one would use.
+// The spacing that a stream without one would use; 0 where the frame's particles agree on none.
 absl::StatusOr<double> EstimatedSpacing(const evaluation::SequenceFrame& frame) {
   const auto reconstructor = Reconstructor::Create({.fill = Fill::kNone});
   if (!reconstructor.ok()) return reconstructor.status();
@@ -32,10 +38,37 @@ absl::StatusOr<double> EstimatedSpacing(const evaluation::SequenceFrame& frame) 
   const absl::Status status = reconstructor->Reconstruct(
       {.positions = std::span<const double>(frame.positions)}, state, workspace, result);
   if (!status.ok()) return status;
-  return result.statistics.spacing;
+  return state.spacing.value_or(0);
+}
+
+// What the file beside the recording says of it, if there is one: NAME.truth for NAME.pemc.
+absl::Status AddKnownTruth(const std::string& input, evaluation::Sequence& sequence) {
+  const auto path = std::filesystem::path(input).replace_extension(".truth");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return absl::OkStatus();
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const absl::Status status = evaluation::AddTruth(text, sequence);
+  return status.ok() ? status
+                     : absl::FailedPreconditionError(
+                           Concat(path.string(), ": ", std::string(status.message())));
 }
 
 }  // namespace
+
+absl::StatusOr<std::vector<std::string>> RecordingsIn(const std::string& directory) {
+  std::vector<std::string> recordings;
+  std::error_code error;
+  for (std::filesystem::directory_iterator file(directory, error), end; !error && file != end;
+       file.increment(error)) {
+    if (file->path().extension() == ".pemc") recordings.push_back(file->path().string());
+  }
+  if (error) return absl::FailedPreconditionError(Concat(directory, ": ", error.message()));
+  if (recordings.empty()) {
+    return absl::FailedPreconditionError(Concat(directory, ": holds no .pemc file"));
+  }
+  std::ranges::sort(recordings);
+  return recordings;
+}
 
 absl::StatusOr<evaluation::Sequence> ReadRecording(const std::string& input,
                                                    const SequenceOptions& options,
@@ -66,7 +99,7 @@ absl::StatusOr<evaluation::Sequence> ReadRecording(const std::string& input,
     if (!(*spacing > 0)) {
       return absl::FailedPreconditionError(
           Concat(input,
-                 ": its first frame has no two particles to take a spacing from; begin "
+                 ": its first frame has no body of particles to take a spacing from; begin "
                  "later by --frames, or give one to `partiemc convert --spacing`"));
     }
     sequence.spacing = *spacing;
@@ -74,6 +107,7 @@ absl::StatusOr<evaluation::Sequence> ReadRecording(const std::string& input,
                            " was estimated from its first frame"));
   }
   sequence.original_spacing = sequence.spacing;
+  if (const absl::Status status = AddKnownTruth(input, sequence); !status.ok()) return status;
   for (const std::string& notice : source->frames->notices()) notes.push_back(notice);
   return sequence;
 }

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -30,6 +31,7 @@ class FrameOutputs {
 
   absl::Status Write(const FrameRecord& frame);
   void AddRefused() { summary_.AddRefused(); }
+  void EndEarly(std::string why) { summary_.EndEarly(std::move(why)); }
 
   /// Completes the statistics, which do not exist before.
   absl::Status Finish();

@@ -15,6 +15,7 @@
 #include "output/text.h"
 #include "partiemc/client/local_stream.h"
 #include "partiemc/client/stream.h"
+#include "partiemc/printable.h"
 #include "partiemc/validate.h"
 
 namespace partiemc::client {
@@ -24,6 +25,13 @@ using Clock = std::chrono::steady_clock;
 
 // How soon Ctrl-C is seen while no answer comes.
 constexpr std::chrono::milliseconds kPollInterval(100);
+
+// A name that a server takes: 128 bytes at most, nothing that a terminal would obey.
+std::string InputLabel(const std::string& input) {
+  std::string label = Printable(BaseName(input)).substr(0, 128);
+  while (!IsPrintable(label)) label.pop_back();  // A character that was cut.
+  return label;
+}
 
 absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags,
                                                         const ReconstructionParameters& parameters,
@@ -42,7 +50,7 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
                                      .outputs = {.mesh = parameters.fill != Fill::kNone,
                                                  .normals = normals,
                                                  .echo_particles = flags.echo_particles},
-                                     .labels = {{"input", BaseName(flags.input).substr(0, 128)}},
+                                     .labels = {{"input", InputLabel(flags.input)}},
                                      .credentials = flags.server.credentials,
                                      .deadline = deadline,
                                      .fallback_addresses = {servers.begin() + 1, servers.end()},
@@ -59,7 +67,8 @@ class Receiver {
            ReplayOutputs& outputs, Progress& progress)
       : flags_(flags), stream_(stream), feeder_(feeder), outputs_(outputs), progress_(progress) {}
 
-  /// kGood when every frame was answered, else the code of what ended the replay, which is told.
+  /// kGood when every frame was answered, else the code of what ended the replay, which is told
+  /// unless it was Ctrl-C.
   ExitCode Run() {
     while (!Interrupted()) {
       const auto received = stream_.Receive(event_, kPollInterval);
@@ -134,11 +143,20 @@ class Receiver {
   std::uint64_t answered_ = 0, failed_checks_ = 0;
 };
 
+// Why not every frame came through; empty where all did.
+std::string WhyEarly(ExitCode ended, const absl::Status& input_status) {
+  if (ended == kInterrupted) return "interrupted";
+  if (ended == kServer) return "the server was lost, or ended the stream";
+  if (ended != kGood) return "an output could not be written";
+  return input_status.ok() ? "" : "the input could not be read further";
+}
+
 // Prints what is worth a word once all frames are through, and decides how the program ends.
 ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& parameters,
                   const ReplayOutputs& outputs, std::uint64_t failed_checks) {
   const Summary& summary = outputs.summary();
   ExitCode code = kGood;
+  for (const std::string& warning : summary.Warnings()) Complain(kGood, warning);
   if (summary.refused_count() > 0 && !flags.keep_going) {
     Complain(kInput, Concat(Plural(summary.refused_count(), "frame"),
                             " refused, as told above; --keep-going takes that as good"));
@@ -170,6 +188,9 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
       "--rate 25\n"
       "  partiemc replay dam_break.pemc --name dam --rate 25   and elsewhere: partiemc watch dam\n"
+      "However it ends, --stats and --report have the frames that came through, and the report "
+      "tells "
+      "why\nit ended early.\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 3 input, 4 server, 130 interrupted.");
   return verb;
 }
@@ -222,18 +243,25 @@ int Replay(const ReplayFlags& flags) {
                              " skipped, because newer ones came (--policy latest)"));
     }
   }
+  const std::string early = WhyEarly(ended, input_status);
+  if (!early.empty()) outputs->EndEarly(early);
+  const Summary& summary = outputs->summary();
+  absl::Status finished;
+  if (summary.frame_count() + (early.empty() ? summary.refused_count() : 0) > 0) {
+    finished = outputs->Finish(seconds);
+    if (!flags.quiet && finished.ok()) std::fputs(summary.Table(seconds).c_str(), stdout);
+  } else if (early.empty()) {
+    return Complain(kInput, Concat(flags.input, ": has no frame to replay; look at --frames"));
+  }
+  // What failed before says why what is left of it cannot be finished.
+  if (!finished.ok() && ended != kFailed) Complain(kFailed, finished);
   if (ended == kInterrupted) {
-    return Complain(kInterrupted, Concat("interrupted after ",
-                                         Plural(outputs->summary().frame_count(), "frame")));
+    return Complain(kInterrupted,
+                    Concat("interrupted after ", Plural(summary.frame_count(), "frame")));
   }
   if (ended != kGood) return ended;
   if (!input_status.ok()) return Complain(kInput, input_status);
-  if (outputs->summary().frame_count() + outputs->summary().refused_count() == 0) {
-    return Complain(kInput, Concat(flags.input, ": has no frame to replay; look at --frames"));
-  }
-  const absl::Status finished = outputs->Finish(seconds);
-  if (!finished.ok()) return Complain(kFailed, finished);
-  if (!flags.quiet) std::fputs(outputs->summary().Table(seconds).c_str(), stdout);
+  if (!finished.ok()) return kFailed;
   return Conclude(flags, *parameters, *outputs, receiver.failed_checks());
 }
 

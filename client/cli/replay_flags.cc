@@ -121,10 +121,6 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_flag("--no-normal-memory", flags.no_normal_memory,
                "Orient normals without those of the frame before")
       ->group(kGroup);
-  app.add_flag("--no-outline-memory", flags.no_outline_memory,
-               "virtual-plane: each outline from its own frame alone; else, where particles have "
-               "ids, they carry the last one along, and it trembles less")
-      ->group(kGroup);
   app.add_option("--clean", flags.clean,
                  "Drop tiny holes and components without a particle: on, off or auto")
       ->type_name("WHEN")

@@ -33,7 +33,6 @@ struct ReplayFlags {
   std::optional<double> reference_radius;
   double surface_offset = 0;
   bool no_normal_memory = false;
-  bool no_outline_memory = false;
   std::string clean = "auto";
   double min_area = 0;
   std::uint64_t min_particles = 0;

@@ -35,7 +35,7 @@ absl::Status ReplayOutputs::Write(const FrameRecord& frame) {
 
 absl::Status ReplayOutputs::Finish(double wall_seconds) {
   absl::Status status = frames_.Finish();
-  if (status.ok() && report_) status = report_->Finish(summary(), wall_seconds);
+  if (report_) status.Update(report_->Finish(summary(), wall_seconds));
   return status;
 }
 

@@ -28,8 +28,10 @@ class ReplayOutputs {
 
   absl::Status Write(const FrameRecord& frame);
   void AddRefused() { frames_.AddRefused(); }
+  /// Report and table tell that not all frames came through, and why.
+  void EndEarly(std::string why) { frames_.EndEarly(std::move(why)); }
 
-  /// Completes statistics and report, which do not exist before.
+  /// Completes statistics and report, which do not exist before, each even if the other fails.
   absl::Status Finish(double wall_seconds);
 
   const Summary& summary() const { return frames_.summary(); }

@@ -39,7 +39,6 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                       .reference_radius = flags.reference_radius,
                                       .surface_offset = flags.surface_offset,
                                       .normal_memory = !flags.no_normal_memory,
-                                      .outline_memory = !flags.no_outline_memory,
                                       .min_component_area = flags.min_area,
                                       .min_component_particles = flags.min_particles};
   const auto placement = FindPlacement(flags.placement);

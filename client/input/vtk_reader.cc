@@ -1,9 +1,9 @@
-// One frame per file: legacy VTK, VTP and VTU through VTK. The only file that sees VTK's headers.
+// One frame per file: legacy VTK (vtk_legacy.h), VTP and VTU through VTK. No other files see VTK's
+// headers.
 #include <vtkAlgorithm.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
 #include <vtkFieldData.h>
-#include <vtkGenericDataObjectReader.h>
 #include <vtkLogger.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
@@ -27,6 +27,7 @@
 #include "client/input/frame_reader.h"
 #include "client/input/number_text.h"
 #include "client/input/text.h"
+#include "client/input/vtk_legacy.h"
 
 namespace partiemc::client::input {
 namespace {
@@ -42,6 +43,9 @@ constexpr std::size_t kHeadBytes = 65536;
 // bytes that zlib packs at its best ratio of about 1:1000.
 constexpr double kLeastBytesPerPlainPoint = 6;
 constexpr double kLeastBytesPerPackedPoint = 0.01;
+
+// The largest count that is told as it stands.
+constexpr double kMostDeclared = 1e18;
 
 // Keeps the first error instead of printing it.
 class MessageCatcher final : public vtkOutputWindow {
@@ -79,9 +83,9 @@ class MessageCatcher final : public vtkOutputWindow {
 
 vtkStandardNewMacro(MessageCatcher)
 
-    // VTK's messages go through one object of the process, and through a log that writes to stderr.
-    // While this lives, they go to `catcher` alone.
-    class CatchMessages {
+// VTK's messages go through one object of the process, and through a log that writes to stderr.
+// While this lives, they go to `catcher` alone.
+class CatchMessages {
  public:
   CatchMessages()
       : lock_(Mutex()),
@@ -198,7 +202,8 @@ double DeclaredPoints(std::string_view head) {
     for (std::size_t at = head.find(key); at != std::string_view::npos; at = head.find(key, at)) {
       at += key.size();
       const std::size_t end = std::min(head.find_first_not_of("0123456789", at), head.size());
-      declared = std::max(declared, ParseNumber(head.substr(at, end - at)).value_or(0));
+      const double count = ParseNumber(head.substr(at, end - at)).value_or(0);
+      declared = std::max(declared, std::min(count, kMostDeclared));
     }
   }
   return declared;
@@ -225,15 +230,7 @@ class VtkReader final : public FrameReader {
   }
 
   vtkSmartPointer<vtkDataObject> ReadData() const {
-    if (legacy_) {
-      vtkNew<vtkGenericDataObjectReader> reader;
-      reader->SetFileName(path_.c_str());
-      reader->ReadAllFieldsOn();
-      reader->ReadAllScalarsOn();
-      reader->ReadAllVectorsOn();
-      reader->Update();
-      return reader->GetOutput();
-    }
+    if (legacy_) return ReadLegacyParticles(path_);
     vtkSmartPointer<vtkXMLReader> reader;
     if (unstructured_) {
       reader = vtkSmartPointer<vtkXMLUnstructuredGridReader>::New();

@@ -211,8 +211,8 @@ void LocalStream::Worker::Process(const OwnedFrame& frame, Event& event) {
   const Clock::time_point begin = Clock::now();
   absl::Status status;
   arena_.Execute([&] {
-    status =
-        reconstructor_.Reconstruct(frame.View(), state_, workspace_, event.frame.result, &stages);
+    status = reconstructor_.Reconstruct(frame.View(), state_, workspace_, event.frame.result,
+                                        {.observer = &stages});
   });
   event.frame.times.total_ms = Milliseconds(Clock::now() - begin);
   if (!status.ok()) {

@@ -11,10 +11,11 @@ namespace partiemc::client {
 namespace {
 
 // Reasons of proto/PROTOCOL.md. A name or a place may be held by what is left of the stream's own
-// former call, and a server of another version may have one of this version beside it.
+// former call, and a server of another version or with other keys may have a better one beside it.
 constexpr std::string_view kDraining = "DRAINING";
-constexpr std::array<std::string_view, 3> kMendableWhileResuming = {
-    "NAME_IN_USE", "TOO_MANY_STREAMS", "CHECKPOINT_MISMATCH"};
+constexpr std::array<std::string_view, 7> kMendableWhileResuming = {
+    "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",    "CALLER_STREAMS",
+    "CALLER_CALLS", "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE"};
 
 }  // namespace
 

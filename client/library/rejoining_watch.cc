@@ -169,7 +169,9 @@ absl::StatusOr<bool> RejoiningWatch::TryAttempt(Clock::time_point until) {
   } else if (!opened.ok()) {
     const std::string reason = call_->reason();
     // The producer may not have come back yet, the place of the former call not be free.
-    const bool passes = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS";
+    const bool passes = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS" ||
+                        reason == "TOO_MANY_OPENING" || reason == "CALLER_WATCHERS" ||
+                        reason == "CALLER_CALLS";
     if (!passes && !call_->lost()) return opened.status();
     TryNext(opened.status());
   } else if (Clock::now() >= loss_->attempt_until) {

@@ -254,8 +254,7 @@ absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response re
 
 // Of an answer with a checkpoint: the frames up to this one need not be sent again.
 void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
-  const std::string& checkpoint =
-      answer.has_frame() ? answer.frame().checkpoint() : answer.error().checkpoint();
+  const std::string& checkpoint = answer.checkpoint();
   if (checkpoint.empty() || next_of_call_ < checkpoint_next_) return;
   checkpoint_ = checkpoint;
   checkpoint_next_ = next_of_call_ + 1;

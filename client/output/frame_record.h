@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
@@ -23,6 +24,17 @@ struct FrameRecord {
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
 };
+
+/// The names of doubts, a blank between two of them.
+inline std::string DoubtsText(Doubts doubts) {
+  std::string text;
+  for (const Doubt doubt : kAllDoubts) {
+    if (!doubts.Has(doubt)) continue;
+    if (!text.empty()) text += ' ';
+    text += Name(doubt);
+  }
+  return text;
+}
 
 /// An axis-parallel box in world units; empty until something is included.
 struct Box {

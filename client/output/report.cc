@@ -121,7 +121,8 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
   AppendAll(out, R"(,"self_intersections":)", statistics.self_intersections,
             R"(,"folded_triangles":)", statistics.folded_triangles, R"(,"dropped_holes":)",
             statistics.dropped_holes, R"(,"dropped_components":)", statistics.dropped_components,
-            R"(,"dropped_spray":)", statistics.dropped_spray);
+            R"(,"dropped_spray":)", statistics.dropped_spray, R"(,"doubts":")",
+            DoubtsText(statistics.doubts), "\"");
   const std::pair<std::string_view, double> numbers[] = {
       {"time", frame.time},
       {"area", statistics.area},
@@ -202,9 +203,6 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
     lines.emplace_back("surface offset", spacings(parameters.surface_offset));
   }
   lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
-  if (parameters.placement == Placement::kVirtualPlane) {
-    lines.emplace_back("outline memory", yes_no(parameters.outline_memory));
-  }
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
   if (parameters.min_component_area > 0) {
     lines.emplace_back("smallest area",

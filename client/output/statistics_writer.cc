@@ -16,10 +16,11 @@ namespace {
 constexpr std::array<std::string_view, 8> kBeforeStages = {
     "frame",          "particles", "polylines", "vertices",
     "triangles_grid", "triangles", "area",      "milliseconds"};
-constexpr std::array<std::string_view, 9> kAfterStages = {
+constexpr std::array<std::string_view, 10> kAfterStages = {
     "perimeter",     "self_intersections", "folded_triangles",
     "dropped_holes", "dropped_components", "dropped_spray",
-    "rings_digest",  "mesh_digest",        "time"};
+    "rings_digest",  "mesh_digest",        "time",
+    "doubts"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
 // "vertices" is a count and a stage: the unit keeps the names of columns apart.
@@ -72,6 +73,7 @@ class Row {
     Digest(frame.rings_digest);
     Digest(frame.mesh_digest);
     Number(frame.time);
+    Words(DoubtsText(statistics.doubts));
   }
 
   std::string Csv() const { return CsvLine(values_); }
@@ -95,9 +97,10 @@ class Row {
       AppendNumber(text, value);
     }
   }
-  void Digest(std::uint64_t value) {
-    const std::string digits = Concat(DigestText(value));
-    values_[next_++] = json_ ? Concat("\"", digits, "\"") : digits;
+  void Digest(std::uint64_t value) { Words(DigestText(value)); }
+  // Without a quote or a comma.
+  void Words(const std::string& words) {
+    values_[next_++] = json_ ? Concat("\"", words, "\"") : words;
   }
 
   bool json_;

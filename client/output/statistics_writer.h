@@ -15,7 +15,8 @@ namespace partiemc::client {
 /// The columns in their order: frame, particles, polylines, vertices, triangles_grid, triangles,
 /// area, milliseconds; one per stage, "bins_ms" to "mesh_ms" ("vertices" alone would stand there
 /// twice); perimeter, self_intersections, folded_triangles, dropped_holes, dropped_components,
-/// dropped_spray, rings_digest, mesh_digest, time. Digests are 16 hexadecimal digits, times
+/// dropped_spray, rings_digest, mesh_digest, time, doubts (their names, a blank between two of
+/// them). Digests are 16 hexadecimal digits, times
 /// milliseconds of wall time, areas and lengths world units; `vertices` are those of the polylines.
 std::span<const std::string_view> StatisticsColumns();
 

@@ -60,6 +60,19 @@ void Summary::Add(const FrameRecord& frame) {
   total_ms_.push_back(frame.total_ms);
   self_intersections_ += statistics.self_intersections;
   folded_triangles_ += statistics.folded_triangles;
+  for (std::size_t k = 0; k < kAllDoubts.size(); ++k) {
+    if (statistics.doubts.Has(kAllDoubts[k])) ++doubted_[k];
+  }
+}
+
+std::vector<std::string> Summary::Warnings() const {
+  std::vector<std::string> warnings;
+  for (std::size_t k = 0; k < kAllDoubts.size(); ++k) {
+    if (doubted_[k] == 0) continue;
+    warnings.push_back(Concat("doubt in ", doubted_[k], " of ", Plural(frame_count(), "frame"),
+                              ": ", Name(kAllDoubts[k]), ": ", Explanation(kAllDoubts[k])));
+  }
+  return warnings;
 }
 
 double Summary::MeanReductionPercent() const { return Mean(reduction_); }
@@ -90,6 +103,7 @@ std::string Summary::Headline(double wall_seconds) const {
     AppendAll(line, ", ", Grouped(static_cast<double>(frame_count()) / wall_seconds, 1),
               " frames per second");
   }
+  if (!ended_early_.empty()) AppendAll(line, "; ended early: ", ended_early_);
   if (self_intersections_ > 0) {
     AppendAll(line, "; self-intersections: ", self_intersections_);
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "output/frame_record.h"
@@ -24,6 +25,9 @@ class Summary {
   /// Counts a frame that was answered by an error.
   void AddRefused() { ++refused_; }
 
+  /// The headline tells that not all frames came through, and why.
+  void EndEarly(std::string why) { ended_early_ = std::move(why); }
+
   std::uint64_t frame_count() const { return particles_.size(); }
   std::uint64_t refused_count() const { return refused_; }
 
@@ -35,7 +39,11 @@ class Summary {
   /// Cost: n log n in the frames.
   std::vector<SummaryRow> Rows() const;
 
-  /// One line: frames, refused ones, seconds, frames per second. Wall time of the whole replay.
+  /// One line for each kind of doubt that there was: in how many frames, and what helps.
+  std::vector<std::string> Warnings() const;
+
+  /// One line: frames, refused ones, seconds, frames per second, why it ended early. Wall time of
+  /// the whole replay.
   std::string Headline(double wall_seconds) const;
 
   /// The headline, then the rows as an aligned plain-text table; every line ends in '\n'.
@@ -45,7 +53,9 @@ class Summary {
   std::vector<double> particles_, polylines_, vertices_, triangles_grid_, triangles_, reduction_;
   std::array<std::vector<double>, kStageCount> stages_ms_;
   std::vector<double> total_ms_;
+  std::array<std::uint64_t, kAllDoubts.size()> doubted_{};  // Frames, by kind.
   std::uint64_t self_intersections_ = 0, folded_triangles_ = 0, refused_ = 0;
+  std::string ended_early_;
 };
 
 }  // namespace partiemc::client

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "partiemc/printable.h"
+
 namespace partiemc::client {
 
 /// Appends `value` in the shortest form that reads back the same bits in its own type; never
@@ -50,18 +52,21 @@ inline std::string Plural(std::uint64_t count, std::string_view noun) {
   return Concat(count, " ", noun, count == 1 ? "" : "s");
 }
 
-/// `text` as a JSON string, quotes and all.
+/// `text` as a JSON string, quotes and all. Control characters are escaped, so that a terminal does
+/// not obey what is printed; what is no UTF-8 becomes U+FFFD.
 inline std::string JsonString(std::string_view text) {
   std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      AppendAll(out, '\\', c);
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      constexpr std::string_view kDigits = "0123456789abcdef";
-      AppendAll(out, "\\u00", kDigits[static_cast<std::size_t>(c >> 4)],
-                kDigits[static_cast<std::size_t>(c & 15)]);
+  while (!text.empty()) {
+    const std::string_view before = text;
+    const auto character = TakeCharacter(text);
+    if (character == U'"' || character == U'\\') {
+      AppendAll(out, '\\', before.front());
+    } else if (!character) {
+      out += "\\ufffd";
+    } else if (IsControl(*character)) {
+      out += Printable(before.substr(0, before.size() - text.size()));
     } else {
-      out += c;
+      out += before.substr(0, before.size() - text.size());
     }
   }
   return out + '"';

@@ -88,9 +88,9 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
 // Returns false if they are more than `max_tiles`.
 bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles) {
   for (BinStretch& stretch : scratch.stretches) {
-    stretch.joined.clear();
+    stretch.tiles.clear();
     for (const TileCoordinate& home : stretch.homes.tiles()) {
-      stretch.joined.push_back(tiles.Insert(home));
+      stretch.tiles.push_back(tiles.Insert(home));
     }
     if (tiles.size() > max_tiles) return false;
   }
@@ -100,7 +100,7 @@ bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles)
   scratch.next.clear();
   for (const TileCoordinate& home : scratch.homes) scratch.next.push_back(tiles.Find(home));
   for (BinStretch& stretch : scratch.stretches) {
-    for (std::uint32_t& joined : stretch.joined) joined = scratch.next[joined];
+    for (std::uint32_t& home : stretch.tiles) home = scratch.next[home];
   }
   scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
   return true;
@@ -112,7 +112,7 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
   scratch.next.assign(scratch.homes.size(), 0);
   for (const BinStretch& stretch : scratch.stretches) {
     for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
-      scratch.next[stretch.joined[k]] += stretch.entries[k];
+      scratch.next[stretch.tiles[k]] += stretch.entries[k];
     }
   }
   std::uint32_t total = 0;
@@ -124,7 +124,7 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
   scratch.offsets = scratch.next;
   for (BinStretch& stretch : scratch.stretches) {
     for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
-      std::uint32_t& next = scratch.next[stretch.joined[k]];
+      std::uint32_t& next = scratch.next[stretch.tiles[k]];
       const std::uint32_t count = stretch.entries[k];
       stretch.entries[k] = next;
       next += count;
@@ -196,17 +196,22 @@ bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   return true;
 }
 
-// The first entry of each tile of the sealed directory, those without particles included.
+// The first entry of each tile of the sealed directory, those without particles included, and the
+// tiles of the stretches' homes.
 void SetOffsets(ParticleBins& bins) {
-  const BinScratch& scratch = bins.scratch;
+  BinScratch& scratch = bins.scratch;
   const auto entries = static_cast<std::uint32_t>(bins.entries.size());
   bins.offsets.resize(bins.tiles.size() + 1);
   std::size_t home = 0;
   for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
     bins.offsets[tile] = home < scratch.homes.size() ? scratch.offsets[home] : entries;
-    home += home < scratch.homes.size() && scratch.homes[home] == bins.tiles[tile];
+    if (home == scratch.homes.size() || scratch.homes[home] != bins.tiles[tile]) continue;
+    scratch.next[home++] = static_cast<std::uint32_t>(tile);
   }
   bins.offsets.back() = entries;
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::uint32_t& tile : stretch.tiles) tile = scratch.next[tile];
+  }
 }
 
 // Why tiles were not found: the first particle too far away, else too many tiles.
@@ -265,9 +270,14 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   const std::size_t stretches = (count + length - 1) / length;
   if (scratch.all_stretches.size() < stretches) scratch.all_stretches.resize(stretches);
   scratch.stretches = std::span(scratch.all_stretches).first(stretches);
+  for (std::size_t k = 0; k < stretches; ++k) {
+    scratch.stretches[k].first = k * length;
+    scratch.stretches[k].last = std::min(count, (k + 1) * length);
+  }
   const auto for_each_stretch = [&](auto visit) {
     ParallelFor(scratch.stretches.size(), [&](std::size_t k) {
-      visit(scratch.stretches[k], k * length, std::min(count, (k + 1) * length));
+      BinStretch& stretch = scratch.stretches[k];
+      visit(stretch, stretch.first, stretch.last);
     });
   };
 

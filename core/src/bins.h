@@ -31,8 +31,10 @@ inline bool LiesIn(const BinEntry& entry, const BitRows& cells) {
 
 /// A stretch of successive particles: sorted by one task.
 struct BinStretch {
+  std::size_t first = 0, last = 0;  ///< Its particles are [first, last).
   TileDirectory homes;  ///< The tiles in which its particles lie, in the order in which they came.
-  std::vector<std::uint32_t> joined;   ///< By home: its place among those of all stretches.
+  std::vector<std::uint32_t> tiles;    ///< By home: its place among those of all stretches; in the
+                                       ///< end its tile.
   std::vector<std::uint32_t> entries;  ///< By home: how many, then where the next one goes.
 };
 

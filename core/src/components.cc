@@ -11,7 +11,6 @@
 namespace partiemc {
 namespace {
 
-constexpr std::uint32_t kNoComponent = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint32_t kSeveralComponents = kNoComponent - 1;
 
 }  // namespace
@@ -111,32 +110,17 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
   return label_[RunAt(crossings, node)];
 }
 
-// The component of all inside nodes of a tile and of its cells' corners beyond it. Runs are
-// numbered by tile, row, column, so that those of the tile are successive, and those of a row.
+// The component of all inside nodes of a tile and of its cells' corners beyond it.
 std::uint32_t Components::ComponentSeenFrom(const TileDirectory& directory,
                                             const Crossings& crossings, std::uint32_t tile) const {
   std::uint32_t seen = kNoComponent;
-  const auto see = [&](std::uint32_t first, std::uint32_t count) {
+  ForEachRunSeenFrom(directory, crossings, tile, [&](std::uint32_t first, std::uint32_t count) {
     if (count == 0) return;
     if (seen == kNoComponent) seen = label_[first];
     std::uint32_t differs = 0;
     for (std::uint32_t run = first; run < first + count; ++run) differs |= label_[run] ^ seen;
     if (differs != 0) seen = kSeveralComponents;
-  };
-  const auto see_left_nodes = [&](std::uint32_t other, int rows) {
-    for (int j = 0; other != kNoTile && j < rows; ++j) {
-      see(first_run_[other * kTileSize + j], crossings.tiles[other].inside[j] & 1);
-    }
-  };
-  const Neighbourhood& near = directory.neighbours(tile);
-  const std::uint32_t first = first_run_[tile * kTileSize];
-  see(first, first_run_[(tile + 1) * kTileSize] - first);
-  if (const std::uint32_t above = near[7]; above != kNoTile) {
-    const std::uint32_t starts = RunStarts(crossings.tiles[above].inside[0]);
-    see(first_run_[above * kTileSize], static_cast<std::uint32_t>(CountBits(starts)));
-  }
-  see_left_nodes(near[5], kTileSize);
-  see_left_nodes(near[8], 1);
+  });
   return seen;
 }
 
@@ -163,22 +147,20 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
   return share;
 }
 
-TilePlace Components::NearestInside(const ParticleBins& bins, const Crossings& crossings,
-                                    std::uint32_t tile, std::uint32_t entry) const {
-  const float x = bins.entries[entry].x;
-  const float y = bins.entries[entry].y;
+std::uint32_t Components::ComponentOf(const TileDirectory& directory, const Crossings& crossings,
+                                      std::uint32_t tile, float x, float y) const {
   const int i = static_cast<int>(x);
   const int j = static_cast<int>(y);
   // The nearest of the four corners is inside as a rule; of equal ones the lower, the more left.
-  const TilePlace closest = Normalise(bins.tiles, tile, i + (x - static_cast<float>(i) > 0.5f),
+  const TilePlace closest = Normalise(directory, tile, i + (x - static_cast<float>(i) > 0.5f),
                                       j + (y - static_cast<float>(j) > 0.5f));
-  if (IsInside(crossings, closest)) return closest;
+  if (IsInside(crossings, closest)) return At(crossings, closest);
   TilePlace nearest{kNoTile, 0, 0};
   float nearest_distance = 4;  // Above the square of a cell's diagonal.
   for (int corner = 0; corner < 4; ++corner) {
     const int di = corner & 1;
     const int dj = corner >> 1;
-    const TilePlace node = Normalise(bins.tiles, tile, i + di, j + dj);
+    const TilePlace node = Normalise(directory, tile, i + di, j + dj);
     if (!IsInside(crossings, node)) continue;
     const float dx = x - static_cast<float>(i + di);
     const float dy = y - static_cast<float>(j + dj);
@@ -188,7 +170,7 @@ TilePlace Components::NearestInside(const ParticleBins& bins, const Crossings& c
       nearest = node;
     }
   }
-  return nearest;
+  return nearest.tile == kNoTile ? kNoComponent : At(crossings, nearest);
 }
 
 void Components::CountParticles(const ParticleBins& bins, const Crossings& crossings,

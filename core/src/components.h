@@ -1,14 +1,20 @@
 // Connected components of the inside nodes: which polygon a node, a ring or a particle belongs to.
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "bins.h"
+#include "bits.h"
 #include "crossings.h"
 
 namespace partiemc {
+
+/// Marks a particle that belongs to no component.
+inline constexpr std::uint32_t kNoComponent = 0xffffffff;
 
 /// Inside nodes joined along lattice edges and through the saddles whose inside corners are
 /// joined: exactly the connectivity of the isoline, so that each component has one outer ring.
@@ -23,15 +29,33 @@ class Components {
   /// Component of an inside node.
   std::uint32_t At(const Crossings& crossings, const TilePlace& node) const;
 
+  /// The component that a particle at (x, y) of a tile belongs to: that of the inside corner of its
+  /// cell that is nearest to it. None: kNoComponent.
+  std::uint32_t ComponentOf(const TileDirectory& directory, const Crossings& crossings,
+                            std::uint32_t tile, float x, float y) const;
+
+  /// Asks the memory for what ComponentOf will look up there.
+  void Prefetch(std::uint32_t tile, int row) const {
+    hwy::Prefetch(&first_run_[tile * kTileSize + row]);
+  }
+
+  /// Calls visit(component) for the components of which a tile's particles may be: once or several
+  /// times for each. Cost: linear in the runs of inside nodes on the tile and its upper right rim.
+  template <typename Visit>
+  void ForEachSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                       std::uint32_t tile, Visit visit) const;
+
   /// Calls visit(tile, j, mask, component) for each run of inside nodes.
   template <typename Visit>
   void ForEachRun(const Crossings& crossings, Visit visit) const;
 
-  /// Calls visit(tile, entry, component) for each particle, by its entry in the list of its own
-  /// tile. A particle belongs to the inside corner of its cell that is nearest to it; none: to
-  /// nobody, and is not visited.
+  /// Calls visit(tile, entry, component) for each particle that belongs to one (ComponentOf), by
+  /// its entry in the list of its own tile.
   template <typename Visit>
   void ForEachParticle(const ParticleBins& bins, const Crossings& crossings, Visit visit) const;
+  template <typename Visit>
+  void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
+                         Visit visit) const;
 
   /// Adds the particles of each component to `counts`, and their weights, where particles have
   /// weights of their own, to `weights`; both have size() elements.
@@ -52,10 +76,8 @@ class Components {
                                   std::uint32_t tile) const;
   TileShare ShareOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile) const;
   template <typename Visit>
-  void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
-                         Visit visit) const;
-  TilePlace NearestInside(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
-                          std::uint32_t entry) const;
+  void ForEachRunSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                          std::uint32_t tile, Visit visit) const;
   std::uint32_t RunAt(const Crossings& crossings, const TilePlace& node) const;
   std::uint32_t Root(std::uint32_t run);
   void Unite(std::uint32_t a, std::uint32_t b);
@@ -98,12 +120,42 @@ void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
   }
 }
 
+// Calls visit(first, count) for the runs of the tile and of its cells' corners beyond it. Runs are
+// numbered by tile, row, column, so that those of the tile are successive, and those of a row.
+template <typename Visit>
+void Components::ForEachRunSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                                    std::uint32_t tile, Visit visit) const {
+  const auto visit_left_nodes = [&](std::uint32_t other, int rows) {
+    for (int j = 0; other != kNoTile && j < rows; ++j) {
+      visit(first_run_[other * kTileSize + j], crossings.tiles[other].inside[j] & 1);
+    }
+  };
+  const Neighbourhood& near = directory.neighbours(tile);
+  const std::uint32_t first = first_run_[tile * kTileSize];
+  visit(first, first_run_[(tile + 1) * kTileSize] - first);
+  if (const std::uint32_t above = near[7]; above != kNoTile) {
+    const std::uint32_t starts = RunStarts(crossings.tiles[above].inside[0]);
+    visit(first_run_[above * kTileSize], static_cast<std::uint32_t>(CountBits(starts)));
+  }
+  visit_left_nodes(near[5], kTileSize);
+  visit_left_nodes(near[8], 1);
+}
+
+template <typename Visit>
+void Components::ForEachSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                                 std::uint32_t tile, Visit visit) const {
+  ForEachRunSeenFrom(directory, crossings, tile, [&](std::uint32_t first, std::uint32_t count) {
+    for (std::uint32_t run = first; run < first + count; ++run) visit(label_[run]);
+  });
+}
+
 template <typename Visit>
 void Components::ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings,
                                    std::uint32_t tile, Visit visit) const {
   for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
-    const TilePlace node = NearestInside(bins, crossings, tile, entry);
-    if (node.tile != kNoTile) visit(tile, entry, At(crossings, node));
+    const BinEntry& at = bins.entries[entry];
+    const std::uint32_t component = ComponentOf(bins.tiles, crossings, tile, at.x, at.y);
+    if (component != kNoComponent) visit(tile, entry, component);
   }
 }
 

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace partiemc {
@@ -17,12 +16,15 @@ struct RepeatedId {
 
 /// Buffers of FindRepeated.
 struct DistinctIdsScratch {
-  std::vector<std::uint64_t> seen;                            ///< A bit for each number.
-  std::vector<std::pair<std::uint64_t, std::size_t>> sorted;  ///< Ids and their places.
+  std::vector<std::uint64_t> seen;      ///< Bits.
+  std::vector<std::uint64_t> suspects;  ///< Hashes.
 };
 
 /// The first id, in their order, that an earlier one equals; nothing if all are different.
-/// Cost: linear where ids are numbered without large gaps, as simulators do it; else n log n.
+/// Ids are ticked off in a bitmap of at most 32 bits for each: by number where they are dense, as
+/// simulators number particles, else by hash; the few that share a bit are compared.
+/// Cost: linear in ids; n log n in those that share a bit, all of them where ids were chosen for
+/// it.
 std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
                                        DistinctIdsScratch& scratch);
 

@@ -132,7 +132,7 @@ void Remember(const IdentityInput& input, IdentityScratch& s, RingHistory& next)
                           .velocity_y = s.tracks.velocity_y[number]});
   }
   for (NodeRun& run : next.runs) run.ring = s.rank[run.ring];
-  next.samples = s.tracks.samples;
+  next.samples = s.tracks.by_id.samples;
   for (ParticleSample& sample : next.samples) sample.ring = s.rank[sample.ring];
   std::sort(next.samples.begin(), next.samples.end(),
             [](const ParticleSample& x, const ParticleSample& y) { return x.hash < y.hash; });

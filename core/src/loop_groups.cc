@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "cancellation.h"
 #include "parallel.h"
 
 namespace partiemc {
@@ -76,25 +77,26 @@ bool LoopGroups::TriangulateGroup(std::span<const double> points, std::size_t gr
   return batch.triangulator.Triangulate(points, batch.points, batch.offsets, batch.triangles);
 }
 
-bool LoopGroups::Triangulate(std::span<const double> points,
-                             std::vector<std::uint32_t>& triangles) {
+void LoopGroups::Triangulate(std::span<const double> points, std::vector<std::uint32_t>& triangles,
+                             std::vector<std::uint32_t>& broken) {
   SortLoops();
   const std::size_t batch_count = MakeBatches();
   ParallelFor(batch_count, [&](std::size_t k) {
     Batch& batch = batches_[k];
     batch.triangles.clear();
-    batch.is_done = true;
+    batch.broken.clear();
     for (std::size_t group = batch.first_group; group < batch.last_group; ++group) {
-      batch.is_done = batch.is_done && TriangulateGroup(points, group, batch);
+      ThrowIfCancelled();
+      if (!TriangulateGroup(points, group, batch)) {
+        batch.broken.push_back(static_cast<std::uint32_t>(group));
+      }
     }
   });
-  bool is_done = true;
   for (std::size_t k = 0; k < batch_count; ++k) {
-    is_done = is_done && batches_[k].is_done;
     triangles.insert(triangles.end(), batches_[k].triangles.begin(), batches_[k].triangles.end());
+    broken.insert(broken.end(), batches_[k].broken.begin(), batches_[k].broken.end());
   }
   Clear();
-  return is_done;
 }
 
 }  // namespace partiemc

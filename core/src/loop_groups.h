@@ -35,9 +35,10 @@ class LoopGroups {
 
   /// Appends the triangles of all groups, in the order of the groups, and forgets the loops.
   /// Groups are taken together to batches of about the same number of points, whatever the number
-  /// of threads. False if it is seen that the loops of a group break the requirements of
-  /// Triangulator, which a strip does not look for.
-  bool Triangulate(std::span<const double> points, std::vector<std::uint32_t>& triangles);
+  /// of threads. A group whose loops are seen to break the requirements of Triangulator, which a
+  /// strip does not look for, has no triangles and is added to `broken`.
+  void Triangulate(std::span<const double> points, std::vector<std::uint32_t>& triangles,
+                   std::vector<std::uint32_t>& broken);
 
  private:
   // Neighbouring groups that one task triangulates, one after the other.
@@ -47,7 +48,7 @@ class LoopGroups {
     std::vector<std::uint32_t> triangles;
     LoopStrip strip;
     Triangulator triangulator;
-    bool is_done = false;
+    std::vector<std::uint32_t> broken;  // Groups.
   };
 
   void SortLoops();

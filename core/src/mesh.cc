@@ -25,7 +25,7 @@ class MeshBuilder {
   MeshBuilder(const MeshInput& input, MeshScratch& scratch, Mesh& mesh)
       : input_(input), scratch_(scratch), mesh_(mesh) {}
 
-  absl::Status Build(FrameStatistics& statistics);
+  void Build(FrameStatistics& statistics);
 
  private:
   bool MovesVertices() const { return input_.parameters.placement == Placement::kFarthestParticle; }
@@ -44,10 +44,10 @@ class MeshBuilder {
   void AddRingLoops();
   void AddStaircaseLoops(bool reversed);
   std::uint32_t OuterRingAt(const TilePlace& inside_node) const;
-  bool TriangulateLoops(TriangleClass triangle_class);
-  bool TriangulateByLoops();
+  void TriangulateLoops(TriangleClass triangle_class);
+  void TriangulateByLoops();
   bool OneSweepIsLong() const;
-  bool TriangulateAll();
+  void TriangulateAll();
   void MoveVertices();
   std::uint64_t CountInteriorCells() const;
   std::uint64_t ExpectedBandTriangles() const;
@@ -202,23 +202,22 @@ void MeshBuilder::AddStaircaseLoops(bool reversed) {
   }
 }
 
-bool MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
-  const bool is_done = scratch_.loops.Triangulate(mesh_.points, mesh_.triangles);
+void MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
+  scratch_.loops.Triangulate(mesh_.points, mesh_.triangles, scratch_.tangled);
   mesh_.classes.resize(mesh_.triangles.size() / 3, triangle_class);
-  return is_done;
 }
 
 // What rings and staircases bound: the band between them, all of the inside for `polygon`, and for
 // `conforming` the interior, as the corners of the staircases are the only points that the band has
 // there.
-bool MeshBuilder::TriangulateByLoops() {
+void MeshBuilder::TriangulateByLoops() {
   scratch_.loops.Clear();
   AddRingLoops();
   if (HasBand()) AddStaircaseLoops(true);
-  if (!TriangulateLoops(TriangleClass::kBoundary)) return false;
-  if (input_.parameters.fill != Fill::kConforming) return true;
+  TriangulateLoops(TriangleClass::kBoundary);
+  if (input_.parameters.fill != Fill::kConforming) return;
   AddStaircaseLoops(false);
-  return TriangulateLoops(TriangleClass::kInterior);
+  TriangulateLoops(TriangleClass::kInterior);
 }
 
 // Whether one ring is so long that others wait for the sweep of its component, and there is a
@@ -235,8 +234,7 @@ bool MeshBuilder::OneSweepIsLong() const {
 
 // Finds the shapes of the interior and triangulates everything, in whichever order is faster: both
 // make the same triangles.
-bool MeshBuilder::TriangulateAll() {
-  bool is_done = false;
+void MeshBuilder::TriangulateAll() {
   const auto trace = [this] {
     TraceStaircases(input_.directory, scratch_.interior, scratch_.staircases);
   };
@@ -244,7 +242,7 @@ bool MeshBuilder::TriangulateAll() {
     const auto sweep = [&] {
       trace();
       AppendCorners();
-      is_done = TriangulateByLoops();
+      TriangulateByLoops();
     };
     ParallelInvoke(sweep, [this] { FillRectangles(); });
     PutNodesInPlace();
@@ -252,12 +250,11 @@ bool MeshBuilder::TriangulateAll() {
     ParallelInvoke(trace, [this] { FillRectangles(); });
     NumberCorners();
     AppendNodes();
-    is_done = TriangulateByLoops();
+    TriangulateByLoops();
   }
   mesh_.triangles.insert(mesh_.triangles.end(), scratch_.triangles.begin(),
                          scratch_.triangles.end());
   mesh_.classes.resize(mesh_.triangles.size() / 3, TriangleClass::kInterior);
-  return is_done;
 }
 
 // Replaces the middles of the segments by the vertices of the rings. A triangle of which two
@@ -327,17 +324,17 @@ std::uint64_t MeshBuilder::CountFolded() const {
   return count;
 }
 
-absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
+void MeshBuilder::Build(FrameStatistics& statistics) {
   mesh_.Clear();
+  scratch_.tangled.clear();
   FindInterior();
   if (input_.parameters.fill == Fill::kNone) {
     TraceStaircases(input_.directory, scratch_.interior, scratch_.staircases);
     interior_cells_ = CountInteriorCells();
   } else {
     CollectRingPoints();
-    if (!TriangulateAll()) {
-      return absl::InternalError("mesh: the rings of this frame cannot be triangulated");
-    }
+    TriangulateAll();
+    if (!scratch_.tangled.empty()) return;
     if (MovesVertices()) MoveVertices();
   }
   const auto band_triangles =
@@ -347,14 +344,13 @@ absl::Status MeshBuilder::Build(FrameStatistics& statistics) {
   statistics.triangles = mesh_.TriangleCount();
   statistics.triangles_grid = 2 * interior_cells_ + band_triangles;
   statistics.folded_triangles = MovesVertices() ? CountFolded() : 0;
-  return absl::OkStatus();
 }
 
 }  // namespace
 
-absl::Status BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
-                       FrameStatistics& statistics) {
-  return MeshBuilder(input, scratch, mesh).Build(statistics);
+void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
+               FrameStatistics& statistics) {
+  MeshBuilder(input, scratch, mesh).Build(statistics);
 }
 
 }  // namespace partiemc

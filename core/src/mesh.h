@@ -29,6 +29,7 @@ struct MeshScratch {
   std::vector<std::uint32_t> staircase_rings;  // By loop of the staircases: the outer ring around.
   std::vector<std::uint32_t> triangles;        // Of the rectangles.
   std::vector<double> points;                  // Of a connectivity that is not yet the mesh's.
+  std::vector<std::uint32_t> tangled;          // Outer rings, of RingTopology (BuildMesh).
 };
 
 struct MeshInput {
@@ -50,9 +51,10 @@ struct MeshInput {
 /// points, and is the same for grid, greedy and conforming. `farthest-particle` takes its
 /// connectivity from the middles of the segments and only then moves the vertices, so that a
 /// triangle folds where the vertices do.
-/// Errors: INTERNAL if the rings cannot be triangulated, which is a bug.
+/// Components that cannot be triangulated, which is a bug, are named in `scratch.tangled` by their
+/// outer rings; the mesh is then worth nothing.
 /// Cost: n log n in the points of rings and staircases, linear in cells.
-absl::Status BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
-                       FrameStatistics& statistics);
+void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
+               FrameStatistics& statistics);
 
 }  // namespace partiemc

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 namespace partiemc {
 
@@ -14,9 +15,17 @@ class TaskArena : public tbb::task_arena {
 };
 
 namespace erased {
+namespace {
+
+void ThrowIfGivenUp() {
+  if (tbb::is_current_task_group_canceling()) throw Cancelled();
+}
+
+}  // namespace
 
 void Invoke(const Action& a, const Action& b) {
   tbb::parallel_invoke([&] { a.run(a.fork_join, a.body); }, [&] { b.run(b.fork_join, b.body); });
+  ThrowIfGivenUp();
 }
 
 void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action) {
@@ -24,6 +33,7 @@ void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action) 
   tbb::parallel_for(Range(0, count, grain), [&](const Range& range) {
     action.run(action.fork_join, action.body, range.begin(), range.end());
   });
+  ThrowIfGivenUp();
 }
 
 std::size_t ThreadCount() {

@@ -1,5 +1,7 @@
 // Parts of a stage in parallel, in the arena of the caller (partiemc/arena.h): the only place where
 // tasks are made. All return when everything is done; an exception of a body comes out of the call.
+// Work whose caller has cancelled it (cancellation.h) ends that way, too, before the next index or
+// range.
 #pragma once
 
 #include <algorithm>
@@ -8,6 +10,7 @@
 #include <cstddef>
 #include <span>
 
+#include "cancellation.h"
 #include "fork_join.h"
 
 namespace partiemc {
@@ -49,6 +52,8 @@ RangeAction RangeActionOf(ForkJoin& fork_join, const Body& body) {
   return {run, fork_join, &body};
 }
 
+// Both throw Cancelled where the task that they are called by has been given up, as another one of
+// its group threw: oneTBB leaves out parts of what such a task begins, and tells nobody.
 void Invoke(const Action& a, const Action& b);
 void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action);
 
@@ -67,23 +72,43 @@ inline std::size_t ThreadCount() { return erased::ThreadCount(); }
 /// `grain` where there are so many.
 template <std::invocable<std::size_t, std::size_t> Body>
 void ParallelForRanges(std::size_t count, std::size_t grain, const Body& body) {
+  const std::atomic<bool>* const flag = CancellationScope::Current();
+  const auto range = [flag, &body](std::size_t first, std::size_t last) {
+    const CancellationScope scope(flag);
+    ThrowIfCancelled(flag);
+    body(first, last);
+  };
   ForkJoin fork_join;
-  erased::ForRanges(count, grain, erased::RangeActionOf(fork_join, body));
+  erased::ForRanges(count, grain, erased::RangeActionOf(fork_join, range));
 }
 
 /// Calls body(k) for each k of [0, count).
 template <std::integral Index, std::invocable<Index> Body>
 void ParallelFor(Index count, const Body& body) {
+  const std::atomic<bool>* const flag = CancellationScope::Current();
   ParallelForRanges(static_cast<std::size_t>(count), 1, [&](std::size_t first, std::size_t last) {
-    for (auto k = static_cast<Index>(first); k < static_cast<Index>(last); ++k) body(k);
+    for (auto k = static_cast<Index>(first); k < static_cast<Index>(last); ++k) {
+      ThrowIfCancelled(flag);
+      body(k);
+    }
   });
 }
 
 /// Calls a() and b().
 template <std::invocable A, std::invocable B>
 void ParallelInvoke(const A& a, const B& b) {
+  const std::atomic<bool>* const flag = CancellationScope::Current();
+  const auto with_flag = [flag](const auto& body) {
+    return [flag, &body] {
+      const CancellationScope scope(flag);
+      ThrowIfCancelled(flag);
+      body();
+    };
+  };
+  const auto first = with_flag(a);
+  const auto second = with_flag(b);
   ForkJoin fork_join;
-  erased::Invoke(erased::ActionOf(fork_join, a), erased::ActionOf(fork_join, b));
+  erased::Invoke(erased::ActionOf(fork_join, first), erased::ActionOf(fork_join, second));
 }
 
 /// Sorts by `less`. Splits as quicksort does, but at most `splits` times in a row, so that no order

@@ -6,10 +6,6 @@
 namespace partiemc {
 namespace {
 
-// Longest Newton step of a cell's vertex, in cells: beyond it the gradient at the middle of the
-// segment no longer speaks for the level set.
-constexpr double kMaxNewtonStep = 0.5;
-
 // Eigenvalues of the QEF below this share of the larger one leave their direction free.
 constexpr double kQefCutoff = 0.1;
 
@@ -53,9 +49,9 @@ LatticePoint ClampToHalf(const Segment& segment, LatticePoint point) {
   return {u, v};
 }
 
-LatticePoint VirtualPlaneVertex(const CellPlane& plane) {
+LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step) {
   if (plane.is_weak) return plane.point;
-  return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, kMaxNewtonStep);
+  return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, max_step);
 }
 
 LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane) {

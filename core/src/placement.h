@@ -43,8 +43,8 @@ inline LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gr
 }
 
 /// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
-/// most half a cell; none where the gradient is weak. In lattice coordinates.
-LatticePoint VirtualPlaneVertex(const CellPlane& plane);
+/// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
+LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
 /// Minimiser of sum_j (n_j . (v - p_j))^2 over the segment's two ends (Eq. 14), in closed form;
 /// directions that the normals hardly constrain stay at the middle. In lattice coordinates.

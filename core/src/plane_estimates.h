@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "partiemc/virtual_plane_constants.h"
 #include "plane_support.h"
 #include "point_field.h"
 #include "point_groups.h"
@@ -14,32 +15,33 @@
 
 namespace partiemc {
 
-/// How far outside of a plane the boundary is, in cells; each at most 0.8 spacings either way. 0
-/// where there is nothing to tell it by.
-struct PlaneEstimates {
-  double support = 0;  ///< By the outermost particles' mean distance to it, plus half a spacing.
-  double strip = 0;    ///< By the particles' volume in a strip below it.
+/// What the particles near a plane say of it; 0 where there are none.
+struct PlaneEstimate {
+  /// How far outside of the plane the boundary is, in cells: by the mean distance of the particles
+  /// that support it, plus half a spacing. At most the support's height either way.
+  double offset = 0;
+  double scatter = 0;  ///< Variance of those distances, in squared spacings.
 };
 
 /// Estimates planes of one field.
 class PlaneEstimator {
  public:
-  PlaneEstimator(const PointField& field, const Scale& scale);
+  PlaneEstimator(const PointField& field, const Scale& scale,
+                 const VirtualPlaneConstants& constants);
 
   using Planes = PointGroup<BentPlane>;
-  using Estimates = std::array<PlaneEstimates, kPointsAtOnce>;
+  using Estimates = std::array<PlaneEstimate, kPointsAtOnce>;
 
-  /// Of at most kQueriesAtOnce groups. Cost: the particles within three spacings of each.
+  /// Of at most kQueriesAtOnce groups. Cost: the particles around each.
   /// Requires: field.Covers(tile, x, y) of each plane; groups and estimates are as many.
   void Estimate(std::span<const Planes> groups, std::span<Estimates> estimates) const;
 
  private:
-  PlaneEstimates EstimatesOf(const SupportSums& sums) const;
+  PlaneEstimate EstimateOf(const SupportSums& sums) const;
 
   const PointField& field_;
-  const Scale& scale_;
+  double spacing_;
   SupportShape support_;
-  StripShape strip_;
 };
 
 }  // namespace partiemc

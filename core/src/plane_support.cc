@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-enum SupportChannel { kDistance, kWeight, kVolume, kSupportSums };
+enum SupportChannel { kWeight, kDistance, kSquare, kSupportSums };
 
 HWY_INLINE Vector Constant(double value) { return hn::Set(Lanes(), static_cast<float>(value)); }
 
@@ -25,30 +25,21 @@ HWY_INLINE Vector Bump(Vector square, Vector inverse_square) {
   return hn::Mul(t, t);
 }
 
-HWY_INLINE Vector InverseSquare(double length) { return Constant(1 / (length * length)); }
-
 // What planes have in common.
-struct Shapes {
-  HWY_INLINE Shapes(const SupportShape& support, const StripShape& strip)
-      : support_radius(Constant(support.radius * support.radius)),
-        support_height(Constant(support.height)),
-        support_width(InverseSquare(support.half_width)),
-        support_depth(Constant(support.depth)),
-        inverse_spacing(Constant(1 / support.spacing)),
-        strip_radius(Constant(strip.radius * strip.radius)),
-        strip_height(Constant(strip.height)),
-        strip_width(InverseSquare(strip.half_width)),
-        strip_depth(InverseSquare(strip.depth)) {}
+struct Shape {
+  HWY_INLINE explicit Shape(const SupportShape& support)
+      : radius_square(Constant(support.radius * support.radius)),
+        height(Constant(support.height)),
+        inverse_square(Constant(1 / (support.radius * support.radius))),
+        depth(Constant(support.depth)),
+        inverse_spacing(Constant(1 / support.spacing)) {}
 
-  // Radii squared; widths and the strip's depth as Bump takes them.
-  Vector support_radius, support_height, support_width, support_depth, inverse_spacing;
-  Vector strip_radius, strip_height, strip_width, strip_depth;
+  Vector radius_square, height, inverse_square, depth, inverse_spacing;
 };
 
 // The sums over a chunk's particles for a plane.
-template <bool kWeighted>
 HWY_INLINE PartialSums<kSupportSums> SumChunk(const NearRows& near, const NearChunk& chunk,
-                                              const BentPlane& plane, const Shapes& shapes) {
+                                              const BentPlane& plane, const Shape& shape) {
   const Lanes d;
   const Vector x = Constant(plane.x - near.origin_x);
   const Vector y = Constant(plane.y - near.origin_y);
@@ -64,30 +55,22 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NearRows& near, const NearCh
     const Vector along_square = hn::Mul(along, along);
     const Vector distance = hn::Add(above, hn::Mul(half_curvature, along_square));
 
-    Vector w = hn::Max(hn::Add(hn::Mul(distance, shapes.inverse_spacing), shapes.support_depth),
-                       hn::Zero(d));
+    Vector w = hn::Max(hn::Add(hn::Mul(distance, shape.inverse_spacing), shape.depth), hn::Zero(d));
     for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
-    const auto supports =
-        hn::And(hn::Lt(square, shapes.support_radius), hn::Lt(above, shapes.support_height));
-    w = hn::IfThenElseZero(supports, hn::Mul(Bump(along_square, shapes.support_width), w));
-    channels[kDistance] =
-        hn::Add(channels[kDistance], hn::IfThenElseZero(supports, hn::Mul(w, distance)));
+    // Of what lies far away, weights and distances may be no numbers.
+    const auto supports = hn::And(hn::Lt(square, shape.radius_square), hn::Lt(above, shape.height));
+    w = hn::IfThenElseZero(supports, hn::Mul(Bump(square, shape.inverse_square), w));
+    const Vector moment = hn::IfThenElseZero(supports, hn::Mul(w, distance));
     channels[kWeight] = hn::Add(channels[kWeight], w);
-
-    const Vector below = hn::Min(distance, hn::Zero(d));
-    Vector volume = hn::Mul(Bump(along_square, shapes.strip_width),
-                            Bump(hn::Mul(below, below), shapes.strip_depth));
-    if constexpr (kWeighted) volume = hn::Mul(volume, hn::Load(d, chunk.weight + k));
-    const auto is_in_strip =
-        hn::And(hn::Lt(square, shapes.strip_radius), hn::Lt(above, shapes.strip_height));
-    channels[kVolume] = hn::Add(channels[kVolume], hn::IfThenElseZero(is_in_strip, volume));
+    channels[kDistance] = hn::Add(channels[kDistance], moment);
+    channels[kSquare] =
+        hn::Add(channels[kSquare], hn::IfThenElseZero(supports, hn::Mul(moment, distance)));
   });
 }
 
-template <bool kWeighted>
-HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& support,
-                    const StripShape& strip, std::span<QuerySupports> sums) {
-  const Shapes shapes(support, strip);
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 std::span<QuerySupports> sums) {
+  const Shape shape(support);
   for (std::size_t q = 0; q < queries.size(); ++q) {
     for (std::size_t k = 0; k < queries[q].planes.size(); ++k) sums[q][k] = {};
   }
@@ -95,19 +78,13 @@ HWY_INLINE void Sum(std::span<const SupportQuery> queries, const SupportShape& s
     const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.planes.size(); ++k) {
       double totals[kSupportSums] = {};
-      SumChunk<kWeighted>(query.near, chunk, query.planes[k], shapes).AddTo(totals);
-      sums[q][k].distance += totals[kDistance];
+      SumChunk(query.near, chunk, query.planes[k], shape).AddTo(totals);
       sums[q][k].weight += totals[kWeight];
-      sums[q][k].volume += totals[kVolume];
+      sums[q][k].distance += totals[kDistance];
+      sums[q][k].square += totals[kSquare];
     }
   };
-  ForEachQuery<kWeighted>(queries, visit);
-}
-
-void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
-                 const StripShape& strip, std::span<QuerySupports> sums) {
-  queries.front().near.weight != nullptr ? Sum<true>(queries, support, strip, sums)
-                                         : Sum<false>(queries, support, strip, sums);
+  ForEachQuery<false>(queries, visit);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -120,8 +97,8 @@ namespace partiemc {
 HWY_EXPORT(SumSupports);
 
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
-                 const StripShape& strip, std::span<QuerySupports> sums) {
-  HWY_DYNAMIC_DISPATCH(SumSupports)(queries, support, strip, sums);
+                 std::span<QuerySupports> sums) {
+  HWY_DYNAMIC_DISPATCH(SumSupports)(queries, support, sums);
 }
 
 }  // namespace partiemc

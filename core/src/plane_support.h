@@ -10,17 +10,12 @@
 
 namespace partiemc {
 
-/// Which particles support a plane, lengths in cells: those in a disc around its point, up to a
-/// height above it, weighted by B(along, half_width) max(0, distance / spacing + depth)^8.
+/// Which particles support a plane, lengths in cells: those nearer to its point than a radius and
+/// not higher above it than a height, weighted by B(apart, radius) max(0, distance / spacing +
+/// depth)^8.
 struct SupportShape {
-  double radius, half_width, height, spacing;
+  double radius, height, spacing;
   double depth;  ///< In spacings.
-};
-
-/// Which particles count as volume below a plane, lengths in cells: those in a disc around its
-/// point, up to a height above it, by B(along, half_width) B(min(distance, 0), depth).
-struct StripShape {
-  double radius, half_width, height, depth;
 };
 
 /// A plane bent to a parabola, in cells relative to a tile.
@@ -30,24 +25,22 @@ struct BentPlane {
   double curvature;
 };
 
-/// Over the particles of a support: the weighted sum of their distances to the parabola, positive
-/// above it, and the sum of those weights. Over those of a strip: the sum of their weights in the
-/// field, or their number where all weigh the same.
+/// Over the particles of a support: the sums of their weights, of their weighted distances to the
+/// parabola, positive above it, and of the squares of these.
 struct SupportSums {
-  double distance, weight;
-  double volume;
+  double weight, distance, square;
 };
 
-/// Up to kPointsAtOnce planes, and at least the particles in both discs of each.
+/// Up to kPointsAtOnce planes, and at least the particles in the disc of each.
 struct SupportQuery {
   NearRows near;
   std::span<const BentPlane> planes;
 };
 
-/// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce, all or none of them
-/// with weights. In floats, with the same bits for any processor, as SumAtPoints.
+/// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce. In floats, with the
+/// same bits for any processor, as SumAtPoints.
 using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
-                 const StripShape& strip, std::span<QuerySupports> sums);
+                 std::span<QuerySupports> sums);
 
 }  // namespace partiemc

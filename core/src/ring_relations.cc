@@ -47,7 +47,7 @@ std::int64_t MedianOf(std::vector<std::int64_t>& ways) {
 
 // Each outer ring goes the way of its samples.
 void ShiftBySamples(const RingTracks& tracks, RelationScratch& s) {
-  const std::vector<FoundSample>& found = tracks.found;
+  const std::vector<FoundSample>& found = tracks.by_id.found;
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
     while (last < found.size() && found[last].before == found[first].before) ++last;
     const auto median = [&](std::int64_t CellShift::*part) {
@@ -132,7 +132,7 @@ void AddFoundSamples(const RingHistory& previous, const RingsNow& now, RelationS
                      std::vector<RingRelation>& relations) {
   s.sample_count.assign(previous.rings.size(), 0);
   for (const ParticleSample& sample : previous.samples) ++s.sample_count[sample.ring];
-  const std::vector<FoundSample>& found = now.tracks.found;
+  const std::vector<FoundSample>& found = now.tracks.by_id.found;
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
     while (last < found.size() && found[last].before == found[first].before &&
            found[last].now == found[first].now) {

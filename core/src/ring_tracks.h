@@ -12,26 +12,15 @@
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
-#include "run_overlaps.h"
+#include "ring_samples.h"
 
 namespace partiemc {
 
-/// A sample of the last frame that is in a ring of this one.
-struct FoundSample {
-  std::uint32_t before = 0, now = 0;  ///< Its rings: index in the history, number in this frame.
-  CellShift way;                      ///< That it has gone.
-};
-
 /// By numbers of the rings of a frame; keeps its memory from frame to frame.
 struct RingTracks {
-  std::vector<ParticleSample> samples;         ///< In no order; `ring` is a number.
-  std::vector<FoundSample> found;              ///< By `before`, then `now`.
+  RingSamples by_id;
   std::vector<double> velocity_x, velocity_y;  ///< World units per time; 0 for holes.
-
-  // Working memory.
-  std::vector<std::uint32_t> first_sample, sample_count;  // By number.
-  std::vector<std::uint32_t> bucket;                      // Of the last frame's samples, by hash.
-  std::vector<std::int64_t> sum_x, sum_y;                 // By number.
+  std::vector<std::int64_t> sum_x, sum_y;      // Working memory.
 };
 
 struct TrackInput {
@@ -44,13 +33,9 @@ struct TrackInput {
   std::span<const std::uint64_t> particle_count;     ///< By number, as CountParticles counts.
 };
 
-/// Follows the particles of a checked frame.
-///   samples     the particles with the least hashes of their ids, kMaxSamples of each outer ring:
-///               the same whatever the order of the particles, a random choice as to where they
-///               are, and, as hashes stay, largely the same ones in the next frame;
-///   velocities  means over the particles, in sums of integers, which have no order either.
-/// Without ids there are no samples, without velocities they are 0. Cost: linear in particles and
-/// samples; nothing without both.
+/// Follows the particles of a checked frame: samples as SampleRings takes them, velocities as means
+/// over the particles, in sums of integers, which have no order. Without ids there are no samples,
+/// without velocities they are 0. Cost: that of SampleRings; with velocities, linear in particles.
 void FollowParticles(const TrackInput& input, const RingHistory& previous, RingTracks& tracks);
 
 }  // namespace partiemc

@@ -279,12 +279,9 @@ std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spaci
   return count;
 }
 
-void DropSpray(const ParticleBins& bins, const Scale& scale,
-               const ReconstructionParameters& parameters, Crossings& crossings,
-               RingScratch& scratch, RingTopology& rings) {
-  FindContainers(bins.tiles, crossings, rings, scratch);
-  rings.dropped_spray = FindSpray(parameters, scale.spacing, rings, scratch);
-  if (rings.dropped_spray == 0) return;
+// Drops the components that are marked.
+void DropMarked(const ParticleBins& bins, Crossings& crossings, RingScratch& scratch,
+                RingTopology& rings) {
   scratch.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
         if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
@@ -293,6 +290,14 @@ void DropSpray(const ParticleBins& bins, const Scale& scale,
   MarkInteriorCells(bins.tiles, crossings);
   CountComponents(bins, crossings, scratch);
   Nest(bins, crossings, scratch, rings);
+}
+
+void DropSpray(const ParticleBins& bins, const Scale& scale,
+               const ReconstructionParameters& parameters, Crossings& crossings,
+               RingScratch& scratch, RingTopology& rings) {
+  FindContainers(bins.tiles, crossings, rings, scratch);
+  rings.dropped_spray = FindSpray(parameters, scale.spacing, rings, scratch);
+  if (rings.dropped_spray > 0) DropMarked(bins, crossings, scratch, rings);
 }
 
 }  // namespace
@@ -315,6 +320,16 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
   if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {
     DropSpray(bins, scale, parameters, crossings, scratch, rings);
   }
+}
+
+void DropComponents(const ParticleBins& bins, std::span<const std::uint32_t> outer_rings,
+                    Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
+  scratch.dropped.assign(scratch.components.size(), 0);
+  for (const std::uint32_t ring : outer_rings) {
+    std::uint8_t& dropped = scratch.dropped[scratch.component_of_ring[ring]];
+    if (std::exchange(dropped, std::uint8_t{1}) == 0) ++rings.dropped_components;
+  }
+  DropMarked(bins, crossings, scratch, rings);
 }
 
 }  // namespace partiemc

@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "near_ring.h"
 #include "parallel.h"
 
 namespace partiemc {
@@ -88,6 +90,21 @@ double NearestSquare(std::span<const WorldPosition> tree, const WorldPosition& q
   return best;
 }
 
+// Gathers the positions nearest to `query`, the tree's order deciding between equal distances.
+void GatherNearest(std::span<const WorldPosition> tree, const WorldPosition& query, int axis,
+                   NearRing& ring) {
+  if (tree.empty()) return;
+  const std::size_t middle = tree.size() / 2;
+  ring.Add(tree[middle].x - query.x, tree[middle].y - query.y);
+  const double across = Along(query, axis) - Along(tree[middle], axis);
+  const auto lower = tree.first(middle);
+  const auto upper = tree.subspan(middle + 1);
+  GatherNearest(across < 0 ? lower : upper, query, 1 - axis, ring);
+  if (across * across < ring.reach_square()) {
+    GatherNearest(across < 0 ? upper : lower, query, 1 - axis, ring);
+  }
+}
+
 // Calls visit(dx, dy) for the positions closer than `radius` to a point, in the order of the tree.
 template <typename Visit>
 void ForEachWithin(std::span<const WorldPosition> tree, const WorldPosition& point, int axis,
@@ -157,9 +174,44 @@ double MedianOf(std::vector<double>& values) {
   return *middle;
 }
 
+// What enough of the particles that are asked are surrounded at, within a factor of two: their
+// median distance. Nothing where they do not agree.
+std::optional<double> AgreedDistance(std::span<const WorldPosition> tree,
+                                     std::span<const WorldPosition> asked,
+                                     std::size_t asked_in_company, std::vector<double>& distances) {
+  distances.resize(asked.size());
+  ParallelFor(asked.size(), [&](std::size_t k) {
+    NearRing ring;
+    GatherNearest(tree, asked[k], 0, ring);
+    distances[k] = ring.IsAround() ? ring.Distance() : 0;
+  });
+  std::erase(distances, 0.0);
+  if (!AreEnough(distances.size(), asked_in_company)) return std::nullopt;
+  const double median = MedianOf(distances);
+  const auto agreeing = std::count_if(distances.begin(), distances.end(), [&](double distance) {
+    return distance <= 2 * median && 2 * distance >= median;
+  });
+  if (!AreEnough(static_cast<std::size_t>(agreeing), asked_in_company)) return std::nullopt;
+  return median;
+}
+
+// The spacing by density, starting from a distance between neighbours, and that distance where the
+// two are the same but for the error of the sums, or where no density can be told.
+double RefineSpacing(double distance, SpacingScratch& scratch) {
+  double spacing = distance;
+  for (int round = 0; round < kDensityRounds; ++round) {
+    const std::optional<double> dense = SpacingOfDensity(scratch.positions, scratch.asked,
+                                                         kDensityRadius * spacing, scratch.weights);
+    if (!dense) break;
+    spacing = *dense;
+  }
+  return std::abs(spacing - distance) <= kSumTolerance * distance ? distance : spacing;
+}
+
 }  // namespace
 
-std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingScratch& scratch) {
+std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
+                                               SpacingScratch& scratch) {
   const std::size_t count = frame.ParticleCount();
   auto& [positions, asked, distances, weights] = scratch;
   positions.resize(count);
@@ -190,16 +242,13 @@ std::optional<double> EstimateSpacing(const Frame& frame, Plane plane, SpacingSc
   if (distances.empty()) return std::nullopt;
   const double median = MedianOf(distances);
   std::erase_if(distances, [&](double distance) { return distance > kLonelyRatio * median; });
-  const double distance = MedianOf(distances);
-
-  double spacing = distance;
-  for (int round = 0; round < kDensityRounds; ++round) {
-    const std::optional<double> dense =
-        SpacingOfDensity(positions, asked, kDensityRadius * spacing, weights);
-    if (!dense) break;
-    spacing = *dense;
-  }
-  return std::abs(spacing - distance) <= kSumTolerance * distance ? distance : spacing;
+  const double spacing = RefineSpacing(MedianOf(distances), scratch);
+  const std::optional<double> around =
+      AgreedDistance(positions, asked, distances.size(), scratch.distances);
+  if (!around) return SpacingEstimate{spacing, false};
+  // Neighbours within half of that have all but the place of their neighbour.
+  const bool is_doubled = 2 * spacing < *around;
+  return SpacingEstimate{is_doubled ? RefineSpacing(*around, scratch) : spacing, true};
 }
 
 }  // namespace partiemc

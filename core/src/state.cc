@@ -19,7 +19,7 @@ namespace {
 // Layout, little-endian: magic, version, cell size, spacing (0: none), area offset, time (kAbsent:
 // none), identities given, a count of each of kKinds, then these, checksum.
 constexpr std::uint32_t kMagic = 0x53504d45;  // "EMPS"
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 5;
 constexpr std::uint64_t kAbsent = 0x7ff8000000000000;  // Not a number.
 constexpr std::size_t kNormalBytes = 4 + 4 + 4 + 4;
 constexpr std::size_t kChecksumBytes = 8;
@@ -29,13 +29,10 @@ struct Kind {
   const char* name;
   std::size_t bytes;
 };
-constexpr std::array<Kind, 7> kKinds = {{{"normals", kNormalBytes},
+constexpr std::array<Kind, 4> kKinds = {{{"normals", kNormalBytes},
                                          {"rings", kRingBytes},
                                          {"runs", kRunBytes},
-                                         {"samples", kSampleBytes},
-                                         {"offsets", kOffsetBytes},
-                                         {"points", kPointBytes},
-                                         {"particles", kParticleBytes}}};
+                                         {"samples", kSampleBytes}}};
 using Counts = std::array<std::uint64_t, kKinds.size()>;
 
 constexpr std::size_t kHeaderBytes = 4 + 4 + 5 * 8 + 8 * kKinds.size();
@@ -74,10 +71,8 @@ absl::Status CheckAreaOffset(std::optional<double> offset) {
 }
 
 Counts CountsOf(const State& state) {
-  const auto& [cell_size, spacing, area_offset, normals, history, outline] = state;
-  return {normals.size(),          history.rings.size(),   history.runs.size(),
-          history.samples.size(),  outline.offsets.size(), outline.points.size() / 2,
-          outline.particles.size()};
+  const RingHistory& history = state.history;
+  return {state.normals.size(), history.rings.size(), history.runs.size(), history.samples.size()};
 }
 
 std::uint64_t BytesOf(const Counts& counts) {
@@ -121,11 +116,15 @@ absl::Status CorruptState(std::string value, std::string rule) {
       {std::string(kReasonCorruptState), "state", std::move(value), std::move(rule)});
 }
 
+std::size_t SerializedBytes(const State& state) {
+  return kHeaderBytes + BytesOf(CountsOf(state)) + kChecksumBytes;
+}
+
 std::string Serialize(const State& state) {
   std::string bytes;
   const RingHistory& history = state.history;
   const Counts counts = CountsOf(state);
-  bytes.reserve(kHeaderBytes + BytesOf(counts) + kChecksumBytes);
+  bytes.reserve(SerializedBytes(state));
   PutNumber(kMagic, bytes);
   PutNumber(kVersion, bytes);
   PutNumber(state.cell_size.value_or(0), bytes);
@@ -141,7 +140,6 @@ std::string Serialize(const State& state) {
     PutNumber(normal.y, bytes);
   }
   PutHistory(history, bytes);
-  PutOutline(state.outline, bytes);
   PutNumber(ChecksumOf(bytes), bytes);
   return bytes;
 }
@@ -180,17 +178,13 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
   state.history.identities_given = TakeNumber<std::uint64_t>(rest);
   const auto counts = TakeCounts(rest);
   if (!counts.ok()) return counts.status();
-  const auto& [normals, rings, runs, samples, offsets, points, particles] = *counts;
+  const auto& [normals, rings, runs, samples] = *counts;
   state.normals.resize(normals);
   state.history.rings.resize(rings);
   state.history.runs.resize(runs);
   state.history.samples.resize(samples);
-  state.outline.offsets.resize(offsets);
-  state.outline.points.resize(2 * points);
-  state.outline.particles.resize(particles);
   if (absl::Status status = TakeNormals(rest, state.normals); !status.ok()) return status;
   if (absl::Status status = TakeHistory(rest, state.history); !status.ok()) return status;
-  if (absl::Status status = TakeOutline(rest, state.outline); !status.ok()) return status;
   return state;
 }
 

@@ -13,9 +13,6 @@ namespace partiemc {
 inline constexpr std::size_t kRingBytes = 8 + 4 + 4 + 8 + 8;
 inline constexpr std::size_t kRunBytes = 4 + 4 + 4 + 4;
 inline constexpr std::size_t kSampleBytes = 8 + 4 + 4 + 4;
-inline constexpr std::size_t kOffsetBytes = 4;
-inline constexpr std::size_t kPointBytes = 8 + 8;
-inline constexpr std::size_t kParticleBytes = 8 + 8 + 8;
 
 /// INVALID_ARGUMENT with a Violation of the reason CORRUPT_STATE.
 absl::Status CorruptState(std::string value, std::string rule);
@@ -27,11 +24,5 @@ void PutHistory(const RingHistory& history, std::string& bytes);
 /// Requires: its time and number of identities have been read, its vectors have their sizes, and
 /// `rest` has the bytes for them.
 absl::Status TakeHistory(std::string_view& rest, RingHistory& history);
-
-/// Appends offsets, points and particles.
-void PutOutline(const KnownOutline& outline, std::string& bytes);
-
-/// Takes what PutOutline appended, and checks it. Requires: as TakeHistory.
-absl::Status TakeOutline(std::string_view& rest, KnownOutline& outline);
 
 }  // namespace partiemc

@@ -71,10 +71,10 @@ struct UnrolledRing {
   std::int32_t *x, *y;         ///< Lattice coordinates of the world, in units.
   std::int32_t* arc;           ///< Length of the ring up to the vertex, in units; in margins, too.
   float *normal_x, *normal_y;  ///< Unit, outward.
-  float *next_x, *next_y;      ///< Scratch: the normals of the next step; then the strips.
-  float* weight;               ///< l: half of the two segments at the vertex, in cells.
-  float* base;   ///< Shift along the normal that the vertex's plane asks for, in cells.
-  float* shift;  ///< Scratch of the steps; has no margins.
+  float *next_x, *next_y;  ///< Scratch: the normals of the next step; then how supports scatter.
+  float* weight;           ///< l: half of the two segments at the vertex, in cells.
+  float* base;             ///< Shift along the normal that the vertex's plane asks for, in cells.
+  float* shift;            ///< Scratch of the steps; has no margins.
 
   /// Writes the elements [begin, end) of one of the arrays to where they are repeated. Different
   /// elements are repeated in different places.

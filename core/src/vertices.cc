@@ -6,7 +6,6 @@
 
 #include "area.h"
 #include "measure.h"
-#include "outline_memory.h"
 #include "parallel.h"
 #include "placement.h"
 #include "virtual_plane.h"
@@ -130,9 +129,9 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment, Pla
   return keep;
 }
 
-// The rings of `virtual-plane`, moved, calmed, matched to their area and repaired.
-void PlaceRefinedRings(const VertexInput& input, const VertexMemory& memory, PlacedVertices& placed,
-                       Rings& rings) {
+// The rings of `virtual-plane`, moved, matched to their area and repaired.
+void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
+                       PlacedVertices& placed, Rings& rings) {
   RingVertices& vertices = placed.vertices;
   PlaceOnVirtualPlanes(input, vertices);
   const RingTopology& topology = input.topology;
@@ -162,11 +161,7 @@ void PlaceRefinedRings(const VertexInput& input, const VertexMemory& memory, Pla
     }
   });
   rings.outer_of = topology.outer_of;
-  if (input.parameters.outline_memory) {
-    RecallOutline(input, memory.last_outline, placed.memory, rings);
-    RememberOutline(input, rings, placed.memory, memory.outline);
-  }
-  MatchArea(input, placed.offset_points, memory.area_offset, rings);
+  MatchArea(input, placed.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   RepairRings(placed.roots, placed.repair, rings);
@@ -177,12 +172,12 @@ void PlaceRefinedRings(const VertexInput& input, const VertexMemory& memory, Pla
 
 }  // namespace
 
-void PlaceVertices(const VertexInput& input, const VertexMemory& memory, PlacedVertices& placed,
-                   Rings& rings) {
+void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+                   PlacedVertices& placed, Rings& rings) {
   rings.Clear();
-  memory.outline.Clear();
+  placed.repair.tangled.clear();
   if (input.parameters.placement == Placement::kVirtualPlane) {
-    PlaceRefinedRings(input, memory, placed, rings);
+    PlaceRefinedRings(input, area_offset, placed, rings);
     return;
   }
   const RingTopology& topology = input.topology;

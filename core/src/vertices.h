@@ -6,11 +6,9 @@
 #include <vector>
 
 #include "normals.h"
-#include "outline_memory_scratch.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
-#include "partiemc/state.h"
 #include "point_field.h"
 #include "repair.h"
 #include "ring_vertices.h"
@@ -34,7 +32,6 @@ struct PlacedVertices {
   RingVertices vertices;
   std::vector<double> roots;
   std::vector<double> offset_points;
-  OutlineMemoryScratch memory;
   RepairScratch repair;
 };
 
@@ -51,27 +48,20 @@ struct VertexInput {
   const Scale& scale;
 };
 
-/// What placing vertices remembers from frame to frame (State).
-struct VertexMemory {
-  const KnownOutline& last_outline;
-  KnownOutline& outline;
-  std::optional<double>& area_offset;  ///< That of the last frame, then of this one.
-};
-
 /// Places the vertices of every ring and measures the rings.
 ///   marching-squares   the crossings of lattice edges, by linear interpolation of F;
 ///   qef                those, and in each cell the minimiser of Eq. 14, kept in the cell;
 ///   farthest-particle  section 3.5: the particle farthest along the normal, one cell around;
 ///   virtual-plane      one vertex per cell and crossed edge, moved to the plane that its
-///                      surroundings support (virtual_plane.h), drawn towards the outline of the
-///                      last frame (outline_memory.h), matched to the particles' area (area.h) and
-///                      repaired (repair.h).
+///                      surroundings support (virtual_plane.h), matched to the particles' area
+///                      (area.h) and repaired (repair.h).
 /// marching-squares and qef keep every vertex in its cell or on its edge, so that rings are simple
 /// by construction (core/METHOD.md, "Why rings are simple"); virtual-plane may leave the cells and
 /// is simple by its repair. farthest-particle drops consecutive equal vertices, and rings of which
 /// fewer than three points remain.
+/// `area_offset`: of `virtual-plane`, that of the last frame, then of this one (area.h).
 /// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
-void PlaceVertices(const VertexInput& input, const VertexMemory& memory, PlacedVertices& placed,
-                   Rings& rings);
+void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+                   PlacedVertices& placed, Rings& rings);
 
 }  // namespace partiemc

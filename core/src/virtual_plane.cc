@@ -16,49 +16,8 @@
 namespace partiemc {
 namespace {
 
-// Longest Newton step of an edge crossing, in cells: it stays nearer to its edge than to the
-// vertices of the cells beside it.
-constexpr double kMaxEdgeStep = 0.3;
-
-// Newton steps longer than this may cross from one branch of F to another, in cells: at corners and
-// where bodies are near each other. The gradient is asked for again at their ends.
-constexpr double kLongStep = 0.07;
-
 // Segments between one and that whose memory is asked for.
 constexpr std::size_t kAskedAhead = 24;
-
-// Shorter rings stay at their roots: the windows below would meet their own ends.
-// Where drops form and vanish, refining short ones costs more calm than it gains shape.
-constexpr double kMinRefinedLength = 24;  // Spacings.
-constexpr std::size_t kMinRefinedVertices = 24;
-
-// Reaches of the windows along a ring, in spacings. Each was the best of a coarse scan on the
-// tuning set; a factor of 1.5 either way changes no ratio by more than a few percent.
-constexpr double kNormalReach = 2.5;
-constexpr double kBilateralReach = 6;
-constexpr double kCurvatureReach = 1.5;
-constexpr double kSmoothingReach = 2.5;
-constexpr double kWidestReach =
-    std::max({kNormalReach, kBilateralReach, kCurvatureReach, kSmoothingReach});
-static_assert(2 * kWidestReach <= kMinRefinedLength, "a window must not meet its own end");
-
-// The kernel rounds a boundary of curvature kappa off by about half of h^2 kappa, and fills it by
-// more where it is concave: in a notch the particles of both flanks count.
-constexpr double kRoundingPerConvexCurvature = 0.5;
-constexpr double kRoundingPerConcaveCurvature = 1;
-// Tighter bends than this are noise: no kernel resolves them. In 1 / spacings.
-constexpr double kMaxCurvature = 0.6;
-
-// A plane's own estimates are noisy: these shares of them are believed. The errors of the two are
-// different ones, so that both together do better than any one.
-constexpr float kSupportTrust = 0.35f;
-constexpr float kStripTrust = 0.25f;
-// Of a ring's mean strip, where volumes are known, in spacings; more is a sign that they are not
-// the volumes of this outline.
-constexpr double kMaxMeanStrip = 0.4;
-
-// Edge vertices nearer than this to the chord of their neighbours say nothing, in spacings.
-constexpr double kThinningDistance = 0.02;
 
 double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
 
@@ -110,18 +69,20 @@ class SegmentLocator {
 // that of a distance stays the same: unless a step is long, normals are those of the points that it
 // begins at.
 void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
+  const VirtualPlaneConstants& constants = input.parameters.constants;
   const CellPlane& plane = input.planes[segment];
   const std::size_t edge = 2 * segment;
   const std::size_t inner = edge + 1;
   v.root[edge] = plane.entry;
-  v.point[edge] = NewtonStep(plane.entry, plane.entry_value,
-                             {plane.entry_gradient_x, plane.entry_gradient_y}, kMaxEdgeStep);
+  v.point[edge] =
+      NewtonStep(plane.entry, plane.entry_value, {plane.entry_gradient_x, plane.entry_gradient_y},
+                 constants.newton_step);
   v.root[inner] = v.point[inner] = ClampToCell(
       input.bins.tiles, plane.cell, input.crossings.segments[input.topology.segments[segment]],
-      VirtualPlaneVertex(plane));
+      VirtualPlaneVertex(plane, constants.newton_step));
   const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
     const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
-    if (Dot(step, step) > kLongStep * kLongStep) {
+    if (Dot(step, step) > constants.long_step * constants.long_step) {
       const FieldPoint at = SegmentLocator(input, segment).Locate(v.point[i]);
       const FieldSample sample =
           at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
@@ -150,20 +111,26 @@ void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) 
   count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
 }
 
+// The reach of the widest window along a ring, in cells.
+double WidestReach(const VertexInput& input) {
+  const VirtualPlaneConstants& c = input.parameters.constants;
+  return std::max({c.normal_reach, c.bilateral_reach, c.curvature_reach, c.smoothing_reach}) *
+         input.scale.spacing;
+}
+
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
 UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
-  if (count < kMinRefinedVertices) return {};
   const auto length_after = [&](std::size_t k) {
     return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
   };
-  const double min_length = kMinRefinedLength * input.scale.spacing;
+  const double min_length = 2 * WidestReach(input);  // A window must not meet its own end.
   double length = 0;
   for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
   if (length < min_length) return {};
   UnrolledRings::Size size =
-      SizeForWindows(std::span(v.point).subspan(first, count), kWidestReach * input.scale.spacing);
+      SizeForWindows(std::span(v.point).subspan(first, count), WidestReach(input));
   size.margin += kWindowPadding;
   return size;
 }
@@ -197,8 +164,9 @@ void ForEachStretch(const UnrolledRing& ring, Body body) {
 
 // Step 2: normals averaged along the ring, first by distance, then also by angle.
 void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
+  const VirtualPlaneConstants& c = input.parameters.constants;
   for (const bool by_angle : {false, true}) {
-    const double reach = (by_angle ? kBilateralReach : kNormalReach) * input.scale.spacing;
+    const double reach = (by_angle ? c.bilateral_reach : c.normal_reach) * input.scale.spacing;
     ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
       MeanNormals(ring, begin, end, reach, by_angle);
       ring.Repeat(ring.next_x, begin, end);
@@ -207,17 +175,6 @@ void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
     std::swap(ring.normal_x, ring.next_x);
     std::swap(ring.normal_y, ring.next_y);
   }
-}
-
-// Whether particles have volumes that the outline should hold.
-bool VolumesAreKnown(const VertexInput& input) {
-  return input.parameters.spacing.has_value() || !input.frame.volumes.empty();
-}
-
-// How far the kernel has moved a boundary of this curvature inward.
-double RoundingOf(double curvature, double spacing) {
-  const double share = curvature > 0 ? kRoundingPerConvexCurvature : kRoundingPerConcaveCurvature;
-  return share * spacing * spacing * curvature;
 }
 
 // Mean of a ring's values by length.
@@ -231,26 +188,26 @@ double MeanOf(const UnrolledRing& ring, const float* values) {
 }
 
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
-// along the ring counts: their means depend on how the particles are arranged, not on the shape.
-// Where volumes are known, the mean of the strips is part of the truth.
-void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const UnrolledRing& ring,
+// along the ring counts: their mean depends on how the particles are arranged, not on the shape.
+// The more the particles that support a ring's planes scatter, the less they are believed.
+void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
-  const double max_curvature = kMaxCurvature / h;
   const VirtualPlaneSteps& steps = input.parameters.steps;
-  const PlaneEstimator estimator(input.field, input.scale);
-  float* strips = ring.next_x;
+  const VirtualPlaneConstants& c = input.parameters.constants;
+  const PlaneEstimator estimator(input.field, input.scale, c);
+  float* scatter = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    MeanCurvature(ring, begin, end, kCurvatureReach * h);
+    MeanCurvature(ring, begin, end, c.curvature_reach * h);
     auto planes = CollectPoints<BentPlane>([&](std::span<const PlaneEstimator::Planes> groups) {
       std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates;
       estimator.Estimate(groups, estimates);
       for (std::size_t q = 0; q < groups.size(); ++q) {
         for (std::size_t of = 0; of < groups[q].count; ++of) {
           const std::size_t i = groups[q].vertices[of];
-          const auto [support, strip] = estimates[q][of];
-          ring.shift[i] = kSupportTrust * (static_cast<float>(support) - ring.base[i]);
-          strips[i] = kStripTrust * (static_cast<float>(strip) - ring.base[i]);
+          const auto [offset, spread] = estimates[q][of];
+          ring.shift[i] = static_cast<float>(offset) - ring.base[i];
+          scatter[i] = static_cast<float>(spread);
         }
       }
     });
@@ -259,11 +216,11 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
       if (BeginsGroup(k / 2)) planes.Part();
       const SegmentLocator locator(input, first_segment + k / 2);
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
-        const double curvature = std::clamp<double>(ring.shift[i], -max_curvature, max_curvature);
-        ring.base[i] = steps.curvature ? static_cast<float>(RoundingOf(curvature, h)) : 0;
-        // What is kept where nothing tells where a plane belongs.
-        ring.shift[i] = steps.support ? kSupportTrust * -ring.base[i] : 0;
-        strips[i] = steps.support ? kStripTrust * -ring.base[i] : 0;
+        // Nothing bends within less than a spacing.
+        const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
+        ring.base[i] = steps.curvature ? static_cast<float>(c.rounding * h * h * curvature) : 0;
+        ring.shift[i] = -ring.base[i];  // What is kept where nothing tells where a plane belongs.
+        scatter[i] = 0;
         if (!steps.support) continue;
         const FieldPoint at = locator.Locate(v.point[2 * first_segment + i]);
         if (at.tile == kNoTile) continue;
@@ -277,25 +234,25 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, const Unro
     }
     planes.Finish();
   });
-  const double mean_strip = MeanOf(ring, strips);
-  double mean = MeanOf(ring, ring.shift) + mean_strip;
-  if (VolumesAreKnown(input)) {
-    const double limit = kStripTrust * kMaxMeanStrip * h;
-    mean -= std::clamp(mean_strip, -limit, limit);
-  }
-  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.base[k] += ring.shift[k] + strips[k] - static_cast<float>(mean);
+  if (steps.support) {
+    const double mean = MeanOf(ring, ring.shift);
+    const double trust = c.support_scatter / (c.support_scatter + MeanOf(ring, scatter));
+    for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean));
+    }
   }
   ring.Repeat(ring.base, 0, ring.count);
 }
 
-// Step 4: every vertex to the weighted mean of what its neighbours' planes say, along its normal.
-// A circle stays as it is: of two points of it, the mean normal is perpendicular to their chord.
+// Step 3, its end: every vertex to the weighted mean of what its neighbours' planes say, along its
+// normal. A circle stays as it is: of two points of it, the mean normal is perpendicular to their
+// chord.
 void SmoothPositions(const VertexInput& input, std::size_t first, const UnrolledRing& ring,
                      RingVertices& v) {
+  const double reach = input.parameters.constants.smoothing_reach * input.scale.spacing;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     if (input.parameters.steps.smoothing) {
-      MeanShift(ring, begin, end, kSmoothingReach * input.scale.spacing);
+      MeanShift(ring, begin, end, reach);
     } else {
       std::copy(ring.base + begin, ring.base + end, ring.shift + begin);
     }
@@ -308,7 +265,7 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Unrolled
   });
 }
 
-// Steps 2 to 4 of a ring.
+// Steps 2 and 3 of a ring.
 void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, RingVertices& v) {
   const std::size_t first_segment = input.topology.offsets[r];
   Unroll(v, 2 * first_segment, ring);
@@ -317,9 +274,9 @@ void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, Ring
   SmoothPositions(input, 2 * first_segment, ring, v);
 }
 
-// Step 5: drops edge vertices that lie on the chord of the cell vertices beside them.
+// Drops edge vertices that lie on the chord of the cell vertices beside them.
 void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
-  const double min_distance = kThinningDistance * input.scale.spacing;
+  const double min_distance = input.parameters.constants.thinning_distance * input.scale.spacing;
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
   for (std::size_t k = first; k < last; k += 2) {

@@ -36,7 +36,6 @@ struct Workspace::Buffers {
   std::optional<double> next_area_offset;
   IdentityScratch identity_scratch;
   RingHistory next_history;
-  KnownOutline next_outline;
   MeshScratch mesh_scratch;
   TouchingPairsBuffers intersections;
 };

@@ -221,7 +221,6 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (message.has_reference_radius()) parameters.reference_radius = message.reference_radius();
   if (message.has_surface_offset()) parameters.surface_offset = message.surface_offset();
   if (message.has_normal_memory()) parameters.normal_memory = message.normal_memory();
-  if (message.has_outline_memory()) parameters.outline_memory = message.outline_memory();
   if (message.has_clean()) parameters.clean = message.clean();
   if (message.has_min_component_area()) {
     parameters.min_component_area = message.min_component_area();
@@ -244,7 +243,6 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   if (parameters.reference_radius) message.set_reference_radius(*parameters.reference_radius);
   message.set_surface_offset(parameters.surface_offset);
   message.set_normal_memory(parameters.normal_memory);
-  message.set_outline_memory(parameters.outline_memory);
   if (parameters.clean) message.set_clean(*parameters.clean);
   message.set_plane(ToWire(parameters.plane));
   message.set_min_component_area(parameters.min_component_area);
@@ -261,6 +259,16 @@ absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) 
   if (!v1::CoordinateFormat_IsValid(message.coordinate_format())) {
     return UnknownEnum("outputs.coordinate_format", message.coordinate_format());
   }
+  if (message.normals() && !message.rings()) {
+    return Invalid(kReasonOutOfRange, "outputs.normals", "true",
+                   "must come with outputs.rings: normals are at the vertices of the rings");
+  }
+  if (message.coordinate_format() != v1::COORDINATE_FORMAT_UNSPECIFIED && !message.rings() &&
+      !message.mesh()) {
+    return Invalid(kReasonOutOfRange, "outputs.coordinate_format",
+                   v1::CoordinateFormat_Name(message.coordinate_format()),
+                   "must come with outputs.rings or outputs.mesh: nothing else has coordinates");
+  }
   return Outputs{
       .rings = message.rings(),
       .mesh = message.mesh(),
@@ -274,8 +282,10 @@ void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
   message.set_rings(outputs.rings);
   message.set_mesh(outputs.mesh);
   message.set_normals(outputs.normals);
-  message.set_coordinate_format(outputs.relative_float32 ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
-                                                         : v1::COORDINATE_FORMAT_FLOAT64);
+  if (outputs.rings || outputs.mesh) {
+    message.set_coordinate_format(outputs.relative_float32 ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
+                                                           : v1::COORDINATE_FORMAT_FLOAT64);
+  }
   message.set_echo_particles(outputs.echo_particles);
 }
 

@@ -13,6 +13,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
+#include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
 
 namespace partiemc::wire {
@@ -20,7 +21,7 @@ namespace partiemc::wire {
 /// The reasons that the codec gives, beside the core's (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonByteCount = "BYTE_COUNT";
 inline constexpr std::string_view kReasonUnsupported = "UNSUPPORTED";
-inline constexpr std::string_view kReasonResolution = "RESOLUTION";
+using partiemc::kReasonResolution;
 
 /// What a client wants back, as resolved (v1::Outputs).
 struct Outputs {
@@ -59,8 +60,8 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
-/// Errors: INVALID_ARGUMENT with a Violation (attributes are refused with reason
-/// UNSUPPORTED until the server offers the capability).
+/// Errors: INVALID_ARGUMENT with a Violation: attributes (reason UNSUPPORTED until the server
+/// offers the capability), normals without rings, a format for nothing.
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 

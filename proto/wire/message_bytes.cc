@@ -29,6 +29,31 @@ std::uint64_t LengthFieldBytes(int field, std::uint64_t bytes) {
          CodedOutputStream::VarintSize64(bytes) + bytes;
 }
 
+// Adds those of the message in `input`, which ends where `input` does, to `fields`, as far as it is
+// a message: a parser comes no further. False where it is none, or has too many.
+bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& type, int& fields) {
+  while (const std::uint32_t tag = input.ReadTag()) {
+    const auto wire_type = WireFormatLite::GetTagWireType(tag);
+    // What a group holds is kept like any unknown field, and no version of the protocol has groups.
+    fields = wire_type == WireFormatLite::WIRETYPE_START_GROUP ? kMaxFields + 1 : fields + 1;
+    if (fields > kMaxFields) return false;
+    const auto* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+    if (wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED && field != nullptr &&
+        field->message_type() != nullptr) {
+      int length = 0;
+      if (!input.ReadVarintSizeAsInt(&length)) return false;
+      // Types of requests do not contain themselves, so this ends.
+      const auto limit = input.PushLimit(length);
+      if (!CountFields(input, *field->message_type(), fields)) return false;
+      if (input.BytesUntilLimit() != 0) return false;
+      input.PopLimit(limit);
+    } else if (!WireFormatLite::SkipField(&input, tag)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // `frame` without its arrays.
 Frame ScalarsOf(const Frame& frame) {
   Frame scalars{.positions = frame.positions, .components = frame.components, .time = frame.time};
@@ -38,12 +63,22 @@ Frame ScalarsOf(const Frame& frame) {
 
 }  // namespace
 
+bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& type) {
+  grpc::ProtoBufferReader reader(&bytes);
+  if (!reader.status().ok()) return false;
+  CodedInputStream input(&reader);
+  int fields = 0;
+  CountFields(input, type, fields);
+  return fields <= kMaxFields;
+}
+
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last) {
   grpc::ProtoBufferReader reader(&bytes);
   if (!reader.status().ok()) return std::nullopt;
   CodedInputStream input(&reader);
-  int held = 0;
+  int held = 0, fields = 0;
   while (const std::uint32_t tag = input.ReadTag()) {
+    if (++fields > kMaxFields) return std::nullopt;
     const int field = WireFormatLite::GetTagFieldNumber(tag);
     if (field <= last && tag == LengthTag(field)) held = field;  // The last one counts.
     if (!WireFormatLite::SkipField(&input, tag)) return std::nullopt;

@@ -2,7 +2,7 @@
 // arrays are copied once and buffers are kept from message to message.
 #pragma once
 
-#include <google/protobuf/message_lite.h>
+#include <google/protobuf/message.h>
 #include <grpcpp/support/byte_buffer.h>
 
 #include <array>
@@ -16,9 +16,18 @@
 
 namespace partiemc::wire {
 
+/// Of a request, with those of its messages and with unknown ones. No request that means something
+/// has nearly as many; each costs up to thirty times its bytes once it is parsed.
+inline constexpr int kMaxFields = 4096;
+
+/// Whether parsing `bytes` as a message of `type` takes about as much memory as they do: at most
+/// kMaxFields fields, as far as it is such a message, and no groups. Passes over the contents of
+/// strings.
+bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& type);
+
 /// Of a message that is nothing but a oneof of the fields 1 to `last`: the number of the one that
-/// it holds, 0 where it holds none, nothing where `bytes` is no message. What is in the fields is
-/// not looked at.
+/// it holds, 0 where it holds none, nothing where `bytes` is no message or has more than kMaxFields
+/// fields. What is in the fields is not looked at.
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
 
 /// Adds what `bytes` holds to `message`; strings that are there and empty keep their memory. False

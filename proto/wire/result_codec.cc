@@ -112,6 +112,20 @@ absl::Status EncodeMesh(const Result& result, v1::ReconstructedFrame& message) {
                       *mesh.mutable_points());
 }
 
+v1::Doubt ToWire(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kSpacingProvisional:
+      return v1::DOUBT_SPACING_PROVISIONAL;
+    case Doubt::kSpacingContradicted:
+      return v1::DOUBT_SPACING_CONTRADICTED;
+    case Doubt::kVolumesContradictSpacing:
+      return v1::DOUBT_VOLUMES_CONTRADICT_SPACING;
+    case Doubt::kPositionsCoarse:
+      return v1::DOUBT_POSITIONS_COARSE;
+  }
+  return v1::DOUBT_UNSPECIFIED;
+}
+
 void EncodeStatistics(const FrameStatistics& statistics, const FrameTimes& times,
                       v1::FrameStatistics& message) {
   message.set_particles(statistics.particles);
@@ -128,6 +142,10 @@ void EncodeStatistics(const FrameStatistics& statistics, const FrameTimes& times
   message.set_perimeter(statistics.perimeter);
   message.set_spacing(statistics.spacing);
   message.set_cell_size(statistics.cell_size);
+  message.clear_doubts();
+  for (const Doubt doubt : kAllDoubts) {
+    if (statistics.doubts.Has(doubt)) message.add_doubts(ToWire(doubt));
+  }
   message.clear_stages();
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     v1::StageTime& time = *message.add_stages();
@@ -295,6 +313,12 @@ void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& stati
                 .perimeter = message.perimeter(),
                 .spacing = message.spacing(),
                 .cell_size = message.cell_size()};
+  // A doubt that a later server adds is not an error.
+  for (const Doubt doubt : kAllDoubts) {
+    if (std::count(message.doubts().begin(), message.doubts().end(), ToWire(doubt)) > 0) {
+      statistics.doubts.Add(doubt);
+    }
+  }
   times = {};
   times.total_ms = message.milliseconds();
   for (const v1::StageTime& time : message.stages()) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace partiemc::wire {
@@ -24,11 +25,6 @@ constexpr std::uint32_t VarintTag(int field) {
   return WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_VARINT);
 }
 
-std::size_t LengthFieldBytes(int field, std::size_t bytes) {
-  return CodedOutputStream::VarintSize32(LengthTag(field)) +
-         CodedOutputStream::VarintSize64(bytes) + bytes;
-}
-
 // What `write` writes.
 template <typename Write>
 std::string Written(Write write) {
@@ -41,59 +37,62 @@ std::string Written(Write write) {
   return text;
 }
 
-// Where ReconstructRequest.frame.positions begins in the bytes of a well-formed request; of several
-// the last, as for a parser.
-std::optional<std::size_t> OffsetOfPositions(grpc::ByteBuffer& request) {
-  grpc::ProtoBufferReader reader(&request);
-  if (!reader.status().ok()) return std::nullopt;
-  CodedInputStream input(&reader);
-  std::optional<std::size_t> offset;
+// A stretch of a message's bytes.
+struct Span {
+  std::size_t offset = 0, length = 0;
+};
+
+std::optional<Span> FindIn(CodedInputStream& input, std::span<const int> path) {
+  std::optional<Span> found;
   std::uint32_t length = 0;
   while (const std::uint32_t tag = input.ReadTag()) {
-    if (tag != LengthTag(v1::ReconstructRequest::kFrameFieldNumber)) {
+    if (tag != LengthTag(path.front())) {
       if (!WireFormatLite::SkipField(&input, tag)) return std::nullopt;
       continue;
     }
     if (!input.ReadVarint32(&length)) return std::nullopt;
-    const auto outer = input.PushLimit(static_cast<int>(length));
-    while (const std::uint32_t inner = input.ReadTag()) {
-      if (inner != LengthTag(v1::ParticleFrame::kPositionsFieldNumber)) {
-        if (!WireFormatLite::SkipField(&input, inner)) return std::nullopt;
-        continue;
-      }
-      if (!input.ReadVarint32(&length)) return std::nullopt;
-      offset = static_cast<std::size_t>(input.CurrentPosition());
+    if (path.size() == 1) {
+      found = Span{static_cast<std::size_t>(input.CurrentPosition()), length};
       if (!input.Skip(static_cast<int>(length))) return std::nullopt;
+      continue;
     }
+    const auto outer = input.PushLimit(static_cast<int>(length));
+    if (const auto inner = FindIn(input, path.subspan(1))) found = inner;
     input.PopLimit(outer);
   }
-  return offset;
+  return found;
+}
+
+// What field `path` of the message in `bytes` holds: the first number is a field of the message,
+// the next one of the message in that field. Of several the last, as for a parser.
+std::optional<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
+  grpc::ProtoBufferReader reader(&bytes);
+  if (!reader.status().ok()) return std::nullopt;
+  CodedInputStream input(&reader);
+  return FindIn(input, path);
 }
 
 }  // namespace
 
-WatchedBytes::WatchedBytes(const grpc::ByteBuffer& response, const v1::ReconstructedFrame& frame) {
-  const auto frame_bytes = static_cast<std::size_t>(frame.GetCachedSize());
-  // Serialisers write fields in the order of their numbers, so that the checkpoint is the last.
-  const std::size_t checkpoint_bytes =
-      frame.checkpoint().empty() ? 0
-                                 : LengthFieldBytes(v1::ReconstructedFrame::kCheckpointFieldNumber,
-                                                    frame.checkpoint().size());
-  Append(response, response.Length() - frame_bytes, frame_bytes - checkpoint_bytes);
+WatchedBytes::WatchedBytes(grpc::ByteBuffer& response) {
+  constexpr int kPath[] = {v1::ReconstructResponse::kFrameFieldNumber};
+  if (const auto frame = Find(response, kPath)) Append(response, frame->offset, frame->length);
 }
 
 void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame) {
-  const auto offset = OffsetOfPositions(request);
-  if (!offset) return;  // A frame without particles.
+  constexpr int kPath[] = {v1::ReconstructRequest::kFrameFieldNumber,
+                           v1::ParticleFrame::kPositionsFieldNumber};
+  const auto positions = Find(request, kPath);
+  if (!positions || frame.positions().empty()) return;  // A frame without particles.
   const std::string head = Written([&](CodedOutputStream& out) {
     out.WriteTag(VarintTag(v1::ReconstructedFrame::kParticleFormatFieldNumber));
     out.WriteVarint32(static_cast<std::uint32_t>(frame.position_format()));
     out.WriteTag(LengthTag(v1::ReconstructedFrame::kParticlesFieldNumber));
-    out.WriteVarint64(frame.positions().size());
+    out.WriteVarint64(positions->length);
   });
   slices_.emplace_back(head);
   size_ += head.size();
-  Append(request, *offset, frame.positions().size());
+  Append(request, positions->offset, positions->length);
 }
 
 grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped) const {

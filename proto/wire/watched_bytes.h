@@ -15,10 +15,11 @@ namespace partiemc::wire {
 /// Immutable but for EchoParticles, and cheap to copy: slices are counted references.
 class WatchedBytes {
  public:
-  /// Shares the memory of `response`, which ToBytes made of a ReconstructResponse that holds
-  /// `frame`. Its checkpoint is left out: that is between the producer and the server.
-  /// Requires: `frame` has no particles and has not been changed since.
-  WatchedBytes(const grpc::ByteBuffer& response, const v1::ReconstructedFrame& frame);
+  /// The frame in `response`, which ToBytes made of a ReconstructResponse, all of it and nothing
+  /// else: what stands beside it, its checkpoint, is between the producer and the server. Shares
+  /// the memory of `response`.
+  /// Requires: a frame, without particles.
+  explicit WatchedBytes(grpc::ByteBuffer& response);
 
   /// Adds the positions of the frame in `request`, the bytes of a ReconstructRequest that was
   /// parsed into `frame`, by sharing their memory.

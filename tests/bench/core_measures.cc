@@ -60,6 +60,7 @@ CoreMeasures::CoreMeasures(const ReferenceScenes& scenes, bool quick, Harness& h
   for (auto& measured : cases_) {
     Progress("warming up: " + measured->name);
     measured->stream->WarmUp();
+    measured->stream_with_ids->WarmUp();
     const int iterations = IterationsOf(*measured->scene, quick);
     Register(*measured, iterations);
   }
@@ -79,6 +80,9 @@ void CoreMeasures::AddCase(const Scene& scene, int kernel_radius, bool two_threa
   measured->two_threads = two_threads;
   measured->with_floor = with_floor;
   measured->stream = std::make_unique<CoreStream>(scene, ReferenceParameters(scene, kernel_radius));
+  measured->ids = ShuffledIds(scene);
+  measured->stream_with_ids =
+      std::make_unique<CoreStream>(scene, ReferenceParameters(scene, kernel_radius), measured->ids);
   cases_.push_back(std::move(measured));
 }
 
@@ -94,6 +98,10 @@ void CoreMeasures::Register(Case& measured, int iterations) {
       state.counters[CpuCounter(stage)] = {cost.cpu_ms, benchmark::Counter::kAvgIterations};
     }
   });
+  harness_.Add("frame_with_ids/" + measured.name, iterations,
+               [&with_ids = *measured.stream_with_ids](benchmark::State& state) {
+                 for (auto _ : state) with_ids.Next();
+               });
   if (measured.two_threads) {
     harness_.Add("frame_two_threads/" + measured.name, iterations,
                  [&stream](benchmark::State& state) {
@@ -141,6 +149,12 @@ void CoreMeasures::AddTo(Report& report) const {
     const double field = StageCost(*measured, Stage::kBins).cpu_ms + stage_alone;
     report.AddMetric("frame_over_field_" + name, frame.cpu_ms / field, "ratio");
     report.AddMetric("frame_over_field_stage_" + name, frame.cpu_ms / stage_alone, "ratio");
+    report.AddMetric("ids_over_plain_" + name,
+                     harness_.Median("frame_with_ids/" + name).cpu_ms / frame.cpu_ms, "ratio");
+    report.AddMetric("ids_over_plain_state_" + name,
+                     static_cast<double>(SerializedBytes(measured->stream_with_ids->state())) /
+                         static_cast<double>(SerializedBytes(measured->stream->state())),
+                     "ratio");
     if (measured->two_threads) {
       const Cost two = harness_.Median("frame_two_threads/" + name);
       report.AddMetric("compute_two_threads_ms_" + name, two.wall_ms, "ms");
@@ -173,6 +187,7 @@ void CoreMeasures::AddTo(Report& report) const {
   }
   AddStageTable(report);
   AddFloorTable(report);
+  AddIdTable(report);
   AddThreadTable(report);
 }
 
@@ -221,6 +236,22 @@ void CoreMeasures::AddFloorTable(Report& report) const {
                            StageCost(*measured, Stage::kField).cpu_ms),
                     Figure(report.Metric("field_over_scatter_" + measured->name)),
                     Figure(report.Metric("field_stage_over_scatter_" + measured->name))});
+  }
+  report.AddTable(rows);
+}
+
+void CoreMeasures::AddIdTable(Report& report) const {
+  report.AddHeading("With ids");
+  report.AddParagraph(
+      "The same frames with ids: dense, in an order that is not that of the particles' places. "
+      "Milliseconds of wall clock / processor; ratios are of processor time, and of the bytes of "
+      "a checkpoint's state.");
+  std::vector<Report::Row> rows = {{"scene", "without", "with", "ratio", "state"}};
+  for (const auto& measured : cases_) {
+    rows.push_back({measured->name, WallAndCpu(harness_.Median("frame/" + measured->name)),
+                    WallAndCpu(harness_.Median("frame_with_ids/" + measured->name)),
+                    Figure(report.Metric("ids_over_plain_" + measured->name)),
+                    Figure(report.Metric("ids_over_plain_state_" + measured->name))});
   }
   report.AddTable(rows);
 }

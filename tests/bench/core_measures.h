@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,6 +32,8 @@ class CoreMeasures {
     bool two_threads;
     bool with_floor;
     std::unique_ptr<CoreStream> stream;
+    std::vector<std::uint64_t> ids;
+    std::unique_ptr<CoreStream> stream_with_ids;  // The same frames.
     ScatterBuffers floor;
   };
 
@@ -39,6 +42,7 @@ class CoreMeasures {
   Cost StageCost(const Case& measured, Stage stage) const;
   void AddStageTable(Report& report) const;
   void AddFloorTable(Report& report) const;
+  void AddIdTable(Report& report) const;
   void AddThreadTable(Report& report) const;
 
   Harness& harness_;

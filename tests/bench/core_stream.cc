@@ -4,15 +4,19 @@
 
 namespace partiemc::bench {
 
-CoreStream::CoreStream(const Scene& scene, const ReconstructionParameters& parameters)
+CoreStream::CoreStream(const Scene& scene, const ReconstructionParameters& parameters,
+                       std::span<const std::uint64_t> ids)
     : scene_(scene),
+      ids_(ids),
       reconstructor_(Require(Reconstructor::Create(parameters))),
       arenas_{oneapi::tbb::task_arena(1), oneapi::tbb::task_arena(2)} {}
 
 void CoreStream::Next(int threads) {
-  const Frame frame = scene_.At(next_++);
-  Require(arenas_[threads - 1].execute(
-      [&] { return reconstructor_.Reconstruct(frame, state_, workspace_, result_, &stages_); }));
+  Frame frame = scene_.At(next_++);
+  if (!ids_.empty()) frame.ids = ids_.first(frame.ParticleCount());
+  Require(arenas_[threads - 1].execute([&] {
+    return reconstructor_.Reconstruct(frame, state_, workspace_, result_, {.observer = &stages_});
+  }));
 }
 
 void CoreStream::WarmUp() {

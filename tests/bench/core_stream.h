@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "bench/clocks.h"
 #include "bench/scenes.h"
@@ -31,8 +32,10 @@ class StageClock final : public StageObserver {
 /// State, workspace and result are kept from frame to frame, as a server's stream keeps them.
 class CoreStream {
  public:
-  /// `scene` must outlive the stream. Ends the program where the parameters are refused.
-  CoreStream(const Scene& scene, const ReconstructionParameters& parameters);
+  /// `scene` must outlive the stream, and `ids`: of the scene's particles, or empty. Ends the
+  /// program where the parameters are refused.
+  CoreStream(const Scene& scene, const ReconstructionParameters& parameters,
+             std::span<const std::uint64_t> ids = {});
 
   /// Reconstructs the scene's next frame in an arena of one or of two threads.
   void Next(int threads = 1);
@@ -40,10 +43,12 @@ class CoreStream {
   void WarmUp();
 
   const Result& result() const { return result_; }
+  const State& state() const { return state_; }
   StageClock& stages() { return stages_; }
 
  private:
   const Scene& scene_;
+  std::span<const std::uint64_t> ids_;
   Reconstructor reconstructor_;
   State state_;
   Workspace workspace_;

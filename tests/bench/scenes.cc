@@ -1,8 +1,10 @@
 #include "bench/scenes.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <utility>
 
 #include "client/recording/recording.h"
@@ -82,7 +84,8 @@ void Jitter(support::Random& random, std::vector<Point>& points) {
   }
 }
 
-void Shuffle(support::Random& random, std::vector<Point>& points) {
+template <typename T>
+void Shuffle(support::Random& random, std::vector<T>& points) {
   for (std::size_t left = points.size(); left > 1; --left) {
     std::swap(points[left - 1], points[random.Below(left)]);
   }
@@ -177,6 +180,18 @@ absl::StatusOr<ReferenceScenes> MakeReferenceScenes(bool quick) {
                          .islands_1m = Islands("islands_1m", 1'000'000),
                          .blob_1024 = Blob("1024", 640'000),
                          .dam_break = *std::move(dam_break)};
+}
+
+std::vector<std::uint64_t> ShuffledIds(const Scene& scene) {
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < scene.frames.size(); ++k) {
+    count = std::max(count, scene.At(k).ParticleCount());
+  }
+  std::vector<std::uint64_t> ids(count);
+  std::iota(ids.begin(), ids.end(), std::uint64_t{0});
+  support::Random random(kSeed);
+  Shuffle(random, ids);
+  return ids;
 }
 
 std::span<const float> FloatPositions(const Scene& scene) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <variant>
@@ -50,6 +51,10 @@ struct ReferenceScenes {
   Scene dam_break;
 };
 absl::StatusOr<ReferenceScenes> MakeReferenceScenes(bool quick);
+
+/// Ids of all particles that a scene ever has: 0, 1, 2, ... in shuffled order, which is not that in
+/// which the particles lie, as in a simulator that sorts them anew now and then.
+std::vector<std::uint64_t> ShuffledIds(const Scene& scene);
 
 /// The float positions of a scene's first frame. Requires: a scene of floats.
 std::span<const float> FloatPositions(const Scene& scene);

@@ -30,6 +30,8 @@ constexpr Line kLines[] = {
     {"sparse_field_over_compact_1m", "at most 3",
      "a thousand islands over one blob, bins and field"},
     {"sparse_over_compact_1m", "at most 5", "the same, whole frame"},
+    {"ids_over_plain_1m", "at most 1.15", "a million with ids over without, whole frame"},
+    {"ids_over_plain_islands_1m", "at most 1.15", "the same, a thousand islands"},
     {"allocations_per_warm_frame", "0", "calls of malloc by the core"},
     {"server_peak_mb_1m", "at most 200", "peak memory of the server"},
     {"server_growth_mb_1m", "0",

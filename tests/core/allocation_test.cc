@@ -1,6 +1,7 @@
 // Counts every operator new of the program: a frame like one before must need none. oneTBB's own
 // task pool takes memory by other means and is not counted.
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -11,18 +12,27 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "partiemc/partiemc.h"
+#include "partiemc/status.h"
 #include "support/particles.h"
 
 namespace {
 
 std::atomic<std::size_t> allocations = 0;
+std::atomic<std::size_t> live_bytes = 0;
 
 void* Allocate(std::size_t bytes, std::size_t alignment) {
   ++allocations;
   void* memory = nullptr;
   if (posix_memalign(&memory, alignment, bytes) != 0) throw std::bad_alloc();
+  live_bytes += malloc_usable_size(memory);
   return memory;
+}
+
+void Free(void* memory) {
+  live_bytes -= malloc_usable_size(memory);
+  std::free(memory);
 }
 
 }  // namespace
@@ -31,10 +41,10 @@ void* operator new(std::size_t bytes) { return Allocate(bytes, alignof(std::max_
 void* operator new(std::size_t bytes, std::align_val_t alignment) {
   return Allocate(bytes, static_cast<std::size_t>(alignment));
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory) noexcept { Free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { Free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { Free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { Free(memory); }
 
 namespace partiemc {
 namespace {
@@ -90,7 +100,9 @@ TEST_P(WarmFrame, AllocatesNothing) {
   Workspace workspace;
   Result result;
   std::size_t before = 0;
-  for (int round = 0; round < 3; ++round) {
+  // Until the offset of the area, which moves by little a frame, comes back to where it was.
+  constexpr int kRounds = 24;
+  for (int round = 0; round < kRounds; ++round) {
     before = allocations;
     for (const Particles& frame : frames) {
       arena.execute([&] {
@@ -128,6 +140,116 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                                   std::to_string(tested.param.threads) +
                                   (tested.param.estimates_spacing ? "_spacing" : "");
                          });
+
+// Grants a number of requests, and notes what was asked for.
+class Guard final : public MemoryGuard {
+ public:
+  explicit Guard(int granted) : granted_(granted) {}
+  bool Reserve(std::uint64_t bytes) override {
+    EXPECT_GE(bytes, last_);
+    last_ = bytes;
+    return granted_-- > 0;
+  }
+  std::uint64_t last() const { return last_; }
+
+ private:
+  int granted_;
+  std::uint64_t last_ = 0;
+};
+
+struct MemoryCase {
+  std::string name;
+  Particles particles;
+  ReconstructionParameters parameters;
+};
+
+// Frames that differ in what they need most memory for.
+std::vector<MemoryCase> MemoryCases() {
+  std::vector<MemoryCase> cases;
+  const auto add = [&](std::string name, const Particles& particles,
+                       ReconstructionParameters parameters = {}) {
+    parameters.spacing = 1;
+    cases.push_back({name, particles, parameters});
+    cases.push_back({absl::StrCat(name, ", ids"), particles, parameters});
+    for (std::size_t k = 0; k < particles.size(); ++k) cases.back().particles.ids.push_back(k);
+  };
+  const auto spread = [](int side, double distance, double x0 = 0) {
+    return support::Scaled(support::Lattice(side, side, x0 / distance, x0 / distance), distance);
+  };
+  Particles islands;
+  for (int k = 0; k < 400; ++k) islands.Add(support::Disc(7.5, k % 20 * 30, k / 20 * 30));
+  support::Random random(3);
+  add("corners of tiles", spread(90, 64));
+  add("middles of tiles", spread(60, 96, 16));
+  add("one body", support::Disc(300));
+  add("one body, grid", support::Disc(300), {.fill = Fill::kGrid});
+  add("islands", islands);
+  add("drops", spread(150, 5));
+  add("drops of a fine lattice", spread(60, 20), {.kernel_radius = 8, .cell_size = .25});
+  add("drops of a coarse lattice", spread(150, 5), {.kernel_radius = 1.5, .cell_size = 2});
+  add("noise", support::Noise(random, 30'000, 300));
+  return cases;
+}
+
+TEST(MemoryGuard, IsToldNoLessThanAFrameTakesAndNotMuchMore) {
+  for (const MemoryCase& tested : MemoryCases()) {
+    SCOPED_TRACE(tested.name);
+    const auto reconstructor = Reconstructor::Create(tested.parameters);
+    ASSERT_TRUE(reconstructor.ok());
+    const std::size_t before = live_bytes;
+    Guard guard(100);
+    std::size_t held = 0;
+    {
+      State state;
+      Workspace workspace;
+      Result result;
+      for (int k = 0; k < 2; ++k) {  // The second one remembers the first.
+        guard = Guard(100);
+        const absl::Status status = reconstructor->Reconstruct(
+            tested.particles.AsFrame(), state, workspace, result, {.memory = &guard});
+        ASSERT_TRUE(status.ok()) << status;
+      }
+      held = live_bytes - before;
+    }
+    EXPECT_LE(held, guard.last());
+    EXPECT_GE(2.5 * static_cast<double>(held), static_cast<double>(guard.last()));
+  }
+}
+
+TEST(MemoryGuard, RefusesAFrameBeforeItsTilesTakeMemory) {
+  const MemoryCase tested = MemoryCases().front();
+  const auto reconstructor = Reconstructor::Create(tested.parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  State state;
+  Workspace workspace;
+  Result result;
+  const Particles drop = support::Disc(5);
+  ASSERT_TRUE(reconstructor->Reconstruct(drop.AsFrame(), state, workspace, result).ok());
+  const State before = state;
+  const Result drop_result = result;
+  for (const int granted : {0, 1}) {
+    SCOPED_TRACE(granted);
+    const std::size_t live = live_bytes;
+    Guard guard(granted);
+    const absl::Status status = reconstructor->Reconstruct(tested.particles.AsFrame(), state,
+                                                           workspace, result, {.memory = &guard});
+    EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
+    const auto violation = FindViolation(status);
+    ASSERT_TRUE(violation.has_value());
+    EXPECT_EQ(violation->reason, kReasonOutOfMemory);
+    EXPECT_EQ(violation->field, "positions");
+    EXPECT_EQ(violation->value, "32400 tiles of 32 x 32 cells");
+    EXPECT_EQ(state, before);
+    EXPECT_EQ(result, Result());
+    // The directory of the tiles and the particles' own places, but none of what lies on tiles.
+    if (granted == 0) {
+      EXPECT_LE(live_bytes - live, 32'400 * 200u);
+    }
+  }
+  State again;
+  ASSERT_TRUE(reconstructor->Reconstruct(drop.AsFrame(), again, workspace, result).ok());
+  EXPECT_EQ(result, drop_result);
+}
 
 }  // namespace
 }  // namespace partiemc

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <set>
+#include <string>
 
 #include "partiemc/result.h"
 
@@ -40,6 +44,31 @@ TEST(Digest, IsTheOneOfTheProtocol) {
   EXPECT_EQ(DigestMesh(OneTriangle()), Fold({6, 0, 0, kOne, 0, 0, kOne, 3, 0, 1, 2, 1, 0}));
   EXPECT_EQ(DigestRings(Rings{}), Fold({0, 1, 0, 0}));
   EXPECT_EQ(DigestMesh(Mesh{}), Fold({0, 0, 0}));
+}
+
+// The worked example of proto/PROTOCOL.md, with which writers of clients test their arithmetic.
+TEST(Digest, OfTheExampleOfTheProtocolIsTheOneThatStandsThere) {
+  Rings rings;
+  rings.points = {0, 0, 4, 0, 4, 3, 0, 3, 1, 1, 1, 2, 2.5, 1};
+  rings.offsets = {0, 4, 7};
+  rings.outer_of = {kNoRing, 0};
+  Mesh mesh;
+  mesh.points = rings.points;
+  mesh.triangles = {0, 1, 6, 0, 6, 4, 0, 4, 5, 0, 5, 3, 3, 5, 2, 5, 6, 2, 6, 1, 2};
+  mesh.classes.assign(7, TriangleClass::kBoundary);
+  mesh.classes.back() = TriangleClass::kInterior;
+  std::ifstream file(PARTIEMC_SOURCE_DIR "/proto/PROTOCOL.md");
+  const std::string protocol{std::istreambuf_iterator<char>(file), {}};
+  ASSERT_FALSE(protocol.empty());
+  const auto expect_told = [&](const char* line, std::uint64_t digest) {
+    char text[64];
+    std::snprintf(text, sizeof(text), line, static_cast<unsigned long long>(digest));
+    EXPECT_NE(protocol.find(text), std::string::npos) << text;
+  };
+  expect_told("rings_digest    0x%016llx\n", DigestRings(rings));
+  expect_told("mesh_digest     0x%016llx\n", DigestMesh(mesh));
+  expect_told("the one number 0: 0x%016llx and", DigestRings(Rings{}));
+  expect_told("for the empty mesh, 0x%016llx.", DigestMesh(Mesh{}));
 }
 
 TEST(Digest, TellsEveryChangeOfGeometryApart) {

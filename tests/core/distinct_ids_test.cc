@@ -5,6 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "id_hash.h"
+#include "support/chosen_ids.h"
 #include "support/random.h"
 
 namespace partiemc {
@@ -40,6 +42,26 @@ TEST(DistinctIds, TheFirstRepetitionIsFoundInAnyRange) {
     const std::uint64_t lowest = random.Chance(0.5) ? 0 : kLargest - range;
     std::vector<std::uint64_t> ids(count);
     for (std::uint64_t& id : ids) id = lowest + random.Below(range);
+    ExpectAsByMap(ids, scratch);
+  }
+}
+
+TEST(DistinctIds, WhereNoneHasAnyAllAreFoundToBeOne) {
+  DistinctIdsScratch scratch;
+  ExpectAsByMap(std::vector<std::uint64_t>(1000, 4294967295), scratch);  // As PySPH leaves them.
+}
+
+TEST(DistinctIds, ThatShareABitAreComparedNotConfused) {
+  DistinctIdsScratch scratch;
+  for (const std::uint64_t step : {1u, 1u << 20}) {
+    std::vector<std::uint64_t> ids(5000);
+    // All of the same leading part of the hash, which is what the bitmap has a bit for.
+    for (std::size_t k = 0; k < ids.size(); ++k) ids[k] = support::IdWithHash(step * k);
+    ASSERT_EQ(HashOf(ids[3]), 3 * step);
+    ExpectAsByMap(ids, scratch);
+    ids.back() = ids[17];
+    ExpectAsByMap(ids, scratch);
+    ids[4000] = ids[3999];
     ExpectAsByMap(ids, scratch);
   }
 }

@@ -87,8 +87,9 @@ TEST(LoopGroups, RegionsOfAllKindsAreCoveredWhateverTheNumberOfThreads) {
       for (int frame = 0; frame < 2; ++frame) {  // The second one is warm.
         groups.Clear();
         const Region all = Deal(regions, groups);
-        std::vector<std::uint32_t> triangles;
-        ASSERT_TRUE(groups.Triangulate(all.points, triangles));
+        std::vector<std::uint32_t> triangles, broken;
+        groups.Triangulate(all.points, triangles, broken);
+        ASSERT_TRUE(broken.empty());
         if (expected.empty()) {
           ExpectCover(all, triangles);
           expected = triangles;
@@ -99,7 +100,7 @@ TEST(LoopGroups, RegionsOfAllKindsAreCoveredWhateverTheNumberOfThreads) {
   }
 }
 
-TEST(LoopGroups, OneGroupThatIsNoRegionIsSeenAmongMany) {
+TEST(LoopGroups, OneGroupThatIsNoRegionIsNamedAmongMany) {
   std::vector<Region> regions = Regions(100);
   Region spoiled;
   spoiled.AddLoop(Rectangle(1e6, 0, 1e6 + 3, 3));
@@ -108,15 +109,17 @@ TEST(LoopGroups, OneGroupThatIsNoRegionIsSeenAmongMany) {
   LoopGroups groups;
   groups.Clear();
   const Region all = Deal(regions, groups);
-  std::vector<std::uint32_t> triangles;
-  EXPECT_FALSE(groups.Triangulate(all.points, triangles));
+  std::vector<std::uint32_t> triangles, broken;
+  groups.Triangulate(all.points, triangles, broken);
+  EXPECT_EQ(broken, std::vector<std::uint32_t>{200});
 }
 
 TEST(LoopGroups, NoLoopsMakeNoTriangles) {
   LoopGroups groups;
   groups.Clear();
-  std::vector<std::uint32_t> triangles;
-  EXPECT_TRUE(groups.Triangulate({}, triangles));
+  std::vector<std::uint32_t> triangles, broken;
+  groups.Triangulate({}, triangles, broken);
+  EXPECT_TRUE(broken.empty());
   EXPECT_TRUE(triangles.empty());
 }
 

@@ -134,17 +134,25 @@ TEST_P(Metamorphic, AScaleByAPowerOfTwoScalesEveryPointBitForBit) {
   }
 }
 
-TEST_P(Metamorphic, ParticlesInAnyOrderGiveTheSameRingsUpToRounding) {
-  if (GetParam() == Placement::kFarthestParticle) {
-    // Its choice between two particles may hang on a rounding: the number of rings does not.
-    support::Random random(3);
-    const Particles particles = support::Blob(random, 9);
-    const Result a = ReconstructOnce({.placement = GetParam()}, particles);
-    const Result b =
-        ReconstructOnce({.placement = GetParam()}, support::Permuted(particles, random));
-    EXPECT_EQ(a.rings.RingCount(), b.rings.RingCount());
-    return;
+// How many points of `a` have one of `b` as near as that.
+std::size_t CountFoundIn(const Rings& a, const Rings& b, double distance) {
+  std::size_t found = 0;
+  for (std::size_t k = 0; k < a.points.size(); k += 2) {
+    for (std::size_t i = 0; i < b.points.size(); i += 2) {
+      if (std::abs(a.points[k] - b.points[i]) > distance) continue;
+      if (std::abs(a.points[k + 1] - b.points[i + 1]) > distance) continue;
+      ++found;
+      break;
+    }
   }
+  return found;
+}
+
+TEST_P(Metamorphic, ParticlesInAnyOrderGiveTheSameRingsUpToRounding) {
+  // The choice of `farthest-particle` between two particles may hang on a rounding: then a vertex
+  // is another one, and nothing else.
+  const bool chooses = GetParam() == Placement::kFarthestParticle;
+  std::size_t points = 0, found = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     support::Random random(seed);
@@ -152,8 +160,18 @@ TEST_P(Metamorphic, ParticlesInAnyOrderGiveTheSameRingsUpToRounding) {
     const Result here = ReconstructOnce({.placement = GetParam()}, particles);
     const Result there =
         ReconstructOnce({.placement = GetParam()}, support::Permuted(particles, random));
-    EXPECT_LT(LargestDistance(here.rings, there.rings), 1e-4 * here.statistics.spacing);
+    const double distance = 1e-4 * here.statistics.spacing;
+    if (!chooses) {
+      EXPECT_LT(LargestDistance(here.rings, there.rings), distance);
+      continue;
+    }
+    EXPECT_EQ(here.rings.RingCount(), there.rings.RingCount());
+    EXPECT_EQ(here.rings.outer_of, there.rings.outer_of);
+    points += here.rings.PointCount() + there.rings.PointCount();
+    found += CountFoundIn(here.rings, there.rings, distance) +
+             CountFoundIn(there.rings, here.rings, distance);
   }
+  EXPECT_GE(found, points - points / 100) << "of " << points;
 }
 
 TEST_P(Metamorphic, FloatAndDoublePositionsOfTheSameValuesGiveTheSameBits) {

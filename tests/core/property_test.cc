@@ -66,7 +66,7 @@ Particles NextFrame(const Particles& before, double spacing, support::Random& ra
 }
 
 // The scene and what becomes of it: without ids it moves a little, so that the second frame has a
-// memory of normals; with ids there is a third one, so that a carried outline is carried on.
+// memory of normals; with ids particles move each by itself, come and go, in two more frames.
 std::vector<Particles> MakeFrames(Particles scene, double spacing, std::uint64_t seed) {
   support::Random moves(seed ^ 0x5eed3);
   if (scene.size() == 0 || moves.Chance(0.4)) {
@@ -100,7 +100,6 @@ Trial MakeTrial(std::uint64_t seed) {
   if (rare.Chance(0.1)) trial.parameters.min_component_particles = rare.Below(20);
   if (rare.Chance(0.1)) trial.parameters.spacing_rule = SpacingRule::kEveryFrame;
   if (rare.Chance(0.1)) trial.parameters.surface_offset = rare.Uniform(-1, 1);
-  trial.parameters.outline_memory = !rare.Chance(0.2);
   return trial;
 }
 

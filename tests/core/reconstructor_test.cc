@@ -45,7 +45,7 @@ TEST(Reconstructor, ALoneParticleIsARingOfItsOwnWhereTheSpacingIsGiven) {
   }
 }
 
-TEST(Reconstructor, NothingIsDecidedUntilAFrameHasTwoDistinctPositions) {
+TEST(Reconstructor, NothingIsDecidedUntilAFrameHasABody) {
   const Reconstructor reconstructor = Make({});
   Particles equal;
   for (int k = 0; k < 5; ++k) equal.Add(2, 3);
@@ -59,7 +59,7 @@ TEST(Reconstructor, NothingIsDecidedUntilAFrameHasTwoDistinctPositions) {
     EXPECT_EQ(result.statistics.cell_size, 0);
     EXPECT_EQ(state, State{});
   }
-  const Particles lattice = support::Scaled(support::Lattice(5, 5), 0.25);
+  const Particles lattice = support::Scaled(support::Lattice(6, 6), 0.25);
   ASSERT_TRUE(reconstructor.Reconstruct(lattice.AsFrame(), state, workspace, result).ok());
   EXPECT_EQ(state.spacing, 0.25);
   EXPECT_EQ(state.cell_size, 0.25);
@@ -187,7 +187,9 @@ TEST(Reconstructor, TellsAnObserverTheSevenStagesInTheirOrder) {
   Recorder recorder;
   const Particles particles = support::Disc(4);
   ASSERT_TRUE(
-      reconstructor.Reconstruct(particles.AsFrame(), state, workspace, result, &recorder).ok());
+      reconstructor
+          .Reconstruct(particles.AsFrame(), state, workspace, result, {.observer = &recorder})
+          .ok());
   EXPECT_EQ(recorder.told,
             (std::vector<std::string>{"+bins", "-bins", "+field", "-field", "+crossings",
                                       "-crossings", "+rings", "-rings", "+normals", "-normals",
@@ -200,7 +202,10 @@ TEST(Reconstructor, AnObserverChangesNothing) {
   Workspace workspace;
   Result result;
   Recorder recorder;
-  ASSERT_TRUE(Make({}).Reconstruct(particles.AsFrame(), state, workspace, result, &recorder).ok());
+  ASSERT_TRUE(
+      Make({})
+          .Reconstruct(particles.AsFrame(), state, workspace, result, {.observer = &recorder})
+          .ok());
   EXPECT_EQ(result, ReconstructOnce({}, particles));
 }
 

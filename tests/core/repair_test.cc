@@ -37,6 +37,7 @@ std::vector<double> Reversed(const std::vector<double>& ring) {
 Rings Repaired(const Rings& roots, Rings rings) {
   RepairScratch scratch;
   RepairRings(roots.points, scratch, rings);
+  EXPECT_TRUE(scratch.tangled.empty());
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.offsets, scratch.pairs), 0u);
   EXPECT_EQ(rings.measures.size(), rings.RingCount());
   for (std::size_t ring = 0; ring < rings.measures.size(); ++ring) {
@@ -87,6 +88,54 @@ TEST(Repair, FindsARingThatWasTurnedInsideOut) {
   for (std::size_t k = 1; k < moved.points.size(); k += 2) moved.points[k] = roots.points[k];
   ASSERT_LT(MeasureRing(moved.RingPoints(0)).area, 0);
   EXPECT_EQ(Repaired(roots, moved).points, roots.points);
+}
+
+TEST(Repair, FindsOneHoleThatLeftAPlateOfThousands) {
+  constexpr int kSide = 60;
+  std::vector<std::vector<double>> points{Square(2.0 * kSide, 2.0 * kSide, 2.0 * kSide + 2)};
+  for (int k = 0; k < kSide * kSide; ++k) {
+    points.push_back(Reversed(Square(4 * (k % kSide) + 2, 4 * (k / kSide) + 2, 1)));
+  }
+  const Rings roots = RingsOf(points, 1);
+  EXPECT_EQ(Repaired(roots, roots).points, roots.points);
+  for (const std::size_t ring : {1, 1830, kSide * kSide}) {
+    Rings moved = roots;
+    for (std::size_t k = 2 * roots.offsets[ring]; k < 2 * roots.offsets[ring + 1]; k += 2) {
+      moved.points[k] += 5 * kSide;
+    }
+    EXPECT_EQ(Repaired(roots, moved).points, roots.points) << "hole " << ring;
+  }
+}
+
+/// Each round frees one square, which then meets the next: as many rounds as there are squares, if
+/// nothing were to end them.
+TEST(Repair, EndsInSimpleRingsHoweverManyRoundsItWouldTake) {
+  constexpr int kSquares = 200;
+  std::vector<std::vector<double>> at_roots, elsewhere;
+  for (int k = 0; k < kSquares; ++k) {
+    at_roots.push_back(Square(3 * k, 0, 1));
+    // Where the next one belongs, but for the last, which stays: it meets the one before.
+    elsewhere.push_back(k + 1 < kSquares ? Square(3 * k + 3, 0, 1) : Square(3 * k, 0, 1));
+  }
+  const Rings roots = RingsOf(at_roots, kSquares);
+  EXPECT_EQ(Repaired(roots, RingsOf(elsewhere, kSquares)).points, roots.points);
+}
+
+TEST(Repair, NamesTheOuterRingsOfWhatCrossesAtItsRootsToo) {
+  // The first square and the third cross; so do the fifth and its hole.
+  const Rings roots = RingsOf({Square(0, 0, 1), Square(5, 0, 1), Square(1.5, 0, 1),
+                               Square(20, 0, 3), Square(10, 0, 2), Reversed(Square(11, 0, 2))},
+                              5);
+  Rings rings = roots;
+  rings.outer_of[5] = 4;
+  RepairScratch scratch;
+  RepairRings(roots.points, scratch, rings);
+  EXPECT_EQ(scratch.tangled, (std::vector<std::uint32_t>{0, 2, 4}));
+  EXPECT_EQ(rings.points, roots.points);
+  EXPECT_EQ(rings.measures.size(), 6u);
+  rings = RingsOf({Square(0, 0, 1)}, 1);
+  RepairRings(rings.points, scratch, rings);
+  EXPECT_TRUE(scratch.tangled.empty()) << "it is of the frame before";
 }
 
 TEST(Repair, SeparatesPointsThatFellTogether) {

@@ -87,7 +87,7 @@ LatticePoint Aimed(Random& random, Aim aim, const CellPlane& plane, LatticePoint
     case Aim::kCount:
       break;
   }
-  return VirtualPlaneVertex(plane);
+  return VirtualPlaneVertex(plane, VirtualPlaneConstants{}.newton_step);
 }
 
 // The plane of a segment with a value and gradient that have nothing to do with the level set:

@@ -14,7 +14,46 @@ using support::Particles;
 
 std::optional<double> Estimate(const Particles& particles) {
   SpacingScratch scratch;
-  return EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch);
+  const auto estimate = EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch);
+  if (!estimate) return std::nullopt;
+  return estimate->spacing;
+}
+
+bool IsAgreed(const Particles& particles) {
+  SpacingScratch scratch;
+  const auto estimate = EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch);
+  return estimate && estimate->is_agreed;
+}
+
+// Rows shifted by half a spacing, as discs lie when they are pressed together.
+Particles Hexagonal(int columns, int rows) {
+  Particles particles;
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) particles.Add(i + 0.5 * (j % 2), j * std::sqrt(0.75));
+  }
+  return particles;
+}
+
+Particles Shaken(const Particles& particles, support::Random& random, double most) {
+  Particles shaken;
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    shaken.Add(particles.xy[2 * k] + random.Uniform(-most, most),
+               particles.xy[2 * k + 1] + random.Uniform(-most, most));
+  }
+  return shaken;
+}
+
+// Two particles, this far from each other, for each that there was.
+Particles InPairs(const Particles& particles, support::Random& random, double apart) {
+  Particles pairs;
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const double angle = random.Uniform(0, 6.28);
+    for (const double side : {-0.5, 0.5}) {
+      pairs.Add(particles.xy[2 * k] + side * apart * std::cos(angle),
+                particles.xy[2 * k + 1] + side * apart * std::sin(angle));
+    }
+  }
+  return pairs;
 }
 
 TEST(Spacing, OfALatticeIsItsConstant) {
@@ -106,8 +145,61 @@ TEST(Spacing, DoesNotDependOnWhatWasEstimatedBefore) {
   for (const auto& particles :
        {support::Lattice(300, 200), support::Lattice(2, 1), support::Noise(random, 5000, 40),
         Particles{}, support::Lattice(20, 30)}) {
-    EXPECT_EQ(EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch), Estimate(particles));
+    const auto estimate = EstimateSpacing(particles.AsFrame(), Plane::kXy, scratch);
+    EXPECT_EQ(estimate.has_value(), Estimate(particles).has_value());
+    EXPECT_EQ(estimate ? estimate->spacing : 0, Estimate(particles).value_or(0));
   }
+}
+
+TEST(Spacing, IsAgreedWhereABodyIsHoweverItsParticlesAreArranged) {
+  support::Random random(21);
+  const Particles lattice = support::Lattice(40, 40);
+  EXPECT_TRUE(IsAgreed(lattice));
+  EXPECT_TRUE(IsAgreed(Hexagonal(40, 40)));
+  for (const double most : {0.1, 0.3, 0.5}) {
+    EXPECT_TRUE(IsAgreed(Shaken(lattice, random, most))) << most;
+  }
+  for (const double most : {0.1, 0.3}) {
+    EXPECT_TRUE(IsAgreed(Shaken(Hexagonal(40, 40), random, most))) << most;
+  }
+  for (const double apart : {1e-6, 0.1, 0.4, 0.6}) {
+    EXPECT_TRUE(IsAgreed(InPairs(Shaken(lattice, random, 0.05), random, apart))) << apart;
+  }
+  Particles thinned;
+  for (std::size_t k = 0; k < lattice.size(); ++k) {
+    if (random.Uniform(0, 1) < 0.5) thinned.Add(lattice.xy[2 * k], lattice.xy[2 * k + 1]);
+  }
+  EXPECT_TRUE(IsAgreed(thinned));
+  // Small ones, and beside as much spray.
+  EXPECT_TRUE(IsAgreed(support::Disc(3)));
+  EXPECT_TRUE(IsAgreed(support::Lattice(50, 4)));
+  Particles with_spray = support::Lattice(20, 20);
+  with_spray.Add(support::Shifted(support::Scaled(support::Lattice(40, 10), 30), 100, 100));
+  EXPECT_TRUE(IsAgreed(with_spray));
+}
+
+TEST(Spacing, IsNotAgreedByFewOrRandomParticlesAndLines) {
+  EXPECT_FALSE(IsAgreed(support::Lattice(2, 1)));
+  EXPECT_FALSE(IsAgreed(support::Lattice(3, 3)));
+  EXPECT_FALSE(IsAgreed(support::Lattice(500, 1)));
+  EXPECT_FALSE(IsAgreed(support::Lattice(500, 2)));
+  support::Random random(22);
+  for (int k = 0; k < 100; ++k) EXPECT_FALSE(IsAgreed(support::Noise(random, 10, 100))) << k;
+  for (const std::size_t count : {1000, 10'000}) {
+    EXPECT_FALSE(IsAgreed(support::Noise(random, count, 100))) << count;
+  }
+}
+
+TEST(Spacing, OfParticlesInPairsIsThatOfTheDensity) {
+  support::Random random(23);
+  for (const double apart : {1e-6, 0.1, 0.4}) {
+    const Particles pairs = InPairs(support::Lattice(40, 40), random, apart);
+    EXPECT_NEAR(*Estimate(pairs), std::sqrt(0.5), 0.02) << apart;
+  }
+  // A few of them change nothing.
+  Particles some = support::Lattice(30, 30);
+  some.Add(support::Shifted(support::Lattice(30, 8), 1e-6, 0));
+  EXPECT_NEAR(*Estimate(some), std::sqrt(30.0 / 38), 0.15);
 }
 
 TEST(Spacing, OfTwoParticlesIsTheirDistance) {
@@ -140,7 +232,7 @@ TEST(Spacing, IsMeasuredInThePlaneOfTheParticles) {
   for (int k = 0; k < 30; ++k) xyz.insert(xyz.end(), {2.0 * (k % 6), 7.0, 2.0 * (k / 6)});
   const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
   SpacingScratch scratch;
-  EXPECT_EQ(EstimateSpacing(frame, Plane::kXz, scratch), 2.0);
+  EXPECT_EQ(EstimateSpacing(frame, Plane::kXz, scratch)->spacing, 2.0);
 }
 
 }  // namespace

@@ -29,9 +29,6 @@ State ExampleState() {
                          {.identity = 9}};
   state.history.runs = {{-7, -5, 3, 0}, {-7, 4, 4, 1}, {-7, 9, 12, 0}, {2, -100, 1 << 30, 2}};
   state.history.samples = {{3, -5, -7, 0}, {1ull << 40, 1 << 30, 2, 2}, {~0ull, 9, -7, 0}};
-  state.outline.offsets = {0, 3, 7};
-  state.outline.points = {-5, -7, -4.5, -7, -5, -6.5, 0x1p31, -0x1p31, 4, 9, 4.1, 9.1, 0.1, 1e-300};
-  state.outline.particles = {{3, -5.25, -7}, {1ull << 40, -0x1p31, 0x1p31}, {~0ull, 9, 0.1}};
   return state;
 }
 
@@ -57,11 +54,9 @@ std::string Patched(std::string bytes, std::size_t at, T value) {
 
 constexpr std::size_t kVersionAt = 4, kCellSizeAt = 8, kSpacingAt = 16, kOffsetAt = 24,
                       kTimeAt = 32, kGivenAt = 40, kNormalCountAt = 48, kRingCountAt = 56,
-                      kRunCountAt = 64, kSampleCountAt = 72, kOutlineOffsetCountAt = 80,
-                      kPointCountAt = 88, kParticleCountAt = 96, kNormalsAt = 104,
+                      kRunCountAt = 64, kSampleCountAt = 72, kNormalsAt = 80,
                       kRingsAt = kNormalsAt + 4 * 16, kRunsAt = kRingsAt + 3 * 32,
-                      kSamplesAt = kRunsAt + 4 * 16, kOutlineOffsetsAt = kSamplesAt + 3 * 20,
-                      kPointsAt = kOutlineOffsetsAt + 3 * 4, kParticlesAt = kPointsAt + 7 * 16;
+                      kSamplesAt = kRunsAt + 4 * 16;
 
 void ExpectRefused(std::string_view bytes, std::string_view what) {
   const auto state = ParseState(bytes);
@@ -77,9 +72,8 @@ TEST(State, ComesBackAsItWas) {
 }
 
 TEST(State, TakesAsManyBytesAsItsHeaderSays) {
-  EXPECT_EQ(Serialize(State{}).size(), 112u);
-  EXPECT_EQ(Serialize(ExampleState()).size(),
-            112u + 4 * 16 + 3 * 32 + 4 * 16 + 3 * 20 + 3 * 4 + 7 * 16 + 3 * 24);
+  EXPECT_EQ(Serialize(State{}).size(), 88u);
+  EXPECT_EQ(Serialize(ExampleState()).size(), 88u + 4 * 16 + 3 * 32 + 4 * 16 + 3 * 20);
 }
 
 TEST(State, EveryTruncationIsRefused) {
@@ -107,10 +101,8 @@ TEST(State, ABodySealedByTheTestIsAccepted) {
 
 TEST(State, HostileCountsAreRefusedBeforeAnythingIsAllocated) {
   const std::string body = BodyOf(ExampleState());
-  for (const auto& [at, right] :
-       {std::pair(kNormalCountAt, 4u), std::pair(kRingCountAt, 3u), std::pair(kRunCountAt, 4u),
-        std::pair(kSampleCountAt, 3u), std::pair(kOutlineOffsetCountAt, 3u),
-        std::pair(kPointCountAt, 7u), std::pair(kParticleCountAt, 3u)}) {
+  for (const auto& [at, right] : {std::pair(kNormalCountAt, 4u), std::pair(kRingCountAt, 3u),
+                                  std::pair(kRunCountAt, 4u), std::pair(kSampleCountAt, 3u)}) {
     EXPECT_EQ(*ParseState(Sealed(Patched(body, at, std::uint64_t{right}))), ExampleState());
     for (const std::uint64_t count :
          {std::uint64_t{0}, std::uint64_t{right - 1}, std::uint64_t{right + 1},
@@ -123,14 +115,11 @@ TEST(State, HostileCountsAreRefusedBeforeAnythingIsAllocated) {
   const std::string overflowing = Patched(body, kNormalCountAt, (std::uint64_t{1} << 60) + 4);
   ExpectRefused(Sealed(Patched(overflowing, kRunCountAt, (std::uint64_t{15} << 60) + 4)),
                 "counts that overflow");
-  const std::string too_many_points = Patched(body, kPointCountAt, (std::uint64_t{1} << 60) + 7);
-  ExpectRefused(Sealed(Patched(too_many_points, kNormalCountAt, (std::uint64_t{15} << 60) + 4)),
-                "points that overflow");
-  ExpectRefused(Sealed(body.substr(0, body.size() - 1)), "a particle cut short");
+  ExpectRefused(Sealed(body.substr(0, body.size() - 1)), "a sample cut short");
 }
 
 TEST(State, OtherVersionsAreRefusedByNumber) {
-  for (const auto& [version, told] : {std::pair(3u, "version 3;"), std::pair(77u, "version 77;")}) {
+  for (const auto& [version, told] : {std::pair(4u, "version 4;"), std::pair(77u, "version 77;")}) {
     const auto state = ParseState(Sealed(Patched(BodyOf(ExampleState()), kVersionAt, version)));
     ASSERT_FALSE(state.ok());
     EXPECT_NE(state.status().message().find(told), absl::string_view::npos) << state.status();
@@ -211,48 +200,6 @@ TEST(State, RunsWithoutOrderNodesOrARingAreRefused) {
   ExpectRefused(Sealed(Patched(body, kRunsAt + 8, std::int32_t{4})), "nodes of the next run");
   ExpectRefused(Sealed(Patched(body, kRunsAt + 16, std::int32_t{-8})), "rows out of order");
   ExpectRefused(Sealed(Patched(body, kRunsAt + 48, std::int32_t{-7})), "columns out of order");
-}
-
-TEST(State, AnOutlineOfWhatAreNoRingsOfAllOfItsPointsIsRefused) {
-  const std::string body = BodyOf(ExampleState());
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt, 1u)), "a point in no ring before all");
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt + 8, 6u)), "a point in no ring after all");
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt + 8, 8u)), "points that are not there");
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt + 4, 2u)), "a ring of two points");
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt + 4, 5u)), "a last ring of two points");
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt + 4, 8u)), "a ring of less than none");
-  ExpectRefused(Sealed(Patched(body, kOutlineOffsetsAt + 4, ~0u)), "rings beyond all numbers");
-  EXPECT_TRUE(ParseState(Sealed(Patched(body, kOutlineOffsetsAt + 4, 4u))).ok());
-  State state = ExampleState();
-  state.outline.offsets.clear();
-  ExpectRefused(Serialize(state), "points without rings");
-  state.outline.points.clear();
-  EXPECT_EQ(*ParseState(Serialize(state)), state);
-  state.outline.offsets = {1};
-  ExpectRefused(Serialize(state), "rings without points");
-}
-
-TEST(State, OutlinesAndParticlesThatLieNowhereAreRefused) {
-  const std::string body = BodyOf(ExampleState());
-  for (const double value :
-       {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
-        std::numeric_limits<double>::quiet_NaN(), 1e300, std::nextafter(0x1p31, 1e300),
-        std::nextafter(-0x1p31, -1e300)}) {
-    for (std::size_t k = 0; k < 14; ++k) {
-      ExpectRefused(Sealed(Patched(body, kPointsAt + 8 * k, value)), "a point");
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      ExpectRefused(Sealed(Patched(body, kParticlesAt + 24 * k + 8, value)), "a particle's x");
-      ExpectRefused(Sealed(Patched(body, kParticlesAt + 24 * k + 16, value)), "a particle's y");
-    }
-  }
-}
-
-TEST(State, ParticlesOfTheOutlineWithoutOrderAreRefused) {
-  const std::string body = BodyOf(ExampleState());
-  ExpectRefused(Sealed(Patched(body, kParticlesAt, std::uint64_t{1} << 40)), "twice the same");
-  ExpectRefused(Sealed(Patched(body, kParticlesAt + 24, std::uint64_t{2})), "out of order");
-  ExpectRefused(Sealed(Patched(body, kParticlesAt + 48, std::uint64_t{0})), "out of order");
 }
 
 // A placement, and whether particles have ids.

@@ -64,11 +64,11 @@ void ExpectSameOutlines(const Result& a, const Result& b) {
   }
 }
 
-// Ids and velocities tell of identities, and ids carry the outline's memory; nothing else.
-TEST(TrackedTurmoilOf100Discs, WithoutMemoryOutlinesDoNotDependOnIdsOrVelocitiesByABit) {
+// Ids and velocities tell of identities, and of nothing else.
+TEST(TrackedTurmoilOf100Discs, OutlinesDoNotDependOnIdsOrVelocitiesByABit) {
   for (const Placement placement : AllPlacements()) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-      const ReconstructionParameters parameters{.placement = placement, .outline_memory = false};
+      const ReconstructionParameters parameters{.placement = placement};
       RingStream plain(parameters), ids(parameters), velocities(parameters), both(parameters);
       for (int frame = 0; frame < 5; ++frame) {
         plain.Next(Turmoil(kNothing, seed, frame));

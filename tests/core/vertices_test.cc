@@ -124,7 +124,7 @@ TEST(Vertices,
   EXPECT_LT(vertices, 0.2 * middles);
 }
 
-TEST(Vertices, OfTheVirtualPlaneTakeOneStepOfAtMostHalfACellAlongTheGradient) {
+TEST(Vertices, OfTheVirtualPlaneTakeOneBoundedStepAlongTheGradient) {
   constexpr double kRounding = 1e-7;  // Of F and its gradient.
   const auto vertex = [](float value, float gx, float gy, bool weak = false) {
     CellPlane plane;
@@ -133,7 +133,7 @@ TEST(Vertices, OfTheVirtualPlaneTakeOneStepOfAtMostHalfACellAlongTheGradient) {
     plane.gradient_x = gx;
     plane.gradient_y = gy;
     plane.is_weak = weak;
-    return VirtualPlaneVertex(plane);
+    return VirtualPlaneVertex(plane, VirtualPlaneConstants{}.newton_step);
   };
   // F = value + g . d is zero at -value g / |g|^2.
   const LatticePoint plain = vertex(0.1f, 0.6f, 0.8f);
@@ -143,7 +143,7 @@ TEST(Vertices, OfTheVirtualPlaneTakeOneStepOfAtMostHalfACellAlongTheGradient) {
   EXPECT_NEAR(inward.x, 10, 1e-12);
   EXPECT_NEAR(inward.y, 20.1, kRounding);
   const LatticePoint longest = vertex(5, 1, 0);
-  EXPECT_NEAR(longest.x, 9.5, 1e-12);
+  EXPECT_NEAR(longest.x, 10 - VirtualPlaneConstants{}.newton_step, 1e-12);
   EXPECT_NEAR(longest.y, 20, 1e-12);
   const LatticePoint weak = vertex(0.1f, 1, 1, true);
   EXPECT_EQ(weak.x, 10);

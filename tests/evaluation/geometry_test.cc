@@ -6,12 +6,12 @@
 #include <numbers>
 #include <vector>
 
-#include "evaluation/erosion.h"
-#include "evaluation/outline.h"
-#include "evaluation/random.h"
-#include "evaluation/segment_index.h"
-#include "evaluation/shapes.h"
-#include "evaluation/trigonometry.h"
+#include "evaluation/scenes/erosion.h"
+#include "evaluation/scenes/outline.h"
+#include "evaluation/scenes/random.h"
+#include "evaluation/scenes/segment_index.h"
+#include "evaluation/scenes/shapes.h"
+#include "evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // All methods over all sequences.
-#include "evaluation/study.h"
+#include "evaluation/metrics/study.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,10 +7,15 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <string>
+#include <vector>
+
+#include "evaluation/report/study_tables.h"
 
 namespace partiemc::evaluation {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 bool GoOn(std::size_t) { return true; }
@@ -63,6 +68,24 @@ TEST(Study, EachStepMethodHasExactlyOneStepOff) {
   EXPECT_EQ(names.size(), 6u);
 }
 
+TEST(Study, EachSensitivityMethodHasExactlyOneConstantChanged) {
+  const auto methods = SensitivityMethods();
+  EXPECT_EQ(methods.size(), 2 * AllConstants().size());
+  std::set<std::string> names;
+  for (const StudyMethod& method : methods) {
+    ReconstructionParameters parameters = method.method.parameters;
+    int changed = 0;
+    for (const NamedConstant& constant : AllConstants()) {
+      changed += parameters.constants.*constant.value != VirtualPlaneConstants{}.*constant.value;
+    }
+    EXPECT_EQ(changed, 1) << method.method.name;
+    parameters.constants = {};
+    EXPECT_EQ(parameters, ReconstructionParameters{}) << method.method.name;
+    names.insert(method.method.name);
+  }
+  EXPECT_EQ(names.size(), methods.size());
+}
+
 TEST(Study, RowsAreTheSameForOneAndThreeThreads) {
   StudyPlan plan = SmallPlan();
   const auto one = RunStudy(plan, GoOn);
@@ -86,31 +109,16 @@ TEST(Study, ReportsAsManyFramesAsItAnnounced) {
   const StudyPlan plan = SmallPlan();
   const auto study = RunAnnounced(plan);
   ASSERT_TRUE(study.ok());
-  // Seven methods, of which one needs ids, and one a spacing: left out where there is none.
+  // Six methods, of which one needs a spacing: left out where there is none.
   EXPECT_EQ(study->rows.size(), 3u * (6 + 5));
 }
 
-TEST(Study, TheMethodWithoutMemoryIsTheDefaultWithoutItAndNothingElse) {
-  ReconstructionParameters without;
-  without.outline_memory = false;
-  const auto methods = StudyMethods();
-  const auto found = std::ranges::find(methods, "virtual-plane-no-memory",
-                                       [](const StudyMethod& m) { return m.method.name; });
-  ASSERT_NE(found, methods.end());
-  EXPECT_EQ(found->method.parameters, without);
-  EXPECT_TRUE(found->needs_ids);
-}
-
-TEST(Study, ScenesThatTellIdsShowWhatTheMemoryIsWorth) {
+TEST(Study, ScenesTellIdsWhereThisIsAskedFor) {
   StudyPlan plan = SmallPlan();
   plan.ids = true;
   const auto study = RunAnnounced(plan);
   ASSERT_TRUE(study.ok()) << study.status();
-  EXPECT_EQ(study->rows.size(), 3u * (7 + 6));
   EXPECT_TRUE(study->ToldIds(false));
-  for (const Knowledge knowledge : plan.told) {
-    EXPECT_EQ(study->Of("virtual-plane-no-memory", knowledge, false).size(), 3u);
-  }
 }
 
 // A disc in a recording of its own, with ids or without.
@@ -126,7 +134,7 @@ Sequence RecordedDisc(bool ids) {
   return recording;
 }
 
-TEST(Study, RecordingsHaveTheMethodWithoutMemoryWhereSomeHaveIds) {
+TEST(Study, RecordingsTellIdsWhereTheyHaveSome) {
   for (const bool some : {false, true}) {
     SCOPED_TRACE(some);
     StudyPlan plan = SmallPlan();
@@ -136,15 +144,10 @@ TEST(Study, RecordingsHaveTheMethodWithoutMemoryWhereSomeHaveIds) {
     ASSERT_TRUE(study.ok()) << study.status();
     EXPECT_FALSE(study->ToldIds(false));
     EXPECT_EQ(study->ToldIds(true), some);
-    const auto rows = [&](bool recordings) {
-      return study->Of("virtual-plane-no-memory", Knowledge::kSpacing, recordings);
-    };
-    EXPECT_TRUE(rows(false).empty());
-    // Both or none, so that means are over the same recordings as those of other methods.
-    ASSERT_EQ(rows(true).size(), some ? 2u : 0u);
-    if (!some) continue;
-    EXPECT_FALSE(rows(true)[0].ids);
-    EXPECT_TRUE(rows(true)[1].ids);
+    const auto rows = study->Of("virtual-plane", Knowledge::kSpacing, true);
+    ASSERT_EQ(rows.size(), 2u);
+    EXPECT_FALSE(rows[0].ids);
+    EXPECT_EQ(rows[1].ids, some);
   }
 }
 
@@ -176,6 +179,93 @@ TEST(Study, MeansLeaveOutWhatIsAbsentOrNotJudged) {
   rows[1].judged = false;
   EXPECT_EQ(MeanOver(rows, Metric::kHausdorff), 1);
   EXPECT_TRUE(std::isnan(MeanOver(rows, Metric::kBias)));
+}
+
+// Rows of the baseline and of one method: (sequence, group, sampler, mean deviation of both).
+struct Made {
+  std::string sequence;
+  Group group;
+  std::string sampler;
+  double method, baseline;
+};
+
+Study StudyOf(const std::vector<Made>& made) {
+  Study study;
+  study.methods = StudyMethods();
+  study.told = {Knowledge::kSpacing};
+  for (const Made& numbers : made) {
+    for (const bool baseline : {true, false}) {
+      Row row;
+      row.sequence = numbers.sequence;
+      row.group = numbers.group;
+      row.sampler = numbers.sampler;
+      row.method = baseline ? std::string(kBaseline) : "virtual-plane";
+      row.knowledge = Knowledge::kSpacing;
+      row.values.fill(kAbsent);
+      row.values[static_cast<std::size_t>(Metric::kMeanDeviation)] =
+          baseline ? numbers.baseline : numbers.method;
+      row.frames.resize(3);
+      for (FrameNumbers& frame : row.frames) {
+        frame.neighbours = {baseline ? 0.9 : 0, 0.1};
+      }
+      study.rows.push_back(row);
+    }
+  }
+  return study;
+}
+
+std::vector<std::string> NamesOf(const Table& table) {
+  std::vector<std::string> names;
+  for (const TableRow& row : table.rows) {
+    if (!row.part) names.push_back(row.name);
+  }
+  return names;
+}
+
+TEST(StudyTables, PutTheWorstGroupAndSamplerFirstAndListWhatIsLost) {
+  const Study study = StudyOf({{"a", Group::kRigid, "lattice", 0.5, 1},
+                               {"b", Group::kRigid, "clumped", 2, 1},
+                               {"c", Group::kNoise, "lattice", 3, 1},
+                               {"d", Group::kGrowth, "relaxed", 1.2, 1}});
+  const Selection selection{Knowledge::kSpacing, false};
+  const auto tables = DetailTables(study, selection, "virtual-plane");
+  ASSERT_EQ(tables.size(), 3u);
+  EXPECT_THAT(NamesOf(tables[0]), ElementsAre("noise", "growth", "rigid", "all"));
+  EXPECT_EQ(tables[0].rows[0].cells[1].text, "3.000");
+  EXPECT_TRUE(tables[0].rows[0].cells[1].alert);
+  EXPECT_THAT(NamesOf(tables[1]), ElementsAre("clumped", "lattice", "relaxed", "all"));
+  EXPECT_EQ(tables[1].rows[1].cells[1].text, "1.225") << "sqrt(1.5)";
+  EXPECT_THAT(NamesOf(tables[2]), ElementsAre("c", "b")) << "d is below 1.25";
+  EXPECT_EQ(tables[2].rows[0].cells[1].text, "3.00");
+}
+
+TEST(StudyTables, ShowSequencesWhereAllAreOfOneGroup) {
+  const Study study = StudyOf({{"a", Group::kRigid, "relaxed", 0.04, 0.08},
+                               {"b", Group::kRigid, "relaxed-100", 0.06, 0.03}});
+  const Table table = DetailTables(study, {Knowledge::kSpacing, false}, "virtual-plane")[0];
+  EXPECT_THAT(NamesOf(table), ElementsAre("b", "a", "mean (ratio: geometric)"));
+  EXPECT_EQ(table.rows[0].cells[0].text, "0.0600");
+  EXPECT_EQ(table.rows[0].cells[2].text, "2.000");
+  EXPECT_TRUE(table.rows[0].cells[2].alert);
+  EXPECT_EQ(table.rows[2].cells[0].text, "0.0500");
+  EXPECT_EQ(table.rows[2].cells[1].text, "0.0550");
+  EXPECT_EQ(table.rows[2].cells[2].text, "1.000");
+}
+
+TEST(StudyTables, ShowTheNearestNeighboursOfSamplersAndRecordings) {
+  Study study = StudyOf({{"a", Group::kRigid, "clumped", 1, 1},
+                         {"b", Group::kGrowth, "clumped", 1, 1},
+                         {"c", Group::kRigid, "lattice", 1, 1},
+                         {"r.pemc", Group::kRecording, "", 1, 1}});
+  study.rows[0].frames[0].neighbours = {0.3, 0.7};  // One of six frames of the sampler.
+  study.rows[6].frames[2].neighbours = {0.5, 0.2};
+  const Table table = NeighbourTable(study);
+  EXPECT_THAT(NamesOf(table), ElementsAre("clumped", "lattice", "r.pemc, first frame",
+                                          "r.pemc, middle frame", "r.pemc, last frame"));
+  EXPECT_EQ(table.rows[0].cells[0].text, "0.800");
+  EXPECT_EQ(table.rows[0].cells[1].text, "0.200");
+  EXPECT_EQ(table.rows[3].cells[0].text, "0.900");
+  EXPECT_EQ(table.rows[4].cells[0].text, "0.500");
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ void RequireGuarantees(const ReconstructionParameters& parameters, const Result&
 void RequireNoTrace(const absl::Status& status, const Result& result, const State& before,
                     const State& after) {
   Require(status.code() == absl::StatusCode::kInvalidArgument ||
+              status.code() == absl::StatusCode::kOutOfRange ||
               status.code() == absl::StatusCode::kResourceExhausted,
           absl::StrCat("a frame is refused for what it is: ", status.ToString()));
   RequireViolation(status);
@@ -136,7 +137,6 @@ ReconstructionParameters HostileParameters(Choices& choices) {
   parameters.spacing_rule = flags & 2 ? SpacingRule::kEveryFrame : SpacingRule::kFirstFrame;
   parameters.normal_memory = !(flags & 4);
   if (flags & 8) parameters.clean = (flags & 16) != 0;
-  parameters.outline_memory = (flags & 24) != 16;  // The value of `clean` is free without one.
   parameters.plane = flags & 32 ? Plane::kYz : Plane::kXy;
   if (flags & 64) parameters.min_component_area = choices.Take<std::uint8_t>();
   if (flags & 128) parameters.min_component_particles = choices.Take<std::uint8_t>();

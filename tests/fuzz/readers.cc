@@ -99,6 +99,7 @@ void AttackReader(client::input::OpenReader& open, std::uint8_t choice, std::str
 void AttackLammpsDump(Bytes bytes) { AttackFile(client::input::OpenLammpsDump, bytes); }
 void AttackNpy(Bytes bytes) { AttackFile(client::input::OpenNpy, bytes); }
 void AttackTextTable(Bytes bytes) { AttackFile(client::input::OpenTextTable, bytes); }
+void AttackVtk(Bytes bytes) { AttackFile(client::input::OpenVtk, bytes); }
 void AttackXyz(Bytes bytes) { AttackFile(client::input::OpenXyz, bytes); }
 
 }  // namespace partiemc::fuzz

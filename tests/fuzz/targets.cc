@@ -5,6 +5,7 @@ namespace partiemc::fuzz {
 std::span<const Target> AllTargets() {
   static constexpr Target kTargets[] = {
       {"checkpoint", AttackCheckpoint},
+      {"config", AttackConfig},
       {"expressions", AttackExpressions},
       {"frame_message", AttackFrameMessage},
       {"frames", AttackFrames},
@@ -15,7 +16,13 @@ std::span<const Target> AllTargets() {
       {"recording", AttackRecording},
       {"result_message", AttackResultMessage},
       {"state", AttackState},
+      {"stream_requests", AttackStreamRequests},
       {"text_table", AttackTextTable},
+      {"tokens", AttackTokens},
+#ifdef PARTIEMC_HAVE_VTK
+      {"vtk", AttackVtk},
+#endif
+      {"watch_requests", AttackWatchRequests},
       {"xyz", AttackXyz},
   };
   return kTargets;

@@ -15,17 +15,22 @@ using Bytes = std::span<const std::uint8_t>;
 using Attack = void(Bytes bytes);
 
 Attack AttackCheckpoint;    // What a client resumes from, and frames after it.
+Attack AttackConfig;        // A server's configuration file.
 Attack AttackExpressions;   // What a person writes behind --select, --columns, --frames, ...
 Attack AttackFrameMessage;  // A ReconstructFrameRequest, decoded, reconstructed, encoded.
 Attack AttackFrames;        // Frames of hostile coordinates, every guarantee of a result checked.
 Attack AttackLammpsDump;    // The readers of client/input, each with the bytes as its file.
 Attack AttackNpy;
 Attack AttackNpz;
-Attack AttackPacked;         // gzip, zstd and deflate, and what reads lines from them.
-Attack AttackRecording;      // A .pemc file, as it is or with its blocks packed as they should be.
-Attack AttackResultMessage;  // A server's answer, as the client decodes it.
-Attack AttackState;          // A serialised State, its checksum put right, and a frame after it.
+Attack AttackPacked;          // gzip, zstd and deflate, and what reads lines from them.
+Attack AttackRecording;       // A .pemc file, as it is or with its blocks packed as they should be.
+Attack AttackResultMessage;   // A server's answer, as the client decodes it.
+Attack AttackState;           // A serialised State, its checksum put right, and a frame after it.
+Attack AttackStreamRequests;  // A producer's messages, one after the other into the same buffers.
 Attack AttackTextTable;
+Attack AttackTokens;         // The token file of a server.
+Attack AttackVtk;            // Legacy VTK, VTP and VTU; only where VTK is built in.
+Attack AttackWatchRequests;  // A watcher's messages while results come.
 Attack AttackXyz;
 
 struct Target {

@@ -66,7 +66,6 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.reference_radius = 1.25;
   parameters.surface_offset = -0.5;
   parameters.normal_memory = false;
-  parameters.outline_memory = false;
   parameters.clean = false;
   parameters.min_component_area = 2.5;
   parameters.min_component_particles = 3'000'000'000'000;
@@ -81,7 +80,6 @@ TEST(Parameters, WhatIsAbsentTakesItsDefault) {
   const auto decoded = DecodeParameters({});
   ASSERT_TRUE(decoded.ok());
   EXPECT_EQ(*decoded, ReconstructionParameters{});
-  EXPECT_TRUE(decoded->outline_memory);
 }
 
 TEST(Parameters, AZeroThatIsGivenIsNotTakenForAbsent) {
@@ -109,19 +107,45 @@ TEST(OutputsMessage, AbsentMeansRingsAndMesh) {
   EXPECT_EQ(*outputs, Outputs{});
 }
 
-TEST(OutputsMessage, EveryCombinationComesBackAsItWas) {
+TEST(OutputsMessage, EveryCombinationThatMeansSomethingComesBackAsItWas) {
   for (int bits = 0; bits < 32; ++bits) {
     const Outputs outputs{.rings = (bits & 1) != 0,
                           .mesh = (bits & 2) != 0,
                           .normals = (bits & 4) != 0,
                           .relative_float32 = (bits & 8) != 0,
                           .echo_particles = (bits & 16) != 0};
+    if (outputs.normals && !outputs.rings) continue;
+    if (outputs.relative_float32 && !outputs.rings && !outputs.mesh) continue;
     v1::Outputs message;
     EncodeOutputs(outputs, message);
     const auto decoded = DecodeOutputs(message, /*present=*/true);
     ASSERT_TRUE(decoded.ok());
     EXPECT_EQ(*decoded, outputs);
   }
+}
+
+// Such a client would get statistics and wait for geometry.
+TEST(OutputsMessage, NormalsAndFormatsWithoutGeometryAreRefused) {
+  v1::Outputs normals;
+  normals.set_normals(true);
+  EXPECT_EQ(ViolationOf(DecodeOutputs(normals, /*present=*/true).status()).field,
+            "outputs.normals");
+  normals.set_mesh(true);
+  EXPECT_EQ(ViolationOf(DecodeOutputs(normals, /*present=*/true).status()).field,
+            "outputs.normals");
+  for (const auto named : {v1::COORDINATE_FORMAT_FLOAT64, v1::COORDINATE_FORMAT_FLOAT32_RELATIVE}) {
+    v1::Outputs format;
+    format.set_coordinate_format(named);
+    format.set_echo_particles(true);
+    const auto refused = DecodeOutputs(format, /*present=*/true);
+    EXPECT_EQ(refused.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(ViolationOf(refused.status()).reason, kReasonOutOfRange);
+    EXPECT_EQ(ViolationOf(refused.status()).field, "outputs.coordinate_format");
+    format.set_mesh(true);
+    EXPECT_TRUE(DecodeOutputs(format, /*present=*/true).ok());
+  }
+  // Statistics and digests alone may be what somebody wants.
+  EXPECT_TRUE(DecodeOutputs({}, /*present=*/true).ok());
 }
 
 TEST(OutputsMessage, WhatTheServerCannotDoIsRefusedAndNotIgnored) {

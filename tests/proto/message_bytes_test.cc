@@ -130,5 +130,54 @@ TEST(MergeBytes, TellsWhatIsNoMessage) {
   }
 }
 
+// "field: bytes", length-delimited, for fields of less than 16 and contents of less than 128 bytes.
+std::string Field(int number, const std::string& contents) {
+  return std::string{static_cast<char>(number << 3 | 2), static_cast<char>(contents.size())} +
+         contents;
+}
+
+std::string Repeated(const std::string& text, int times) {
+  std::string all;
+  for (int i = 0; i < times; ++i) all += text;
+  return all;
+}
+
+bool RequestHasFewFields(const std::string& text) {
+  grpc::ByteBuffer bytes = InPieces(text, 7);
+  return HasFewFields(bytes, *v1::ReconstructRequest::descriptor());
+}
+
+TEST(MessageBytes, FieldsAreCountedWithThoseOfMessagesAndUnknownOnes) {
+  EXPECT_TRUE(RequestHasFewFields(""));
+  const std::string unknown = Field(15, "x");
+  EXPECT_TRUE(RequestHasFewFields(Repeated(unknown, kMaxFields)));
+  EXPECT_FALSE(RequestHasFewFields(Repeated(unknown, kMaxFields + 1)));
+  // Within the frame: fields of the frame beside the frame's own.
+  v1::ReconstructRequest request;
+  for (int i = 0; i < kMaxFields - 1; ++i) request.mutable_frame()->add_scalars();
+  EXPECT_TRUE(RequestHasFewFields(request.SerializeAsString()));
+  request.mutable_frame()->add_scalars();
+  EXPECT_FALSE(RequestHasFewFields(request.SerializeAsString()));
+  // A string's contents are not looked at, whatever they look like.
+  request.mutable_frame()->clear_scalars();
+  request.mutable_frame()->set_positions(Repeated(unknown, 2 * kMaxFields));
+  EXPECT_TRUE(RequestHasFewFields(request.SerializeAsString()));
+}
+
+TEST(MessageBytes, WhatIsNoMessageIsCountedAsFarAsAParserComes) {
+  EXPECT_TRUE(RequestHasFewFields("\x07")) << "a wire type that does not exist";
+  EXPECT_TRUE(RequestHasFewFields("\x12\x05x")) << "cut off";
+  const std::string many = Repeated(Field(15, ""), kMaxFields + 1);
+  EXPECT_FALSE(RequestHasFewFields(many + "\x07"));
+  EXPECT_FALSE(RequestHasFewFields("\x12\xff\xff\x7f" + many)) << "in a message that is cut off";
+  EXPECT_FALSE(RequestHasFewFields(Repeated("\x7b", 200'000))) << "groups in groups";
+  EXPECT_FALSE(RequestHasFewFields("\x7b\x7c")) << "a group";
+}
+
+TEST(MessageBytes, TheHeldFieldOfTooManyIsNotLookedFor) {
+  grpc::ByteBuffer bytes = InPieces(Repeated(Field(15, ""), kMaxFields + 1), 100);
+  EXPECT_FALSE(HeldField(bytes, kLast).has_value());
+}
+
 }  // namespace
 }  // namespace partiemc::wire

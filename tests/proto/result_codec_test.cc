@@ -52,6 +52,8 @@ Result SquareWithHole() {
                        .perimeter = 24,
                        .spacing = 1,
                        .cell_size = 1};
+  result.statistics.doubts.Add(Doubt::kSpacingContradicted);
+  result.statistics.doubts.Add(Doubt::kPositionsCoarse);
   return result;
 }
 
@@ -68,6 +70,23 @@ v1::ReconstructedFrame Encoded(const Result& result, const Outputs& outputs) {
   v1::ReconstructedFrame message;
   EXPECT_TRUE(EncodeResult(result, SomeTimes(), outputs, message).ok());
   return message;
+}
+
+TEST(ResultMessage, EachDoubtIsToldOnceAndThoseOfALaterServerArePassedOver) {
+  v1::ReconstructedFrame message;
+  for (const Doubt doubt : kAllDoubts) {
+    Result result = SquareWithHole();
+    result.statistics.doubts = {};
+    result.statistics.doubts.Add(doubt);
+    // Into the same message each time: the doubt of the frame before is gone.
+    ASSERT_TRUE(EncodeResult(result, SomeTimes(), kAll, message).ok());
+    ASSERT_EQ(message.statistics().doubts_size(), 1);
+    EXPECT_NE(message.statistics().doubts(0), v1::DOUBT_UNSPECIFIED);
+    message.mutable_statistics()->add_doubts(static_cast<v1::Doubt>(99));
+    ReconstructedFrame frame;
+    ASSERT_TRUE(DecodeResult(message, frame).ok());
+    EXPECT_EQ(frame.result.statistics.doubts, result.statistics.doubts) << Name(doubt);
+  }
 }
 
 TEST(ResultMessage, EverythingComesBackAsItWas) {

@@ -107,15 +107,17 @@ std::string NginxFile(const std::string& folder, const std::string& socket,
 
 }  // namespace
 
-Fleet::Fleet(std::size_t count) : servers_(count), addresses_(count) {
+Fleet::Fleet(std::size_t count, std::vector<std::string> arguments)
+    : arguments_(std::move(arguments)), servers_(count), addresses_(count) {
   for (std::size_t k = 0; k < count; ++k) Start(k, "127.0.0.1:0");
 }
 
 void Fleet::Start(std::size_t server, const std::string& address) {
   const support::TemporaryFolder folder;
   const std::string port_file = folder.Path("port");
-  servers_[server] = std::make_unique<server::ServerProcess>(
-      std::vector<std::string>{"--address", address, "--port-file", port_file});
+  std::vector<std::string> arguments = arguments_;
+  arguments.insert(arguments.end(), {"--address", address, "--port-file", port_file});
+  servers_[server] = std::make_unique<server::ServerProcess>(std::move(arguments));
   WaitFor([&] { return std::filesystem::exists(port_file); }, "a server");
   addresses_[server] = server::FileText(port_file);
   if (!addresses_[server].empty()) addresses_[server].pop_back();  // The end of the line.

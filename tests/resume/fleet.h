@@ -17,11 +17,14 @@ namespace partiemc::resume {
 
 class Fleet {
  public:
-  explicit Fleet(std::size_t count);
+  /// Each with these arguments beside its address.
+  explicit Fleet(std::size_t count, std::vector<std::string> arguments = {});
 
   std::size_t size() const { return servers_.size(); }
   /// Stay the same.
   const std::vector<std::string>& addresses() const { return addresses_; }
+  /// What a server has logged since it was started last.
+  std::string Output(std::size_t server) const { return servers_[server]->Output(); }
 
   /// kill -9, and once it has gone the same again at the same address.
   void KillAndRestart(std::size_t server);
@@ -31,6 +34,7 @@ class Fleet {
  private:
   void Start(std::size_t server, const std::string& address);
 
+  const std::vector<std::string> arguments_;
   std::vector<std::unique_ptr<server::ServerProcess>> servers_;
   std::vector<std::string> addresses_;
 };

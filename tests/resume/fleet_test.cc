@@ -23,6 +23,8 @@ constexpr std::size_t kServers = 3;
 // Frames a second of one stream: a simulation's, and little enough for a shared machine.
 constexpr double kRate = 40;
 constexpr std::chrono::seconds kGrace(20);
+// From a disturbance to the next answer (tests/PROMISES.md).
+constexpr double kMaxRecoveryMs = 1000;
 
 class FleetTest : public testing::TestWithParam<Door> {
  protected:
@@ -101,7 +103,26 @@ std::vector<double> RecoveriesMs(const std::vector<History>& histories,
   return recoveries;
 }
 
-void Print(Door door, const char* what, std::uint64_t count, std::vector<double> recoveries,
+// The longest time between two answers of a stream that lost nothing in between: what the machine
+// itself makes streams wait.
+double LongestPauseMs(const std::vector<History>& histories) {
+  double longest = 0;
+  for (const History& history : histories) {
+    for (std::size_t k = 1; k < history.answers.size(); ++k) {
+      const auto from = history.answers[k - 1].at, to = history.answers[k].at;
+      const bool disturbed = std::ranges::any_of(
+          history.reconnections, [&](auto told) { return from <= told && told <= to; });
+      if (disturbed) continue;
+      longest = std::max(longest, std::chrono::duration<double, std::milli>(to - from).count());
+    }
+  }
+  return longest;
+}
+
+// Prints what was seen, and judges how long users were without: 99 of 100 of them at most a second,
+// beside what the machine makes them wait anyway. Of less than a hundred recoveries one may be
+// longer.
+void Judge(Door door, const char* what, std::uint64_t count, const std::vector<double>& recoveries,
            const std::vector<History>& histories) {
   std::uint64_t frames = 0;
   for (const History& history : histories) frames += history.answers.size();
@@ -113,6 +134,12 @@ void Print(Door door, const char* what, std::uint64_t count, std::vector<double>
               DoorName(door).c_str(), static_cast<unsigned long long>(count), what,
               static_cast<unsigned long long>(frames), recoveries.size(), percentile(50),
               percentile(99), percentile(100));
+  const double pause = LongestPauseMs(histories), bound = kMaxRecoveryMs + pause;
+  const auto late = static_cast<std::size_t>(
+      std::ranges::count_if(recoveries, [bound](double recovery) { return recovery > bound; }));
+  EXPECT_LE(late, std::max<std::size_t>(1, recoveries.size() / 100))
+      << "p99 " << percentile(99) << " ms; the longest pause without a loss was " << pause << " ms";
+  EXPECT_LE(percentile(50), bound);
 }
 
 TEST_P(FleetTest, KillsAtRandomMomentsAreSeenInNoAnswer) {
@@ -129,7 +156,7 @@ TEST_P(FleetTest, KillsAtRandomMomentsAreSeenInNoAnswer) {
     }
   });
   const auto recoveries = RecoveriesMs(histories, disturbances);
-  Print(GetParam(), "kills", kills, recoveries, histories);
+  Judge(GetParam(), "kills", kills, recoveries, histories);
   EXPECT_FALSE(recoveries.empty()) << "no stream has been at a server that was killed";
 }
 
@@ -148,7 +175,7 @@ TEST_P(FleetTest, RollingTerminationsAreSeenByNoCaller) {
     }
   });
   const auto recoveries = RecoveriesMs(histories, disturbances);
-  Print(GetParam(), "SIGTERMs", terminations, recoveries, histories);
+  Judge(GetParam(), "SIGTERMs", terminations, recoveries, histories);
   EXPECT_FALSE(recoveries.empty()) << "no stream has been at a server that was told to go";
 }
 

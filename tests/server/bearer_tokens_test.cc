@@ -17,40 +17,71 @@ using ::testing::Not;
 
 constexpr char kAlice[] = "alice-0123456789+/=._~";
 constexpr char kBob[] = "bob-0123456789abcdef";
+constexpr char kPeer[] = "ipv4:192.0.2.7:50000";
 
 std::string File(const std::string& text) {
   const auto tokens = BearerTokens::Parse(text);
   return tokens.ok() ? "accepted" : std::string(tokens.status().message());
 }
 
+// Of the client that has the token; "nobody" where there is none.
+std::string ClientOf(const BearerTokens& tokens, const std::string& token) {
+  const auto* const client = tokens.Find(token);
+  return client == nullptr ? "nobody" : client->terms->name;
+}
+
 TEST(BearerTokens, AreFoundByTheirWholeTextAndNamed) {
   const auto tokens =
       BearerTokens::Parse(std::string("# who may come in\n\n") + kAlice + "\talice\r\n" + kBob);
   ASSERT_TRUE(tokens.ok()) << tokens.status();
-  EXPECT_EQ(tokens->size(), 2u);
-  EXPECT_EQ(tokens->ClientOf(kAlice), "alice");
-  EXPECT_EQ(tokens->ClientOf(kBob), "token-4");
+  EXPECT_EQ(tokens->clients().size(), 2u);
+  EXPECT_EQ(ClientOf(*tokens, kAlice), "alice");
+  EXPECT_EQ(ClientOf(*tokens, kBob), "token-4");
   const std::string bob = kBob;
   for (const std::string& other : {std::string(), bob.substr(1), bob.substr(0, bob.size() - 1),
                                    bob + "x", bob + '\0', " " + bob, std::string("alice")}) {
-    EXPECT_EQ(tokens->ClientOf(other), std::nullopt) << other;
+    EXPECT_EQ(ClientOf(*tokens, other), "nobody") << other;
   }
 }
 
-TEST(BearerTokens, AFileThatIsNoneIsRefusedByLineAndRuleWithoutShowingAToken) {
+TEST(BearerTokens, MayEverythingUnlessTheirLineSaysOtherwise) {
+  const auto tokens = BearerTokens::Parse(std::string(kAlice) + " alice\n" + kBob +
+                                          " may=watch names=tank-* watchers=2\n");
+  ASSERT_TRUE(tokens.ok()) << tokens.status();
+  const CallerTerms& alice = *tokens->Find(kAlice)->terms;
+  EXPECT_TRUE(alice.may_produce && alice.may_watch && alice.may_list && alice.MayUse("tonk"));
+  EXPECT_EQ(alice.quota, CallerQuota());
+  const CallerTerms& bob = *tokens->Find(kBob)->terms;
+  EXPECT_EQ(bob.name, "token-2");
+  EXPECT_FALSE(bob.may_produce || bob.may_list || bob.MayUse("tonk"));
+  EXPECT_EQ(bob.quota, (CallerQuota{.watchers = 2}));
+}
+
+TEST(BearerTokens, AFileThatIsNoneIsRefusedByLineWordAndRuleWithoutShowingAWord) {
   const std::string token = kAlice;
   EXPECT_THAT(File(""), HasSubstr("no token"));
   EXPECT_THAT(File("# nothing\n \n"), HasSubstr("no token"));
-  EXPECT_THAT(File(token + "\n" + token + " twice\n"), HasSubstr("line 2: must not repeat"));
-  EXPECT_THAT(File("\nshort-secret\n"), HasSubstr("line 2: must begin with a token of 16"));
-  EXPECT_THAT(File(std::string(513, 'a')), HasSubstr("line 1"));
-  EXPECT_THAT(File("secret\"with\"quotes\"in\"it"), HasSubstr("line 1"));
-  EXPECT_THAT(File(token + " two names"), HasSubstr("line 1: after the token"));
-  EXPECT_THAT(File(token + " na/me"), HasSubstr("line 1: after the token"));
-  for (const std::string& wrong : {token + "\n" + token, token + " two names",
-                                   std::string("short-secret"), token + " na/me"}) {
-    EXPECT_THAT(File(wrong), Not(HasSubstr("alice"))) << wrong;
-    EXPECT_THAT(File(wrong), Not(HasSubstr("secret"))) << wrong;
+  const struct {
+    std::string text;
+    const char* told;
+  } wrong[] = {
+      {token + "\n" + token + " twice\n", "line 2, word 1: must not repeat"},
+      {"\nshort-secret\n", "line 2, word 1: must be a token of 16"},
+      {std::string(513, 'a'), "line 1, word 1"},
+      {"secret\"with\"quotes\"in\"it", "line 1, word 1"},
+      {token + " two names", "line 1, word 3: after the token"},
+      {token + " na/me", "line 1, word 2: a name must"},
+      {token + " alice " + kBob, "line 1, word 3: after the token"},
+      {token + " alice streams=secret", "line 1, word 3: calls=, streams= and watchers= must"},
+      {"# one\n" + token + " may=secret", "line 2, word 2: may= must"},
+      {token + " names=secret,/", "line 1, word 2: names= must"},
+      {token + " bytes=9secret", "line 1, word 2: bytes= must"},
+  };
+  for (const auto& [text, told] : wrong) {
+    EXPECT_THAT(File(text), HasSubstr(told));
+    EXPECT_THAT(File(text), Not(HasSubstr("alice"))) << text;
+    EXPECT_THAT(File(text), Not(HasSubstr("bob"))) << text;
+    EXPECT_THAT(File(text), Not(HasSubstr("secret"))) << text;
   }
 }
 
@@ -64,18 +95,55 @@ TEST(BearerTokens, AreNoMoreThanAThousand) {
 TEST(Authentication, LetsEverybodyInUntilThereAreTokens) {
   Authentication authentication;
   EXPECT_FALSE(authentication.required());
-  EXPECT_EQ(*authentication.Authenticate(std::nullopt), "");
+  EXPECT_EQ(authentication.Authenticate(std::nullopt, kPeer)->name(), "");
   authentication.Set(*BearerTokens::Parse(std::string(kAlice) + " alice"));
   EXPECT_TRUE(authentication.required());
-  EXPECT_EQ(*authentication.Authenticate(std::string("Bearer ") + kAlice), "alice");
-  EXPECT_EQ(*authentication.Authenticate(std::string("bEARER ") + kAlice), "alice");
+  EXPECT_EQ(authentication.Authenticate(std::string("Bearer ") + kAlice, kPeer)->name(), "alice");
+  EXPECT_EQ(authentication.Authenticate(std::string("bEARER ") + kAlice, kPeer)->name(), "alice");
+}
+
+TEST(Authentication, TellsCallersWithoutATokenFromEachOtherByTheirAddress) {
+  const Authentication authentication({.calls = 5});
+  const auto account = [&](const char* peer) {
+    return authentication.Authenticate(std::nullopt, peer)->account();
+  };
+  const auto first = account("ipv4:192.0.2.7:1");
+  EXPECT_EQ(account("ipv4:192.0.2.7:2"), first);
+  EXPECT_NE(account("ipv4:192.0.2.8:1"), first);
+  EXPECT_EQ(first->quota(), (CallerQuota{.calls = 5}));
+}
+
+TEST(Authentication, KeepsTheAccountOfATokenWhateverItsPeerWhileItsTermsChange) {
+  Authentication authentication({.calls = 50, .streams = 9});
+  const auto load = [&](const std::string& text) {
+    authentication.Set(*BearerTokens::Parse(text));
+  };
+  const auto caller = [&](const char* token, const char* peer = kPeer) {
+    return *authentication.Authenticate(std::string("Bearer ") + token, peer);
+  };
+  load(std::string(kAlice) + " streams=2\n" + kBob);
+  const Caller alice = caller(kAlice), bob = caller(kBob);
+  EXPECT_NE(alice.account(), bob.account());
+  EXPECT_EQ(caller(kAlice, "ipv4:192.0.2.9:1").account(), alice.account());
+  EXPECT_EQ(alice.account()->quota(), (CallerQuota{.calls = 50, .streams = 2}));
+  EXPECT_EQ(bob.account()->quota(), (CallerQuota{.calls = 50, .streams = 9}));
+  const auto place = alice.account()->Take(CallerAccount::Kind::kStream);
+
+  load(std::string("# other lines, other terms\n") + kBob + " bob\n" + kAlice +
+       " streams=1 may=watch");
+  EXPECT_EQ(caller(kAlice).account(), alice.account());
+  EXPECT_EQ(caller(kBob).account(), bob.account());
+  EXPECT_FALSE(alice.account()->Take(CallerAccount::Kind::kStream).ok()) << "one is held";
+  EXPECT_FALSE(caller(kAlice).CheckMayProduce().ok());
+  EXPECT_TRUE(alice.CheckMayProduce().ok()) << "what has begun goes on";
+  EXPECT_EQ(caller(kBob).name(), "bob");
 }
 
 TEST(Authentication, TurnsAwayWithAReasonAndWithoutRepeatingWhatItWasGiven) {
   Authentication authentication;
   authentication.Set(*BearerTokens::Parse(kAlice));
   const auto reason = [&](std::optional<std::string> header) {
-    const auto client = authentication.Authenticate(header);
+    const auto client = authentication.Authenticate(header, kPeer);
     EXPECT_EQ(client.status().code(), absl::StatusCode::kUnauthenticated);
     EXPECT_THAT(std::string(client.status().message()), Not(HasSubstr("0123456789")));
     return FindViolation(client.status())->reason;

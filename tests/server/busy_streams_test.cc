@@ -62,6 +62,15 @@ TEST(BusyStreams, ForgetsAStreamThatHasStopped) {
   EXPECT_EQ(busy.Count(1000, kStart + seconds(20)), 1u);
 }
 
+TEST(BusyStreams, CountsNoneOfAPeriodLongAgoWhenOneBeginsAgain) {
+  BusyStreams busy(kLate);
+  std::vector<BusyStreams::Mark> streams(3);
+  for (BusyStreams::Mark& stream : streams) busy.Worked(stream, 1000, kStart);
+  const auto again = kStart + 5 * kLate;
+  busy.Worked(streams[0], 1000, again);
+  EXPECT_EQ(busy.Count(1000, again), 1u);
+}
+
 TEST(BusyStreams, ForgetsAllOnceNobodyHasHadSuchAFrameForLong) {
   BusyStreams busy(kLate);
   std::vector<BusyStreams::Mark> streams(2);

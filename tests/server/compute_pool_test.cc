@@ -3,20 +3,26 @@
 #include "server/compute_pool.h"
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <deque>
 #include <functional>
 #include <future>
 #include <latch>
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "server/caller.h"
 
 namespace partiemc::server {
 namespace {
@@ -81,6 +87,164 @@ TEST(ComputePool, TasksAtTheSameTimeHaveWorkersOfTheirOwn) {
     first_worker.wait();
   });
   EXPECT_NE(first_worker.get(), second_worker.get());
+}
+
+// Who had the turns of a pool of one thread, in their order. What is submitted before Order runs
+// after all of it has been.
+class Turns {
+ public:
+  Turns() {
+    // Shared, because the thread that keeps the promise may still be in it when this one goes on.
+    const auto begun = std::make_shared<std::promise<void>>();
+    pool_->Submit([this, begun](Worker&) {
+      begun->set_value();
+      all_submitted_.get_future().wait();
+    });
+    begun->get_future().wait();
+  }
+  // Jobs that wait at once, as calls of ReconstructFrame do.
+  void Calls(char name, int count, const CallerAccount* caller) {
+    for (int i = 0; i < count; ++i) {
+      pool_->Submit([this, name](Worker&) { order_ += name; }, [] {}, nullptr, caller);
+    }
+  }
+  // Frames of which each waits when the one before is done, as those of a stream do.
+  void Stream(char name, int frames, const CallerAccount* caller) {
+    Next(name, frames, caller, &marks_.emplace_back());
+  }
+  std::string Order() {
+    all_submitted_.set_value();
+    pool_.reset();  // Runs all that was submitted.
+    return order_;
+  }
+
+ private:
+  void Next(char name, int frames, const CallerAccount* caller, BusyStreams::Mark* mark) {
+    if (frames == 0) return;
+    const auto next = [=, this] { Next(name, frames - 1, caller, mark); };
+    running_->Submit([this, name](Worker&) { order_ += name; }, next, mark, caller);
+  }
+
+  std::promise<void> all_submitted_;
+  std::string order_;
+  std::deque<BusyStreams::Mark> marks_;
+  std::optional<ComputePool> pool_{1};
+  ComputePool* const running_ = &*pool_;  // Also while the pool runs its last jobs.
+};
+
+TEST(Turns, OfAllCallsOfACallerAreThoseOfOneStream) {
+  const CallerAccount caller;
+  Turns turns;
+  turns.Calls('c', 6, &caller);
+  turns.Stream('s', 3, &caller);
+  turns.Stream('t', 2, &caller);
+  EXPECT_EQ(turns.Order(),
+            "cst"
+            "cst"
+            "cs"
+            "ccc");
+}
+
+TEST(Turns, GoFromCallerToCallerHoweverManyStreamsAndCallsOneHas) {
+  const CallerAccount greedy, modest;
+  Turns turns;
+  for (const char stream : {'1', '2', '3'}) turns.Stream(stream, 2, &greedy);
+  turns.Calls('c', 4, &greedy);
+  turns.Stream('m', 4, &modest);
+  turns.Calls('n', 2, &modest);
+  EXPECT_EQ(turns.Order(),
+            "1m2n3mcn"
+            "1m2m"
+            "3c"
+            "cc");
+}
+
+TEST(Turns, OfWhoComesLateComeBeforeTheBacklogOfOthers) {
+  const CallerAccount first, second;
+  Turns turns;
+  turns.Calls('a', 5, &first);
+  turns.Calls('b', 1, nullptr);
+  turns.Calls('c', 2, &second);
+  EXPECT_EQ(turns.Order(), "abcacaaa");
+}
+
+TEST(RecentCallers, KnowWhetherAnybodyElseHasCome) {
+  const CallerAccount alice, bob, carol;
+  const TimePoint start;
+  RecentCallers recent;
+  EXPECT_FALSE(recent.AnybodyBut(&alice, start)) << "nobody has come";
+  recent.Came(&alice, start);
+  EXPECT_FALSE(recent.AnybodyBut(&alice, start));
+  EXPECT_TRUE(recent.AnybodyBut(&bob, start));
+  recent.Came(&bob, start + seconds(1));
+  recent.Came(&alice, start + seconds(2));
+  recent.Came(&alice, start + seconds(3));
+  EXPECT_TRUE(recent.AnybodyBut(&alice, start + seconds(1)));
+  EXPECT_FALSE(recent.AnybodyBut(&alice, start + seconds(2))) << "Bob's visit is too old";
+  recent.Came(&carol, start + seconds(4));
+  EXPECT_TRUE(recent.AnybodyBut(&carol, start + seconds(3))) << "Alice";
+  EXPECT_FALSE(recent.AnybodyBut(&carol, start + seconds(4)));
+  EXPECT_FALSE(recent.AnybodyBut(nullptr, start + seconds(5)));
+}
+
+TEST(RoundRobin, WhoIsNotAllowedKeepsItsTurn) {
+  RoundRobin<char, Line<int>> lines;
+  for (const auto& [key, item] : {std::pair('a', 1), {'b', 2}, {'a', 3}}) lines.Push(key, item);
+  EXPECT_EQ(lines.PopOf([](char key) { return key == 'b'; }), 2);
+  EXPECT_EQ(lines.PopOf([](char key) { return key == 'b'; }), std::nullopt);
+  EXPECT_EQ(lines.PopOf([](char) { return true; }), 1);
+  EXPECT_EQ(lines.PopOf([](char) { return true; }), 3);
+  EXPECT_TRUE(lines.empty());
+}
+
+TEST(ComputePool, LongJobsOfOneCallerLeaveAThreadToOthers) {
+  const CallerAccount greedy, modest;
+  std::latch done(3);
+  std::promise<void> held_up;
+  const auto go_on = held_up.get_future().share();
+  std::atomic<int> running = 0, most = 0, free_places = 0;
+  ComputePool pool(2);               // Ends before what its tasks use.
+  RunAndWait(pool, [](Worker&) {});  // By nobody in particular, so that callers share.
+  for (int k = 0; k < 3; ++k) {
+    pool.Submit(
+        [&](Worker&) {
+          most = std::max<int>(most, ++running);
+          go_on.wait();
+          --running;
+        },
+        [&] { done.count_down(); }, nullptr, &greedy);
+  }
+  std::promise<void> through;
+  pool.Submit([&](Worker&) { free_places = oneapi::tbb::this_task_arena::max_concurrency(); },
+              [&] { through.set_value(); }, nullptr, &modest);
+  EXPECT_EQ(through.get_future().wait_for(kLongEnough), std::future_status::ready)
+      << "it waits for a job of another caller";
+  EXPECT_EQ(free_places, 1) << "its pieces would wait for those of another caller";
+  held_up.set_value();
+  done.wait();
+  EXPECT_EQ(most, 1);
+}
+
+TEST(ComputePool, ACallerAloneHasAllThreadsAgainAfterAWhile) {
+  const CallerAccount gone, stays;
+  std::atomic<int> places = 0;
+  ComputePool pool(2);
+  const auto run = [&](const CallerAccount& caller) {
+    const auto done = std::make_shared<std::promise<void>>();
+    pool.Submit([&](Worker&) { places = oneapi::tbb::this_task_arena::max_concurrency(); },
+                [done] { done->set_value(); }, nullptr, &caller);
+    done->get_future().wait();
+  };
+  run(gone);
+  EXPECT_EQ(places, 2) << "alone";
+  const TimePoint left = WarmSize::Clock::now();
+  run(stays);
+  if (WarmSize::Clock::now() - left < kSharingTime) {
+    EXPECT_EQ(places, 1);
+  }
+  std::this_thread::sleep_until(left + kSharingTime + milliseconds(100));
+  run(stays);
+  EXPECT_EQ(places, 2);
 }
 
 // Tells when it is destroyed.

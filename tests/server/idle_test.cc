@@ -100,8 +100,10 @@ TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
   ComputePool pool(1);
   StreamRegistry registry(10);
   WatchRegistry watchers(10);
-  const IdleTimer timer(registry, watchers,
-                        {.opening = milliseconds(20), .streaming = minutes(10)});
+  UnaryRegistry calls(10);
+  ServerLimits limits;
+  limits.idle = {.opening = milliseconds(20), .streaming = minutes(10)};
+  const IdleTimer timer(registry, watchers, calls, limits);
   // It sleeps already when they come.
   for (int round = 0; round < 3; ++round) {
     MemoryDoor door(pool, 2, BlobParameters(), kLimits);

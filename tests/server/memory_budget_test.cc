@@ -23,6 +23,7 @@
 namespace partiemc::server {
 namespace {
 
+using Fit = FairShare::Fit;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
@@ -34,30 +35,30 @@ class Waiter final : public MemoryBudget::Waiter {
 
 TEST(MemoryBudget, GivesWhatThereIsAndCountsWhatIsTakenAnyhow) {
   MemoryBudget budget(100);
-  EXPECT_TRUE(budget.TryTake(60));
-  EXPECT_FALSE(budget.TryTake(41));
-  EXPECT_TRUE(budget.TryTake(40));
+  EXPECT_EQ(budget.TryTake(60), Fit::kYes);
+  EXPECT_EQ(budget.TryTake(41), Fit::kNoRoom);
+  EXPECT_EQ(budget.TryTake(40), Fit::kYes);
   budget.Take(1000);
   EXPECT_EQ(budget.held(), 1100u);
-  EXPECT_FALSE(budget.TryTake(1));
+  EXPECT_EQ(budget.TryTake(1), Fit::kNoRoom);
   budget.GiveBack(1001);
-  EXPECT_TRUE(budget.TryTake(1));
+  EXPECT_EQ(budget.TryTake(1), Fit::kYes);
 }
 
 TEST(MemoryBudget, IsNotFooledByNumbersThatRunOver) {
   MemoryBudget budget(100);
   budget.Take(1);
-  EXPECT_FALSE(budget.TryTake(std::numeric_limits<std::uint64_t>::max()));
+  EXPECT_EQ(budget.TryTake(std::numeric_limits<std::uint64_t>::max()), Fit::kNoRoom);
   EXPECT_EQ(budget.held(), 1u);
 }
 
 TEST(MemoryBudget, ServesThoseWhoWaitInTheirOrderAndLetsNobodyPast) {
   MemoryBudget budget(100);
   const auto large = std::make_shared<Waiter>(), small = std::make_shared<Waiter>();
-  ASSERT_TRUE(budget.TryTake(50));
+  ASSERT_EQ(budget.TryTake(50), Fit::kYes);
   ASSERT_FALSE(budget.TakeOrWait(80, large));
   ASSERT_FALSE(budget.TakeOrWait(10, small)) << "there is room, but somebody came first";
-  EXPECT_FALSE(budget.TryTake(10)) << "likewise";
+  EXPECT_EQ(budget.TryTake(10), Fit::kNoRoom) << "likewise";
   budget.GiveBack(20);
   EXPECT_THAT(small->granted, IsEmpty());
   budget.GiveBack(30);
@@ -70,17 +71,56 @@ TEST(MemoryBudget, WhoeverWaitsNoMoreOrHasGoneStandsInNobodysWay) {
   MemoryBudget budget(100);
   auto first = std::make_shared<Waiter>(), gone = std::make_shared<Waiter>();
   const auto last = std::make_shared<Waiter>();
-  ASSERT_TRUE(budget.TryTake(50));
+  ASSERT_EQ(budget.TryTake(50), Fit::kYes);
   ASSERT_FALSE(budget.TakeOrWait(100, first));
   ASSERT_FALSE(budget.TakeOrWait(100, gone));
   ASSERT_FALSE(budget.TakeOrWait(30, last));
   gone.reset();
   budget.StopWaiting(first);
   EXPECT_THAT(first->granted, IsEmpty());
-  EXPECT_THAT(last->granted, IsEmpty()) << "nobody has looked who has gone";
-  budget.GiveBack(50);
   EXPECT_THAT(last->granted, ElementsAre(30));
+  budget.GiveBack(50);
   EXPECT_EQ(budget.held(), 30u);
+}
+
+TEST(MemoryBudget, OneCallerThatHoldsItsShareKeepsNobodyElseOut) {
+  const CallerAccount greedy, modest;
+  MemoryBudget budget(100);
+  const auto first = std::make_shared<Waiter>(), second = std::make_shared<Waiter>();
+  ASSERT_TRUE(budget.TakeOrWait(40, first, &greedy));
+  ASSERT_FALSE(budget.TakeOrWait(40, first, &greedy)) << "more than would be free";
+  ASSERT_FALSE(budget.TakeOrWait(5, second, &greedy)) << "behind one of the same caller";
+  EXPECT_EQ(budget.TryTake(5, &greedy), Fit::kMoreThanShare);
+  EXPECT_EQ(budget.TryTake(30, &modest), Fit::kYes);
+  EXPECT_EQ(budget.TryTake(5, &modest), Fit::kMoreThanShare);
+  budget.GiveBack(30, &modest);
+  EXPECT_THAT(first->granted, IsEmpty());
+  budget.GiveBack(40, &greedy);
+  EXPECT_THAT(first->granted, ElementsAre(40));
+  EXPECT_THAT(second->granted, ElementsAre(5));
+  EXPECT_EQ(budget.held(), 45u);
+}
+
+TEST(MemoryBudget, OneOfSeveralCallersThatWaitsForRoomIsPassedByNobody) {
+  const CallerAccount one, two, three;
+  MemoryBudget budget(100);
+  const auto large = std::make_shared<Waiter>();
+  budget.Take(90, &one);
+  ASSERT_FALSE(budget.TakeOrWait(60, large, &two));
+  EXPECT_EQ(budget.TryTake(5, &three), Fit::kNoRoom);
+  budget.GiveBack(90, &one);
+  EXPECT_THAT(large->granted, ElementsAre(60));
+}
+
+TEST(MemoryBudget, ATokensBytesAreItsMost) {
+  const CallerAccount caller(CallerQuota{.bytes = 10});
+  MemoryBudget budget(100);
+  EXPECT_EQ(budget.TryTake(11, &caller), Fit::kMoreThanShare);
+  EXPECT_EQ(budget.TryTake(10, &caller), Fit::kYes);
+  const auto waiter = std::make_shared<Waiter>();
+  EXPECT_FALSE(budget.TakeOrWait(1, waiter, &caller));
+  budget.GiveBack(1, &caller);
+  EXPECT_THAT(waiter->granted, ElementsAre(1));
 }
 
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};

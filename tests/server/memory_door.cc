@@ -75,6 +75,7 @@ std::optional<MemoryAnswer> MemoryDoor::Receive() {
   auto answer = std::exchange(to_receive_, std::nullopt);
   if (answer && answer->what == Outgoing::kAnswer) ++frames_received_;
   changed_.notify_all();
+  changed_.wait(lock, [this] { return !telling_; });
   return answer;
 }
 
@@ -189,9 +190,13 @@ void MemoryDoor::WriteLoop() {
       written = !cancelled_;
       if (written) to_receive_ = std::move(being_written_);
       being_written_.reset();
+      telling_ = true;
       changed_.notify_all();
     }
     flow_->WriteDone(written);
+    const std::lock_guard lock(mutex_);
+    telling_ = false;
+    changed_.notify_all();
   }
 }
 

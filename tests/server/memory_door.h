@@ -51,7 +51,8 @@ class MemoryDoor final : private StreamDoor {
   void SendRequest(MemoryRequest request);
   void HalfClose();
   void Cancel();
-  /// The next answer, or nothing once the stream has finished.
+  /// The next answer, which the server then knows to be taken, or nothing once the stream has
+  /// finished.
   std::optional<MemoryAnswer> Receive();
   /// Once finished; waits for it.
   absl::Status status();
@@ -90,6 +91,7 @@ class MemoryDoor final : private StreamDoor {
   std::optional<std::size_t> read_slot_;
   std::optional<MemoryAnswer> being_written_;
   std::optional<MemoryAnswer> to_receive_;
+  bool telling_ = false;  // The flow that a write is done.
   std::optional<absl::Status> finished_;
   std::size_t frames_read_ = 0, frames_received_ = 0, most_inside_ = 0;
 

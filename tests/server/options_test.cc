@@ -82,6 +82,8 @@ TEST(CommandLineOptions, TheConfigFileCanBeNamedByTheEnvironment) {
 TEST(CommandLineOptions, FewerParticlesMakeSmallerFramesUnlessToldOtherwise) {
   EXPECT_EQ(Parsed({"--max-particles", "1000"}).server.limits.max_frame_bytes,
             ServerLimits::DefaultFrameBytes(1000));
+  EXPECT_EQ(Parsed({"--memory-budget", "64MB"}).server.limits.max_frame_bytes, 8u << 20);
+  EXPECT_EQ(Parsed({"--memory-budget", "1"}).server.limits.max_frame_bytes, 4u << 20);
   EXPECT_EQ(Parsed({"--max-frame-bytes", "2MB"}).server.limits.max_frame_bytes, 2u << 20);
 }
 
@@ -124,6 +126,17 @@ TEST(CommandLineOptions, TlsIsACertificateAndItsKeyAndWhatClientsAreAskedFor) {
   EXPECT_THAT(Refused({"--tls-cert", "a.pem"}), HasSubstr("--tls-key"));
   EXPECT_THAT(Refused({"--tls-key", "a.key"}), HasSubstr("--tls-cert"));
   EXPECT_THAT(Refused({"--tls-client-ca", "ca.pem"}), HasSubstr("--tls-cert"));
+}
+
+TEST(CommandLineOptions, CheckpointsAreSignedWhereAKeyFileIsNamedInAnyOfTheWays) {
+  EXPECT_FALSE(Parsed({}).server.checkpoint_key_file.has_value());
+  EXPECT_EQ(Parsed({"--checkpoint-key-file", "keys"}).server.checkpoint_key_file, "keys");
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Write("options.toml", "checkpoint-key-file = \"from-file\"\n");
+  const Environment keys("PARTIEMC_CHECKPOINT_KEY_FILE", "from-environment");
+  EXPECT_EQ(Parsed({}).server.checkpoint_key_file, "from-environment");
+  EXPECT_EQ(Parsed({"--config", path.c_str()}).server.checkpoint_key_file, "from-file");
+  EXPECT_EQ(Parsed({"--health-check"}).health_check->ToString(), "127.0.0.1:50051");
 }
 
 TEST(CommandLineOptions, WhatIsWrongIsToldInOneLine) {

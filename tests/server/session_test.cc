@@ -5,8 +5,10 @@
 #include <malloc.h>
 #include <oneapi/tbb/global_control.h>
 
+#include <atomic>
 #include <limits>
 #include <new>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -174,6 +176,66 @@ TEST(Session, MemoryThatRunsOutIsAnErrorOfTheFrameAndTheStreamGoesOn) {
   EXPECT_EQ(stream.Good(1), undisturbed.Good(1));
 }
 
+// Particles in four tiles each, of which none is shared.
+std::vector<double> CornersOfTiles(int side) {
+  std::vector<double> positions;
+  for (int k = 0; k < side * side; ++k) {
+    positions.push_back(64 * kBlobSpacing * (k % side));
+    positions.push_back(64 * kBlobSpacing * (k / side));
+  }
+  return positions;
+}
+
+TEST(Session, TilesThatTheBudgetHasNoRoomForAreAnErrorOfTheFrameAndTheStreamGoesOn) {
+  MemoryBudget budget(std::uint64_t{20} << 20);
+  Worker worker(nullptr, &budget);
+  Session session =
+      *Session::Open(BlobParameters(), {.max_particles = 20'000, .max_tiles = 50'000});
+  Stream undisturbed;
+  Digests digests;
+  const auto answer = [&](const std::vector<double>& positions) {
+    return session.Answer(session.next_sequence(), FrameOf(positions), worker,
+                          [&](const Result& result, auto&) {
+                            digests = {DigestRings(result.rings), DigestMesh(result.mesh)};
+                            return absl::OkStatus();
+                          });
+  };
+  ASSERT_TRUE(answer(MovingBlob(kSeed, 0)).ok());
+  undisturbed.Good(0);
+  EXPECT_EQ(budget.held(), 0u) << "an ordinary frame needs nothing of it";
+  const absl::Status refused = answer(CornersOfTiles(70));  // About 200 MB.
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(ReasonOf(refused), kReasonOutOfMemory);
+  EXPECT_EQ(session.next_sequence(), 3u);
+  EXPECT_EQ(budget.held(), 0u);
+  ASSERT_TRUE(answer(MovingBlob(kSeed, 1)).ok());
+  EXPECT_EQ(digests, undisturbed.Good(1));
+  ASSERT_TRUE(answer(CornersOfTiles(25)).ok()) << "about 30 MB, for which there is room";
+  EXPECT_GT(budget.held(), std::uint64_t{5} << 20);
+  worker.Empty();
+  EXPECT_EQ(budget.held(), 0u);
+}
+
+TEST(Session, ACancelledFrameUsesUpNothingAndMayComeAgain) {
+  Stream stream, undisturbed;
+  stream.Good(0);
+  undisturbed.Good(0);
+  const std::vector<double> positions = MovingBlob(kSeed, 1);
+  const std::atomic<bool> cancelled = true;
+  const absl::Status status = stream.session().Answer(
+      2, FrameOf(positions), stream.worker(),
+      [](auto&, auto&) {
+        ADD_FAILURE() << "was delivered";
+        return absl::OkStatus();
+      },
+      &cancelled);
+  EXPECT_TRUE(absl::IsCancelled(status)) << status;
+  EXPECT_EQ(FindViolation(status), std::nullopt);
+  EXPECT_EQ(stream.session().next_sequence(), 2u);
+  EXPECT_EQ(stream.Good(1), undisturbed.Good(1));
+  EXPECT_EQ(stream.Good(2), undisturbed.Good(2));
+}
+
 TEST(Session, TheWorkerThatComputesMakesNoDifference) {
   Stream one;
   Session two = *Session::Open(BlobParameters(), kLimits);
@@ -222,7 +284,7 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
   }
   const std::size_t after = HeldBytes();
   if (after == 0) GTEST_SKIP() << "malloc tells nothing";
-  ASSERT_GT(large.Checkpoint().size(), 4 * kMaxBytesEach);
+  ASSERT_GT(large.MakeCheckpoint({}, nullptr, ~0ull).size(), 4 * kMaxBytesEach);
   EXPECT_LE(after, before + kSessions * kMaxBytesEach);
 }
 

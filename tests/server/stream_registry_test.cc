@@ -32,9 +32,9 @@ class Registry : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kMaxStreams = 3;
 
-  std::shared_ptr<StreamFlow> Enter() {
+  std::shared_ptr<StreamFlow> Enter(const Caller& caller = {}) {
     auto flow = std::make_shared<StreamFlow>(door_, pool_, budget_, 1);
-    EXPECT_TRUE(registry_.Enter(flow).ok());
+    EXPECT_TRUE(registry_.Enter(flow, caller).ok());
     return flow;
   }
   absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, const std::string& name) {
@@ -67,23 +67,72 @@ TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
   EXPECT_TRUE(Open(*late, "late").ok());
 }
 
-TEST_F(Registry, NoMoreCallsMayBeOpeningThanStreamsMayBeOpen) {
-  std::vector<std::shared_ptr<StreamFlow>> flows;
-  for (std::uint32_t i = 0; i < kMaxStreams; ++i) flows.push_back(Enter());
-  const auto late = std::make_shared<StreamFlow>(door_, pool_, budget_, 1);
-  const auto refused = registry_.Enter(late);
-  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_EQ(ReasonOf(refused), kReasonTooManyStreams);
-  registry_.Leave(*late);  // As a call that was refused does.
-  EXPECT_FALSE(registry_.Enter(late).ok());
-  EXPECT_TRUE(Open(*flows[0], "").ok());
-  EXPECT_TRUE(registry_.Enter(late).ok()) << "one has opened";
-  registry_.Close(*flows[0]);
-  registry_.Leave(*flows[0]);
-  EXPECT_FALSE(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, budget_, 1)).ok());
-  registry_.Close(*flows[1]);
-  EXPECT_TRUE(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, budget_, 1)).ok())
-      << "one has given up";
+// A caller with a token of this line.
+Caller CallerWith(const CallerTerms& terms) {
+  return Caller(std::make_shared<const CallerTerms>(terms),
+                std::make_shared<CallerAccount>(terms.quota));
+}
+
+TEST_F(Registry, ACallerOpensNoMoreStreamsThanItsQuotaAndOthersDo) {
+  const Caller caller = CallerWith({.quota = {.streams = 1}});
+  const auto first = Enter(caller), second = Enter(caller), other = Enter();
+  ASSERT_TRUE(Open(*first, "").ok());
+  const auto refused = Open(*second, "");
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(ReasonOf(refused.status()), kReasonCallerStreams);
+  EXPECT_TRUE(Open(*other, "").ok());
+  registry_.Close(*first);
+  EXPECT_TRUE(Open(*second, "").ok());
+}
+
+TEST_F(Registry, AStreamThatIsTakenOverPassesItsPlaceOn) {
+  const Caller caller = CallerWith({.quota = {.streams = 1}});
+  const auto first = Enter(caller), second = Enter(caller), third = Enter(caller);
+  const std::string token = NewStreamToken();
+  ASSERT_TRUE(registry_.Open(*first, {.name = "tank", .labels = {}, .parameters = {}}, token).ok());
+  ASSERT_TRUE(
+      registry_.Open(*second, {.name = "tank", .labels = {}, .parameters = {}}, token).ok());
+  EXPECT_EQ(caller.account()->held(CallerAccount::Kind::kStream), 1u);
+  registry_.Close(*first);
+  EXPECT_EQ(caller.account()->held(CallerAccount::Kind::kStream), 1u);
+  EXPECT_FALSE(Open(*third, "").ok());
+  // To another caller, who has the stream's token: that one's quota counts.
+  const Caller other = CallerWith({.quota = {.streams = 1}});
+  const auto fourth = Enter(other);
+  ASSERT_TRUE(registry_.Open(*fourth, {.name = "", .labels = {}, .parameters = {}}, token).ok());
+  EXPECT_EQ(other.account()->held(CallerAccount::Kind::kStream), 1u);
+  registry_.Close(*second);
+  EXPECT_EQ(caller.account()->held(CallerAccount::Kind::kStream), 0u);
+  registry_.Close(*fourth);
+  EXPECT_EQ(other.account()->held(CallerAccount::Kind::kStream), 0u);
+}
+
+TEST_F(Registry, ACallerUsesAndSeesItsOwnNamesOnly) {
+  const Caller tanks = CallerWith({.names = {"tank-*"}});
+  const auto mine = Enter(tanks), other = Enter(), wrong = Enter(tanks);
+  ASSERT_TRUE(Open(*mine, "tank-1").ok());
+  ASSERT_TRUE(Open(*other, "dam").ok());
+  EXPECT_EQ(ReasonOf(Open(*wrong, "dam-2").status()), kReasonNotPermitted);
+  EXPECT_EQ(ReasonOf(Open(*wrong, "").status()), kReasonNotPermitted) << "the name is made up";
+  EXPECT_EQ(ReasonOf(Open(*wrong, "dam").status()), kReasonNotPermitted) << "in use or not";
+
+  EXPECT_TRUE(registry_.Find("tank-1", tanks).ok());
+  EXPECT_EQ(ReasonOf(registry_.Find("tank-2", tanks).status()), kReasonNoSuchStream);
+  EXPECT_EQ(registry_.Find("dam", tanks).status().code(), absl::StatusCode::kPermissionDenied);
+  EXPECT_EQ(registry_.Find("dim", tanks).status().code(), absl::StatusCode::kPermissionDenied);
+  ASSERT_EQ(registry_.List(0, 10, tanks).size(), 1u);
+  EXPECT_EQ(registry_.List(0, 10, tanks)[0].description.name, "tank-1");
+  EXPECT_EQ(registry_.List(0, 10).size(), 2u);
+  EXPECT_TRUE(Open(*wrong, "tank-2").ok());
+}
+
+TEST_F(Registry, ATakeoverInheritsNoNameThatItsCallerMayNotUse) {
+  const std::string token = NewStreamToken();
+  const auto first = Enter(), second = Enter(CallerWith({.names = {"tank-*"}}));
+  ASSERT_TRUE(registry_.Open(*first, {.name = "dam", .labels = {}, .parameters = {}}, token).ok());
+  const auto refused = registry_.Open(*second, {.name = "", .labels = {}, .parameters = {}}, token);
+  EXPECT_EQ(ReasonOf(refused.status()), kReasonNotPermitted);
+  EXPECT_FALSE(door_.finished.has_value()) << "the first goes on";
 }
 
 TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatIsClosed) {

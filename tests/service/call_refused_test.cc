@@ -5,7 +5,11 @@
 
 #include <chrono>
 #include <fstream>
+#include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "service/error_testing.h"
 #include "support/temporary_folder.h"
@@ -15,6 +19,10 @@ namespace {
 
 constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
 
+constexpr char kOfOneCaller[] =
+    " of one caller, which is a token or, without tokens, an address; try again when a call of it "
+    "has ended";
+
 class CallRefused : public ErrorTable {
  protected:
   void Expect(const grpc::Status& status, const std::string& found, grpc::StatusCode code,
@@ -22,6 +30,7 @@ class CallRefused : public ErrorTable {
     EXPECT_EQ(status.error_code(), code) << status.error_message();
     EXPECT_EQ(found, reason);
     EXPECT_EQ(status.error_message(), message);
+    ExpectDetails(status, reason);
   }
   // Of a stream whose first request is `open`.
   void ExpectOfOpen(const v1::ReconstructRequest& open, grpc::StatusCode code,
@@ -47,9 +56,30 @@ class CallRefused : public ErrorTable {
     const auto status = stub_->ReconstructFrame(&context, CallRequest(), &response);
     Expect(status, ReasonOf(context), code, reason, message);
   }
-  void WantToken() {
-    options_.token_file = folder_.Write("tokens", std::string(kToken) + "\n");
+  void WantToken(const std::string& terms = "") {
+    options_.token_file = folder_.Write("tokens", std::string(kToken) + " " + terms + "\n");
     Serve();
+  }
+  static void Identify(grpc::ClientContext& context) {
+    SetDeadline(context);
+    context.AddMetadata("authorization", std::string("Bearer ") + kToken);
+  }
+  // Of a second stream, "dam", of a caller with these terms, beside its "tank-1".
+  void ExpectOfTerms(const std::string& terms, grpc::StatusCode code, const std::string& reason,
+                     const std::string& message) {
+    WantToken(terms);
+    grpc::ClientContext first_context, second_context;
+    Identify(first_context);
+    Identify(second_context);
+    v1::ReconstructResponse opened;
+    const auto first = stub_->Reconstruct(&first_context);
+    ASSERT_TRUE(first->Write(OpenRequest("tank-1")) && first->Read(&opened));
+    const auto second = stub_->Reconstruct(&second_context);
+    second->Write(OpenRequest("dam"));
+    EXPECT_FALSE(second->Read(&opened));
+    const auto status = second->Finish();
+    Expect(status, ReasonOf(second_context), code, reason, message);
+    first_context.TryCancel();
   }
   // Of GetServerInfo on a server that wants a token.
   void ExpectOfCaller(const std::string& authorization, const std::string& reason,
@@ -64,18 +94,17 @@ class CallRefused : public ErrorTable {
   }
   static v1::ReconstructRequest Resume(const std::string& checkpoint, const std::string& token) {
     auto open = OpenRequest("tank");
+    open.mutable_open()->set_checkpoint_interval(1);
     open.mutable_open()->mutable_resume()->set_checkpoint(checkpoint);
     open.mutable_open()->mutable_resume()->set_stream_token(token);
     return open;
   }
-  // What a server sent after one frame.
+  // What a server sent after one frame of the stream whose token is kToken.
   std::string Checkpoint() {
     Serve();
-    auto open = OpenRequest();
-    open.mutable_open()->set_checkpoint_interval(1);
     StreamClient client(channel_);
-    client.SendAndReceive(open);
-    return client.SendAndReceive(BlobRequest(1, 1, 0)).frame().checkpoint();
+    client.SendAndReceive(Resume("", kToken));
+    return client.SendAndReceive(BlobRequest(1, 1, 0)).checkpoint();
   }
 
   const support::TemporaryFolder folder_;
@@ -93,6 +122,18 @@ TEST_F(CallRefused, OUT_OF_RANGE) {
   open.mutable_open()->mutable_parameters()->set_kernel_radius(20);
   ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
                "parameters.kernel_radius: 20; must be in [1.5, 8] spacings");
+  // Nothing of what these name would come.
+  auto normals = OpenRequest();
+  normals.mutable_open()->mutable_outputs()->set_normals(true);
+  ExpectOfOpen(
+      normals, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+      "outputs.normals: true; must come with outputs.rings: normals are at the vertices of "
+      "the rings");
+  auto format = OpenRequest();
+  format.mutable_open()->mutable_outputs()->set_coordinate_format(v1::COORDINATE_FORMAT_FLOAT64);
+  ExpectOfOpen(format, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+               "outputs.coordinate_format: COORDINATE_FORMAT_FLOAT64; must come with outputs.rings "
+               "or outputs.mesh: nothing else has coordinates");
 }
 
 TEST_F(CallRefused, UNSUPPORTED) {
@@ -112,6 +153,13 @@ TEST_F(CallRefused, LABELS) {
   (*open.mutable_open()->mutable_labels())["key"] = std::string(200, 'x');
   ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "LABELS",
                "open.labels: \"key\"; must have a key and a value of at most 128 bytes each");
+  for (const char* text : {"\x1b[31m", "\xc2\x9b", "exe.\xe2\x80\xaegpj", "two\nlines"}) {
+    auto hostile = OpenRequest();
+    (*hostile.mutable_open()->mutable_labels())["key"] = text;
+    ExpectOfOpen(hostile, StatusCode::INVALID_ARGUMENT, "LABELS",
+                 "open.labels: \"key\"; must have a key and a value of UTF-8 without control "
+                 "characters");
+  }
 }
 
 TEST_F(CallRefused, STREAM_TOKEN) {
@@ -129,15 +177,33 @@ TEST_F(CallRefused, CORRUPT_STATE) {
   std::string damaged = Checkpoint();
   damaged.back() = static_cast<char>(damaged.back() ^ 1);
   ExpectOfOpen(Resume(damaged, kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_STATE",
-               "state: a wrong checksum; must be what Serialize wrote");
+               "open.resume.checkpoint: a wrong checksum; must be as a server sent it; start the "
+               "stream anew");
 }
 
 TEST_F(CallRefused, CHECKPOINT_MISMATCH) {
   auto open = Resume(Checkpoint(), kToken);
   open.mutable_open()->mutable_parameters()->set_kernel_radius(2);
   ExpectOfOpen(open, StatusCode::FAILED_PRECONDITION, "CHECKPOINT_MISMATCH",
-               "open.resume.checkpoint: other parameters; must be resumed with the parameters that "
+               "open.resume.checkpoint: other parameters; must be resumed with all of `open` that "
                "it was made with");
+}
+
+TEST_F(CallRefused, CHECKPOINT_SIGNATURE) {
+  const std::string checkpoint = Checkpoint();
+  options_.checkpoint_key_file = folder_.Write("keys", "a-key-of-test-0123456789\n");
+  Serve();
+  ExpectOfOpen(Resume(checkpoint, kToken), StatusCode::FAILED_PRECONDITION, "CHECKPOINT_SIGNATURE",
+               "open.resume.checkpoint: not signed by this server's keys; must come from a server "
+               "with a key of this one's --checkpoint-key-file; resume on such a server, or start "
+               "the stream anew");
+}
+
+TEST_F(CallRefused, CHECKPOINT_BYTES) {
+  options_.limits.max_frame_bytes = 2000;
+  ExpectOfOpen(Resume(std::string(2001, 'x'), kToken), StatusCode::RESOURCE_EXHAUSTED,
+               "CHECKPOINT_BYTES",
+               "open.resume.checkpoint: 2001 bytes; must be at most 2000 bytes");
 }
 
 TEST_F(CallRefused, TAKEN_OVER) {
@@ -175,7 +241,66 @@ TEST_F(CallRefused, TOO_MANY_STREAMS) {
 TEST_F(CallRefused, TOO_MANY_CALLS) {
   options_.limits.max_streams = 0;
   ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_CALLS",
-               "calls of ReconstructFrame: 0 going on; must be at most 0; try again later");
+               "calls of ReconstructFrame: 0 going on, 0 of this caller; must be at most 0, and of "
+               "one caller no more than are free; try again later");
+}
+
+TEST_F(CallRefused, TOO_MANY_OPENING) {
+  options_.limits.max_watchers = 0;
+  Serve();
+  std::vector<std::unique_ptr<StreamClient>> clients;
+  // The first to come gives way; which one that is is the network's choice.
+  std::vector<std::thread> waiting;
+  std::mutex mutex;
+  int gave_way = 0;
+  for (int i = 0; i < 65; ++i) clients.push_back(std::make_unique<StreamClient>(channel_));
+  for (const auto& client : clients) {
+    waiting.emplace_back([&] {
+      const auto status = client->Finish();
+      const std::lock_guard lock(mutex);
+      if (status.error_code() == StatusCode::CANCELLED) return;
+      ++gave_way;
+      Expect(status, client->reason(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_OPENING",
+             "calls without a request: more than 64; must send the first request at once: of the "
+             "caller with most of them the oldest gives way; try again");
+    });
+  }
+  EXPECT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return gave_way > 0;
+  }));
+  for (const auto& client : clients) client->Cancel();
+  for (std::thread& thread : waiting) thread.join();
+  EXPECT_EQ(gave_way, 1);
+}
+
+TEST_F(CallRefused, CALLER_CALLS) {
+  ExpectOfTerms("calls=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_CALLS",
+                "caller.calls: 1 going on; must be at most 1" + std::string(kOfOneCaller));
+}
+
+TEST_F(CallRefused, CALLER_STREAMS) {
+  ExpectOfTerms("streams=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_STREAMS",
+                "caller.streams: 1 going on; must be at most 1" + std::string(kOfOneCaller));
+}
+
+TEST_F(CallRefused, CALLER_BYTES) {
+  WantToken("bytes=100B");
+  grpc::ClientContext context;
+  Identify(context);
+  v1::ReconstructFrameResponse response;
+  const auto status = stub_->ReconstructFrame(&context, CallRequest(), &response);
+  Expect(status, ReasonOf(context), StatusCode::RESOURCE_EXHAUSTED, "CALLER_BYTES",
+         "caller.bytes: " + std::to_string(CallRequest().ByteSizeLong()) +
+             " more; must not make it more than is free, nor more than the `bytes=`" +
+             std::string(kOfOneCaller));
+}
+
+TEST_F(CallRefused, NOT_PERMITTED) {
+  ExpectOfTerms(
+      "names=tank-*", StatusCode::PERMISSION_DENIED, "NOT_PERMITTED",
+      "open.stream_name: \"dam\"; must be a name that this token may use (`names=` in the "
+      "server's --token-file)");
 }
 
 TEST_F(CallRefused, MEMORY_BUDGET) {
@@ -229,7 +354,38 @@ TEST_F(CallRefused, NoReason_RESOURCE_EXHAUSTED) {
   EXPECT_EQ(client.reason(), "");
 }
 
-TEST_F(CallRefused, NoReason_INVALID_ARGUMENT) {
+TEST_F(CallRefused, OPEN_BYTES) {
+  auto open = OpenRequest();
+  open.mutable_open()->set_stream_name(std::string(100'000, 'x'));
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OPEN_BYTES",
+               "open: " + std::to_string(open.ByteSizeLong()) +
+                   " bytes; must be at most 65536 bytes beside its checkpoint");
+}
+
+TEST_F(CallRefused, MALFORMED) {
+  Serve();
+  grpc::GenericStub stub(channel_);
+  for (const std::string method : {"ReconstructFrame", "ListStreams", "GetServerInfo"}) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    grpc::CompletionQueue queue;
+    const grpc::Slice slice("\x07");
+    const auto call = stub.PrepareUnaryCall(
+        &context, "/partiemc.v1.ReconstructionService/" + method, {&slice, 1}, &queue);
+    call->StartCall();
+    grpc::ByteBuffer response;
+    grpc::Status status;
+    call->Finish(&response, &status, nullptr);
+    void* tag = nullptr;
+    bool ok = false;
+    queue.Next(&tag, &ok);
+    Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "MALFORMED",
+           "request: 1 bytes; must be a " + method + "Request of at most " +
+               (method == "ReconstructFrame" ? "1250000" : "4096") + " bytes and 4096 fields");
+  }
+}
+
+TEST_F(CallRefused, PAGE_TOKEN) {
   Serve();
   grpc::ClientContext context;
   SetDeadline(context);
@@ -237,8 +393,15 @@ TEST_F(CallRefused, NoReason_INVALID_ARGUMENT) {
   request.set_page_token("elsewhere");
   v1::ListStreamsResponse response;
   const auto status = stub_->ListStreams(&context, request, &response);
-  Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "",
-         "page_token: not from here; must be the next_page_token of an answer");
+  Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "PAGE_TOKEN",
+         "page_token: 9 characters; must be the next_page_token of an answer");
+  grpc::ClientContext second;
+  SetDeadline(second);
+  request.clear_page_token();
+  request.set_page_size(-1);
+  const auto negative = stub_->ListStreams(&second, request, &response);
+  Expect(negative, ReasonOf(second), StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+         "page_size: -1; must be at least 0");
 }
 
 TEST_F(CallRefused, NoReason_UNAUTHENTICATED) {

@@ -1,6 +1,6 @@
-// SIGTERM at bad moments: while streams open, with full windows, with clients that never read, more
-// than once. The server leaves with 0 each time, and what clients got is whole. Ten servers are
-// drained under load by default, `--drains 100` for more.
+// SIGTERM at bad moments: while streams open, with full windows, with clients that never read, in
+// frames that outlast the grace time, twice. What clients got is whole, and the server leaves in
+// time. Ten servers are drained under load by default, `--drains 100` for more.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -15,6 +15,8 @@
 #include <thread>
 #include <vector>
 
+#include "grpc/health/v1/health.grpc.pb.h"
+#include "service/process_clocks.h"
 #include "service/server_process.h"
 #include "service/service_testing.h"
 
@@ -23,6 +25,7 @@ namespace {
 
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
+namespace health = grpc::health::v1;
 
 std::uint64_t drains = 10;
 
@@ -144,7 +147,7 @@ TEST_F(Drain, WhileStreamsOpenEachIsServedOrToldToGoElsewhere) {
 }
 
 TEST_F(Drain, ACallThatHasNotOpenedIsToldToGoElsewhere) {
-  Serve("3");  // A connection that its client does not look after takes that long to close.
+  Serve("30");
   StreamClient before(Channel());
   StreamClient other(Channel());
   ASSERT_TRUE(other.SendAndReceive(OpenRequest()).has_opened());
@@ -182,14 +185,88 @@ TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
   }
 }
 
-TEST_F(Drain, FurtherSignalsChangeNothing) {
-  Serve("30");
-  std::atomic<int> streaming = 0;
-  std::thread client([&] { StreamUntilTheEnd(Channel(), 1, streaming); });
-  while (streaming == 0) std::this_thread::yield();
+// A frame that takes long: all its particles lie within reach of every point of its outline.
+v1::ReconstructRequest LongFrame() {
+  constexpr std::size_t kParticles = 4'000'000;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> anywhere(0, 1);
+  std::vector<float> positions(2 * kParticles);
+  for (float& coordinate : positions) coordinate = anywhere(random);
+  v1::ReconstructRequest request;
+  request.mutable_frame()->set_sequence(1);
+  request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
+  request.mutable_frame()->set_positions(positions.data(), positions.size() * sizeof(float));
+  return request;
+}
+
+v1::ReconstructRequest OpenForLongFrames() {
+  auto open = OpenRequest("long");
+  auto& parameters = *open.mutable_open()->mutable_parameters();
+  parameters.set_spacing(1);
+  parameters.set_kernel_radius(8);
+  parameters.set_cell_size(0.25);
+  return open;
+}
+
+// Nothing may hold the server beyond its grace time: neither this frame nor who waits for it.
+TEST_F(Drain, AFrameThatOutlastsTheGraceTimeDoesNotHoldTheServer) {
+  Serve("0.2", {"--max-particles", "4000000", "--max-frame-bytes", "100MB"});
+  StreamClient client(Channel());
+  ASSERT_TRUE(client.SendAndReceive(OpenForLongFrames()).has_opened());
+  const auto frame = LongFrame();
+  const double before_ms = ProcessCpuMs(server_->process().process());
+  ASSERT_TRUE(client.Send(frame));
+  // To be sure that it is being computed: reading it takes a tenth of a second.
+  while (ProcessCpuMs(server_->process().process()) < before_ms + 500) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   Terminate();
-  for (const int signal : {SIGTERM, SIGINT, SIGTERM}) server_->process().Signal(signal);
-  client.join();
+  const auto code = server_->process().WaitFor(kPatience);
+  ASSERT_TRUE(code.has_value()) << "it hangs";
+  // 0 where the frame could be cancelled in time; 1 where the process was cut off.
+  if (*code != 0) {
+    EXPECT_EQ(*code, 1);
+    EXPECT_THAT(server_->process().Output(), HasSubstr("cut off"));
+  }
+  for (auto answer = client.Receive(); answer.response_case() != 0; answer = client.Receive()) {
+    EXPECT_FALSE(answer.has_frame()) << "it is too short";
+  }
+}
+
+TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
+  for (const int second : {SIGTERM, SIGINT}) {
+    Serve("3600");
+    StreamClient client(Channel());
+    ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
+    // Its answer is not taken, so that the drain waits for an hour.
+    std::atomic<bool> stop = false;
+    std::thread writer([&] {
+      for (std::uint64_t k = 1; !stop && client.Send(BlobRequest(k, 1, k % 3)); ++k) {
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    Terminate();
+    while (server_->process().Output().find("draining") == std::string::npos) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    server_->process().Signal(second);
+    EXPECT_EQ(server_->process().WaitFor(kPatience), 128 + second);
+    EXPECT_THAT(server_->process().Output(), HasSubstr("cut off"));
+    stop = true;
+    writer.join();
+  }
+}
+
+// Clients without a call that nobody looks after.
+TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
+  Serve("3600");
+  const auto idle = Channel();
+  const auto stub = v1::ReconstructionService::NewStub(idle);
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::GetServerInfoResponse info;
+  ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
+  Terminate();
   ExpectGoodEnd();
 }
 

@@ -1,10 +1,13 @@
 #include "service/error_table.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <regex>
 #include <sstream>
+
+#include "partiemc/v1/reconstruction.pb.h"
 
 namespace partiemc::server {
 namespace {
@@ -65,7 +68,63 @@ std::vector<ErrorRow> CallRowsOf(const Table& table) {
   return rows;
 }
 
+// "positions[3].y" -> {"positions[3]", "y"}.
+std::vector<std::string> PartsOf(const std::string& path) {
+  std::vector<std::string> parts;
+  std::istringstream rest(path);
+  for (std::string part; std::getline(rest, part, '.');) parts.push_back(part);
+  return parts;
+}
+
+// Bytes hold numbers, or points of x, y and z.
+bool IsPath(const google::protobuf::Descriptor* message, const std::vector<std::string>& parts) {
+  static const std::regex kPart("([a-z_]+)(\\[[0-9]+\\])?");
+  const google::protobuf::FieldDescriptor* field = nullptr;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    std::smatch match;
+    if (!std::regex_match(parts[k], match, kPart)) return false;
+    if (message == nullptr) {
+      static const std::regex kCoordinate("[xyz]");
+      return k + 1 == parts.size() && std::regex_match(parts[k], kCoordinate) &&
+             field->type() == google::protobuf::FieldDescriptor::TYPE_BYTES;
+    }
+    field = message->FindFieldByName(match[1]);
+    if (field == nullptr) return false;
+    message = field->message_type();
+  }
+  return field != nullptr;
+}
+
+// "Beside fields these are spoken of: `client`, `streams`." -> {"client", "streams"}.
+std::vector<std::string> Subjects() {
+  static const std::regex kWord("`([^`]+)`");
+  const std::string page = Read(Root() / "proto" / "PROTOCOL.md");
+  const std::string mark = "Beside fields";
+  const std::size_t begin = page.find(mark);
+  if (begin == page.npos) return {};
+  const std::string sentence = page.substr(begin, page.find(". ", begin) - begin);
+  std::vector<std::string> subjects;
+  for (std::sregex_iterator at(sentence.begin(), sentence.end(), kWord), end; at != end; ++at) {
+    subjects.push_back((*at)[1]);
+  }
+  return subjects;
+}
+
 }  // namespace
+
+bool IsFieldOrSubject(const std::string& field) {
+  const auto subjects = Subjects();
+  if (std::find(subjects.begin(), subjects.end(), field) != subjects.end()) return true;
+  // Those that errors are about, and parts of them that a caller fills in.
+  for (const google::protobuf::Descriptor* message :
+       {v1::ReconstructRequest::descriptor(), v1::OpenStream::descriptor(),
+        v1::ParticleFrame::descriptor(), v1::ReconstructFrameRequest::descriptor(),
+        v1::WatchStreamRequest::descriptor(), v1::ListStreamsRequest::descriptor(),
+        v1::ReconstructedFrame::descriptor()}) {
+    if (IsPath(message, PartsOf(field))) return true;
+  }
+  return false;
+}
 
 std::vector<ErrorRow> FrameErrorRows() {
   std::vector<ErrorRow> rows;

@@ -28,4 +28,9 @@ std::vector<std::string> ReasonsInTables();
 /// Every reason that a constant `kReason... = "..."` of core, proto or server gives.
 std::vector<std::string> ReasonsInCode();
 
+/// Whether an error may speak of this field: a path of the .proto, from a message that carries it
+/// ("open.labels", "positions[3].y", "parameters.spacing"), or one of the subjects that PROTOCOL.md
+/// names ("streams").
+bool IsFieldOrSubject(const std::string& field);
+
 }  // namespace partiemc::server

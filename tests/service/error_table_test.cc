@@ -7,6 +7,9 @@
 #include <set>
 #include <string>
 
+#include "partiemc/status.h"
+#include "server/error_details.h"
+
 namespace partiemc::server {
 namespace {
 
@@ -49,6 +52,39 @@ TEST(ErrorTables, EveryReasonInTheCodeHasARow) {
     EXPECT_TRUE(in_tables.contains(reason))
         << reason << " can be answered: add its row to a table of proto/PROTOCOL.md";
   }
+}
+
+TEST(ErrorTables, AFieldIsAPathOfTheProtoOrANamedSubject) {
+  for (const char* field : {"open.labels", "open.resume.checkpoint", "positions[17].y", "ids[5]",
+                            "parameters.kernel_radius", "scalars[2].values", "rings.points[7]",
+                            "page_size", "client", "authorization"}) {
+    EXPECT_TRUE(IsFieldOrSubject(field)) << field;
+  }
+  for (const char* field : {"", "state", "open.label", "positions[x]", "positions.w", "ids[5].x.y",
+                            "sequence.x", "open..labels", "labels[0].x"}) {
+    EXPECT_FALSE(IsFieldOrSubject(field)) << field;
+  }
+}
+
+// By hand from the public definitions of google.rpc.Status, ErrorInfo and google.protobuf.Any.
+TEST(ErrorDetails, AreTheBytesOfThePublicMessages) {
+  const auto status =
+      ViolationError(absl::StatusCode::kNotFound, {"NO_SUCH_STREAM", "a", "\xff", "c"});
+  const auto field = [](char tag, const std::string& bytes) {
+    return tag + std::string(1, static_cast<char>(bytes.size())) + bytes;
+  };
+  const std::string details = ErrorDetails(status);
+  const std::string before = std::string("\x08\x05") + field(0x12, "a: \\xff; c");
+  ASSERT_EQ(details.substr(0, before.size()), before);
+  const std::string type = field(0x0a, "type.googleapis.com/google.rpc.ErrorInfo");
+  const std::string reason = field(0x0a, "NO_SUCH_STREAM") + field(0x12, "partiemc");
+  for (const std::string& part :
+       {type, reason, field(0x1a, field(0x0a, "field") + field(0x12, "a")),
+        field(0x1a, field(0x0a, "value") + field(0x12, "\\xff")),
+        field(0x1a, field(0x0a, "rule") + field(0x12, "c"))}) {
+    EXPECT_NE(details.find(part), details.npos) << part;
+  }
+  EXPECT_EQ(ErrorDetails(absl::InternalError("a bug")), "");
 }
 
 }  // namespace

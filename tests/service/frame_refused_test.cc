@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "partiemc/status.h"
+#include "server/moving_blob.h"
 #include "server/session.h"
 #include "service/error_testing.h"
 
@@ -34,6 +35,7 @@ class FrameRefused : public ErrorTable {
     EXPECT_EQ(error.reason(), reason);
     EXPECT_EQ(error.message(), message);
     EXPECT_EQ(error.message(), error.field() + ": " + error.value() + "; " + error.rule());
+    EXPECT_TRUE(IsFieldOrSubject(error.field())) << error.field();
     EXPECT_EQ(error.sequence(), frame.frame().sequence());
     EXPECT_EQ(error.next_sequence(), next_sequence);
     EXPECT_TRUE(client.SendAndReceive(BlobRequest(next_sequence, 1, 0)).has_frame());
@@ -71,7 +73,7 @@ TEST_F(FrameRefused, MALFORMED) {
   ASSERT_EQ(end.answers.size(), 2u) << end.status.error_message();
   const v1::FrameError& error = end.answers[1].error();
   EXPECT_EQ(error.reason(), "MALFORMED");
-  EXPECT_EQ(error.message(), "frame: 7 bytes; must be a ParticleFrame");
+  EXPECT_EQ(error.message(), "frame: 7 bytes; must be a ParticleFrame of at most 4096 fields");
   EXPECT_EQ(error.next_sequence(), 2u);
 }
 
@@ -137,6 +139,18 @@ TEST_F(FrameRefused, NOT_PLANAR) {
          "positions[2].z: 0.5; particles must lie in the xy plane, but z ranges over [0, 0.5]");
 }
 
+// As float32, so far from the origin that steps are many spacings.
+v1::ReconstructRequest CoarseRequest() {
+  std::vector<float> far;
+  for (const double coordinate : MovingBlob(1, 0)) {
+    far.push_back(static_cast<float>(coordinate + 1e6));
+  }
+  auto request = BlobRequest(2, 1, 0);
+  request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
+  request.mutable_frame()->set_positions(far.data(), far.size() * sizeof(float));
+  return request;
+}
+
 TEST_F(FrameRefused, RESOLUTION) {
   auto open = OpenRequest();
   open.mutable_open()->mutable_outputs()->set_rings(true);
@@ -151,6 +165,14 @@ TEST_F(FrameRefused, RESOLUTION) {
   EXPECT_EQ(answer.error().rule(),
             "must move by at most 1e-04 spacings; ask for COORDINATE_FORMAT_FLOAT64");
   EXPECT_EQ(answer.error().next_sequence(), 2u);
+  const auto coarse = client.SendAndReceive(CoarseRequest());
+  EXPECT_EQ(coarse.error().reason(), "RESOLUTION");
+  EXPECT_EQ(coarse.error().field(), "positions");
+  EXPECT_TRUE(coarse.error().value().starts_with("float32 up to 100000"));
+  EXPECT_EQ(coarse.error().rule(), "must be finer than a quarter of the spacing, " +
+                                       ShortestNumber(kBlobSpacing) +
+                                       "; send float64, or coordinates relative to a near origin");
+  EXPECT_EQ(coarse.error().next_sequence(), 3u);
 }
 
 // Beyond what a message can say: the codec has looked at all counts before the core does.

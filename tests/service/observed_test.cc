@@ -6,7 +6,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
@@ -82,6 +85,21 @@ Samples Scrape(const Server& server) {
   return samples;
 }
 
+// The gauges of ours that tell what goes on at the moment: all but those that tell a limit or a
+// fact.
+std::set<std::string> GaugesOfWhatGoesOn(const Server& server) {
+  static const std::set<std::string> kFacts = {"partiemc_build_info",
+                                               "partiemc_memory_budget_bytes"};
+  static const std::regex kType("# TYPE (partiemc_[a-z_]+) gauge");
+  std::set<std::string> gauges;
+  std::istringstream lines(Get(*server.metrics_address(), "/metrics"));
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch match;
+    if (std::regex_match(line, match, kType) && !kFacts.contains(match[1])) gauges.insert(match[1]);
+  }
+  return gauges;
+}
+
 class Observed : public ::testing::Test {
  protected:
   Observed() {
@@ -104,6 +122,7 @@ class Observed : public ::testing::Test {
 };
 
 TEST_F(Observed, CountersEqualWhatTheClientDid) {
+  const auto start = std::chrono::steady_clock::now();
   {
     StreamClient client(channel_);
     ASSERT_TRUE(client.SendAndReceive(OpenRequest("one")).has_opened());
@@ -137,6 +156,16 @@ TEST_F(Observed, CountersEqualWhatTheClientDid) {
   EXPECT_EQ(samples["partiemc_frame_errors_total{reason=\"SEQUENCE_GAP\"}"], 1);
   EXPECT_EQ(samples["partiemc_frame_errors_total{reason=\"BYTE_COUNT\"}"], 1);
   EXPECT_EQ(samples["partiemc_frame_seconds_count"], 3);
+  // In seconds: stages are parts of their frames, and frames were answered one after the other.
+  double stage_seconds = 0;
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    stage_seconds += samples["partiemc_stage_seconds_sum{stage=\"" +
+                             std::string(Name(static_cast<Stage>(k))) + "\"}"];
+  }
+  EXPECT_GT(stage_seconds, 0);
+  EXPECT_LE(stage_seconds, samples["partiemc_frame_seconds_sum"]);
+  EXPECT_LE(samples["partiemc_frame_seconds_sum"],
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   for (std::size_t k = 0; k < kStageCount; ++k) {
     const std::string stage = "{stage=\"" + std::string(Name(static_cast<Stage>(k))) + "\"";
     EXPECT_EQ(samples["partiemc_stage_seconds_count" + stage + "}"], 3) << stage;
@@ -154,22 +183,45 @@ TEST_F(Observed, CountersEqualWhatTheClientDid) {
   EXPECT_EQ(samples["partiemc_build_info{version=\"" PARTIEMC_VERSION "\"}"], 1);
 }
 
-TEST_F(Observed, GaugesAreAtZeroAfterEverythingHasClosedAndTheProcessIsMeasured) {
-  for (int i = 0; i < 5; ++i) {
-    StreamClient client(channel_);
-    ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
-    client.Send(BlobRequest(1, 1, 0));  // Left unanswered.
+TEST_F(Observed, EveryGaugeHasMovedAndIsAtZeroAfterEverythingHasClosed) {
+  const std::set<std::string> gauges = GaugesOfWhatGoesOn(*server_);
+  // Each must have been seen above zero, so that zero says something.
+  std::set<std::string> still = {"partiemc_streams", "partiemc_watchers",
+                                 "partiemc_compute_queue_length", "partiemc_memory_held_bytes",
+                                 "partiemc_watched_bytes"};
+  for (const std::string& name : still) EXPECT_TRUE(gauges.contains(name)) << name;
+  {
+    StreamClient watched(channel_);
+    ASSERT_TRUE(watched.SendAndReceive(OpenRequest("watched")).has_opened());
+    WatchClient watcher(channel_);  // Has credit for one, so that the next ones wait for it.
+    watcher.Open("watched", v1::WATCH_MODE_LATEST, 1);
+    ASSERT_TRUE(watcher.Receive().has_opened());
+    std::vector<std::unique_ptr<StreamClient>> busy;
+    for (int i = 0; i < 8; ++i) {
+      busy.push_back(std::make_unique<StreamClient>(channel_));
+      ASSERT_TRUE(busy.back()->SendAndReceive(OpenRequest()).has_opened());
+    }
+    std::uint64_t sequence = 0;
+    EXPECT_TRUE(Eventually([&] {
+      ++sequence;
+      watched.SendAndReceive(BlobRequest(sequence, 1, sequence));
+      for (const auto& client : busy) client->Send(BlobRequest(sequence, 1, sequence));
+      const Samples samples = Scrape(*server_);
+      std::erase_if(still, [&](const std::string& name) { return samples.at(name) > 0; });
+      for (const auto& client : busy) client->Receive();
+      return still.empty();
+    })) << "never moved: "
+        << testing::PrintToString(still);
+    for (const auto& client : busy) client->Send(BlobRequest(sequence + 1, 1, 0));  // Not answered.
   }
   EXPECT_TRUE(Eventually([&] {
-    Samples samples = Scrape(*server_);
-    return samples["partiemc_streams"] == 0 && samples["partiemc_compute_queue_length"] == 0 &&
-           samples["partiemc_memory_held_bytes"] == 0;
-  }));
+    const Samples samples = Scrape(*server_);
+    return std::ranges::all_of(gauges, [&](const auto& name) { return samples.at(name) == 0; });
+  })) << testing::PrintToString(Scrape(*server_));
+}
+
+TEST_F(Observed, TheProcessIsMeasured) {
   Samples samples = Scrape(*server_);
-  for (const char* name :
-       {"partiemc_streams", "partiemc_compute_queue_length", "partiemc_memory_held_bytes"}) {
-    EXPECT_TRUE(samples.contains(name)) << name;
-  }
   EXPECT_GT(samples["process_resident_memory_bytes"], 1e6);
   EXPECT_GT(samples["process_virtual_memory_bytes"], samples["process_resident_memory_bytes"]);
   EXPECT_GT(samples["process_cpu_seconds_total"], 0);

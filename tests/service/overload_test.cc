@@ -115,29 +115,52 @@ TEST_P(Overload, ACallThatTheBudgetHasNoRoomForIsRefusedAtOnceWithTheWayOut) {
   EXPECT_THAT(status.error_message(), HasSubstr("--memory-budget"));
 }
 
-TEST_P(Overload, AsManyCallsAsStreamsMayBeOpeningAndOneMoreIsRefusedAtOnce) {
-  limits_.max_streams = 2;
-  limits_.idle = {};
-  Serve(limits_);
-  // Which of them comes last is the network's choice; that one ends, the others wait for `open`.
-  std::vector<std::unique_ptr<StreamClient>> clients;
-  std::vector<std::thread> waiting;
-  std::atomic<int> refused = 0;
-  std::promise<void> one_was;
-  for (int i = 0; i < 3; ++i) clients.push_back(std::make_unique<StreamClient>(channel_));
-  for (const auto& client : clients) {
-    waiting.emplace_back([&] {
-      const auto status = client->Finish();
-      if (status.error_code() != grpc::StatusCode::RESOURCE_EXHAUSTED) return;
-      EXPECT_EQ(client->reason(), "TOO_MANY_STREAMS");
-      EXPECT_THAT(status.error_message(), HasSubstr("2 opening"));
-      if (++refused == 1) one_was.set_value();
+// Calls that are begun and cancelled at once, on both kinds of streams, several at a time.
+void BeginAndCancel(const std::shared_ptr<grpc::Channel>& channel, int calls) {
+  std::vector<std::thread> clients;
+  for (int k = 0; k < 4; ++k) {
+    clients.emplace_back([&] {
+      for (int i = 0; i < calls; ++i) {
+        StreamClient stream(channel);
+        WatchClient watch(channel);
+        stream.Cancel();
+        watch.Cancel();
+      }
     });
   }
-  EXPECT_EQ(one_was.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
-  for (const auto& client : clients) client->Cancel();
-  for (std::thread& thread : waiting) thread.join();
-  EXPECT_EQ(refused, 1);
+  for (std::thread& client : clients) client.join();
+}
+
+// A refusal and a cancellation once both ended the call: gRPC aborts the process at the second end.
+TEST_P(Overload, CallsThatAreCancelledWhileTheyGiveWayEndOnce) {
+  limits_.max_streams = 1;
+  limits_.max_watchers = 0;
+  Serve(limits_);
+  // Take all places of calls without a request, so that each that comes has another give way.
+  std::vector<std::unique_ptr<StreamClient>> opening(limits_.MaxOpeningCalls());
+  for (auto& client : opening) client = std::make_unique<StreamClient>(channel_);
+  BeginAndCancel(channel_, 500);
+  for (const auto& client : opening) client->Cancel();
+  EXPECT_TRUE(Eventually([&] {
+    StreamClient client(channel_);
+    return client.SendAndReceive(OpenRequest()).has_opened();
+  }));
+}
+
+TEST_P(Overload, CallsThatAreCancelledWhileTheServerDrainsEndOnce) {
+  Serve(limits_);
+  StreamClient held(channel_);
+  ASSERT_TRUE(held.SendAndReceive(OpenRequest()).has_opened());
+  // gRPC's own in-process channel does not survive calls after its server has gone.
+  const auto calling = Connect(*server_, Transport::kTcp);
+  std::atomic<bool> stop = false;
+  std::thread caller([&] {
+    while (!stop) BeginAndCancel(calling, 20);
+  });
+  server_->Drain(std::chrono::seconds(10));
+  stop = true;
+  caller.join();
+  EXPECT_EQ(held.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
 }  // namespace

@@ -79,7 +79,8 @@ TEST_P(Protocol, BytesThatAreNoRequestEndTheStream) {
   const StreamEnd open = SendBytes(channel_, {std::string("\x0a\x02\x0a\x09", 4)});
   EXPECT_EQ(open.status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(open.reason, "PROTOCOL");
-  EXPECT_EQ(open.status.error_message(), "request: malformed; must be a ReconstructRequest");
+  EXPECT_EQ(open.status.error_message(),
+            "request: malformed; must be a ReconstructRequest of at most 4096 fields");
 
   const StreamEnd later = SendBytes(channel_, {OpenRequest().SerializeAsString(), "\x12\x7f"});
   EXPECT_EQ(later.status.error_message(), "request: malformed; must be `frame`");

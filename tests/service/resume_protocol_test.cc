@@ -1,16 +1,22 @@
 // Checkpoints, tokens and takeover as they look on the wire (proto/PROTOCOL.md, "Resume").
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "server/checkpoint.h"
 #include "server/moving_blob.h"
+#include "service/captured_log.h"
 #include "service/service_testing.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
+
+using ::testing::HasSubstr;
 
 constexpr unsigned kSeed = 7;
 constexpr std::uint64_t kFrames = 8;
@@ -35,9 +41,45 @@ class ResumeProtocol : public ::testing::TestWithParam<Transport> {
                      const std::string& reason) {
     StreamClient client(channel_);
     client.Send(open);
+    client.HalfClose();
     const grpc::Status status = client.Finish();
     EXPECT_EQ(status.error_code(), code) << status.error_message();
     EXPECT_EQ(client.reason(), reason);
+  }
+
+  void ExpectMismatch(const v1::ReconstructRequest& open, const std::string& what) {
+    StreamClient client(channel_);
+    client.Send(open);
+    client.HalfClose();
+    const grpc::Status status = client.Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION) << what;
+    EXPECT_EQ(client.reason(), "CHECKPOINT_MISMATCH") << what;
+    EXPECT_THAT(status.error_message(), HasSubstr(what));
+  }
+
+  // A stream that is open, and its checkpoint after one frame.
+  struct Stream {
+    std::unique_ptr<StreamClient> client;
+    std::string token, checkpoint;
+  };
+  Stream Start(const std::string& name = "tank") {
+    Stream stream{.client = std::make_unique<StreamClient>(channel_)};
+    auto open = OpenWithCheckpoints(1);
+    open.mutable_open()->set_stream_name(name);
+    stream.token = stream.client->SendAndReceive(open).opened().stream_token();
+    stream.checkpoint = stream.client->SendAndReceive(BlobRequest(1, kSeed, 0)).checkpoint();
+    return stream;
+  }
+
+  // Of the only stream.
+  static std::string ListedName(const std::shared_ptr<grpc::Channel>& channel) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::ListStreamsResponse streams;
+    EXPECT_TRUE(
+        v1::ReconstructionService::NewStub(channel)->ListStreams(&context, {}, &streams).ok());
+    EXPECT_EQ(streams.streams_size(), 1);
+    return streams.streams_size() == 1 ? streams.streams(0).stream_name() : "";
   }
 
   std::unique_ptr<Server> server_ = StartServer(TestOptions());
@@ -56,13 +98,11 @@ TEST_P(ResumeProtocol, ACheckpointComesWithEveryKthFrameWhateverItsAnswer) {
     if (k == 6) request.mutable_frame()->mutable_positions()->pop_back();
     const auto answer = client.SendAndReceive(request);
     ASSERT_EQ(answer.has_error(), k == 6);
-    const std::string& checkpoint =
-        k == 6 ? answer.error().checkpoint() : answer.frame().checkpoint();
-    EXPECT_EQ(!checkpoint.empty(), k % 3 == 0) << k;
+    EXPECT_EQ(!answer.checkpoint().empty(), k % 3 == 0) << k;
   }
   const auto gap = client.SendAndReceive(BlobRequest(9, kSeed, 9));
   EXPECT_EQ(gap.error().reason(), "SEQUENCE_GAP");
-  EXPECT_TRUE(gap.error().checkpoint().empty()) << "uses up no number";
+  EXPECT_TRUE(gap.checkpoint().empty()) << "uses up no number";
 }
 
 TEST_P(ResumeProtocol, AResumedStreamGivesTheDigestsOfAnUndisturbedOne) {
@@ -83,7 +123,7 @@ TEST_P(ResumeProtocol, AResumedStreamGivesTheDigestsOfAnUndisturbedOne) {
     const auto answer = client.SendAndReceive(BlobRequest(k + 1, kSeed, k));
     ASSERT_TRUE(answer.has_frame());
     EXPECT_EQ((Digests{answer.frame().rings_digest(), answer.frame().mesh_digest()}), expected[k]);
-    checkpoint = answer.frame().checkpoint();
+    checkpoint = answer.checkpoint();
   }
 }
 
@@ -105,7 +145,7 @@ TEST_P(ResumeProtocol, WhatDoesNotFitIsRefused) {
   const auto opened = client.SendAndReceive(OpenWithCheckpoints(1));
   const std::string token = opened.opened().stream_token();
   const auto answer = client.SendAndReceive(BlobRequest(1, kSeed, 0));
-  const std::string checkpoint = answer.frame().checkpoint();
+  const std::string checkpoint = answer.checkpoint();
 
   ExpectRefused(Resume(checkpoint, "mine"), grpc::StatusCode::INVALID_ARGUMENT, "STREAM_TOKEN");
   ExpectRefused(Resume("nonsense", token), grpc::StatusCode::INVALID_ARGUMENT,
@@ -113,11 +153,141 @@ TEST_P(ResumeProtocol, WhatDoesNotFitIsRefused) {
   std::string damaged = checkpoint;
   damaged.back() = static_cast<char>(damaged.back() ^ 1);
   ExpectRefused(Resume(damaged, token), grpc::StatusCode::INVALID_ARGUMENT, "CORRUPT_STATE");
-  auto other = Resume(checkpoint, token);
-  other.mutable_open()->mutable_parameters()->set_kernel_radius(2);
-  ExpectRefused(other, grpc::StatusCode::FAILED_PRECONDITION, "CHECKPOINT_MISMATCH");
 
   EXPECT_TRUE(client.SendAndReceive(BlobRequest(2, kSeed, 1)).has_frame()) << "undisturbed";
+}
+
+TEST_P(ResumeProtocol, ACheckpointIsGoodForItsOwnStreamAndForEverythingThatOpenSaid) {
+  const Stream stream = Start();
+  const Stream other = Start("other");
+  ExpectMismatch(Resume(other.checkpoint, stream.token), "another stream");
+
+  auto open = Resume(stream.checkpoint, stream.token);
+  open.mutable_open()->mutable_parameters()->set_kernel_radius(2);
+  ExpectMismatch(open, "other parameters");
+  open = Resume(stream.checkpoint, stream.token);
+  open.mutable_open()->mutable_outputs()->set_rings(true);
+  ExpectMismatch(open, "other outputs");
+  open = Resume(stream.checkpoint, stream.token);
+  open.mutable_open()->set_checkpoint_interval(2);
+  ExpectMismatch(open, "another checkpoint_interval");
+  open = Resume(stream.checkpoint, stream.token);
+  (*open.mutable_open()->mutable_labels())["run"] = "7";
+  ExpectMismatch(open, "other labels");
+  open = Resume(stream.checkpoint, stream.token);
+  open.mutable_open()->set_stream_name("tank-2");
+  ExpectMismatch(open, "another stream_name");
+
+  open = Resume(stream.checkpoint, stream.token);
+  open.mutable_open()->mutable_outputs()->set_rings(true);  // What an absent message means.
+  open.mutable_open()->mutable_outputs()->set_mesh(true);
+  StreamClient client(channel_);
+  EXPECT_TRUE(client.SendAndReceive(open).has_opened());
+}
+
+TEST_P(ResumeProtocol, ServersWithOneKeyTakeEachOthersCheckpointsAndNoOthers) {
+  ServerOptions options = TestOptions();
+  const support::TemporaryFolder folder;
+  options.checkpoint_key_file = folder.Write("a", "key-a-of-test-0123456789\n");
+  server_ = StartServer(options);
+  channel_ = Connect(*server_, GetParam());
+  const auto brother = StartServer(options);
+  options.checkpoint_key_file = folder.Write("b", "key-b-of-test-0123456789\n");
+  const auto stranger = StartServer(options);
+  const Stream stream = Start();
+
+  StreamClient client(Connect(*brother, GetParam()));
+  const auto opened = client.SendAndReceive(Resume(stream.checkpoint, stream.token));
+  ASSERT_TRUE(opened.has_opened());
+  EXPECT_EQ(opened.opened().next_sequence(), 2u);
+  const auto answer = client.SendAndReceive(BlobRequest(2, kSeed, 1));
+  EXPECT_EQ((Digests{answer.frame().rings_digest(), answer.frame().mesh_digest()}),
+            LocalDigests(kSeed, 2).back());
+
+  channel_ = Connect(*stranger, GetParam());
+  ExpectRefused(Resume(stream.checkpoint, stream.token), grpc::StatusCode::FAILED_PRECONDITION,
+                "CHECKPOINT_SIGNATURE");
+  StreamClient anew(channel_);
+  EXPECT_TRUE(anew.SendAndReceive(Resume("", stream.token)).has_opened())
+      << "the beginning of a stream has no signature";
+}
+
+TEST_P(ResumeProtocol, AKeyFileThatIsBrokenIsAnErrorAtTheStartAndKeepsTheOldKeysLater) {
+  const support::TemporaryFolder folder;
+  const auto write = [&](const std::string& keys) {  // Whole or not at all.
+    std::filesystem::rename(folder.Write("next", keys), folder.Path("keys"));
+    return folder.Path("keys");
+  };
+  ServerOptions options = TestOptions();
+  options.reload_interval = std::chrono::milliseconds(10);
+  options.checkpoint_key_file = write("short-secret");
+  const CapturedLog log;
+  const auto refused = Server::Start(options);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(
+      std::string(refused.status().message()),
+      HasSubstr("--checkpoint-key-file " + folder.Path("keys") + ": line 1: must be a key"));
+
+  write("key-a-secret-0123456789");
+  server_ = StartServer(options);
+  channel_ = Connect(*server_, GetParam());
+  const Stream stream = Start();
+  write("short-secret");
+  EXPECT_TRUE(Eventually([&] { return log.Count("checkpoint keys not reloaded") == 1; }));
+  StreamClient client(channel_);
+  EXPECT_TRUE(client.SendAndReceive(Resume(stream.checkpoint, stream.token)).has_opened());
+
+  write("key-b-secret-0123456789");
+  EXPECT_TRUE(Eventually([&] { return log.Count("checkpoint keys reloaded") >= 1; }));
+  ExpectRefused(Resume(stream.checkpoint, stream.token), grpc::StatusCode::FAILED_PRECONDITION,
+                "CHECKPOINT_SIGNATURE");
+  server_.reset();
+  EXPECT_EQ(log.Count("secret"), 0u) << log.Text();
+}
+
+TEST_P(ResumeProtocol, ACheckpointThatWouldBeTooLargeIsNotSentAndOneThatIsIsRefusedUnread) {
+  ServerOptions options = TestOptions();
+  options.limits.max_frame_bytes = 10'000;
+  server_ = StartServer(options);
+  channel_ = Connect(*server_, GetParam());
+  StreamClient client(channel_);
+  const auto opened = client.SendAndReceive(OpenWithCheckpoints(1));
+  // Particles far apart, each with an outline of its own.
+  auto spray = BlobRequest(1, kSeed, 0);
+  std::vector<float> positions;
+  for (int k = 0; k < 500; ++k) positions.insert(positions.end(), {static_cast<float>(k), 0.0f});
+  spray.mutable_frame()->set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
+  spray.mutable_frame()->set_positions(positions.data(), positions.size() * sizeof(float));
+  const auto large = client.SendAndReceive(spray);
+  ASSERT_TRUE(large.has_frame());
+  EXPECT_EQ(large.frame().statistics().particles(), 500u);
+  EXPECT_TRUE(large.checkpoint().empty());
+  auto small = spray;
+  small.mutable_frame()->set_sequence(2);
+  small.mutable_frame()->mutable_positions()->resize(80);
+  const auto answer = client.SendAndReceive(small);
+  EXPECT_FALSE(answer.checkpoint().empty());
+  EXPECT_LE(answer.checkpoint().size(), 10'000u);
+  const std::string token = opened.opened().stream_token();
+  ExpectRefused(Resume(std::string(10'001, 'x'), token), grpc::StatusCode::RESOURCE_EXHAUSTED,
+                "CHECKPOINT_BYTES");
+  ExpectRefused(Resume(std::string(10'000, 'x'), token), grpc::StatusCode::INVALID_ARGUMENT,
+                "CORRUPT_CHECKPOINT");
+}
+
+TEST_P(ResumeProtocol, ANameThatTheServerMadeUpStaysTheStreamsOnEveryServer) {
+  const auto other_server = StartServer(TestOptions());
+  const auto other_channel = Connect(*other_server, GetParam());
+  const Stream stream = Start("");
+  const std::string name = ListedName(channel_);
+  EXPECT_EQ(name.substr(0, 7), "stream-");
+  for (const auto& given : {std::string(), name}) {
+    auto open = Resume(stream.checkpoint, stream.token);
+    open.mutable_open()->set_stream_name(given);
+    StreamClient client(other_channel);
+    ASSERT_TRUE(client.SendAndReceive(open).has_opened());
+    EXPECT_EQ(ListedName(other_channel), name);
+  }
 }
 
 }  // namespace

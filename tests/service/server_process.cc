@@ -35,7 +35,7 @@ std::string FileText(const std::string& path) {
   return text.str();
 }
 
-ServerProcess::ServerProcess(std::vector<std::string> arguments)
+ServerProcess::ServerProcess(std::vector<std::string> arguments, const Surroundings& surroundings)
     : folder_(std::make_unique<support::TemporaryFolder>()) {
   const std::string output = folder_->Path("output");
   arguments.insert(arguments.begin(), PARTIEMC_SERVER);
@@ -46,8 +46,15 @@ ServerProcess::ServerProcess(std::vector<std::string> arguments)
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
                                    O_CREAT | O_TRUNC | O_WRONLY, 0600);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  EXPECT_EQ(posix_spawn(&process_, argv[0], &actions, nullptr, argv.data(), environ), 0);
+  const int error = surroundings.standard_error;
+  posix_spawn_file_actions_adddup2(&actions, error < 0 ? STDOUT_FILENO : error, STDERR_FILENO);
+  std::vector<char*> variables;
+  for (const std::string& more : surroundings.environment) {
+    variables.push_back(const_cast<char*>(more.c_str()));
+  }
+  for (char** variable = environ; *variable != nullptr; ++variable) variables.push_back(*variable);
+  variables.push_back(nullptr);
+  EXPECT_EQ(posix_spawn(&process_, argv[0], &actions, nullptr, argv.data(), variables.data()), 0);
   posix_spawn_file_actions_destroy(&actions);
 }
 
@@ -119,8 +126,8 @@ int RunServer(const std::vector<std::string>& arguments, std::string* output) {
   return code;
 }
 
-ServingProcess::ServingProcess(std::vector<std::string> arguments)
-    : process_(With(std::move(arguments), folder_.Path("port"))) {
+ServingProcess::ServingProcess(std::vector<std::string> arguments, const Surroundings& surroundings)
+    : process_(With(std::move(arguments), folder_.Path("port")), surroundings) {
   const std::string port_file = folder_.Path("port");
   while (!std::filesystem::exists(port_file)) {
     if (const auto code = process_.WaitFor(std::chrono::milliseconds(5))) {

@@ -17,11 +17,17 @@ namespace partiemc::server {
 
 std::string FileText(const std::string& path);
 
+/// What a server is started with beside its arguments.
+struct Surroundings {
+  std::vector<std::string> environment = {};  ///< NAME=VALUE, beside this process's own.
+  int standard_error = -1;                    ///< A file descriptor; -1: in Output().
+};
+
 /// partiemc-server with these arguments, its output in a file. Both are gone when this
 /// goes out of scope.
 class ServerProcess {
  public:
-  explicit ServerProcess(std::vector<std::string> arguments);
+  explicit ServerProcess(std::vector<std::string> arguments, const Surroundings& surroundings = {});
   ~ServerProcess();
   ServerProcess(ServerProcess&& other) noexcept;
   ServerProcess& operator=(ServerProcess&&) = delete;
@@ -55,7 +61,8 @@ int RunServer(const std::vector<std::string>& arguments, std::string* output = n
 /// One that serves on a port of loopback that it chose itself.
 class ServingProcess {
  public:
-  explicit ServingProcess(std::vector<std::string> arguments = {});
+  explicit ServingProcess(std::vector<std::string> arguments = {},
+                          const Surroundings& surroundings = {});
   const std::string& address() const { return address_; }
   ServerProcess& process() { return process_; }
   const ServerProcess& process() const { return process_; }

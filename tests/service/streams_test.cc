@@ -91,6 +91,37 @@ TEST_P(Streams, RelativeCoordinatesThatWouldBeTooCoarseRefuseTheFrameAndLeaveThe
   EXPECT_EQ(client.SendAndReceive(BlobRequest(3, 3, 1)).frame().rings_digest(), expected[1].rings);
 }
 
+TEST_P(Streams, DoubtsAreToldAndAGuessedSpacingLeavesNoTrace) {
+  auto open = OpenRequest();
+  open.mutable_open()->mutable_parameters()->clear_spacing();
+  const std::vector<double> two_far = {0, 0, 3e4, 4e4};
+  auto beginning = BlobRequest(1, 3, 0);
+  beginning.mutable_frame()->set_positions(two_far.data(), two_far.size() * sizeof(double));
+
+  StreamClient client(channel_);
+  ASSERT_TRUE(client.SendAndReceive(open).has_opened());
+  const auto guessed = client.SendAndReceive(beginning).frame();
+  ASSERT_EQ(guessed.statistics().doubts_size(), 1);
+  EXPECT_EQ(guessed.statistics().doubts(0), v1::DOUBT_SPACING_PROVISIONAL);
+  const auto body = client.SendAndReceive(BlobRequest(2, 3, 0)).frame();
+  EXPECT_EQ(body.statistics().doubts_size(), 0);
+
+  StreamClient undisturbed(channel_);
+  ASSERT_TRUE(undisturbed.SendAndReceive(open).has_opened());
+  const auto expected = undisturbed.SendAndReceive(BlobRequest(1, 3, 0)).frame();
+  EXPECT_EQ(body.rings_digest(), expected.rings_digest());
+  EXPECT_EQ(body.mesh_digest(), expected.mesh_digest());
+
+  // Now that it is fixed, particles three times as far are told of.
+  std::vector<double> wide = MovingBlob(3, 1);
+  for (double& coordinate : wide) coordinate *= 3;
+  auto contradicting = BlobRequest(3, 3, 1);
+  contradicting.mutable_frame()->set_positions(wide.data(), wide.size() * sizeof(double));
+  const auto told = client.SendAndReceive(contradicting).frame();
+  ASSERT_EQ(told.statistics().doubts_size(), 1);
+  EXPECT_EQ(told.statistics().doubts(0), v1::DOUBT_SPACING_CONTRADICTED);
+}
+
 // Sends `request` and expects a frame error with this reason.
 void ExpectError(StreamClient& client, const v1::ReconstructRequest& request,
                  std::string_view reason, std::uint64_t next_sequence) {

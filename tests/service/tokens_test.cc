@@ -40,6 +40,9 @@ TEST_F(Security, EveryMethodWantsAToken) {
     EXPECT_EQ(wrong.code, grpc::StatusCode::UNAUTHENTICATED);
     EXPECT_EQ(wrong.reason, "TOKEN_UNKNOWN");
     EXPECT_THAT(wrong.message, Not(HasSubstr("secret")));
+    EXPECT_NE(Call(channel, method, std::string("bEARER ") + kToken).code,
+              grpc::StatusCode::UNAUTHENTICATED)
+        << method;
     EXPECT_NE(Call(channel, method, std::string("Bearer ") + kToken).code,
               grpc::StatusCode::UNAUTHENTICATED);
   }
@@ -148,7 +151,7 @@ TEST_F(Security, NoSecretIsEverInTheLog) {
   Write("server.key", authority_.Issue("server").key);
   EXPECT_TRUE(Eventually([&] { return log.Count("not reloaded") == 2; }));
   server_.reset();
-  EXPECT_THAT(log.Text(), HasSubstr("grpc: "));  // What gRPC says is in it too.
+  EXPECT_THAT(log.Text(), HasSubstr("\"message\":\"grpc\""));  // Errors of gRPC's are in it too.
   EXPECT_THAT(log.Text(), Not(HasSubstr("secret")));
   EXPECT_THAT(log.Text(), Not(HasSubstr("PRIVATE")));
   const std::size_t line = identity.key.find('\n') + 1;

@@ -6,12 +6,15 @@
 #include <string>
 
 #include "service/error_testing.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
 
 using grpc::StatusCode;
 using ::testing::MatchesRegex;
+
+constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
 
 class WatchRefused : public ErrorTable {
  protected:
@@ -29,6 +32,7 @@ class WatchRefused : public ErrorTable {
     EXPECT_EQ(status.error_code(), code);
     EXPECT_EQ(watcher.reason(), reason);
     EXPECT_THAT(status.error_message(), MatchesRegex(message));
+    ExpectDetails(status, reason);
   }
   void ExpectOfOpen(const std::string& name, v1::WatchMode mode, std::uint32_t credits,
                     StatusCode code, const std::string& reason, const std::string& message) {
@@ -51,6 +55,7 @@ class WatchRefused : public ErrorTable {
     Expect(watcher, StatusCode::RESOURCE_EXHAUSTED, reason, message);
   }
 
+  const support::TemporaryFolder folder_;
   std::unique_ptr<StreamClient> producer_;
 };
 
@@ -93,9 +98,41 @@ TEST_F(WatchRefused, TOO_MANY_WATCHERS) {
   first.Open("tank", v1::WATCH_MODE_LATEST, 1);
   ASSERT_TRUE(first.Receive().has_opened());
   WatchClient second(channel_);
+  second.Open("tank", v1::WATCH_MODE_LATEST, 1);
   Expect(second, StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS",
          "watchers: 1 watch; must be at most 1; try again when one has left, or start the server "
          "with a larger --max-watchers");
+}
+
+TEST_F(WatchRefused, CALLER_WATCHERS) {
+  options_.limits.max_watchers = 2;
+  options_.token_file = folder_.Write("tokens", std::string(kToken) + " watchers=1\n");
+  Serve();
+  const auto begin = [&](grpc::ClientContext& context) {
+    SetDeadline(context);
+    context.AddMetadata("authorization", std::string("Bearer ") + kToken);
+  };
+  grpc::ClientContext producing, watching, too_many;
+  begin(producing), begin(watching), begin(too_many);
+  const auto producer = stub_->Reconstruct(&producing);
+  v1::ReconstructResponse opened;
+  ASSERT_TRUE(producer->Write(OpenRequest("tank")) && producer->Read(&opened));
+  v1::WatchStreamRequest open;
+  open.mutable_open()->set_stream_name("tank");
+  open.mutable_open()->set_credits(1);
+  v1::WatchStreamResponse response;
+  const auto first = stub_->WatchStream(&watching), second = stub_->WatchStream(&too_many);
+  ASSERT_TRUE(first->Write(open) && first->Read(&response));
+  EXPECT_TRUE(second->Write(open));
+  EXPECT_FALSE(second->Read(&response));
+  const auto status = second->Finish();
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(ReasonOf(too_many), "CALLER_WATCHERS");
+  EXPECT_EQ(status.error_message(),
+            "caller.watchers: 1 going on; must be at most 1 of one caller, which is a token or, "
+            "without tokens, an address; try again when a call of it has ended");
+  producing.TryCancel();
+  watching.TryCancel();
 }
 
 TEST_F(WatchRefused, FELL_BEHIND) {

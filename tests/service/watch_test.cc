@@ -297,7 +297,8 @@ TEST_P(Watch, OneWatcherTooManyIsRefusedAtOnceAndThePlaceIsFreeWhenOneLeaves) {
     ASSERT_TRUE(watchers.back()->Receive().has_opened());
   }
   EXPECT_EQ(ListedWatchers(), 4u);
-  WatchClient fifth(channel_);  // Refused before it says anything.
+  WatchClient fifth(channel_);
+  fifth.Open("tank", v1::WATCH_MODE_LATEST, 1);
   ExpectRefused(fifth, grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS",
                 "watchers: 4 watch; must be at most 4");
   watchers.pop_back();

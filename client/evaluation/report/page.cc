@@ -94,26 +94,16 @@ Series SeriesOf(Placement placement, std::string_view suffix, std::vector<double
 }
 
 constexpr std::string_view kAboutScenes =
-    "Every ratio is one of means over the sequences; every method has its own calibration, the "
-    "field and its guard are the same.";
+    "Ratios are geometric means over the sequences, each of which counts alike; every method has "
+    "its own calibration, the field and its guard are the same.";
 constexpr std::string_view kAboutRecordings =
-    "There is no true boundary: areas are compared with the sum of the particles' volumes, "
+    "Only a few tell their true boundary, or where walls are: areas are compared with the sum of "
+    "the particles' volumes, "
     "contours "
     "with the one before, carried along by the particles. Where particles scatter, nobody knows "
     "how "
     "a contour should move, and what is measured there is that. 'Motion known' leaves out such "
     "places: whether one is told is for the particles around it to say, not for the contour.";
-constexpr std::string_view kMemoryOnRecordings =
-    " Where particles have ids, virtual-plane remembers: it lets them carry its last outline along "
-    "and moves towards that, which is close to how jitter is measured here. "
-    "virtual-plane-no-memory "
-    "does without. What the memory costs and gains against a known truth is for the synthetic "
-    "sequences to say, with --ids.";
-constexpr std::string_view kMemoryOnScenes =
-    " Methods were told which particle is which (--ids), so that virtual-plane lets the particles "
-    "carry its last outline along; beside virtual-plane-no-memory it shows what that costs and "
-    "gains. Jitter is measured by the true motion, which no method knows.";
-
 std::string MethodSections(const Evaluation& evaluation) {
   const Study& study = evaluation.study;
   std::string out;
@@ -126,25 +116,26 @@ std::string MethodSections(const Evaluation& evaluation) {
       if (const Table steps = StepTable(study, selection); !steps.rows.empty()) {
         content += AsHtml(steps);
       }
+      const std::string_view whole = Name(Placement::kVirtualPlane);
+      if (!study.Of(whole, knowledge, recordings).empty()) {
+        for (const Table& table : DetailTables(study, selection, whole)) content += AsHtml(table);
+      }
       content += AsHtml(MeansTable(study, selection)) + AsHtml(OtherMeansTable(study, selection)) +
                  AsHtml(StageTable(study, selection));
-      content += recordings ? "<details><summary>By recording, each method</summary>"
-                            : "<details><summary>By group, each method</summary>";
+      content += recordings ? "<details><summary>By recording, the other methods</summary>"
+                            : "<details><summary>By group and sampler, the other methods</summary>";
       for (const StudyMethod& method : study.methods) {
         const std::string& name = method.method.name;
-        if (name == kBaseline || method.is_step || study.Of(name, knowledge, recordings).empty())
+        if (name == kBaseline || name == whole || method.is_step ||
+            study.Of(name, knowledge, recordings).empty()) {
           continue;
-        content += AsHtml(recordings ? SequenceTable(study, selection, name)
-                                     : GroupTable(study, selection, name));
+        }
+        for (const Table& table : DetailTables(study, selection, name)) content += AsHtml(table);
       }
       content += "</details>\n";
     }
-    const std::string_view about = recordings ? kAboutRecordings : kAboutScenes;
-    const std::string_view memory = !study.ToldIds(recordings) ? ""
-                                    : recordings               ? kMemoryOnRecordings
-                                                               : kMemoryOnScenes;
     out += Section(recordings ? "Methods on recordings" : "Methods on synthetic sequences",
-                   Concat(about, memory), content);
+                   recordings ? kAboutRecordings : kAboutScenes, content);
   }
   return out;
 }
@@ -315,9 +306,11 @@ std::string EvaluationHtml(const Evaluation& evaluation) {
                  "(farthest-particle) and for our default (virtual-plane).",
                  Tally(evaluation.claims) + "<details open><summary>All claims</summary>" +
                      ClaimList(evaluation.claims) + "</details>\n");
-  out += MethodSections(evaluation) + PaperTableSection(evaluation) + FeatureSection(evaluation) +
-         ThinningSection(evaluation) + GridSections(evaluation) + CountSection(evaluation) +
-         FillSection(evaluation.paper) + NotesSection(evaluation);
+  out += MethodSections(evaluation) +
+         Section("Particles", "", AsHtml(NeighbourTable(evaluation.study))) +
+         PaperTableSection(evaluation) + FeatureSection(evaluation) + ThinningSection(evaluation) +
+         GridSections(evaluation) + CountSection(evaluation) + FillSection(evaluation.paper) +
+         NotesSection(evaluation);
   return out + "</main>\n</body>\n</html>\n";
 }
 

@@ -4,7 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "evaluation/claims.h"
+#include "evaluation/paper/claims.h"
 #include "evaluation/report/study_tables.h"
 
 namespace partiemc::evaluation {

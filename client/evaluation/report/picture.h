@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/paper.h"
+#include "evaluation/paper/paper.h"
 
 namespace partiemc::evaluation {
 

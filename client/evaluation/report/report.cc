@@ -1,9 +1,11 @@
 #include "evaluation/report/report.h"
 
 #include <cmath>
+#include <span>
 #include <string_view>
+#include <utility>
 
-#include "evaluation/compare.h"
+#include "evaluation/metrics/compare.h"
 #include "evaluation/report/study_tables.h"
 #include "output/text.h"
 
@@ -30,9 +32,9 @@ void AppendArray(std::string& out, const Items& items, AppendItem append) {
 
 void AppendRow(std::string& out, const Row& row) {
   AppendAll(out, "{\"sequence\":", JsonString(row.sequence), ",\"group\":\"", Name(row.group),
-            "\",\"shape\":", JsonString(row.shape), ",\"judged\":", row.judged ? "true" : "false",
-            ",\"method\":", JsonString(row.method), ",\"knowledge\":\"", Name(row.knowledge),
-            "\",\"ids\":", row.ids ? "true" : "false");
+            "\",\"shape\":", JsonString(row.shape), ",\"sampler\":", JsonString(row.sampler),
+            ",\"judged\":", row.judged ? "true" : "false", ",\"method\":", JsonString(row.method),
+            ",\"knowledge\":\"", Name(row.knowledge), "\",\"ids\":", row.ids ? "true" : "false");
   for (std::size_t k = 0; k < kMetricCount; ++k) {
     const auto metric = static_cast<Metric>(k);
     AppendAll(out, ",\"", Name(metric), "\":", JsonNumber(row[metric]));
@@ -40,22 +42,35 @@ void AppendRow(std::string& out, const Row& row) {
   out += '}';
 }
 
-void AppendComparison(std::string& out, const Comparison& comparison) {
+// "NAME": ratio, worst first.
+void AppendParts(std::string& out, std::span<const Row> rows, std::span<const Row> baseline,
+                 Metric metric, By by) {
+  out += '{';
+  bool first = true;
+  for (const Part& part : CompareParts(rows, baseline, std::span(&metric, 1), 0, by)) {
+    if (std::isnan(part.ratios[0].value)) continue;
+    AppendAll(out, std::exchange(first, false) ? "" : ",", JsonString(part.name), ":",
+              JsonNumber(part.ratios[0].value));
+  }
+  out += '}';
+}
+
+void AppendComparison(std::string& out, std::span<const Row> rows, std::span<const Row> baseline,
+                      Metric metric) {
+  const Comparison comparison = CompareRows(rows, baseline, metric);
   const Verdict& verdict = comparison.verdict;
-  AppendAll(out, "{\"metric\":\"", Name(comparison.metric),
-            "\",\"mean\":", JsonNumber(comparison.method_mean),
-            ",\"baseline_mean\":", JsonNumber(comparison.baseline_mean),
+  AppendAll(out, "{\"metric\":\"", Name(metric), "\",\"mean\":", JsonNumber(MeanOver(rows, metric)),
+            ",\"baseline_mean\":", JsonNumber(MeanOver(baseline, metric)),
             ",\"ratio\":", JsonNumber(comparison.ratio.value),
             ",\"low\":", JsonNumber(comparison.ratio.low),
-            ",\"high\":", JsonNumber(comparison.ratio.high), ",\"wins\":", verdict.wins,
-            ",\"ties\":", verdict.ties, ",\"losses\":", verdict.losses, ",\"groups\":{");
-  bool first = true;
-  for (std::size_t k = 0; k < kGroupCount; ++k) {
-    if (std::isnan(comparison.group_ratios[k])) continue;
-    AppendAll(out, std::exchange(first, false) ? "" : ",", '"', Name(static_cast<Group>(k)),
-              "\":", JsonNumber(comparison.group_ratios[k]));
-  }
-  out += "}}";
+            ",\"high\":", JsonNumber(comparison.ratio.high),
+            ",\"ratio_of_means\":", JsonNumber(comparison.ratio_of_means),
+            ",\"wins\":", verdict.wins, ",\"ties\":", verdict.ties, ",\"losses\":", verdict.losses,
+            ",\"groups\":");
+  AppendParts(out, rows, baseline, metric, By::kGroup);
+  out += ",\"samplers\":";
+  AppendParts(out, rows, baseline, metric, By::kSampler);
+  out += '}';
 }
 
 // One object per method, knowledge and kind of sequence.
@@ -72,11 +87,9 @@ void AppendComparisons(std::string& out, const Study& study) {
                   "{\"method\":", JsonString(method.method.name), ",\"knowledge\":\"",
                   Name(knowledge), "\",\"recordings\":", recordings ? "true" : "false",
                   ",\"metrics\":");
-        std::vector<Comparison> comparisons;
-        for (const Metric metric : JudgedMetrics(recordings)) {
-          comparisons.push_back(CompareRows(rows, baseline, metric));
-        }
-        AppendArray(out, comparisons, AppendComparison);
+        AppendArray(out, JudgedMetrics(recordings), [&](std::string& text, Metric metric) {
+          AppendComparison(text, rows, baseline, metric);
+        });
         out += '}';
       }
     }
@@ -114,14 +127,14 @@ void AppendThinned(std::string& out, const ShareRow& thinned) {
   out += '}';
 }
 
-// Of a study, for the terminal: groups of the default and its variants only; the page has all.
+// Of a study, for the terminal: what counts first. Parts of the default and its variants only; the
+// page has them of all.
 std::vector<Table> StudyTables(const Study& study) {
   std::vector<Table> tables;
   for (const bool recordings : {false, true}) {
-    if (recordings && !study.HasRecordings()) continue;
+    if (study.Of(kBaseline, study.told.front(), recordings).empty()) continue;
     for (const Knowledge knowledge : study.told) {
       const Selection selection{knowledge, recordings};
-      tables.push_back(MeansTable(study, selection));
       tables.push_back(RatioTable(study, selection));
       if (Table steps = StepTable(study, selection); !steps.rows.empty()) {
         tables.push_back(std::move(steps));
@@ -132,13 +145,16 @@ std::vector<Table> StudyTables(const Study& study) {
             study.Of(name, knowledge, recordings).empty()) {
           continue;
         }
-        tables.push_back(recordings ? SequenceTable(study, selection, name)
-                                    : GroupTable(study, selection, name));
+        for (Table& table : DetailTables(study, selection, name)) {
+          tables.push_back(std::move(table));
+        }
       }
+      tables.push_back(MeansTable(study, selection));
       tables.push_back(OtherMeansTable(study, selection));
       tables.push_back(StageTable(study, selection));
     }
   }
+  tables.push_back(NeighbourTable(study));
   return tables;
 }
 
@@ -174,7 +190,7 @@ std::string EvaluationText(const Evaluation& evaluation) {
 }
 
 std::string EvaluationCsv(const Study& study) {
-  std::string out = "sequence,group,shape,judged,method,knowledge,ids";
+  std::string out = "sequence,group,shape,sampler,judged,method,knowledge,ids";
   for (std::size_t k = 0; k < kMetricCount; ++k) {
     AppendAll(out, ',', Name(static_cast<Metric>(k)));
   }
@@ -189,8 +205,8 @@ std::string EvaluationCsv(const Study& study) {
   };
   for (const Row& row : study.rows) {
     AppendAll(out, quoted(row.sequence), ',', Name(row.group), ',', quoted(row.shape), ',',
-              row.judged ? '1' : '0', ',', row.method, ',', Name(row.knowledge), ',',
-              row.ids ? '1' : '0');
+              quoted(row.sampler), ',', row.judged ? '1' : '0', ',', row.method, ',',
+              Name(row.knowledge), ',', row.ids ? '1' : '0');
     for (const double value : row.values) {
       out += ',';
       if (std::isfinite(value)) client::AppendNumber(out, value);

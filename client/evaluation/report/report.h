@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/claims.h"
-#include "evaluation/paper.h"
-#include "evaluation/study.h"
+#include "evaluation/metrics/study.h"
+#include "evaluation/paper/claims.h"
+#include "evaluation/paper/paper.h"
 
 namespace partiemc::evaluation {
 

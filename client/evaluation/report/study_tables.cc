@@ -1,13 +1,14 @@
 #include "evaluation/report/study_tables.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "evaluation/compare.h"
 
 namespace partiemc::evaluation {
 namespace {
@@ -43,6 +44,10 @@ std::string_view Head(Metric metric) {
       return "Hausdorff jitter";
     case Metric::kMeanJitter:
       return "mean jitter";
+    case Metric::kAreaErrorSize:
+      return "area error";
+    case Metric::kWallRoughness:
+      return "wall roughness";
     case Metric::kKnownHausdorffJitter:
       return "Hausdorff jitter, motion known";
     case Metric::kKnownMeanJitter:
@@ -69,6 +74,11 @@ void ForMethods(const Study& study, const Selection& selection, EachMethod row) 
 }
 
 Cell RatioCell(double ratio, double alert_above) { return {Fixed(ratio, 3), ratio > alert_above}; }
+
+Cell IntervalCell(const Ratio& ratio) {
+  if (std::isnan(ratio.value)) return {"-"};
+  return {absl::StrCat(Fixed(ratio.low, 3), "..", Fixed(ratio.high, 3))};
+}
 
 }  // namespace
 
@@ -152,33 +162,36 @@ Table StageTable(const Study& study, const Selection& selection) {
 }
 
 Table RatioTable(const Study& study, const Selection& selection) {
-  Table table{Title("ratios of means to marching squares", selection),
-              "Below 1 is better. 95 % bootstrap interval; sequences won / tied (1 %) / lost.",
+  Table table{Title("geometric means of ratios to marching squares", selection),
+              "Every sequence counts alike; below 1 is better. 95 % bootstrap interval; ratio of "
+              "the means; sequences won / tied (1 %) / lost.",
               JudgedHeads(selection),
               {}};
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
   ForMethods(study, selection, [&](const std::string& name, std::span<const Row> rows) {
     if (name == kBaseline) return;
     TableRow ratio{name, {}}, interval{"95 % interval", {}, true};
-    TableRow verdicts{"won / tied / lost", {}, true};
+    TableRow means{"ratio of means", {}, true}, verdicts{"won / tied / lost", {}, true};
     for (const Metric metric : JudgedMetrics(selection.recordings)) {
       const Comparison comparison = CompareRows(rows, baseline, metric);
-      ratio.cells.push_back(RatioCell(comparison.ratio.value, 1));
-      const bool absent = std::isnan(comparison.ratio.value);
-      interval.cells.push_back({absent ? "-"
-                                       : absl::StrCat(Fixed(comparison.ratio.low, 3), "..",
-                                                      Fixed(comparison.ratio.high, 3))});
       const Verdict& verdict = comparison.verdict;
+      ratio.cells.push_back(RatioCell(comparison.ratio.value, 1));
+      interval.cells.push_back(IntervalCell(comparison.ratio));
+      means.cells.push_back({Fixed(comparison.ratio_of_means, 3)});
       verdicts.cells.push_back(
-          {absent ? "-" : absl::StrCat(verdict.wins, "/", verdict.ties, "/", verdict.losses)});
+          {std::isnan(comparison.ratio.value)
+               ? "-"
+               : absl::StrCat(verdict.wins, "/", verdict.ties, "/", verdict.losses)});
     }
-    for (TableRow* row : {&ratio, &interval, &verdicts}) table.rows.push_back(std::move(*row));
+    for (TableRow* row : {&ratio, &interval, &means, &verdicts}) {
+      table.rows.push_back(std::move(*row));
+    }
   });
   return table;
 }
 
 Table StepTable(const Study& study, const Selection& selection) {
-  Table table{Title("ratios of virtual-plane with a step switched off", selection),
+  Table table{Title("geometric means of virtual-plane with a step switched off", selection),
               "To marching squares; marked where the method is better without the step by 1 %.",
               JudgedHeads(selection),
               {}};
@@ -186,7 +199,7 @@ Table StepTable(const Study& study, const Selection& selection) {
   const std::string whole(Name(Placement::kVirtualPlane));
   const auto whole_rows = study.Of(whole, selection.knowledge, selection.recordings);
   const auto ratio = [&](std::span<const Row> rows, Metric metric) {
-    return RatioOfMeans(MatchPairs(rows, baseline, metric));
+    return GeometricMean(MatchPairs(rows, baseline, metric));
   };
   for (const StudyMethod& method : study.methods) {
     const std::string& name = method.method.name;
@@ -203,43 +216,145 @@ Table StepTable(const Study& study, const Selection& selection) {
   return table;
 }
 
-Table GroupTable(const Study& study, const Selection& selection, std::string_view method) {
-  Table table{Title("ratios by group", selection) + ", " + std::string(method),
-              "A group that loses more than 5 % is marked.",
+Table PartTable(const Study& study, const Selection& selection, std::string_view method, By by) {
+  constexpr const char* kWhat[] = {"geometric means by group", "geometric means by sampler",
+                                   "ratios by sequence"};
+  const auto metrics = JudgedMetrics(selection.recordings);
+  const std::size_t worst_by = WorstBy(selection.recordings);
+  Table table{Title(kWhat[static_cast<int>(by)], selection) + ", " + std::string(method),
+              absl::StrCat("To marching squares; worst first by ",
+                           std::string(Head(metrics[worst_by])), ". Above 1 is marked."),
               JudgedHeads(selection),
               {}};
+  table.heads.push_back("sequences");
   const auto rows = study.Of(method, selection.knowledge, selection.recordings);
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
-  std::vector<Comparison> comparisons;
-  for (const Metric metric : JudgedMetrics(selection.recordings)) {
-    comparisons.push_back(CompareRows(rows, baseline, metric));
-  }
-  for (std::size_t k = 0; k < kGroupCount; ++k) {
-    const auto group = static_cast<Group>(k);
-    if (MatchPairs(rows, baseline, Metric::kAreaError, group).empty()) continue;
-    TableRow& row = table.rows.emplace_back(TableRow{std::string(Name(group)), {}});
-    for (const Comparison& comparison : comparisons) {
-      row.cells.push_back(RatioCell(comparison.group_ratios[k], kGroupLossRatio));
+  std::vector<Part> parts = CompareParts(rows, baseline, metrics, worst_by, by);
+  Part all{"all", 0, {}};
+  for (const Part& part : parts) all.sequences += part.sequences;
+  for (const Metric metric : metrics)
+    all.ratios.push_back(CompareRows(rows, baseline, metric).ratio);
+  parts.push_back(std::move(all));
+  for (const Part& part : parts) {
+    TableRow ratios{part.name, {}}, intervals{"95 % interval", {}, true};
+    for (const Ratio& ratio : part.ratios) {
+      ratios.cells.push_back(RatioCell(ratio.value, 1));
+      intervals.cells.push_back(IntervalCell(ratio));
     }
+    ratios.cells.push_back({absl::StrCat(part.sequences)});
+    intervals.cells.push_back({""});
+    table.rows.push_back(std::move(ratios));
+    if (part.sequences > 1) table.rows.push_back(std::move(intervals));
   }
   return table;
 }
 
-Table SequenceTable(const Study& study, const Selection& selection, std::string_view method) {
-  Table table{Title("ratios by sequence", selection) + ", " + std::string(method),
-              "More than 5 % lost is marked.",
-              JudgedHeads(selection),
+Table LossTable(const Study& study, const Selection& selection, std::string_view method) {
+  Table table{Title("sequences above 1.25", selection) + ", " + std::string(method),
+              "Ratios to marching squares; below 1.25 empty. Worst first.",
+              {},
+              {}};
+  std::vector<Metric> metrics;
+  for (const Metric metric : JudgedMetrics(selection.recordings)) {
+    if (metric == Metric::kBias) continue;
+    metrics.push_back(metric);
+    table.heads.emplace_back(Head(metric));
+  }
+  const auto rows = study.Of(method, selection.knowledge, selection.recordings);
+  const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
+  struct Loss {
+    double worst;
+    TableRow row;
+  };
+  std::vector<Loss> losses;
+  for (const Part& part : CompareParts(rows, baseline, metrics, 0, By::kSequence)) {
+    Loss loss{0, {part.name, {}}};
+    for (const Ratio& ratio : part.ratios) {
+      const bool lost = ratio.value > kLossRatio;
+      if (lost) loss.worst = std::max(loss.worst, ratio.value);
+      loss.row.cells.push_back({lost ? Fixed(ratio.value, 2) : ""});
+    }
+    if (loss.worst > 0) losses.push_back(std::move(loss));
+  }
+  std::ranges::stable_sort(losses, std::ranges::greater(), &Loss::worst);
+  for (Loss& loss : losses) table.rows.push_back(std::move(loss.row));
+  return table;
+}
+
+Table DeviationTable(const Study& study, const Selection& selection, std::string_view method) {
+  Table table{Title("mean deviation by sequence", selection) + ", " + std::string(method),
+              "In spacings; worst first. A ratio above 1 is marked.",
+              {std::string(method), std::string(kBaseline), "ratio"},
               {}};
   const auto rows = study.Of(method, selection.knowledge, selection.recordings);
-  if (selection.recordings) table.heads.push_back("share with known motion");
   const auto baseline = study.Of(kBaseline, selection.knowledge, selection.recordings);
-  for (const Row& row : rows) {
-    TableRow& line = table.rows.emplace_back(TableRow{row.sequence, {}});
-    for (const Metric metric : JudgedMetrics(selection.recordings)) {
-      const auto pairs = MatchPairs(std::span(&row, 1), baseline, metric);
-      line.cells.push_back(RatioCell(RatioOfMeans(pairs), kGroupLossRatio));
+  constexpr std::array kMetric = {Metric::kMeanDeviation};
+  const auto add = [&](const std::string& name, std::span<const Row> of, double ratio) {
+    const std::vector<Pair> pairs = MatchPairs(of, baseline, kMetric[0]);
+    Pair means;
+    for (const Pair& pair : pairs) {
+      means.method += pair.method / static_cast<double>(pairs.size());
+      means.baseline += pair.baseline / static_cast<double>(pairs.size());
     }
-    if (selection.recordings) line.cells.push_back({Fixed(row[Metric::kKnownShare], 3)});
+    table.rows.push_back(
+        {name, {{Fixed(means.method, 4)}, {Fixed(means.baseline, 4)}, RatioCell(ratio, 1)}});
+  };
+  for (const Part& part : CompareParts(rows, baseline, kMetric, 0, By::kSequence)) {
+    const auto row = std::ranges::find(rows, part.name, &Row::sequence);
+    add(part.name, std::span(&*row, 1), part.ratios[0].value);
+  }
+  add("mean (ratio: geometric)", rows, CompareRows(rows, baseline, kMetric[0]).ratio.value);
+  return table;
+}
+
+std::vector<Table> DetailTables(const Study& study, const Selection& selection,
+                                std::string_view method) {
+  if (selection.recordings) return {PartTable(study, selection, method, By::kSequence)};
+  std::vector<Table> tables;
+  const auto rows = study.Of(method, selection.knowledge, false);
+  const bool one_group =
+      std::ranges::all_of(rows, [&](const Row& row) { return row.group == rows.front().group; });
+  tables.push_back(one_group ? DeviationTable(study, selection, method)
+                             : PartTable(study, selection, method, By::kGroup));
+  tables.push_back(PartTable(study, selection, method, By::kSampler));
+  tables.push_back(LossTable(study, selection, method));
+  return tables;
+}
+
+Table NeighbourTable(const Study& study) {
+  Table table{"Nearest neighbours",
+              "In spacings, those beyond two left out. Samplers: mean over all frames; recordings: "
+              "of one frame.",
+              {"mean", "standard deviation"},
+              {}};
+  const auto add = [&](std::string name, const NeighbourDistances& distances) {
+    table.rows.push_back(
+        {std::move(name), {{Fixed(distances.mean, 3)}, {Fixed(distances.deviation, 3)}}});
+  };
+  struct Sum {
+    std::string sampler;
+    NeighbourDistances total;
+    double frames = 0;
+  };
+  std::vector<Sum> sums;
+  for (const Row& row : study.Of(kBaseline, study.told.front(), false)) {
+    auto sum = std::ranges::find(sums, row.sampler, &Sum::sampler);
+    if (sum == sums.end()) sum = sums.insert(sum, {row.sampler, {}, 0});
+    for (const FrameNumbers& frame : row.frames) {
+      sum->total.mean += frame.neighbours.mean;
+      sum->total.deviation += frame.neighbours.deviation;
+      sum->frames += 1;
+    }
+  }
+  for (const Sum& sum : sums) {
+    add(sum.sampler, {sum.total.mean / sum.frames, sum.total.deviation / sum.frames});
+  }
+  for (const Row& row : study.Of(kBaseline, study.told.front(), true)) {
+    const std::size_t last = row.frames.size() - 1;
+    for (const auto& [when, frame] :
+         {std::pair{"first", std::size_t{0}}, {"middle", last / 2}, {"last", last}}) {
+      add(absl::StrCat(row.sequence, ", ", when, " frame"), row.frames[frame].neighbours);
+    }
   }
   return table;
 }

@@ -122,6 +122,7 @@ class Page {
     if (frame.dropped_spray > 0) numbers.push(['Dropped spray', shown(frame.dropped_spray)]);
     if (frame.self_intersections > 0) numbers.push(['Self-crossings', shown(frame.self_intersections), 'alert']);
     if (frame.folded_triangles > 0) numbers.push(['Folded', shown(frame.folded_triangles), 'alert']);
+    if (frame.doubts) numbers.push(['Doubts', frame.doubts.replaceAll(' ', ', '), 'alert']);
     numbers.push(['Digests', `rings ${frame.rings_digest}, mesh ${frame.mesh_digest}`, 'digest']);
     byId('numbers').replaceChildren(...numbers.map(([name, value, kind]) => {
       const cell = document.createElement('div');

@@ -31,8 +31,8 @@ struct Frame {
   /// Simulation time. Velocities count between frames of which the later one has the larger time.
   double time = 0;
 
-  // Ids, velocities and time decide identities of rings (core/METHOD.md, "Identities"), ids carry
-  // the memory of the outline ("The default placement", 6); nothing else depends on them.
+  // Ids, velocities and time decide identities of rings (core/METHOD.md, "Identities"); nothing
+  // else depends on them.
 
   std::size_t ParticleCount() const {
     return std::visit([](auto view) { return view.size(); }, positions) /
@@ -46,7 +46,8 @@ struct FrameLimits {
   static constexpr std::size_t kMostParticles = 1'000'000'000, kMostTiles = 1'000'000;
 
   std::size_t max_particles = 16'000'000;
-  /// Tiles of 32 x 32 lattice nodes that particles reach; a tile costs about 10 kB of memory.
+  /// Tiles of 32 x 32 lattice nodes that particles reach. One that little of the isoline runs
+  /// through costs about 10 kB of memory; each of its cells that it does run through 1 kB more.
   std::size_t max_tiles = 131'072;
 };
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "absl/status/status.h"
+#include "partiemc/virtual_plane_constants.h"
 
 namespace partiemc {
 
@@ -29,12 +30,13 @@ enum class Fill : std::uint8_t {
 
 /// Where the particle spacing h comes from when the caller does not give it.
 enum class SpacingRule : std::uint8_t {
-  kFirstFrame,  ///< Estimated from the first frame with two distinct positions, then kept.
-  kEveryFrame,  ///< Estimated in each frame; it changes the radii, never the lattice.
+  kFirstFrame,  ///< Estimated from the first frame whose particles agree on one, then kept.
+  kEveryFrame,  ///< Of each frame that agrees on one; it changes the radii, never the lattice.
 };
 
-/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). All on is the method;
-/// each can be switched off, so that `evaluate` can show what it is worth. Not on the wire.
+/// What the steps of `virtual-plane` are made of (core/METHOD.md, "The default placement"). All on
+/// is the method; each can be switched off, so that `evaluate` can show what it is worth. Not on
+/// the wire.
 struct VirtualPlaneSteps {
   bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, beside the cell's.
   bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
@@ -80,15 +82,12 @@ struct ReconstructionParameters {
   /// Orient the cell normals by those of the frame before (Eq. 11); otherwise by the isoline alone.
   bool normal_memory = true;
 
-  /// `virtual-plane` only: where particles have ids, let them carry the outline of the last frame
-  /// along, and move vertices towards it. Calmer outlines; without ids it does nothing.
-  bool outline_memory = true;
-
   /// Drop holes smaller than six particles and components that hold no particle. Absent: as the
   /// placement wants it (on for `virtual-plane`, off for the others).
   std::optional<bool> clean = std::nullopt;
 
   VirtualPlaneSteps steps;
+  VirtualPlaneConstants constants;
 
   /// Components that enclose less area than this many squared spacings, at least 0 (a lone
   /// particle's has about 2), or fewer particles than this, are dropped with everything in them,

@@ -12,6 +12,7 @@
 #pragma once
 
 #include "partiemc/arena.h"
+#include "partiemc/doubt.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/reconstructor.h"

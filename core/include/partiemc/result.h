@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "partiemc/doubt.h"
+
 namespace partiemc {
 
 /// Marks an outer ring in Rings::outer_of.
@@ -78,10 +80,12 @@ struct Mesh {
 
 struct FrameStatistics {
   std::uint64_t particles = 0;
-  std::uint64_t tiles = 0;               ///< Tiles of 32 x 32 nodes that were allocated.
-  std::uint64_t active_cells = 0;        ///< Cells that the isoline runs through.
-  std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
-  std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
+  std::uint64_t tiles = 0;          ///< Tiles of 32 x 32 nodes that were allocated.
+  std::uint64_t active_cells = 0;   ///< Cells that the isoline runs through.
+  std::uint64_t dropped_holes = 0;  ///< Holes that cleaning closed.
+  /// Components without a particle that cleaning removed. Those whose rings could not be made
+  /// simple would count here, too: there are none (core/METHOD.md, "Why rings are simple").
+  std::uint64_t dropped_components = 0;
   std::uint64_t dropped_spray = 0;       ///< Components below a size that the caller set.
   std::uint64_t triangles = 0;           ///< Triangles of the mesh.
   std::uint64_t triangles_grid = 0;      ///< What `grid` would have made of the same rings.
@@ -89,8 +93,9 @@ struct FrameStatistics {
   std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
   double area = 0;       ///< Sum over rings of their signed areas, world units squared.
   double perimeter = 0;  ///< Sum over rings, world units.
-  double spacing = 0;    ///< Spacing used in this frame, world units; 0 while undecided.
-  double cell_size = 0;  ///< Lattice spacing of the stream, world units; 0 while undecided.
+  double spacing = 0;    ///< Spacing used in this frame, world units; 0: there was none.
+  double cell_size = 0;  ///< That of the lattice, world units; of the stream unless provisional.
+  Doubts doubts;         ///< What speaks against this answer.
 
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };

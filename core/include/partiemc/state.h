@@ -65,56 +65,32 @@ struct RingHistory {
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
 
-/// A particle of the last frame that was near its outline.
-struct NearParticle {
-  std::uint64_t hash = 0;  ///< Of its id, as ParticleSample::hash.
-  double x = 0, y = 0;     ///< In cells from the origin.
-
-  friend bool operator==(const NearParticle&, const NearParticle&) = default;
-};
-
-/// The outline of the last frame before it was matched to an area, and the particles that carry it
-/// into the next one (core/METHOD.md, "The default placement", step 6). Empty where particles have
-/// no ids. Its size follows the length of the outline and the particles beside it.
-struct KnownOutline {
-  std::vector<std::uint32_t> offsets;   ///< Ring k has points [offsets[k], offsets[k + 1]).
-  std::vector<double> points;           ///< x, y of each, in cells from the origin.
-  std::vector<NearParticle> particles;  ///< By hash.
-
-  void Clear() {
-    offsets.clear();
-    points.clear();
-    particles.clear();
-  }
-
-  friend bool operator==(const KnownOutline&, const KnownOutline&) = default;
-};
-
 /// Everything that a stream remembers between frames, and nothing else. A default-constructed
 /// State is that of a stream that has seen no frame. Reconstruction is a pure function of frame
 /// and state, so that a stream goes on from a restored State bit for bit as if it had never
 /// stopped.
 struct State {
-  /// Lattice spacing in world units: set by the first frame with two distinct positions (or by a
-  /// given spacing), never changed afterwards.
+  /// Lattice spacing in world units: set by a given spacing, or by the first frame whose particles
+  /// agree on one; never changed afterwards. Frames before that one leave nothing behind.
   std::optional<double> cell_size;
   /// Spacing in use, world units.
   std::optional<double> spacing;
   /// How far the last frame's outline was moved to match its area, in spacings (core/METHOD.md,
-  /// "The default placement", step 7).
+  /// "The default placement", step 6).
   std::optional<double> area_offset;
   /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
   std::vector<CellNormal> normals;
   RingHistory history;
-  KnownOutline outline;
 
   friend bool operator==(const State&, const State&) = default;
 };
 
-/// Bytes with a version and a checksum; the same on every machine. Size: 112 bytes, 16 per normal,
-/// 32 per ring, 16 per run and 20 per sample; of the outline 4 per offset, 16 per point and 24 per
-/// particle.
+/// Bytes with a version and a checksum; the same on every machine. Size: 88 bytes, 16 per normal,
+/// 32 per ring, 16 per run and 20 per sample.
 std::string Serialize(const State& state);
+
+/// The number of them, without writing any.
+std::size_t SerializedBytes(const State& state);
 
 /// The state that Serialize wrote. Errors: INVALID_ARGUMENT (reason CORRUPT_STATE) for anything
 /// else, other versions included; bytes are untrusted, every count is checked against their number

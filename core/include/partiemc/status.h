@@ -27,7 +27,9 @@ inline constexpr std::string_view kReasonCount = "COUNT";
 inline constexpr std::string_view kReasonDuplicate = "DUPLICATE";
 inline constexpr std::string_view kReasonTooManyParticles = "TOO_MANY_PARTICLES";
 inline constexpr std::string_view kReasonTooManyTiles = "TOO_MANY_TILES";
+inline constexpr std::string_view kReasonOutOfMemory = "OUT_OF_MEMORY";
 inline constexpr std::string_view kReasonNotPlanar = "NOT_PLANAR";
+inline constexpr std::string_view kReasonResolution = "RESOLUTION";
 inline constexpr std::string_view kReasonCorruptState = "CORRUPT_STATE";
 
 /// A status of the given code whose message reads "field: value; rule" and which carries

@@ -28,11 +28,10 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
   EXPECT_THAT(FilesIn(output), ElementsAre("evaluation.csv", "evaluation.html", "evaluation.json"));
 
   const auto json = nlohmann::json::parse(Content(output + "/evaluation.json"));
-  std::set<std::string> sequences, methods, on_scenes;
+  std::set<std::string> sequences, methods;
   for (const auto& row : json["rows"]) {
     sequences.insert(row["sequence"]);
     methods.insert(row["method"]);
-    if (row["group"] != "recording") on_scenes.insert(row["method"]);
     EXPECT_EQ(row["ids"], row["group"] == "recording") << row;
     EXPECT_GT(row["vertices"], 3) << row;
     EXPECT_EQ(row["spurious_components"], 0) << row;
@@ -41,8 +40,7 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
     }
   }
   EXPECT_EQ(sequences.size(), 8u) << "one of each group, and the recording";
-  EXPECT_EQ(on_scenes.size(), 12u);
-  EXPECT_EQ(methods.size(), 13u) << "virtual-plane-no-memory is for the recording, which has ids";
+  EXPECT_EQ(methods.size(), 12u);
   const std::string csv = Content(output + "/evaluation.csv");
   EXPECT_EQ(std::ranges::count(csv, '\n'), 1 + std::ssize(json["rows"]));
 
@@ -60,7 +58,7 @@ TEST(Evaluate, TheSmokeSetAndADamBreakMakePageCsvAndJson) {
 TEST(Evaluate, ScenesTellIdsWhereTheyAreAskedTo) {
   const support::TemporaryFolder directory;
   const Ran ran = RunPartiemc({"evaluate", "--ids", "--quiet", "--methods",
-                               "virtual-plane-no-memory", "--output-dir", directory.Path("out")});
+                               "virtual-plane-no-volumes", "--output-dir", directory.Path("out")});
   ASSERT_EQ(ran.exit_code, 0) << ran.error;
   EXPECT_THAT(ran.out, HasSubstr("methods were told which particle is which (--ids)"));
   const auto json = nlohmann::json::parse(Content(directory.Path("out/evaluation.json")));
@@ -70,7 +68,33 @@ TEST(Evaluate, ScenesTellIdsWhereTheyAreAskedTo) {
     EXPECT_EQ(row["ids"], true) << row;
   }
   EXPECT_THAT(methods, ElementsAre("farthest-particle", "marching-squares", "qef", "virtual-plane",
-                                   "virtual-plane-no-memory"));
+                                   "virtual-plane-no-volumes"));
+}
+
+TEST(Evaluate, RecordingsOfAFolderAreMeasuredByWhatIsKnownOfThem) {
+  const support::TemporaryFolder directory;
+  const Ran ran = RunPartiemc({"evaluate", "--quiet", "--methods", "virtual-plane", "--recordings",
+                               PARTIEMC_SOURCE_DIR "/tests/data/recordings", "--frames", "8:11",
+                               "--output-dir", directory.Path("out")});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.out, HasSubstr("ratios by sequence, spacing given, virtual-plane"));
+  EXPECT_THAT(ran.out, HasSubstr("ellipse.pemc, middle frame"));
+  const auto json = nlohmann::json::parse(Content(directory.Path("out/evaluation.json")));
+  std::set<std::string> all, with_walls, with_truth, with_area;
+  for (const auto& row : json["rows"]) {
+    if (row["group"] != "recording") continue;
+    all.insert(row["sequence"]);
+    EXPECT_TRUE(row["known_mean_jitter"].is_number()) << row;
+    if (row["wall_roughness"].is_number()) with_walls.insert(row["sequence"]);
+    if (row["mean_deviation"].is_number()) with_truth.insert(row["sequence"]);
+    if (row["area_error_size"].is_number()) with_area.insert(row["sequence"]);
+  }
+  EXPECT_THAT(all, ElementsAre("drop_on_film.pemc", "ellipse.pemc", "granular_column.pemc",
+                               "sloshing.pemc", "splash.pemc", "square.pemc"));
+  EXPECT_THAT(with_walls, ElementsAre("drop_on_film.pemc", "granular_column.pemc", "sloshing.pemc",
+                                      "splash.pemc"));
+  EXPECT_THAT(with_truth, ElementsAre("ellipse.pemc"));
+  EXPECT_THAT(with_area, ElementsAre("ellipse.pemc", "sloshing.pemc", "square.pemc"));
 }
 
 TEST(Evaluate, AWrongWordIsOneLineAndNothingIsMade) {
@@ -81,6 +105,7 @@ TEST(Evaluate, AWrongWordIsOneLineAndNothingIsMade) {
       {"--threads", "0"},
       {"--recording", kDamBreak, "--frames", "x"},
       {"--recording", kDamBreak, "--select", "type=1"},
+      {"--recordings"},
   };
   for (std::vector<std::string> arguments : wrong) {
     arguments.insert(arguments.begin(), "evaluate");
@@ -91,6 +116,15 @@ TEST(Evaluate, AWrongWordIsOneLineAndNothingIsMade) {
     EXPECT_THAT(ran.out, IsEmpty());
   }
   EXPECT_THAT(FilesIn(directory.path()), IsEmpty());
+}
+
+TEST(Evaluate, AFolderWithoutRecordingsIsRefused) {
+  const support::TemporaryFolder directory;
+  for (const std::string& folder : {directory.path().string(), directory.Path("absent")}) {
+    const Ran ran = RunPartiemc({"evaluate", "--recordings", folder});
+    EXPECT_EQ(ran.exit_code, 3) << ran.error;
+    EXPECT_THAT(ran.error, HasSubstr(folder));
+  }
 }
 
 TEST(Evaluate, ARecordingOfOneFrameIsRefused) {

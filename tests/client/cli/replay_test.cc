@@ -7,6 +7,7 @@
 #include <chrono>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <sstream>
 #include <thread>
@@ -209,6 +210,20 @@ TEST(Replay, AFrameThatIsRefusedIsToldAndTheOthersGoOn) {
   }
 }
 
+TEST(Replay, WarnsOfDoubtsAndTellsWhatHelps) {
+  const support::TemporaryFolder directory;
+  for (const char* frame : {"frame_0.csv", "frame_1.csv"}) {
+    std::ofstream(directory.Path(frame)) << "x,y\n0,0\n300,400\n";
+  }
+  const std::string input = directory.path().string();
+  const Ran guessed = RunPartiemc({"replay", input, "--local"});
+  EXPECT_EQ(guessed.exit_code, 0) << guessed.error;
+  EXPECT_THAT(guessed.error, HasSubstr("doubt in 2 of 2 frames: spacing-provisional: "));
+  EXPECT_THAT(guessed.error, HasSubstr("give the spacing"));
+  const Ran given = RunPartiemc({"replay", input, "--local", "--spacing", "1"});
+  EXPECT_EQ(given.error.find("doubt"), std::string::npos) << given.error;
+}
+
 TEST(Replay, QuietSaysNothing) {
   const Ran ran = RunPartiemc({"replay", kDamBreak, "--local", "--quiet", "--frames", "0:5"});
   EXPECT_EQ(ran.exit_code, 0);
@@ -225,17 +240,39 @@ TEST(Replay, ARecordingThatWasCutOffIsReplayedAsFarAsItGoes) {
   EXPECT_THAT(ran.error, HasSubstr("truncated after"));
 }
 
-TEST(Replay, ADamagedRecordingIsExitCodeThreeAndLeavesNoStatisticsTakenForWhole) {
-  const support::TemporaryFolder directory;
+// What came through before the end that `why` tells: a row of statistics and a frame of the report
+// for each file that was written.
+void ExpectKept(const support::TemporaryFolder& directory, const std::string& why) {
+  const std::string report = Content(directory.Path("report.html"));
+  EXPECT_THAT(report, AllOf(HasSubstr("ended early: " + why), HasSubstr("</html>")));
+  std::size_t frames_in_report = 0;
+  const std::string mark = "class=\"frame-numbers\">";
+  for (auto at = report.find(mark); at != report.npos; at = report.find(mark, at + 1)) {
+    ++frames_in_report;
+  }
+  std::vector<std::string> expected;
+  const auto frames = Column(Content(directory.Path("stats.csv")), "frame");
+  EXPECT_GE(frames.size(), 1u);
+  EXPECT_EQ(frames_in_report, frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(frames[k], std::to_string(k));
+  for (const std::string& file : FilesIn(directory.path())) {
+    EXPECT_EQ(file.find(".part"), file.npos) << file;  // Nothing half written.
+  }
+}
+
+TEST(Replay, ADamagedRecordingIsExitCodeThreeAndKeepsWhatCameBefore) {
+  const support::TemporaryFolder input, directory;
   std::string bytes = Content(kDamBreak);
   bytes[bytes.size() / 2] = static_cast<char>(~bytes[bytes.size() / 2]);
-  std::ofstream(directory.Path("damaged.pemc"), std::ios::binary) << bytes;
-  const Ran ran = RunPartiemc({"replay", directory.Path("damaged.pemc"), "--local", "--quiet",
-                               "--stats", directory.Path("stats.csv")});
+  std::ofstream(input.Path("damaged.pemc"), std::ios::binary) << bytes;
+  const Ran ran =
+      RunPartiemc({"replay", input.Path("damaged.pemc"), "--local", "--quiet", "--stats",
+                   directory.Path("stats.csv"), "--report", directory.Path("report.html")});
   EXPECT_EQ(ran.exit_code, 3);
   EXPECT_THAT(ran.error, HasSubstr("damaged after"));
   EXPECT_EQ(std::ranges::count(ran.error, '\n'), 1) << ran.error;
-  EXPECT_THAT(FilesIn(directory.path()), ElementsAre("damaged.pemc"));
+  EXPECT_THAT(FilesIn(directory.path()), ElementsAre("report.html", "stats.csv"));
+  ExpectKept(directory, "the input could not be read further");
 }
 
 TEST(Replay, ARangeWithoutFramesIsExitCodeThree) {
@@ -251,41 +288,69 @@ TEST(Replay, APlaceThatCannotBeWrittenIsKnownBeforeTheWork) {
   EXPECT_THAT(ran.error, HasSubstr("/nonexistent/directory/report.html"));
 }
 
-TEST(Replay, CtrlCEndsItWithWholeFramesAndNothingHalfWritten) {
-  const support::TemporaryFolder directory;
-  Program replay(
-      PARTIEMC_PROGRAM,
-      {"replay", kDamBreak, "--local", "--rate", "50", "--output-dir", directory.Path("frames"),
-       "--stats", directory.Path("stats.csv"), "--report", directory.Path("report.html")});
+// A replay into `directory` that is under way: two frames are there.
+std::unique_ptr<Program> BeginReplay(const support::TemporaryFolder& directory,
+                                     std::vector<std::string> where) {
+  where.insert(where.begin(),
+               {"replay", kDamBreak, "--rate", "50", "--output-dir", directory.Path("frames"),
+                "--stats", directory.Path("stats.csv"), "--report", directory.Path("report.html")});
+  auto replay = std::make_unique<Program>(PARTIEMC_PROGRAM, where);
   const std::string second = directory.Path("frames/frame_000001.geojson");
-  while (replay.Running() && !std::filesystem::exists(second)) {
+  while (replay->Running() && !std::filesystem::exists(second)) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  replay.Signal(SIGINT);
-  EXPECT_EQ(replay.Wait(), 130);
-  EXPECT_THAT(replay.Error(), HasSubstr("interrupted after"));
-  for (const std::string& file : FilesIn(directory.path())) {
-    EXPECT_THAT(file, ::testing::MatchesRegex("frames/frame_0000[0-9][0-9]\\.geojson"));
-    EXPECT_TRUE(Content(directory.Path(file)).ends_with("}\n")) << file;
+  return replay;
+}
+
+TEST(Replay, CtrlCEndsItWithWholeFramesTheirStatisticsAndTheirReport) {
+  const ServerProgram server;
+  for (const std::vector<std::string>& where :
+       {std::vector<std::string>{"--local"}, {"--server", server.address()}}) {
+    const support::TemporaryFolder directory;
+    const auto replay = BeginReplay(directory, where);
+    replay->Signal(SIGINT);
+    EXPECT_EQ(replay->Wait(), 130);
+    EXPECT_THAT(replay->Error(), HasSubstr("interrupted after"));
+    EXPECT_THAT(replay->Out(), HasSubstr("ended early: interrupted"));
+    ExpectKept(directory, "interrupted");
+    for (const std::string& file : FilesIn(directory.path())) {
+      if (file == "report.html" || file == "stats.csv") continue;
+      EXPECT_THAT(file, ::testing::MatchesRegex("frames/frame_0000[0-9][0-9]\\.geojson"));
+      EXPECT_TRUE(Content(directory.Path(file)).ends_with("}\n")) << file;
+    }
   }
 }
 
-TEST(Replay, AServerThatDiesIsExitCodeFourInOneLine) {
-  const ServerProgram server;
-  const support::TemporaryFolder directory;
-  Program replay(PARTIEMC_PROGRAM, {"replay", kDamBreak, "--server", server.address(), "--rate",
-                                    "50", "--quiet", "--output-dir", directory.Path("frames"),
-                                    "--stats", directory.Path("stats.csv")});
-  const std::string second = directory.Path("frames/frame_000001.geojson");
-  while (replay.Running() && !std::filesystem::exists(second)) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+// Its checkpoints are of no use without another server, to which it looks in vain.
+TEST(Replay, AServerThatDiesIsExitCodeFourInOneLineAndKeepsWhatCameBefore) {
+  for (const char* interval : {"0", "1"}) {
+    const ServerProgram server;
+    const support::TemporaryFolder directory;
+    const auto replay =
+        BeginReplay(directory, {"--server", server.address(), "--quiet", "--checkpoint-interval",
+                                interval, "--deadline", "2"});
+    server.Signal(SIGKILL);
+    EXPECT_EQ(replay->Wait(), 4);
+    const std::string error = replay->Error();
+    EXPECT_EQ(std::ranges::count(error, '\n'), 1) << error;
+    EXPECT_THAT(error, HasSubstr(server.address()));
+    ExpectKept(directory, "the server was lost");
   }
-  server.Signal(SIGKILL);
-  EXPECT_EQ(replay.Wait(), 4);
-  const std::string error = replay.Error();
-  EXPECT_EQ(std::ranges::count(error, '\n'), 1) << error;
-  EXPECT_THAT(error, HasSubstr(server.address()));
-  EXPECT_FALSE(std::filesystem::exists(directory.Path("stats.csv")));
+}
+
+TEST(Replay, AFileOfAnyNameIsReplayedThroughAServer) {
+  const ServerProgram server;
+  const support::TemporaryFolder input;
+  for (const std::string& name : {std::string("two\nlines\x1b[31m.csv"), std::string("\xff.csv"),
+                                  std::string(60, 'x') + "\xc3\xa4.csv"}) {
+    std::ofstream file(input.Path(name));
+    file << "x,y\n";
+    for (int k = 0; k < 36; ++k) file << k % 6 << "," << k / 6 << "\n";
+    file.close();
+    const Ran ran = RunPartiemc(
+        {"replay", input.Path(name), "--server", server.address(), "--spacing", "1", "--quiet"});
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  }
 }
 
 TEST(Info, TellsVersionAndLimitsForPeopleAndPrograms) {

@@ -60,6 +60,17 @@ TEST(LammpsDump, ATiltedBoxShearsScaledPositions) {
   EXPECT_THAT(read.frames[0].positions, ElementsAre(4, 20, 7, 10));
 }
 
+TEST(LammpsDump, TheBoundsOfATriclinicBoxHoldAllOfItsCorners) {
+  // Boxes of 10 x 20 x 1 that lean twice along x: the corner of both tilts is the farthest.
+  const std::string head = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n";
+  for (const std::string bounds :
+       {"0 17 4\n-2 20 3\n-0.5 0.5 -2\n", "-7 10 -4\n0 22 -3\n-0.5 0.5 2\n"}) {
+    const ReadSequence read = Read(Frame("0", "2", "xs ys\n0 0\n1 0\n", head + bounds));
+    ASSERT_EQ(read.frames.size(), 1u) << read.status;
+    EXPECT_THAT(read.frames[0].positions, ElementsAre(0, 0, 10, 0)) << bounds;
+  }
+}
+
 TEST(LammpsDump, ABoxGivenByItsEdgesIsTheSameBox) {
   const std::string edges =
       "ITEM: BOX BOUNDS abc origin pp pp pp\n10 0 0 0\n4 20 0 0\n0 0 1 -0.5\n";

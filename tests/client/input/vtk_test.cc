@@ -70,6 +70,40 @@ TEST(Vtk, LegacyFilesTellTheirTime) {
   EXPECT_FALSE(frame.float32);
 }
 
+constexpr char kLegacy[] = "# vtk DataFile Version 4.2\nx\nASCII\nDATASET ";
+constexpr char kTwoPoints[] = "POINTS 2 double\n1 2 0\n3 4 0\n";
+constexpr char kMasses[] = "POINT_DATA 2\nSCALARS mass double 1\nLOOKUP_TABLE default\n5 6\n";
+
+TEST(Vtk, CellsArePassedOver) {
+  const support::TemporaryFolder directory;
+  const std::string cell_data = "CELL_DATA 2\nSCALARS mass double 1\nLOOKUP_TABLE default\n7 8\n";
+  const std::string before = std::string(kLegacy) + "UNSTRUCTURED_GRID\n" + kTwoPoints;
+  for (const std::string& cells : {
+           std::string("CELLS 2 4\n1 0\n1 1\nCELL_TYPES 2\n1\n1\n"),
+           // Indices of points that are not there, and counts beyond the cells' end.
+           std::string("CELLS 2 4\n9 900000000\n-7 1\nCELL_TYPES 2\n1\n99\n"),
+           std::string("CELLS 1 2\n5 0\nCELL_TYPES 1\n1\n"),
+       }) {
+    for (const std::string& data : {std::string(), cell_data}) {
+      const RecordedFrame frame = ReadOne(directory.Write("a.vtk", before + cells + data + kMasses),
+                                          {.select = {"mass=6"}});
+      EXPECT_THAT(frame.positions, ElementsAre(3, 4)) << cells << data;
+    }
+  }
+}
+
+TEST(Vtk, CellsThatTheFileCannotHoldAreRefused) {
+  const support::TemporaryFolder directory;
+  for (const char* cells :
+       {"CELLS 2 4000000000000\n", "CELLS -1 2\n", "CELLS 2\n", "CELLS 2 4\n1 0",
+        "VERTICES 1 9999999\n1 0\n", "CELL_TYPES 70000000000\n1\n"}) {
+    ExpectRefused(ReadAll(directory.Write("a.vtk", std::string(kLegacy) + "UNSTRUCTURED_GRID\n" +
+                                                       kTwoPoints + cells))
+                      .status,
+                  absl::StatusCode::kDataLoss, {"a.vtk", "VTK cannot read it"});
+  }
+}
+
 TEST(Vtk, DeclaredCountsAreNotBelieved) {
   const support::TemporaryFolder directory;
   for (const char* count : {"60000000", "999999999999"}) {

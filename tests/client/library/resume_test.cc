@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
 #include <thread>
 #include <vector>
 
@@ -23,9 +24,11 @@ const std::string kToken(32, '7');
 const std::vector<double> kPositions = {1, 2};
 const Frame kFrame{.positions = std::span<const double>(kPositions)};
 
-// Accepts a stream that can be resumed; gives the request.
-v1::OpenStream AcceptResumable(FakeServer::Rpc& rpc, std::uint64_t next_sequence,
-                               std::uint64_t max_frame_bytes = 1 << 20) {
+// Accepts a stream that can be resumed, `change` being what this server does otherwise; gives the
+// request.
+v1::OpenStream AcceptResumable(
+    FakeServer::Rpc& rpc, std::uint64_t next_sequence,
+    const std::function<void(v1::StreamOpened&)>& change = [](v1::StreamOpened&) {}) {
   v1::ReconstructRequest request;
   rpc.Read(&request);
   v1::ReconstructResponse response;
@@ -33,8 +36,9 @@ v1::OpenStream AcceptResumable(FakeServer::Rpc& rpc, std::uint64_t next_sequence
   opened.set_stream_token(kToken);
   *opened.mutable_parameters() = request.open().parameters();
   opened.set_frames_in_flight(2);
-  opened.mutable_limits()->set_max_frame_bytes(max_frame_bytes);
+  opened.mutable_limits()->set_max_frame_bytes(1 << 20);
   opened.set_next_sequence(next_sequence);
+  change(opened);
   rpc.Write(response);
   return request.open();
 }
@@ -45,7 +49,7 @@ void AnswerSome(FakeServer::Rpc& rpc, int count, std::uint64_t interval) {
   for (int k = 0; k < count && ReadFrame(rpc, frame); ++k) {
     auto answer = TriangleAt(frame);
     if (frame.sequence() % interval == 0) {
-      answer.mutable_frame()->set_checkpoint("after " + std::to_string(frame.sequence()));
+      answer.set_checkpoint("after " + std::to_string(frame.sequence()));
     }
     rpc.Write(answer);
   }
@@ -146,6 +150,33 @@ TEST(Resume, AVerdictOfTheServerIsNoLostConnectionWhateverItsCode) {
   EXPECT_EQ(calls, 1);
 }
 
+class MayPassElsewhere : public testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Reason, MayPassElsewhere,
+                         testing::Values("NAME_IN_USE", "TOO_MANY_STREAMS", "CHECKPOINT_MISMATCH",
+                                         "CHECKPOINT_SIGNATURE"));
+
+TEST_P(MayPassElsewhere, IsNoVerdictWhileAStreamResumes) {
+  FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  FakeServer strange([&](grpc::ServerContext& context, FakeServer::Rpc&) {
+    context.AddTrailingMetadata("partiemc-reason", GetParam());
+    return Lost(grpc::StatusCode::FAILED_PRECONDITION);
+  });
+  FakeServer good([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  StreamOptions options = Options(&strange);
+  options.fallback_addresses.push_back(good.address());
+  const auto stream = Stream::Open(first.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_THAT(Exchange(**stream, 2), ElementsAre(1, 2));
+}
+
 TEST(Resume, ADrainingServerIsLeftWithoutAWordToTheCaller) {
   FakeServer first([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
     AcceptResumable(rpc, 1);
@@ -187,13 +218,16 @@ TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
   EXPECT_EQ(event.sequence, 1u);
 }
 
-TEST(Resume, AReplicaWithSmallerLimitsIsPassedOver) {
+// What is true of a replica that cannot go on with a stream as the first server began it.
+void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise) {
   FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     AcceptResumable(rpc, 1);
     return Lost(grpc::StatusCode::UNAVAILABLE);
   });
-  FakeServer small([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
-    AcceptResumable(rpc, 1, 100);
+  FakeServer other([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1, otherwise);
+    v1::ParticleFrame frame;
+    EXPECT_FALSE(ReadFrame(rpc, frame)) << "a frame of a stream that it cannot go on with";
     return WaitForCancel(context);
   });
   FakeServer good([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
@@ -201,11 +235,21 @@ TEST(Resume, AReplicaWithSmallerLimitsIsPassedOver) {
     AnswerSome(rpc, 100, 2);
     return grpc::Status::OK;
   });
-  StreamOptions options = Options(&small);
+  StreamOptions options = Options(&other);
   options.fallback_addresses.push_back(good.address());
   const auto stream = Stream::Open(first.address(), options);
   ASSERT_TRUE(stream.ok()) << stream.status();
   EXPECT_THAT(Exchange(**stream, 2), ElementsAre(1, 2));
+}
+
+TEST(Resume, AReplicaWithSmallerLimitsIsPassedOver) {
+  ExpectPassedOver(
+      [](v1::StreamOpened& opened) { opened.mutable_limits()->set_max_frame_bytes(100); });
+}
+
+TEST(Resume, AReplicaThatResolvesTheParametersOtherwiseIsPassedOver) {
+  ExpectPassedOver(
+      [](v1::StreamOpened& opened) { opened.mutable_parameters()->set_kernel_radius(4); });
 }
 
 TEST(Resume, GivesUpInTimeWithTheLastError) {

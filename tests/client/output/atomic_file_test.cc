@@ -112,6 +112,19 @@ TEST(AtomicFile, AFullDiskInTheMiddleLeavesNothing) {
   EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
+TEST(AtomicFile, AFullDiskAtTheEndLeavesNothingEither) {
+  support::TemporaryFolder directory;
+  auto file = AtomicFile::Create(directory / "out.txt");
+  ASSERT_TRUE(file.ok()) << file.status();
+  ASSERT_TRUE(file->Append(std::string(2000, 'x')).ok());  // Waits for Commit.
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_FALSE(file->Commit().ok());
+  }
+  { const AtomicFile gone = *std::move(file); }
+  EXPECT_THAT(directory.Entries(), IsEmpty());
+}
+
 // A pipe of its own stands for all that is no regular file: with /dev/null, a mistake would
 // replace the machine's.
 TEST(AtomicFile, APipeIsWrittenStraightAwayAndStaysAPipe) {

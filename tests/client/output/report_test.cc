@@ -256,15 +256,6 @@ TEST(Report, ParametersAreDescribedUnderTheirNames) {
                   std::pair("fewest particles", "3")));
 }
 
-TEST(Report, TheMemoryOfTheOutlineIsToldOfThePlacementThatHasOne) {
-  using Line = std::pair<std::string, std::string>;
-  EXPECT_THAT(DescribeParameters({}), Contains(Line("outline memory", "on")));
-  EXPECT_THAT(DescribeParameters({.outline_memory = false}),
-              Contains(Line("outline memory", "off")));
-  EXPECT_THAT(DescribeParameters({.placement = Placement::kQef}),
-              Not(Contains(Key("outline memory"))));
-}
-
 TEST(ReportGeometry, RingsMeshAndParticlesComeBackWithinHalfAStep) {
   const Result result = SquareWithHoleAndIsland();
   const std::vector<double> particles = {3.1, 3.2, 0.1, 0.3, 1.23, 0.31};

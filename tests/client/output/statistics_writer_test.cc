@@ -18,7 +18,7 @@ constexpr const char* kHeader =
     "frame,particles,polylines,vertices,triangles_grid,triangles,area,milliseconds,"
     "bins_ms,field_ms,crossings_ms,rings_ms,normals_ms,vertices_ms,mesh_ms,"
     "perimeter,self_intersections,folded_triangles,dropped_holes,dropped_components,"
-    "dropped_spray,rings_digest,mesh_digest,time";
+    "dropped_spray,rings_digest,mesh_digest,time,doubts";
 
 FrameRecord Record(const Result& result) {
   return {.index = 3,
@@ -50,7 +50,19 @@ TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
   EXPECT_EQ(Written(directory / "stats.csv", {Record(result)}),
             std::string(kHeader) +
                 "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,23.5,1,2,3,4,5,"
-                "0123456789abcdef,000000000000000f,0.1\n");
+                "0123456789abcdef,000000000000000f,0.1,\n");
+}
+
+TEST(Statistics, DoubtsAreNamedInACellOfTheirOwn) {
+  support::TemporaryFolder directory;
+  Result result = SquareWithHoleAndIsland();
+  result.statistics.doubts.Add(Doubt::kVolumesContradictSpacing);
+  result.statistics.doubts.Add(Doubt::kSpacingProvisional);
+  constexpr const char* kNames = "spacing-provisional volumes-contradict-spacing";
+  EXPECT_THAT(Written(directory / "stats.csv", {Record(result)}),
+              HasSubstr(std::string(",0.1,") + kNames + "\n"));
+  const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
+  EXPECT_EQ(rows[0].at("doubts"), kNames);
 }
 
 TEST(Statistics, JsonIsAnArrayOfObjects) {

@@ -89,6 +89,21 @@ TEST(Summary, BrokenPromisesAreToldOnlyWhereThereAreAny) {
   EXPECT_THAT(summary.Headline(1), HasSubstr("self-intersections: 3; folded triangles: 2"));
 }
 
+TEST(Summary, WarnsOncePerKindOfDoubtAndTellsInHowManyFrames) {
+  Summary summary = HundredFrames();
+  EXPECT_TRUE(summary.Warnings().empty());
+  Result result;
+  result.statistics.doubts.Add(Doubt::kSpacingProvisional);
+  summary.Add({.result = result});
+  result.statistics.doubts.Add(Doubt::kPositionsCoarse);
+  summary.Add({.result = result});
+  const auto warnings = summary.Warnings();
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_THAT(warnings[0], HasSubstr("in 2 of 102 frames: spacing-provisional: "));
+  EXPECT_THAT(warnings[0], HasSubstr("give the spacing"));
+  EXPECT_THAT(warnings[1], HasSubstr("in 1 of 102 frames: positions-coarse: "));
+}
+
 TEST(Summary, TheTableIsPlainTextWithColumnsThatEndBelowEachOther) {
   const std::vector<std::string> lines = Lines(HundredFrames().Table(4));
   ASSERT_GT(lines.size(), 10u);

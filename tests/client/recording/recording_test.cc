@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "recording/block.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::client {
@@ -241,6 +242,25 @@ TEST_F(Recording, ADamagedByteIsNeverDeliveredAsAFrame) {
     EXPECT_TRUE(!read.status.ok() || !read.notices.empty() || read.frames.size() == frames.size());
   }
   EXPECT_GT(errors, whole.size() / 2);
+}
+
+// Messages behind their lengths, as they are in a block: field 1 of a frame is its number, field 3
+// its format; field 1 left out is number 0.
+TEST_F(Recording, AFrameInAnotherFramesPlaceIsDamage) {
+  using namespace std::string_literals;
+  const std::string header = "\0"s, frame_0 = "\x02\x18\x01"s, frame_1 = "\x04\x08\x01\x18\x01"s;
+  const auto frames_of = [&](const std::string& frames) {
+    recording::BlockPacker packer(1);
+    std::string file = recording::MakeMark(recording::kFileTag, recording::kVersion);
+    for (const std::string& block : {header, frames}) file += *packer.Pack(block);
+    file += recording::MakeMark(recording::kTailTag, 2);
+    std::ofstream(Path(), std::ios::binary) << file;
+    return Read(Path());
+  };
+  EXPECT_THAT(frames_of(frame_0 + frame_1).frames, SizeIs(2));
+  for (const std::string& wrong : {frame_0 + frame_0, frame_1 + frame_1, frame_1 + frame_0}) {
+    EXPECT_THAT(std::string(frames_of(wrong).status.message()), HasSubstr("stands there"));
+  }
 }
 
 TEST_F(Recording, BytesBehindTheEndAreDamage) {

@@ -55,7 +55,7 @@ struct StreamOptions {
   std::string name = {};
   ReconstructionParameters parameters = {};
   Outputs outputs = {};
-  /// Shown where streams are listed. At most 16, keys and values of at most 128 bytes each.
+  /// Shown where streams are listed. At most 16; 128 bytes at most, no control characters each.
   std::map<std::string, std::string> labels = {};
   /// TLS, certificates and token. Loopback and Unix sockets need none, unless the server wants
   /// them.

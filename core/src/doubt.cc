@@ -1,0 +1,34 @@
+#include "partiemc/doubt.h"
+
+namespace partiemc {
+
+std::string_view Name(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kSpacingProvisional:
+      return "spacing-provisional";
+    case Doubt::kSpacingContradicted:
+      return "spacing-contradicted";
+    case Doubt::kVolumesContradictSpacing:
+      return "volumes-contradict-spacing";
+    case Doubt::kPositionsCoarse:
+      return "positions-coarse";
+  }
+  return "";
+}
+
+std::string_view Explanation(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kSpacingProvisional:
+      return "particles do not agree on a spacing yet, lengths are a guess; give the spacing";
+    case Doubt::kSpacingContradicted:
+      return "particles are more than twice as near or far as the spacing says; give the right one";
+    case Doubt::kVolumesContradictSpacing:
+      return "volumes are more than twice or less than half the squared spacing; look at their "
+             "unit";
+    case Doubt::kPositionsCoarse:
+      return "float32 positions are coarse for the spacing; send float64, or relative to an origin";
+  }
+  return "";
+}
+
+}  // namespace partiemc

@@ -1,0 +1,77 @@
+// Lines that take turns.
+#pragma once
+
+#include <algorithm>
+#include <list>
+#include <map>
+#include <optional>
+#include <utility>
+
+namespace partiemc::server {
+
+/// First in, first out.
+template <typename T>
+class Line {
+ public:
+  using Item = T;
+
+  void Push(T item) { items_.push_back(std::move(item)); }
+  T Pop() {
+    T item = std::move(items_.front());
+    items_.pop_front();
+    return item;
+  }
+  bool empty() const { return items_.empty(); }
+
+ private:
+  std::list<T> items_;  // A deque allocates half a kilobyte when it is made.
+};
+
+/// Each key has a line of its own, a Line or again a RoundRobin; those that are not empty take
+/// turns in the order in which they came, one item a turn. Costs log(lines) an item. Not
+/// thread-safe.
+template <typename Key, typename Lines>
+class RoundRobin {
+ public:
+  using Item = typename Lines::Item;
+
+  /// `where` are the keys within the line, if it has any, then the item.
+  template <typename... Where>
+  void Push(const Key& key, Where&&... where) {
+    auto [line, is_new] = lines_.try_emplace(key);
+    if (is_new) line->second = turns_.emplace(turns_.end(), key, Lines());
+    line->second->second.Push(std::forward<Where>(where)...);
+  }
+
+  /// Requires: not empty.
+  Item Pop() { return Take(turns_.begin()); }
+  /// Of the first whose key is `allowed`; who is not keeps its turn. None where nobody is.
+  template <typename Allowed>
+  std::optional<Item> PopOf(Allowed allowed) {
+    const auto turn = std::find_if(turns_.begin(), turns_.end(),
+                                   [&](const auto& line) { return allowed(line.first); });
+    if (turn == turns_.end()) return std::nullopt;
+    return Take(turn);
+  }
+
+  bool empty() const { return turns_.empty(); }
+
+ private:
+  using Turns = std::list<std::pair<Key, Lines>>;
+
+  Item Take(typename Turns::iterator turn) {
+    Item item = turn->second.Pop();
+    if (turn->second.empty()) {
+      lines_.erase(turn->first);
+      turns_.erase(turn);
+    } else {
+      turns_.splice(turns_.end(), turns_, turn);
+    }
+    return item;
+  }
+
+  Turns turns_;  // None is empty; the first is the next.
+  std::map<Key, typename Turns::iterator> lines_;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,269 @@
+#include "attack/hostile_clients.h"
+
+#include <array>
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "attack/http2_client.h"
+#include "attack/requests.h"
+
+namespace partiemc::attack {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPatience(3'000);
+// Between two rounds of an attacker: several of them share two cores with the server.
+constexpr milliseconds kPause(300);
+constexpr std::size_t kMegabyte = 1'000'000, kMebibyte = 1 << 20;
+
+using Client = std::unique_ptr<Http2Client>;
+
+Headers Bearer(const Hostility& hostility) {
+  return {{"authorization", "Bearer " + hostility.token}};
+}
+
+// One round after the other, each with a connection of its own. What a round leaves open stays open
+// for `kept` more rounds.
+void Rounds(Hostility& hostility, std::size_t kept, const std::function<void(Http2Client&)>& round,
+            const Http2Client::Options& options = {}) {
+  std::deque<Client> open;
+  while (!hostility.stop) {
+    try {
+      open.push_back(std::make_unique<Http2Client>(hostility.address, options));
+      round(*open.back());
+      ++hostility.rounds;
+    } catch (const std::runtime_error&) {
+      // No connection: the test looks whether the server lives.
+    }
+    while (open.size() > kept) open.pop_front();
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
+// Opens a stream and waits until it is open, or refused.
+std::uint32_t OpenStream(Http2Client& client, const Hostility& hostility,
+                         const std::string& open = Open().SerializeAsString()) {
+  const auto call = client.Call(CallHeaders(kReconstruct, Bearer(hostility)));
+  bool answered = false;
+  client.OnFrame([&](const ReceivedFrame& frame) {
+    answered |=
+        frame.stream == call && (frame.type == FrameType::kData || frame.type == FrameType::kReset);
+  });
+  client.SendData(call, Prefixed(open), false, kPatience);
+  client.Read(kPatience, [&] { return answered; });
+  client.OnFrame(nullptr);
+  return call;
+}
+
+// A frame of a few particles, and what else its message holds.
+std::string FrameWith(std::uint64_t sequence, std::string_view more) {
+  std::string frame = Blob(sequence, 1, 60).frame().SerializeAsString();
+  return Prefixed(InField(2, frame.append(more)));
+}
+
+void UnknownFields(Hostility& hostility) {
+  const std::string unknown = UnknownField(1000, 5 * kMebibyte);
+  Rounds(hostility, 0, [&](Http2Client& client) {
+    const auto call = OpenStream(client, hostility);
+    for (std::uint64_t sequence = 1; sequence <= 60 && !hostility.stop; ++sequence) {
+      // In the frame or beside it: a request that is used again must not keep either.
+      const std::string frame = Blob(sequence, 1, 60).frame().SerializeAsString();
+      const std::string message =
+          sequence % 2 == 0 ? InField(2, frame + unknown) : InField(2, frame) + unknown;
+      if (!client.SendData(call, Prefixed(message), false, kPatience)) break;
+    }
+  });
+}
+
+void RepeatedFields(Hostility& hostility) {
+  std::string scalars;
+  for (std::size_t k = 0; k < 5 * kMegabyte; ++k) scalars += std::string_view("\x42\0", 2);
+  const std::string frame = FrameWith(1, scalars);
+  Rounds(hostility, 0, [&](Http2Client& client) {
+    std::vector<std::uint32_t> calls;
+    for (int k = 0; k < 8; ++k) calls.push_back(OpenStream(client, hostility));
+    for (const auto call : calls) {
+      if (!client.SendData(call, frame, false, kPatience)) break;
+    }
+    client.Read(kPatience);
+  });
+}
+
+void HugeOpens(Hostility& hostility) {
+  auto labelled = Open();
+  for (std::size_t k = 0; k < 9'900'000 / 24; ++k) {
+    (*labelled.mutable_open()->mutable_labels())["label-" + std::to_string(k)] = "12345678";
+  }
+  auto resumed = Open();
+  resumed.mutable_open()->mutable_resume()->set_stream_token(std::string(32, 'a'));
+  resumed.mutable_open()->mutable_resume()->set_checkpoint(std::string(76 * kMebibyte, 'x'));
+  const std::array opens = {Prefixed(labelled.SerializeAsString()),
+                            Prefixed(resumed.SerializeAsString())};
+  Rounds(hostility, 0, [&](Http2Client& client) {
+    for (const std::string& open : opens) {
+      const auto call = client.Call(CallHeaders(kReconstruct, Bearer(hostility)));
+      if (!client.SendData(call, open, false, kPatience)) return;
+    }
+    client.Read(kPatience);
+  });
+}
+
+void UnreadAnswers(Hostility& hostility) {
+  const std::string request = Prefixed(LoneParticles(20'000).SerializeAsString());
+  Rounds(hostility, 8,
+         [&](Http2Client& client) {
+           for (int k = 0; k < 16 && !hostility.stop; ++k) {
+             const auto call = client.Call(CallHeaders(kReconstructFrame, Bearer(hostility)));
+             if (!client.SendData(call, request, true, kPatience)) return;
+           }
+           client.Read(milliseconds(500));
+         },
+         {.stream_window = 0});
+}
+
+void UnfinishedCalls(Hostility& hostility) {
+  const std::string part(2 * kMegabyte, 'x');
+  Rounds(hostility, 12, [&](Http2Client& client) {
+    for (int k = 0; k < 6 && !hostility.stop; ++k) {
+      const auto call = client.Call(
+          CallHeaders(k % 2 == 0 ? kReconstruct : kReconstructFrame, Bearer(hostility)));
+      client.Data(call, MessagePrefix(100 * kMegabyte));
+      // As much as it is let, and no more after it.
+      client.SendData(call, part, false, milliseconds(300));
+    }
+    // Headers without an end, too.
+    client.CallBlock(HeaderBlock(CallHeaders(kReconstruct, Bearer(hostility))), 0);
+    client.Flush(kPatience);
+  });
+}
+
+void CallersWithoutToken(Hostility& hostility) {
+  const std::string body = Prefixed(std::string(20 * kMegabyte, 'x'));
+  Rounds(hostility, 4, [&](Http2Client& client) {
+    for (const char* method : {kReconstruct, kReconstructFrame, kWatchStream, kListStreams}) {
+      const auto call = client.Call(CallHeaders(method));
+      client.SendData(call, body, false, milliseconds(500));
+    }
+    for (int k = 0; k < 100; ++k) {
+      client.Data(client.Call(CallHeaders(k % 2 == 0 ? kHealthCheck : kGetServerInfo)),
+                  Prefixed(""), true);
+    }
+    client.Flush(kPatience);
+    client.Read(milliseconds(100));
+  });
+}
+
+void BadFrames(Hostility& hostility) {
+  std::vector<std::string> bad;
+  auto frame = Blob(1, 1, 60);
+  frame.mutable_frame()->mutable_positions()->append("x");
+  bad.push_back(Prefixed(frame.SerializeAsString()));
+  bad.push_back(Prefixed(Blob(1'000'000, 1, 60).SerializeAsString()));
+  bad.push_back(Prefixed(InField(2, "\xff\xff")));
+  frame = Blob(1, 1, 60);
+  frame.mutable_frame()->set_volumes("1234");
+  bad.push_back(Prefixed(frame.SerializeAsString()));
+  Rounds(hostility, 0, [&](Http2Client& client) {
+    const auto call = OpenStream(client, hostility);
+    for (std::uint64_t sequence = 1; sequence <= 200 && !hostility.stop; ++sequence) {
+      const std::string& message = hostility.random.Chance(0.2)
+                                       ? bad[hostility.random.Below(bad.size())]
+                                       : Prefixed(Blob(sequence, 1, 1'000).SerializeAsString());
+      if (!client.SendData(call, message, false, kPatience)) break;
+    }
+    client.Data(call, "", true);
+    client.Flush(kPatience);
+    client.Read(milliseconds(500));
+  });
+}
+
+void KilledClients(Hostility& hostility) {
+  Rounds(hostility, 0, [&](Http2Client& client) {
+    for (int k = 0; k < 4; ++k) {
+      const auto call = OpenStream(client, hostility);
+      for (std::uint64_t sequence = 1; sequence <= 8; ++sequence) {
+        client.SendData(call, Prefixed(Blob(sequence, 1, 1'000).SerializeAsString()), false,
+                        milliseconds(100));
+      }
+    }
+    // What kill -9 leaves of a client: its connection, cut.
+    client.Close(/*reset=*/hostility.random.Chance(0.5));
+  });
+}
+
+void CallsThatStay(Hostility& hostility) {
+  Rounds(hostility, 20, [&](Http2Client& client) {
+    static constexpr std::array kMethods = {kHealthWatch, kReconstruct, kWatchStream, kHealthCheck,
+                                            kReconstructFrame};
+    for (std::size_t k = 0; k < 200; ++k) {
+      client.Call(
+          CallHeaders(kMethods[k % kMethods.size()], k % 2 == 0 ? Headers{} : Bearer(hostility)));
+    }
+    client.Flush(kPatience);
+    client.Read(milliseconds(100));
+  });
+}
+
+constexpr std::array kAttacks = {
+    Attack{"unknown-fields", "60 frames with 5 MiB of an unknown field each", UnknownFields},
+    Attack{"repeated-fields", "8 frames with 10 MB of empty scalars each", RepeatedFields},
+    Attack{"huge-opens", "9.9 MB of labels; a checkpoint of 76 MiB", HugeOpens},
+    Attack{"unread-answers", "unary answers that nobody reads", UnreadAnswers},
+    Attack{"unfinished-calls", "bodies that are begun and never finished", UnfinishedCalls},
+    Attack{"without-token", "20 MB bodies and calls without a token", CallersWithoutToken},
+    Attack{"bad-frames", "every fifth frame breaks a rule", BadFrames},
+    Attack{"killed-clients", "connections cut with frames in flight", KilledClients},
+    Attack{"calls-that-stay", "hundreds of calls that say nothing", CallsThatStay},
+};
+
+}  // namespace
+
+std::span<const Attack> Attacks() { return kAttacks; }
+
+void FloodWithoutToken(Hostility& hostility, std::uint64_t calls, std::size_t connections) {
+  static constexpr std::array kMethods = {kReconstruct, kReconstructFrame, kWatchStream,
+                                          kListStreams, kGetServerInfo,    kHealthCheck,
+                                          kHealthWatch, kReflection};
+  const std::string body = Prefixed(std::string(20 * kMegabyte, 'x'));
+  std::vector<Client> clients(connections);
+  const auto began = std::chrono::steady_clock::now();
+  for (std::uint64_t begun = 0; !hostility.stop; ++begun) {
+    std::this_thread::sleep_until(began + begun * std::chrono::microseconds(60'000'000) / calls);
+    Client& client = clients[begun % connections];
+    try {
+      if (!client || client->closed()) client = std::make_unique<Http2Client>(hostility.address);
+    } catch (const std::runtime_error&) {
+      continue;
+    }
+    const auto call = client->Call(CallHeaders(kMethods[hostility.random.Below(kMethods.size())]));
+    switch (hostility.random.Below(4)) {
+      case 0:
+        break;  // Says nothing more.
+      case 1:
+        client->Data(call, Prefixed(""), true);
+        break;
+      case 2:
+        client->Reset(call);
+        break;
+      default:
+        client->Data(call, MessagePrefix(20 * kMegabyte));
+        break;
+    }
+    if (begun % 500 == 0) {
+      client->SendData(call, body, false, milliseconds(100));
+    } else {
+      client->Flush(milliseconds(100));
+    }
+    client->Read(milliseconds(0));
+    ++hostility.rounds;
+  }
+}
+
+}  // namespace partiemc::attack

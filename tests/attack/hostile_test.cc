@@ -1,0 +1,148 @@
+// Everything hostile at once beside two honest streams, and a flood of those who have no token.
+// A minute and ten seconds by default; on demand
+//   attack_test --gtest_filter='Hostile*' --minutes 60 --flood-seconds 60 --slowdown 2 --beside 64
+// and one attack alone: --attack unknown-fields.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <deque>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "attack/attacked_server.h"
+#include "attack/honest_stream.h"
+#include "attack/hostile_clients.h"
+#include "attack/options.h"
+#include "support/temporary_folder.h"
+
+namespace partiemc::attack {
+namespace {
+
+constexpr double kBudgetMib = 256, kMostFloodMib = 32;
+constexpr char kHonestToken[] = "honest-0123456789abcdef", kToken[] = "hostile-0123456789abcdef";
+constexpr std::chrono::seconds kPatience(90);
+
+double Percentile99(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[values.size() * 99 / 100];
+}
+
+// Attackers, each a thread, until this goes out of scope.
+class Attackers {
+ public:
+  Attackers(const std::string& address, const std::string& only) {
+    for (const Attack& attack : Attacks()) {
+      if (!only.empty() && only != attack.name) continue;
+      rounds_.emplace_back(attack.name, 0);
+      threads_.emplace_back([this, &attack, &rounds = rounds_.back().second, address] {
+        Hostility hostility{address, kToken, support::Random(GetOptions().seed), stop_, rounds};
+        attack.run(hostility);
+      });
+    }
+    EXPECT_FALSE(threads_.empty()) << "no attack " << only;
+  }
+  ~Attackers() {
+    stop_ = true;
+    for (std::thread& thread : threads_) thread.join();
+    for (const auto& [name, rounds] : rounds_) {
+      std::printf("  %s: %lu rounds\n", name, static_cast<unsigned long>(rounds.load()));
+      EXPECT_GT(rounds.load(), 0u) << name;
+    }
+  }
+
+ private:
+  std::atomic<bool> stop_ = false;
+  std::deque<std::pair<const char*, std::atomic<std::uint64_t>>> rounds_;
+  std::vector<std::thread> threads_;
+};
+
+class Hostile : public ::testing::Test {
+ protected:
+  double QuietP99(HonestStream& one, HonestStream& two, std::chrono::seconds time) {
+    one.TakeLatencies();
+    two.TakeLatencies();
+    std::this_thread::sleep_for(time);
+    auto all = one.TakeLatencies();
+    const auto more = two.TakeLatencies();
+    all.insert(all.end(), more.begin(), more.end());
+    return Percentile99(all);
+  }
+
+  std::vector<std::string> Arguments() const {
+    return {
+        "--memory-budget", "256MB", "--token-file",
+        folder_.Write("tokens", std::string(kHonestToken) + " honest\n" + kToken + " hostile\n")};
+  }
+
+  const support::TemporaryFolder folder_;
+  AttackedServer server_{Arguments()};
+};
+
+TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
+  const Options& options = GetOptions();
+  const std::chrono::seconds all(options.seconds),
+      quiet = std::max(all / 9, std::chrono::seconds(5));
+  HonestStream one(server_.address(), kHonestToken, 1), two(server_.address(), kHonestToken, 2);
+  std::this_thread::sleep_for(std::chrono::seconds(1));  // Warm.
+  const double undisturbed = QuietP99(one, two, quiet);
+  MemoryWatch memory(server_.process().process());
+  double disturbed = 0;
+  {
+    std::unique_ptr<AttackedServer> other;
+    if (options.elsewhere) other = std::make_unique<AttackedServer>(Arguments());
+    const Attackers attackers((other ? *other : server_).address(), options.attack);
+    disturbed = QuietP99(one, two, all - quiet);
+  }
+  const double peak = memory.PeakMib();
+  one.Stop();
+  two.Stop();
+  std::printf(
+      "%s: at most %.1f MiB at a budget of %.0f; p99 %.2f -> %.2f ms (%.2f times); %lu "
+      "honest frames\n",
+      options.attack.empty() ? "all" : options.attack.c_str(), peak, kBudgetMib, undisturbed,
+      disturbed, disturbed / undisturbed, static_cast<unsigned long>(one.frames() + two.frames()));
+  ASSERT_TRUE(server_.Lives()) << server_.Output();
+  EXPECT_LE(peak, kBudgetMib + options.beside_mib);
+  EXPECT_LE(disturbed, options.slowdown * undisturbed);
+  EXPECT_EQ(server_.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server_.Terminate(), 0) << server_.Output();
+}
+
+TEST_F(Hostile, AFloodWithoutATokenTakesLittle) {
+  const Options& options = GetOptions();
+  {
+    HonestStream honest(server_.address(), kHonestToken, 3);  // So that all is warm that will be.
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+  }
+  const double idle = server_.ResidentMib();
+  MemoryWatch memory(server_.process().process());
+  std::atomic<bool> stop = false;
+  std::atomic<std::uint64_t> calls = 0;
+  std::vector<std::thread> threads;
+  for (std::uint64_t k = 0; k < 4; ++k) {
+    threads.emplace_back([&, k] {
+      Hostility hostility{server_.address(), "", support::Random(options.seed + k), stop, calls};
+      FloodWithoutToken(hostility, 10'000, 25);
+    });
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(options.flood_seconds));
+  stop = true;
+  for (std::thread& thread : threads) thread.join();
+  const double peak = memory.PeakMib();
+  std::printf("flood without a token: %lu calls in %lu s, %.1f -> at most %.1f MiB\n",
+              static_cast<unsigned long>(calls.load()),
+              static_cast<unsigned long>(options.flood_seconds), idle, peak);
+  ASSERT_TRUE(server_.Lives()) << server_.Output();
+  EXPECT_LE(peak - idle, kMostFloodMib);
+  EXPECT_EQ(server_.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server_.Terminate(), 0) << server_.Output();
+}
+
+}  // namespace
+}  // namespace partiemc::attack

@@ -1,0 +1,36 @@
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+
+#include "attack/options.h"
+
+namespace partiemc::attack {
+
+Options& GetOptions() {
+  static Options options;
+  return options;
+}
+
+}  // namespace partiemc::attack
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  partiemc::attack::Options& options = partiemc::attack::GetOptions();
+  CLI::App app("Attacks on a server of its own.");
+  app.add_option("--calls", options.calls, "Random calls")->capture_default_str();
+  app.add_option("--seconds", options.seconds, "Of hostility")->capture_default_str();
+  app.add_option_function<std::uint64_t>(
+      "--minutes", [&](std::uint64_t minutes) { options.seconds = 60 * minutes; }, "The same");
+  app.add_option("--flood-seconds", options.flood_seconds, "Of a flood without a token")
+      ->capture_default_str();
+  app.add_option("--attack", options.attack, "This one alone, instead of all at once");
+  app.add_flag("--elsewhere", options.elsewhere,
+               "Attack another server, to see what the attackers' own work costs");
+  app.add_option("--seed", options.seed, "Of what is random")->capture_default_str();
+  app.add_option("--slowdown", options.slowdown, "The most of an honest stream's p99")
+      ->capture_default_str();
+  app.add_option("--beside", options.beside_mib, "The most memory beyond the budget, in MiB")
+      ->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,191 @@
+// A frame that is cancelled on its way leaves nothing behind. Also under ThreadSanitizer.
+#include "cancellation.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <atomic>
+#include <cstdint>
+#include <new>
+#include <thread>
+#include <vector>
+
+#include "parallel.h"
+#include "partiemc/partiemc.h"
+#include "support/particles.h"
+#include "support/random.h"
+
+namespace partiemc {
+namespace {
+
+using support::Particles;
+
+constexpr int kFrames = 4;
+
+// A body that moves, with holes, beside drops, with ids: every stage has something to do.
+Particles SceneAt(int frame) {
+  Particles particles = support::Disc(60, 0.4 * frame, 0);
+  support::Random random(3);
+  for (int k = 0; k < 30; ++k) {
+    particles.Add(support::Disc(1 + k % 4, 75 + 9 * (k % 6) + 0.4 * frame, 9 * (k / 6) - 20));
+  }
+  Particles thinned;
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    if (!random.Chance(0.06)) {
+      thinned.Add(particles.x(k), particles.y(k));
+      thinned.ids.push_back(k);
+    }
+  }
+  thinned.time = frame;
+  return thinned;
+}
+
+// Counts what goes on in a frame and cancels it at the end of a stage.
+class CancelAfter final : public StageObserver {
+ public:
+  CancelAfter(Stage stage, std::atomic<bool>& flag) : stage_(stage), flag_(flag) {}
+  void StageBegins(Stage stage) override { last_ = stage; }
+  void StageEnds(Stage stage) override {
+    if (stage == stage_) flag_ = true;
+  }
+  Stage last() const { return last_; }
+
+ private:
+  const Stage stage_;
+  std::atomic<bool>& flag_;
+  Stage last_ = Stage::kBins;
+};
+
+class Cancellation : public testing::TestWithParam<unsigned> {
+ protected:
+  Cancellation() {
+    for (int k = 0; k < kFrames; ++k) frames_.push_back(SceneAt(k));
+    State state;
+    Workspace workspace;
+    Result result;
+    for (const Particles& frame : frames_) {
+      EXPECT_TRUE(reconstructor_->Reconstruct(frame.AsFrame(), state, workspace, result).ok());
+      expected_.push_back(result);
+      states_.push_back(state);
+    }
+  }
+
+  // The frame after the first `done`, undisturbed.
+  void ExpectNext(int done, State& state, Workspace& workspace) {
+    Result result;
+    ASSERT_TRUE(
+        reconstructor_->Reconstruct(frames_[done].AsFrame(), state, workspace, result).ok());
+    EXPECT_EQ(result, expected_[done]);
+    EXPECT_EQ(state, states_[done]);
+  }
+
+  const tbb::global_control control_{tbb::global_control::max_allowed_parallelism, GetParam()};
+  Arena arena_{GetParam()};
+  const absl::StatusOr<Reconstructor> reconstructor_ =
+      Reconstructor::Create({.fill = Fill::kConforming, .spacing = 1});
+  std::vector<Particles> frames_;
+  std::vector<Result> expected_;
+  std::vector<State> states_;
+};
+
+TEST_P(Cancellation, AfterAnyStageLeavesNoTrace) {
+  arena_.Execute([&] {
+    State state;
+    Workspace workspace;
+    ExpectNext(0, state, workspace);
+    for (std::size_t stage = 0; stage + 1 < kStageCount; ++stage) {
+      SCOPED_TRACE(testing::Message() << kStageNames[stage]);
+      std::atomic<bool> flag = false;
+      CancelAfter observer(static_cast<Stage>(stage), flag);
+      Result result = expected_[0];
+      const absl::Status status =
+          reconstructor_->Reconstruct(frames_[3].AsFrame(), state, workspace, result,
+                                      {.observer = &observer, .cancelled = &flag});
+      EXPECT_TRUE(absl::IsCancelled(status)) << status;
+      EXPECT_EQ(observer.last(), static_cast<Stage>(stage)) << "it went on";
+      EXPECT_EQ(result, Result());
+      EXPECT_EQ(state, states_[0]);
+      State next = state;
+      ExpectNext(1, next, workspace);
+    }
+  });
+}
+
+/// From another thread, at whatever moment that has: most frames end within a stage.
+TEST_P(Cancellation, AtAnyMomentLeavesNoTrace) {
+  State state;
+  Workspace workspace;
+  support::Random random(GetParam());
+  int cancelled = 0, whole = 0;
+  for (int round = 0; round < 60; ++round) {
+    SCOPED_TRACE(testing::Message() << "round " << round);
+    const int done = round % (kFrames - 1);
+    state = done == 0 ? State() : states_[done - 1];
+    std::atomic<bool> flag = false;
+    std::atomic<bool> has_begun = false;
+    const std::uint64_t wait = random.Below(40'000);
+    std::thread canceller([&] {
+      while (!has_begun.load(std::memory_order_relaxed)) std::this_thread::yield();
+      for (std::uint64_t k = 0; k < wait; ++k) has_begun.load(std::memory_order_relaxed);
+      flag.store(true, std::memory_order_relaxed);
+    });
+    Result result;
+    absl::Status status;
+    arena_.Execute([&] {
+      has_begun.store(true, std::memory_order_relaxed);
+      status = reconstructor_->Reconstruct(frames_[done].AsFrame(), state, workspace, result,
+                                           {.cancelled = &flag});
+    });
+    canceller.join();
+    if (status.ok()) {
+      ++whole;
+      EXPECT_EQ(result, expected_[done]);
+    } else {
+      ++cancelled;
+      EXPECT_TRUE(absl::IsCancelled(status)) << status;
+      EXPECT_EQ(result, Result());
+      EXPECT_EQ(state, done == 0 ? State() : states_[done - 1]);
+      arena_.Execute([&] { ExpectNext(done, state, workspace); });
+    }
+    arena_.Execute([&] { ExpectNext(done + 1, state, workspace); });
+  }
+  EXPECT_GT(cancelled, 0) << whole << " were not";
+}
+
+/// What a task of a frame begins inside is told, too: oneTBB leaves out parts of it.
+TEST_P(Cancellation, ATaskThatIsGivenUpDoesNotGoOnWithHalfOfItsParts) {
+  std::atomic<bool> went_on_with_half = false;
+  const auto run = [&](const std::atomic<bool>* flag, const auto& at_piece) {
+    const CancellationScope scope(flag);
+    ParallelFor(64, [&](int outer) {
+      std::atomic<int> done = 0;
+      ParallelFor(256, [&](int inner) {
+        at_piece(outer, inner);
+        ++done;
+      });
+      if (done != 256) went_on_with_half = true;
+    });
+  };
+  for (int round = 0; round < 50; ++round) {
+    arena_.Execute([&] {
+      std::atomic<bool> flag = false;
+      EXPECT_THROW(run(&flag,
+                       [&](int outer, int inner) {
+                         if (outer == round % 64 && inner == 200) flag = true;
+                       }),
+                   Cancelled);
+      EXPECT_THROW(run(nullptr,
+                       [&](int outer, int inner) {
+                         if (outer == round % 64 && inner == 200) throw std::bad_alloc();
+                       }),
+                   std::bad_alloc);
+    });
+  }
+  EXPECT_FALSE(went_on_with_half);
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, Cancellation, testing::Values(1u, 2u, 5u),
+                         [](const auto& tested) { return std::to_string(tested.param); });
+
+}  // namespace
+}  // namespace partiemc

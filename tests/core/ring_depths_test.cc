@@ -1,0 +1,144 @@
+#include "ring_depths.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <numbers>
+#include <numeric>
+#include <vector>
+
+#include "intersections.h"
+#include "predicates.h"
+#include "region_shapes.h"
+
+namespace partiemc {
+namespace {
+
+using testing::Random;
+using testing::Region;
+
+// Depths of the named rings; of all if none is.
+std::vector<std::int32_t> Depths(const Region& region, std::vector<std::uint32_t> rings = {}) {
+  if (rings.empty()) {
+    rings.resize(region.LoopCount());
+    std::iota(rings.begin(), rings.end(), 0u);
+  }
+  RingDepths ring_depths;
+  std::vector<std::int32_t> depths;
+  ring_depths.Find(region.points, region.loop_offsets, rings, depths);
+  return depths;
+}
+
+// How often a ring winds around a point, by all of its segments.
+int WindingNumber(const Region& region, std::size_t ring, const Point& point) {
+  const std::size_t first = region.loop_offsets[ring], last = region.loop_offsets[ring + 1];
+  int winding = 0;
+  for (std::size_t k = first; k < last; ++k) {
+    const Point a = region.PointAt(k), b = region.PointAt(k + 1 == last ? first : k + 1);
+    if ((a.y <= point.y) == (b.y <= point.y)) continue;
+    const int side = Orientation(a, b, point);
+    if (a.y <= point.y && side > 0) ++winding;
+    if (a.y > point.y && side < 0) --winding;
+  }
+  return winding;
+}
+
+std::vector<std::int32_t> DepthsOneByOne(const Region& region) {
+  std::vector<std::int32_t> depths;
+  for (std::size_t ring = 0; ring < region.LoopCount(); ++ring) {
+    int depth = 0;
+    for (std::size_t other = 0; other < region.LoopCount(); ++other) {
+      if (other == ring) continue;
+      depth += WindingNumber(region, other, region.PointAt(region.loop_offsets[ring]));
+    }
+    depths.push_back(depth);
+  }
+  return depths;
+}
+
+std::vector<Point> Square(double x, double y, double half, bool is_hole = false) {
+  std::vector<Point> ring{
+      {x - half, y - half}, {x + half, y - half}, {x + half, y + half}, {x - half, y + half}};
+  if (is_hole) std::reverse(ring.begin(), ring.end());
+  return ring;
+}
+
+Region RegionOf(const std::vector<std::vector<Point>>& rings) {
+  Region region;
+  for (const std::vector<Point>& ring : rings) region.AddLoop(ring);
+  return region;
+}
+
+TEST(RingDepths, OuterRingsLieInNothingAndHolesInTheFluidAroundThem) {
+  EXPECT_EQ(Depths(Region{}), std::vector<std::int32_t>{});
+  EXPECT_EQ(Depths(RegionOf({Square(0, 0, 10), Square(0, 0, 5, true), Square(0, 0, 2),
+                             Square(20, 0, 3), Square(0, 7, 1, true)})),
+            (std::vector<std::int32_t>{0, 1, 0, 0, 1}));
+}
+
+TEST(RingDepths, OuterRingsInsideEachOtherAddUp) {
+  EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3, true)})),
+            (std::vector<std::int32_t>{0, -1, 0}));
+  EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)})),
+            (std::vector<std::int32_t>{2, 1, 0}));
+}
+
+TEST(RingDepths, RingsThatAreNotNamedAreNotThere) {
+  const Region region = RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)});
+  EXPECT_EQ(Depths(region, {0, 2}), (std::vector<std::int32_t>{1, 0}));
+  EXPECT_EQ(Depths(region, {2, 0}), (std::vector<std::int32_t>{0, 1}));
+}
+
+TEST(RingDepths, ARingIsLookedForWhereItIsLowestNotWhereItTurnsFirst) {
+  // Its other low turns lie above a square that stands between its legs.
+  const std::vector<Point> legs{{0, 4}, {0, -1}, {1, 3}, {3, 3}, {4, 0}, {4, 4}};
+  EXPECT_EQ(Depths(RegionOf({legs, Square(2, 1, 0.5)})), (std::vector<std::int32_t>{0, 0}));
+}
+
+/// Staircases have many points at one height, and horizontal sides: ties of the sweep.
+TEST(RingDepths, AgreeWithWindingNumbersOfStaircases) {
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed);
+    const testing::Cells cells = testing::RandomCells(random, 14, 14, 0.6);
+    const Region staircases = testing::Staircases(cells, random, seed % 2 == 0);
+    Region region;
+    for (std::size_t k = 0; k < staircases.LoopCount(); ++k) region.AddLoop(staircases.Loop(k));
+    TouchingPairsBuffers buffers;
+    if (CountTouchingPairs(region.points, region.loop_offsets, buffers) > 0) continue;
+    ASSERT_EQ(Depths(region), DepthsOneByOne(region)) << "seed " << seed;
+  }
+}
+
+/// Stars within, beside and around each other, some of them the wrong way round.
+TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
+  int nested = 0;
+  RingDepths warm;
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed);
+    Region region;
+    TouchingPairsBuffers buffers;
+    for (int tries = 0; tries < 60; ++tries) {
+      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % 30);
+      const double size = testing::Uniform(random, 0.1, 8);
+      const Point centre{testing::Uniform(random, -8, 8), testing::Uniform(random, -8, 8)};
+      for (Point& point : ring) point = {centre.x + size * point.x, centre.y + size * point.y};
+      if (random() % 3 == 0) std::reverse(ring.begin(), ring.end());
+      Region with = region;
+      with.AddLoop(ring);
+      if (CountTouchingPairs(with.points, with.loop_offsets, buffers) == 0) region = with;
+    }
+    const std::vector<std::int32_t> expected = DepthsOneByOne(region);
+    nested +=
+        static_cast<int>(std::ranges::count_if(expected, [](int depth) { return depth != 0; }));
+    std::vector<std::uint32_t> rings(region.LoopCount());
+    std::iota(rings.begin(), rings.end(), 0u);
+    std::vector<std::int32_t> depths;
+    warm.Find(region.points, region.loop_offsets, rings, depths);
+    ASSERT_EQ(depths, expected) << "seed " << seed;
+  }
+  EXPECT_GT(nested, 300);
+}
+
+}  // namespace
+}  // namespace partiemc

@@ -1,0 +1,153 @@
+// What a producer sends: message after message, of a stream's first call on, into the buffers that
+// the stream and its worker use again.
+#include <memory>
+#include <string>
+
+#include "fuzz/choices.h"
+#include "fuzz/held_bytes.h"
+#include "fuzz/require.h"
+#include "fuzz/single_thread.h"
+#include "partiemc/status.h"
+#include "server/stream_messages.h"
+#include "server/watch_pump.h"
+#include "wire/message_bytes.h"
+
+namespace partiemc::fuzz {
+namespace {
+
+using server::Outgoing;
+using server::RequestKind;
+
+// A message may come again as often; what the first ones leave warm is not counted.
+constexpr int kMostRepeats = 32;
+constexpr int kWarmingRepeats = 8;
+constexpr std::size_t kMostMessages = 64;
+// What the heap may have grown by for other reasons than the messages.
+constexpr std::size_t kSlackBytes = 64 << 10;
+// What a worker may keep of messages, beside a few times the largest.
+constexpr std::size_t kKeptBytes = 6 << 20;
+constexpr std::size_t kKeptPerByte = 4;
+
+const server::ServerLimits& Limits() {
+  static const server::ServerLimits limits{
+      .frame = {.max_particles = 20'000, .max_tiles = 256},
+      .max_frame_bytes = 1 << 20,
+      .max_streams = 2,
+      .frames_in_flight = 2,
+  };
+  return limits;
+}
+
+// Stands where a call would: nothing is read or written but by the target itself.
+class NoDoor final : public server::StreamDoor {
+ public:
+  void StartRead(std::size_t) override {}
+  void StartWrite(Outgoing, std::size_t) override {}
+  absl::Status Open(std::size_t) override { return absl::OkStatus(); }
+  server::Answered Answer(std::size_t, server::Worker&) override { return {}; }
+  void Cut() override {}
+  void Finish(const absl::Status&) override {}
+};
+
+// What all streams of the process share. No job ever comes to the pool.
+struct Shared {
+  server::ComputePool pool{1};
+  server::MemoryBudget budget{1 << 30};
+  server::WatchPump pump;
+  server::Worker worker;
+};
+
+class Stream {
+ public:
+  explicit Stream(Shared& shared)
+      : shared_(shared),
+        flow_(std::make_shared<server::StreamFlow>(door_, shared.pool, shared.budget,
+                                                   Limits().frames_in_flight)),
+        messages_(Limits(), registry_, shared.pump, keys_) {
+    RequireOk(registry_.Enter(flow_), "a first call is let in");
+  }
+  ~Stream() { registry_.Leave(*flow_); }
+
+  void Take(std::string_view bytes) {
+    const std::size_t slot = taken_++ % Limits().frames_in_flight;
+    const grpc::Slice slice(bytes.data(), bytes.size());
+    messages_.request(slot) = grpc::ByteBuffer(&slice, 1);
+    const RequestKind kind = messages_.Kind(slot);
+    if (!is_open_ && kind == RequestKind::kOpen) {
+      Open(slot);
+    } else if (is_open_ && kind == RequestKind::kFrame) {
+      Answer(slot);
+    }
+    messages_.request(slot).Clear();
+  }
+
+ private:
+  void Open(std::size_t slot) {
+    const auto opened = messages_.Open(slot, *flow_);
+    is_open_ = opened.ok();
+    if (!is_open_) {
+      RequireViolation(opened.status());
+      return;
+    }
+    Require(Response(Outgoing::kOpened, slot).opened().frames_in_flight() > 0, "a window is told");
+  }
+
+  void Answer(std::size_t slot) {
+    const server::Answered answered = messages_.Answer(slot, shared_.worker, flow_->cancelled());
+    if (answered.afterwards) answered.afterwards();
+    const v1::ReconstructResponse response = Response(Outgoing::kAnswer, slot);
+    Require(answered.is_result ? response.has_frame() : response.has_error(), "an answer is told");
+    if (response.has_error()) {
+      const v1::FrameError& error = response.error();
+      Require(!error.reason().empty() && !error.field().empty() && error.next_sequence() > 0,
+              "a refusal has reason, field and the next number");
+    }
+  }
+
+  // As the client gets it.
+  v1::ReconstructResponse Response(Outgoing what, std::size_t slot) {
+    grpc::ByteBuffer bytes = messages_.response(what, slot);
+    messages_.Written(what, slot);
+    v1::ReconstructResponse response;
+    Require(wire::MergeBytes(bytes, response), "an answer reads back");
+    return response;
+  }
+
+  Shared& shared_;
+  NoDoor door_;
+  server::StreamRegistry registry_{Limits().max_streams};
+  std::shared_ptr<server::StreamFlow> flow_;
+  server::CurrentCheckpointKeys keys_;
+  server::StreamMessages messages_;
+  bool is_open_ = false;
+  std::size_t taken_ = 0;
+};
+
+}  // namespace
+
+void AttackStreamRequests(Bytes bytes) {
+  const SingleThread single_thread;
+  static auto* const shared = new Shared;
+  shared->worker.door_buffers.reset();
+  Stream stream(*shared);
+  Choices choices(bytes);
+  std::size_t largest = 0, messages = 0;
+  while (!choices.empty() && messages < kMostMessages) {
+    const int repeats = 1 + static_cast<int>(choices.Below(kMostRepeats));
+    const std::string_view message = choices.TakeText(choices.Take<std::uint32_t>() & 0xfffff);
+    std::size_t warm = 0;
+    for (int k = 0; k < repeats && messages < kMostMessages; ++k, ++messages) {
+      if (k == kWarmingRepeats) warm = HeldBytes();
+      stream.Take(message);
+    }
+    largest = std::max(largest, message.size());
+    Require(warm == 0 || HeldBytes() <= warm + kSlackBytes,
+            "a message that comes again takes no further memory");
+  }
+  const std::size_t with_messages = HeldBytes();
+  shared->worker.door_buffers.reset();
+  Require(with_messages <= HeldBytes() + kKeptBytes + kKeptPerByte * largest,
+          "a worker keeps no more of messages than they justify");
+}
+
+}  // namespace partiemc::fuzz

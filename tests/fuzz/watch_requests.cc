@@ -1,0 +1,152 @@
+// What a watcher sends, message after message, while results come and writes end at any moment.
+#include <memory>
+#include <string>
+
+#include "fuzz/choices.h"
+#include "fuzz/require.h"
+#include "fuzz/targets.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "server/watch_flow.h"
+#include "server/watch_hub.h"
+#include "server/watch_pump.h"
+
+namespace partiemc::fuzz {
+namespace {
+
+constexpr std::size_t kMaxWatcherBytes = 4096;
+constexpr std::size_t kMaxSteps = 256;
+
+// A watch without a connection: its writes end when the target says so.
+class Watch final : private server::WatchDoor {
+ public:
+  explicit Watch(std::shared_ptr<server::WatchHub> hub) : hub_(std::move(hub)) { flow_->Start(); }
+  ~Watch() override {
+    flow_->Cancelled();
+    if (writing_) WriteDone(false);
+    if (reading_) ReadEnded();
+    Require(finished_, "a watch comes to its end");
+  }
+
+  // As the server's reactor does it.
+  void Take(std::string_view bytes) {
+    if (!reading_) return;
+    server::WatchRequest request;
+    parsed_.Clear();
+    if (parsed_.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+      using Kind = server::WatchRequest::Kind;
+      request.kind = parsed_.has_open()     ? Kind::kOpen
+                     : parsed_.has_credit() ? Kind::kCredit
+                                            : Kind::kEmpty;
+      request.credit = parsed_.credit().frames();
+      if (is_open_ && parsed_.has_credit()) credit_ += request.credit;
+    }
+    reading_ = false;
+    flow_->ReadDone(request);
+  }
+  void ReadEnded() {
+    if (std::exchange(reading_, false)) flow_->ReadEnded();
+  }
+  void WriteDone(bool ok) {
+    if (std::exchange(writing_, false)) flow_->WriteDone(ok);
+  }
+  void Cancel() { flow_->Cancelled(); }
+  void Drain() { flow_->Drain(); }
+  void RequireBounded() const {
+    // In mode `latest` two results at most, each within the limit: one is being written.
+    Require(flow_->held_bytes() <= (is_every_ ? 1 : 2) * kMaxWatcherBytes,
+            "a watcher holds no more than it may");
+  }
+
+ private:
+  void StartRead() override {
+    Require(!reading_ && !finished_, "one read at a time");
+    reading_ = true;
+  }
+  absl::StatusOr<server::WatchTerms> Open() override {
+    Require(!is_open_, "a watch is opened once");
+    is_open_ = true;
+    credit_ = parsed_.open().credits();
+    is_every_ = parsed_.open().mode() == v1::WATCH_MODE_EVERY;
+    return server::WatchTerms{
+        .hub = hub_,
+        .mode = is_every_ ? server::WatchMode::kEvery : server::WatchMode::kLatest,
+        .credit = credit_};
+  }
+  void WriteOpened() override { Write(); }
+  void WriteFrame(const server::WatchFrame& frame, std::uint64_t) override {
+    Require(frame.bytes() <= kMaxWatcherBytes, "a frame that is too large is not written");
+    Require(credit_-- > 0, "no frame is written without credit");
+    Write();
+  }
+  void WriteEnded(const server::WatchEnd& end, std::uint64_t) override {
+    Require(!end.reason.empty(), "an end has its reason");
+    Write();
+  }
+  void Cut() override {
+    if (writing_) WriteDone(false);
+    ReadEnded();
+  }
+  void Finish(const absl::Status&) override {
+    Require(!finished_ && !writing_, "a watch ends once, after its last write");
+    finished_ = true;
+  }
+
+  void Write() {
+    Require(!writing_ && !finished_, "one write at a time");
+    writing_ = true;
+  }
+
+  const std::shared_ptr<server::WatchHub> hub_;
+  v1::WatchStreamRequest parsed_;
+  std::uint64_t credit_ = 0;
+  bool is_open_ = false, is_every_ = false, reading_ = false, writing_ = false, finished_ = false;
+  std::shared_ptr<server::WatchFlow> flow_ =
+      std::make_shared<server::WatchFlow>(static_cast<server::WatchDoor&>(*this), kMaxWatcherBytes);
+};
+
+}  // namespace
+
+void AttackWatchRequests(Bytes bytes) {
+  static auto* const pump = new server::WatchPump;
+  const auto hub = std::make_shared<server::WatchHub>(
+      *pump, server::WatchHub::Limits{.tap_bytes = 2 * kMaxWatcherBytes, .kept_bytes = 256});
+  Choices choices(bytes);
+  {
+    Watch watch(hub);
+    bool over = false;
+    for (std::size_t step = 0; step < kMaxSteps && !choices.empty(); ++step) {
+      const std::uint8_t what = choices.Take<std::uint8_t>();
+      switch (what % 8) {
+        case 0:
+        case 1:
+          watch.Take(choices.TakeText(choices.Take<std::uint8_t>()));
+          break;
+        case 2:
+        case 3:
+          watch.WriteDone(what < 248);
+          break;
+        case 4:
+        case 5:
+          if (over) break;
+          hub->Publish(std::make_shared<server::WatchFrame>(16 * std::size_t{what}));
+          hub->Announce();
+          break;
+        case 6:
+          watch.ReadEnded();
+          break;
+        default:
+          if (what < 240) break;
+          if (what == 255) watch.Cancel();
+          if (what == 247) watch.Drain();
+          if (!std::exchange(over, true)) {
+            hub->End(server::WatchEnd::OfStream(absl::OkStatus()));
+          }
+      }
+      pump->Flush();  // So that the same bytes do the same again.
+      watch.RequireBounded();
+    }
+  }
+  pump->Flush();
+}
+
+}  // namespace partiemc::fuzz

@@ -1,0 +1,104 @@
+// How callers share a room.
+#include "server/fair_share.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "server/caller.h"
+
+namespace partiemc::server {
+namespace {
+
+using Fit = FairShare::Fit;
+
+class Room : public ::testing::Test {
+ protected:
+  // As much as `caller` gets, one by one.
+  std::uint64_t TakeAll(const CallerAccount& caller, std::uint64_t most = FairShare::kNoLimit) {
+    while (room_.Fits(&caller, 1, most) == Fit::kYes) room_.Take(&caller, 1);
+    return room_.held_by(&caller);
+  }
+
+  FairShare room_{120};
+  std::array<CallerAccount, 5> callers_;
+};
+
+TEST_F(Room, OneGreedyCallerHasHalfOfIt) {
+  EXPECT_EQ(TakeAll(callers_[0]), 60u);
+  EXPECT_EQ(room_.Fits(&callers_[0], 1), Fit::kMoreThanShare);
+  EXPECT_EQ(room_.Fits(&callers_[1], 1), Fit::kYes);
+}
+
+TEST_F(Room, GreedyCallersLeaveSomeForTheNextWhoeverCameFirst) {
+  std::uint64_t before = room_.room();
+  for (const CallerAccount& caller : callers_) {
+    const std::uint64_t own = TakeAll(caller);
+    EXPECT_GT(own, 0u);
+    EXPECT_LT(own, before);
+    before = own;
+  }
+  EXPECT_GT(room_.room() - room_.held(), 0u);
+  // Once those who came first have less, all have the same.
+  for (int round = 0; round < 100; ++round) {
+    for (const CallerAccount& caller : callers_) {
+      if (room_.Fits(&caller, 1) == Fit::kMoreThanShare) room_.GiveBack(&caller, 1);
+    }
+    for (const CallerAccount& caller : callers_) TakeAll(caller);
+  }
+  for (const CallerAccount& caller : callers_) {
+    EXPECT_NEAR(static_cast<double>(room_.held_by(&caller)), 20, 1);
+  }
+}
+
+TEST_F(Room, WhoHoldsNothingGetsWhatFits) {
+  EXPECT_EQ(room_.Fits(&callers_[0], 120), Fit::kYes);
+  EXPECT_EQ(room_.Fits(&callers_[0], 121), Fit::kNoRoom);
+  room_.Take(&callers_[0], 100);
+  EXPECT_EQ(room_.Fits(&callers_[1], 20), Fit::kYes);
+  EXPECT_EQ(room_.Fits(&callers_[1], 21), Fit::kNoRoom);
+  EXPECT_EQ(room_.Fits(&callers_[0], 1), Fit::kMoreThanShare);
+}
+
+TEST_F(Room, ALimitOfACallerCountsBesideItsShare) {
+  EXPECT_EQ(room_.Fits(&callers_[0], 11, 10), Fit::kMoreThanShare);
+  EXPECT_EQ(TakeAll(callers_[0], 10), 10u);
+  EXPECT_EQ(TakeAll(callers_[1], 1000), 55u);
+  room_.Take(&callers_[2], 7);
+  EXPECT_EQ(room_.Fits(&callers_[2], 1, 5), Fit::kMoreThanShare) << "it holds more already";
+}
+
+TEST_F(Room, TheServerItselfHasNoShare) {
+  room_.Take(nullptr, 100);
+  EXPECT_EQ(room_.Fits(nullptr, 20), Fit::kYes);
+  EXPECT_EQ(room_.Fits(nullptr, 21), Fit::kNoRoom);
+}
+
+TEST_F(Room, WhatIsHeldInAnyCaseCountsAndNobodyIsRememberedWithoutIt) {
+  room_.Take(&callers_[0], 500);
+  EXPECT_EQ(room_.held(), 500u);
+  EXPECT_EQ(room_.Fits(&callers_[1], 1), Fit::kNoRoom);
+  EXPECT_EQ(room_.Fits(&callers_[1], 0), Fit::kNoRoom);
+  room_.GiveBack(&callers_[0], 400);
+  EXPECT_EQ(room_.Fits(&callers_[1], 20), Fit::kYes);
+  room_.GiveBack(&callers_[0], 100);
+  room_.Take(&callers_[1], 0);
+  EXPECT_EQ(room_.callers(), 0u);
+  EXPECT_EQ(room_.held(), 0u);
+}
+
+TEST_F(Room, NumbersAtTheEndOfTheirRangeDoNotWrapAround) {
+  constexpr std::uint64_t kMost = FairShare::kNoLimit;
+  EXPECT_EQ(room_.Fits(&callers_[0], kMost), Fit::kNoRoom);
+  room_.Take(&callers_[0], kMost);
+  EXPECT_EQ(room_.Fits(&callers_[0], 1), Fit::kMoreThanShare);
+  EXPECT_EQ(room_.Fits(&callers_[1], 1), Fit::kNoRoom);
+  room_.GiveBack(&callers_[0], kMost);
+  FairShare all(kMost);
+  all.Take(&callers_[0], kMost - 1);
+  EXPECT_EQ(all.Fits(&callers_[0], 1), Fit::kMoreThanShare);
+  EXPECT_EQ(all.Fits(&callers_[1], 1), Fit::kYes);
+}
+
+}  // namespace
+}  // namespace partiemc::server

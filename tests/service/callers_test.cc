@@ -1,0 +1,207 @@
+// Several callers of one server: what each may, and that none of them locks the others out.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "service/service_testing.h"
+#include "support/temporary_folder.h"
+
+namespace partiemc::server {
+namespace {
+
+using grpc::StatusCode;
+using ::testing::HasSubstr;
+
+constexpr char kAlice[] = "alice-0123456789abcdef";
+constexpr char kMallory[] = "mallory-0123456789abcdef";
+// More than there are places for calls without a request.
+constexpr int kMany = 200;
+
+template <typename Request, typename Response>
+struct Bidi {
+  std::unique_ptr<grpc::ClientContext> context = std::make_unique<grpc::ClientContext>();
+  std::unique_ptr<grpc::ClientReaderWriter<Request, Response>> rpc;
+
+  ~Bidi() {
+    if (context != nullptr) context->TryCancel();
+  }
+  Bidi() = default;
+  Bidi(Bidi&&) = default;
+  // The first answer; one without a case where the call has ended.
+  Response Ask(const Request& request) {
+    Response response;
+    rpc->Write(request);
+    if (!rpc->Read(&response)) response.Clear();
+    return response;
+  }
+  std::string EndReason() {
+    rpc->WritesDone();
+    for (Response response; rpc->Read(&response);) {
+    }
+    rpc->Finish();
+    return ReasonOf(*context);
+  }
+};
+using Stream = Bidi<v1::ReconstructRequest, v1::ReconstructResponse>;
+using Watch = Bidi<v1::WatchStreamRequest, v1::WatchStreamResponse>;
+
+class Callers : public ::testing::Test {
+ protected:
+  void Serve(const std::string& alices_terms, const std::string& mallorys_terms) {
+    options_.token_file = folder_.Write("tokens", std::string(kAlice) + " " + alices_terms + "\n" +
+                                                      kMallory + " " + mallorys_terms + "\n");
+    server_ = StartServer(options_);
+    channel_ = Connect(*server_, Transport::kTcp);
+    stub_ = v1::ReconstructionService::NewStub(channel_);
+  }
+  static void Identify(grpc::ClientContext& context, const char* token) {
+    SetDeadline(context);
+    context.AddMetadata("authorization", std::string("Bearer ") + token);
+  }
+  Stream BeginStream(const char* token) {
+    Stream stream;
+    Identify(*stream.context, token);
+    stream.rpc = stub_->Reconstruct(stream.context.get());
+    return stream;
+  }
+  Watch BeginWatch(const char* token) {
+    Watch watch;
+    Identify(*watch.context, token);
+    watch.rpc = stub_->WatchStream(watch.context.get());
+    return watch;
+  }
+  static v1::WatchStreamRequest OpenWatch(const std::string& name) {
+    v1::WatchStreamRequest request;
+    request.mutable_open()->set_stream_name(name);
+    request.mutable_open()->set_credits(1);
+    return request;
+  }
+  // The reason; "OK" where there was an answer.
+  std::string CallFrame(const char* token) {
+    v1::ReconstructFrameRequest request;
+    *request.mutable_parameters() = OpenRequest().open().parameters();
+    *request.mutable_frame() = BlobRequest(0, 1, 0).frame();
+    grpc::ClientContext context;
+    Identify(context, token);
+    v1::ReconstructFrameResponse response;
+    const auto status = stub_->ReconstructFrame(&context, request, &response);
+    return status.ok() ? "OK" : ReasonOf(context);
+  }
+  v1::GetServerInfoResponse Info(const char* token) {
+    grpc::ClientContext context;
+    Identify(context, token);
+    v1::GetServerInfoResponse info;
+    EXPECT_TRUE(stub_->GetServerInfo(&context, {}, &info).ok());
+    return info;
+  }
+
+  const support::TemporaryFolder folder_;
+  ServerOptions options_ = TestOptions();
+  std::unique_ptr<Server> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::ReconstructionService::Stub> stub_;
+};
+
+TEST_F(Callers, MuteStreamsOfOneKeepNobodyOut) {
+  Serve("alice", "mallory");
+  std::vector<Stream> mute;
+  for (int i = 0; i < kMany; ++i) mute.push_back(BeginStream(kMallory));
+  Stream stream = BeginStream(kAlice);
+  EXPECT_TRUE(stream.Ask(OpenRequest()).has_opened()) << stream.EndReason();
+  EXPECT_EQ(mute[0].EndReason(), "TOO_MANY_OPENING");
+  // Nor others of the same caller, as all are behind a proxy.
+  Stream own = BeginStream(kMallory);
+  EXPECT_TRUE(own.Ask(OpenRequest()).has_opened()) << own.EndReason();
+}
+
+TEST_F(Callers, MuteWatchersOfOneKeepNobodyOut) {
+  Serve("alice", "mallory");
+  Stream producer = BeginStream(kAlice);
+  ASSERT_TRUE(producer.Ask(OpenRequest("tank")).has_opened());
+  std::vector<Watch> mute;
+  for (int i = 0; i < kMany; ++i) mute.push_back(BeginWatch(kMallory));
+  Watch watch = BeginWatch(kAlice);
+  EXPECT_TRUE(watch.Ask(OpenWatch("tank")).has_opened()) << watch.EndReason();
+  EXPECT_EQ(mute[0].EndReason(), "TOO_MANY_OPENING");
+}
+
+TEST_F(Callers, StreamsThatTakeNoAnswersLeaveMemoryForOthers) {
+  const std::size_t frame = BlobRequest(1, 1, 0).ByteSizeLong();
+  constexpr int kStreams = 12;
+  options_.limits.memory_budget = 3 * kStreams * frame;
+  Serve("alice", "mallory");
+  grpc::ChannelArguments small_windows;
+  small_windows.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 1);
+  small_windows.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  const auto channel = grpc::CreateCustomChannel(server_->address().ToString(),
+                                                 grpc::InsecureChannelCredentials(), small_windows);
+  const auto stub = v1::ReconstructionService::NewStub(channel);
+  std::vector<Stream> streams(kStreams);
+  std::vector<std::thread> senders;
+  for (Stream& stream : streams) {
+    Identify(*stream.context, kMallory);
+    stream.rpc = stub->Reconstruct(stream.context.get());
+    senders.emplace_back([&stream] {
+      bool goes_on = stream.rpc->Write(OpenRequest());
+      for (std::uint64_t k = 1; goes_on && k <= 1000; ++k) {
+        goes_on = stream.rpc->Write(BlobRequest(k, 1, k));
+      }
+    });
+  }
+  // Until the server has taken from each as much as it takes.
+  EXPECT_TRUE(
+      Eventually([&] { return Info(kAlice).load().memory_held() >= kStreams * frame / 2; }));
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(CallFrame(kAlice), "OK") << i;
+  for (Stream& stream : streams) stream.context->TryCancel();
+  for (std::thread& sender : senders) sender.join();
+}
+
+TEST_F(Callers, EachHasWhatItsLineSaysAndIsToldWhatIsTooMuch) {
+  Serve("alice", "mallory streams=1 watchers=1 bytes=100B");
+  Stream first = BeginStream(kMallory), second = BeginStream(kMallory);
+  ASSERT_TRUE(first.Ask(OpenRequest("one")).has_opened());
+  EXPECT_FALSE(second.Ask(OpenRequest("two")).has_opened());
+  EXPECT_EQ(second.EndReason(), "CALLER_STREAMS");
+  Watch watch = BeginWatch(kMallory), other = BeginWatch(kMallory);
+  ASSERT_TRUE(watch.Ask(OpenWatch("one")).has_opened());
+  EXPECT_FALSE(other.Ask(OpenWatch("one")).has_opened());
+  EXPECT_EQ(other.EndReason(), "CALLER_WATCHERS");
+  EXPECT_EQ(CallFrame(kMallory), "CALLER_BYTES");
+  EXPECT_EQ(CallFrame(kAlice), "OK");
+}
+
+TEST_F(Callers, HaveNoMoreCallsThanTheirLineSays) {
+  Serve("alice", "mallory calls=2");
+  Stream first = BeginStream(kMallory), second = BeginStream(kMallory);
+  ASSERT_TRUE(first.Ask(OpenRequest()).has_opened() && second.Ask(OpenRequest()).has_opened());
+  EXPECT_EQ(CallFrame(kMallory), "CALLER_CALLS");
+  EXPECT_EQ(CallFrame(kAlice), "OK");
+  EXPECT_EQ(first.EndReason(), "");
+  EXPECT_TRUE(Eventually([&] { return CallFrame(kMallory) == "OK"; }));
+}
+
+TEST_F(Callers, MayDoAndSeeWhatTheirLineSays) {
+  Serve("alice", "wall may=watch,list names=tank-*");
+  Stream tank = BeginStream(kAlice), dam = BeginStream(kAlice), stream = BeginStream(kMallory);
+  ASSERT_TRUE(tank.Ask(OpenRequest("tank-1")).has_opened());
+  ASSERT_TRUE(dam.Ask(OpenRequest("dam")).has_opened());
+  EXPECT_EQ(stream.EndReason(), "NOT_PERMITTED");
+  EXPECT_EQ(CallFrame(kMallory), "NOT_PERMITTED");
+  Watch watch = BeginWatch(kMallory), other = BeginWatch(kMallory);
+  EXPECT_TRUE(watch.Ask(OpenWatch("tank-1")).has_opened());
+  EXPECT_FALSE(other.Ask(OpenWatch("dam")).has_opened());
+  EXPECT_EQ(other.EndReason(), "NOT_PERMITTED");
+  grpc::ClientContext context;
+  Identify(context, kMallory);
+  v1::ListStreamsResponse listed;
+  ASSERT_TRUE(stub_->ListStreams(&context, {}, &listed).ok());
+  ASSERT_EQ(listed.streams_size(), 1);
+  EXPECT_EQ(listed.streams(0).stream_name(), "tank-1");
+}
+
+}  // namespace
+}  // namespace partiemc::server
