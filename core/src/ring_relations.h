@@ -44,7 +44,7 @@ struct RelationScratch {
   std::vector<std::uint8_t> linked_before, linked_now;
 };
 
-/// Finds the related rings (core/METHOD.md, "Identities"): by the nodes that they share after rings
+/// Finds the related rings (core/IDENTITIES.md): by the nodes that they share after rings
 /// have gone the way of their samples, or else of their velocities, or where they are; and by
 /// samples where these contradict. Relations come in no particular order, each pair once.
 /// Cost: n log n in runs, rings and samples.

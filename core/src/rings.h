@@ -49,7 +49,7 @@ struct RingScratch {
 };
 
 /// Joins the segments of `crossings` to rings and assigns each hole to its outer ring. With
-/// `parameters.clean`, components without a particle and holes below 6 h^2 (METHOD, step 3) are
+/// `parameters.clean`, components without a particle and holes below 2 h^2 (METHOD, Cleaning) are
 /// dropped, with everything that lies in such a hole. Then spray is dropped: outer rings that
 /// enclose less area than `min_component_area` h^2, or fewer particles than
 /// `min_component_particles`, with everything in them. Nodes that were dropped change sides in

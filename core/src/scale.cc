@@ -10,7 +10,7 @@ namespace {
 // The kernel (1 - s^2)^3 integrates to pi R^2 / 4 over the plane.
 constexpr double kFourOverPi = 1.27323954473516268615;
 
-// The guard against spurious contours (core/METHOD.md, "Spurious contour"): g = 0.9 / beta^2 is
+// The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 = 0.9 / beta^2 is
 // 0.10 at beta = 3, above what the void between two components has, below a lone particle's f.
 constexpr double kGuardFactor = 0.9;
 // A lone particle must survive, hence never more than this share of the lightest one's own f.
@@ -18,7 +18,7 @@ constexpr double kGuardShareOfLightest = 0.7;
 // Above this density a node is inside, whatever the weighted mean says: f is about 1 inside and
 // 0.5 on a flat boundary, and at the edge of a void of six particles' area about 0.6.
 constexpr double kSaturation = 0.85;
-// Gaps between bodies (core/METHOD.md, "Gaps"): inside of bodies and on their boundaries the spread
+// Gaps between bodies (ibid.): inside of bodies and on their boundaries the spread
 // is 0.1; half-way across a gap of 1.7 spacings it is 0.21.
 constexpr double kGapSpread = 0.21;
 // A lone particle's spread at its reference radius is (r / R)^2. An outline that is asked for

@@ -31,7 +31,7 @@ struct Frame {
   /// Simulation time. Velocities count between frames of which the later one has the larger time.
   double time = 0;
 
-  // Ids, velocities and time decide identities of rings (core/METHOD.md, "Identities"); nothing
+  // Ids, velocities and time decide identities of rings (core/IDENTITIES.md); nothing
   // else depends on them.
 
   std::size_t ParticleCount() const {

@@ -82,7 +82,7 @@ struct ReconstructionParameters {
   /// Orient the cell normals by those of the frame before (Eq. 11); otherwise by the isoline alone.
   bool normal_memory = true;
 
-  /// Drop holes smaller than six particles and components that hold no particle. Absent: as the
+  /// Close holes of less than 2 h^2, drop components that hold no particle. Absent: as the
   /// placement wants it (on for `virtual-plane`, off for the others).
   std::optional<bool> clean = std::nullopt;
 

@@ -19,7 +19,7 @@ struct RingMeasures {
   double centroid_x = 0, centroid_y = 0;  ///< Of the area that the ring encloses, world units.
   std::uint64_t particle_count = 0;       ///< Particles of the ring's component; 0 for holes.
   /// The same for a ring and the one that continues it in the next frame, different for any two
-  /// rings of a frame, and never given twice in a stream (core/METHOD.md, "Identities").
+  /// rings of a frame, and never given twice in a stream (core/IDENTITIES.md).
   std::uint64_t identity = 0;  ///< 0: not tracked.
 
   friend bool operator==(const RingMeasures&, const RingMeasures&) = default;

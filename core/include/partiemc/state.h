@@ -76,7 +76,7 @@ struct State {
   /// Spacing in use, world units.
   std::optional<double> spacing;
   /// How far the last frame's outline was moved to match its area, in spacings (core/METHOD.md,
-  /// "The default placement", step 6).
+  /// "The default placement", step 4).
   std::optional<double> area_offset;
   /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
   std::vector<CellNormal> normals;

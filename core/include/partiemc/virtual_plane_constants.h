@@ -21,7 +21,7 @@ struct VirtualPlaneConstants {
   double rounding = 0.5;            ///< By so many h^2 kappa the kernel rounds a bend off.
   double support_radius = 2;        ///< Particles nearer than this support a plane,
   double support_depth = 2;         ///< unless they lie farther below it than this.
-  double support_height = 0.6;      ///< Nor are those above this its own; no plane moves farther.
+  double support_height = 0.6;      ///< Nor are those above this its own; no estimate exceeds it.
   double support_scatter = 0.01;    ///< Half of a support is believed at this variance, in h^2.
   double smoothing_reach = 3;       ///< Of the mean of what the neighbours' planes say.
   double thinning_distance = 0.01;  ///< Of edge vertices that go, from their neighbours' chord.
