@@ -20,21 +20,24 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
 }
 
 // The offset that a frame alone would ask for, in spacings. Nothing without large components.
-std::optional<double> WishOf(const VertexInput& input, const Rings& rings, double spacing) {
+std::optional<double> WishOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.parameters.constants;
-  const double cell_area = input.scale.cell_size * input.scale.cell_size;
+  rings.measures.resize(rings.RingCount());
+  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
+    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
+  });
   double volume = 0, area = 0, perimeter = 0;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const bool is_outer = rings.outer_of[ring] == kNoRing;
     const std::size_t outer = is_outer ? ring : rings.outer_of[ring];
-    const auto particles = static_cast<double>(input.topology.particle_count[outer]);
-    if (particles < constants.pooled_particles) continue;
-    if (is_outer) volume += VolumeOf(input, ring) * cell_area;
-    const RingMeasures measures = MeasureRing(rings.RingPoints(ring));
-    area += measures.area;
-    perimeter += measures.perimeter;
+    // Spray: its area says how it broke off.
+    if (rings.measures[outer].perimeter < constants.ShortestRing() * spacing) continue;
+    if (is_outer) volume += VolumeOf(input, ring);
+    area += rings.measures[ring].area;
+    perimeter += rings.measures[ring].perimeter;
   }
   if (perimeter <= 0) return std::nullopt;
+  volume *= input.scale.cell_size * input.scale.cell_size;
   return std::clamp((volume - area) / perimeter / spacing, -constants.area_limit,
                     constants.area_limit);
 }
@@ -46,7 +49,7 @@ void MatchArea(const VertexInput& input, std::vector<double>& scratch,
   const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
   if (!is_known || !input.parameters.steps.area) return;
   const double spacing = input.scale.spacing * input.scale.cell_size;
-  if (const std::optional<double> wish = WishOf(input, rings, spacing)) {
+  if (const std::optional<double> wish = WishOf(input, spacing, rings)) {
     const double change = input.parameters.constants.area_change;
     offset = offset ? std::clamp(*wish, *offset - change, *offset + change) : *wish;
   }

@@ -111,13 +111,6 @@ void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) 
   count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
 }
 
-// The reach of the widest window along a ring, in cells.
-double WidestReach(const VertexInput& input) {
-  const VirtualPlaneConstants& c = input.parameters.constants;
-  return std::max({c.normal_reach, c.bilateral_reach, c.curvature_reach, c.smoothing_reach}) *
-         input.scale.spacing;
-}
-
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
 UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
@@ -125,12 +118,12 @@ UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   const auto length_after = [&](std::size_t k) {
     return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
   };
-  const double min_length = 2 * WidestReach(input);  // A window must not meet its own end.
+  const double min_length = input.parameters.constants.ShortestRing() * input.scale.spacing;
   double length = 0;
   for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
   if (length < min_length) return {};
   UnrolledRings::Size size =
-      SizeForWindows(std::span(v.point).subspan(first, count), WidestReach(input));
+      SizeForWindows(std::span(v.point).subspan(first, count), min_length / 2);
   size.margin += kWindowPadding;
   return size;
 }

@@ -156,6 +156,17 @@ TEST(VirtualPlane, ChangesItsAreaOffsetByLittleAFrameAndRemembersItInTheState) {
   }
 }
 
+TEST(VirtualPlane, AsksNoSprayForItsArea) {
+  std::vector<double> positions = Disc(12, 0.05, 4);
+  State alone, beside_spray;
+  Reconstructed(positions, {}, alone);
+  for (int k = 0; k < 100; ++k) {
+    positions.insert(positions.end(), {30.0 + 10 * (k % 10), 30.0 + 10 * (k / 10)});
+  }
+  EXPECT_EQ(Reconstructed(positions, {}, beside_spray).rings.RingCount(), 101u);
+  EXPECT_EQ(beside_spray.area_offset, alone.area_offset);
+}
+
 TEST(VirtualPlane, DoesNotMoveTheOutlineByMoreThanItsLimitForAnyVolume) {
   const std::vector<double> positions = Disc(12, 0.05, 5);
   for (const float volume : {0.5f, 1.5f}) {

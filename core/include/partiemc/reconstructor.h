@@ -16,7 +16,7 @@
 namespace partiemc {
 
 /// Changes whenever the same frames and parameters would give other digests than before.
-inline constexpr std::uint32_t kMethodVersion = 9;
+inline constexpr std::uint32_t kMethodVersion = 10;
 
 /// Buffers that are kept warm from frame to frame. Belongs to a worker, not to a stream: any
 /// workspace serves any reconstructor, and its history never changes a result.

@@ -1,6 +1,7 @@
 // Every number that shapes `virtual-plane`, in one place.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string_view>
 
@@ -26,9 +27,14 @@ struct VirtualPlaneConstants {
   double smoothing_reach = 3;       ///< Of the mean of what the neighbours' planes say.
   double thinning_distance = 0.01;  ///< Of edge vertices that go, from their neighbours' chord.
   // 4. Area.
-  double pooled_particles = 30;  ///< Components of fewer particles are not asked for their area.
-  double area_limit = 0.2;       ///< Longest offset.
-  double area_change = 0.01;     ///< Largest change of the offset in a frame.
+  double area_limit = 0.2;    ///< Longest offset.
+  double area_change = 0.01;  ///< Largest change of the offset in a frame.
+
+  /// Windows along a ring must not meet their own ends: shorter rings stay at their roots, and
+  /// their components are not asked for their area.
+  double ShortestRing() const {
+    return 2 * std::max({normal_reach, bilateral_reach, curvature_reach, smoothing_reach});
+  }
 
   friend bool operator==(const VirtualPlaneConstants&, const VirtualPlaneConstants&) = default;
 };
