@@ -189,6 +189,8 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
   const VirtualPlaneSteps& steps = input.parameters.steps;
   const VirtualPlaneConstants& c = input.parameters.constants;
   const PlaneEstimator estimator(input.field, input.scale, c);
+  // What the kernel takes off a bend grows with the square of its radius R: R^2 kappa / 18.
+  const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
   float* scatter = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, c.curvature_reach * h);
@@ -211,7 +213,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
         // Nothing bends within less than a spacing.
         const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
-        ring.base[i] = steps.curvature ? static_cast<float>(c.rounding * h * h * curvature) : 0;
+        ring.base[i] = steps.curvature ? static_cast<float>(rounding * curvature) : 0;
         ring.shift[i] = -ring.base[i];  // What is kept where nothing tells where a plane belongs.
         scatter[i] = 0;
         if (!steps.support) continue;

@@ -19,7 +19,7 @@ struct VirtualPlaneConstants {
   double bilateral_reach = 6;  ///< Of the mean by distance and angle.
   // 3. Planes.
   double curvature_reach = 2;
-  double rounding = 0.5;            ///< By so many h^2 kappa the kernel rounds a bend off.
+  double rounding = 0.5;            ///< By so many R^2 / 9 kappa the kernel rounds a bend off.
   double support_radius = 2;        ///< Particles nearer than this support a plane,
   double support_depth = 2;         ///< unless they lie farther below it than this.
   double support_height = 0.6;      ///< Nor are those above this its own; no estimate exceeds it.
