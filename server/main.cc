@@ -13,11 +13,11 @@
 #include <thread>
 
 #include "absl/synchronization/mutex.h"
-#include "server/health_check.h"
-#include "server/heap.h"
-#include "server/logging.h"
+#include "server/compute/heap.h"
 #include "server/options.h"
+#include "server/rpc/health_check.h"
 #include "server/server.h"
+#include "server/telemetry/logging.h"
 
 namespace partiemc::server {
 namespace {

@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/machine_memory.h"
+#include "server/base/machine_memory.h"
 
 namespace partiemc::server {
 namespace {

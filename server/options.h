@@ -6,9 +6,9 @@
 #include <string>
 #include <variant>
 
-#include "server/health_check.h"
-#include "server/logging.h"
+#include "server/rpc/health_check.h"
 #include "server/server.h"
+#include "server/telemetry/logging.h"
 
 namespace partiemc::server {
 

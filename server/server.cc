@@ -12,14 +12,14 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "server/call_guard.h"
-#include "server/call_metrics.h"
-#include "server/health_service.h"
-#include "server/heap.h"
-#include "server/logging.h"
-#include "server/service.h"
-#include "server/tls_credentials.h"
-#include "server/worker_memory.h"
+#include "server/compute/heap.h"
+#include "server/compute/worker_memory.h"
+#include "server/rpc/call_guard.h"
+#include "server/rpc/call_metrics.h"
+#include "server/rpc/health_service.h"
+#include "server/rpc/service.h"
+#include "server/security/tls_credentials.h"
+#include "server/telemetry/logging.h"
 
 namespace partiemc::server {
 namespace {

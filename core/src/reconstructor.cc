@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "bits.h"
-#include "cancellation.h"
-#include "intersections.h"
+#include "base/bits.h"
+#include "base/cancellation.h"
+#include "bins/resolution.h"
+#include "bins/spacing_doubt.h"
+#include "frame/spacing.h"
 #include "partiemc/status.h"
-#include "resolution.h"
-#include "spacing.h"
-#include "spacing_doubt.h"
+#include "vertices/intersections.h"
 #include "workspace.h"
 #include "workspace_bytes.h"
 

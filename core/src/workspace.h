@@ -4,19 +4,19 @@
 #include <optional>
 #include <vector>
 
-#include "bins.h"
-#include "crossings.h"
-#include "distinct_ids.h"
-#include "field.h"
-#include "identities.h"
-#include "intersections.h"
-#include "mesh.h"
-#include "normals.h"
+#include "bins/bins.h"
+#include "crossings/crossings.h"
+#include "field/field.h"
+#include "frame/distinct_ids.h"
+#include "frame/spacing.h"
+#include "identities/identities.h"
+#include "mesh/mesh.h"
+#include "normals/normals.h"
 #include "partiemc/reconstructor.h"
-#include "point_field.h"
-#include "rings.h"
-#include "spacing.h"
-#include "vertices.h"
+#include "rings/rings.h"
+#include "sampler/point_field.h"
+#include "vertices/intersections.h"
+#include "vertices/vertices.h"
 
 namespace partiemc {
 

@@ -20,7 +20,8 @@ bool IsMessaging(std::string_view include) {
 }
 
 std::string StageFile(Stage stage, std::string_view extension) {
-  return "core/src/" + std::string(Name(stage)) + std::string(extension);
+  const std::string name(Name(stage));
+  return "core/src/" + name + "/" + name + std::string(extension);
 }
 
 void RequireFile(const SourceTree& tree, const std::string& path, Violations& violations) {
@@ -129,7 +130,7 @@ Violations CoreIsPlain(const SourceTree& tree) {
 }
 
 Violations TasksHaveOneDoor(const SourceTree& tree) {
-  static const std::string kDoor = "core/src/parallel.cc";
+  static const std::string kDoor = "core/src/base/parallel.cc";
   static const std::regex kTasks("(oneapi/)?tbb/(?!global_control\\.h).*");
   Violations violations;
   RequireFile(tree, kDoor, violations);
@@ -140,6 +141,79 @@ Violations TasksHaveOneDoor(const SourceTree& tree) {
         violations.push_back(path + ": includes " + include +
                              "; tasks go through parallel.h or partiemc/arena.h");
       }
+    }
+  }
+  return violations;
+}
+
+Violations FilesKeepTheirRooms(const SourceTree& tree) {
+  constexpr std::size_t kMostStems = 18;
+  struct House {
+    std::string folder;
+    std::string include_root;        ///< What includes begin after.
+    std::vector<std::string> rooms;  ///< A file includes its own and those before it.
+    std::set<std::string> beside;    ///< Stems that lie in no room and may include all of them.
+  };
+  static const std::array<House, 2> kHouses = {
+      {{"core/src/",
+        "core/src/",
+        {"base", "frame", "state", "bins", "field", "crossings", "rings", "sampler", "normals",
+         "vertices", "identities", "mesh", "check"},
+        {"reconstructor", "workspace", "workspace_bytes"}},
+       {"server/",
+        "",
+        {"base", "telemetry", "security", "compute", "watch", "stream", "rpc"},
+        {"main", "options", "server"}}}};
+  static const std::regex kEnding(R"((-inl)?\.(h|cc)$)");
+  Violations violations;
+  for (const House& house : kHouses) {
+    const auto room_of = [&](const std::string& path) {
+      const std::string rest = path.substr(house.folder.size());
+      const auto slash = rest.find('/');
+      return slash == std::string::npos ? std::string() : rest.substr(0, slash);
+    };
+    std::map<std::string, std::set<std::string>> stems;
+    for (const auto& [path, text] : tree) {
+      if (!path.starts_with(house.folder) || !IsCxx(path)) continue;
+      const std::string room = room_of(path);
+      const std::string stem =
+          std::regex_replace(path.substr(path.rfind('/') + 1), kEnding, std::string());
+      stems[room].insert(stem);
+      const auto place = std::ranges::find(house.rooms, room);
+      if (room.empty() ? !house.beside.contains(stem) : place == house.rooms.end()) {
+        violations.push_back(path + ": lies in no room");
+        continue;
+      }
+      for (const std::string& include : Includes(text)) {
+        const std::string target = ResolveInclude(tree, path, include);
+        if (!target.starts_with(house.folder)) continue;
+        if (target != house.include_root + include) {
+          violations.push_back(path + ": includes " + include + " without its room");
+        } else if (!room.empty() && std::ranges::find(house.rooms, room_of(target)) > place) {
+          violations.push_back(path + ": includes " + include + ", of a room below its own");
+        }
+      }
+    }
+    for (const auto& [room, names] : stems) {
+      if (names.size() > kMostStems) {
+        violations.push_back(house.folder + room + ": has " + std::to_string(names.size()) +
+                             " stems");
+      }
+    }
+  }
+  return violations;
+}
+
+Violations GrpcStaysInItsRooms(const SourceTree& tree) {
+  static const std::regex kMayInclude(
+      "server/(rpc|security)/.*|server/(server|main)\\..*|server/telemetry/logging\\.cc");
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    if (!path.starts_with("server/") || !IsCxx(path) || std::regex_match(path, kMayInclude)) {
+      continue;
+    }
+    for (const std::string& include : Includes(text)) {
+      if (IsMessaging(include)) violations.push_back(path + ": includes " + include);
     }
   }
   return violations;

@@ -15,9 +15,18 @@ using Violations = std::vector<std::string>;
 /// room.
 Violations CoreIsPlain(const SourceTree& tree);
 
-/// Outside of the tests only core/src/parallel.cc, which is compiled without ThreadSanitizer,
+/// Outside of the tests only core/src/base/parallel.cc, which is compiled without ThreadSanitizer,
 /// includes what makes tasks of oneTBB, so that the sanitizer is told about every fork and join.
 Violations TasksHaveOneDoor(const SourceTree& tree);
+
+/// Every file of core/src and of server lies in one of their rooms, or is one of the few beside
+/// them that put the rooms together. A file includes its own room and rooms above it, by its path.
+/// A room has at most 18 stems.
+Violations FilesKeepTheirRooms(const SourceTree& tree);
+
+/// Of the server, the rooms rpc and security, what starts it, and logging.cc, which takes gRPC's
+/// own lines, alone include gRPC and messages.
+Violations GrpcStaysInItsRooms(const SourceTree& tree);
 
 /// Each of the seven stages has its header and source; a stage reaches the headers of earlier
 /// stages only; no other source than reconstructor.cc reaches all of them.

@@ -65,13 +65,13 @@ TEST(Architecture, AForeignHeaderInTheCoreIsSeen) {
   for (const std::string header :
        {"<grpcpp/grpcpp.h>", "<spdlog/spdlog.h>", "<fstream>", "<iostream>", "<chrono>",
         "\"partiemc/v1/reconstruction.pb.h\"", "\"wire/codec.h\""}) {
-    const SourceTree tree = Planted("core/src/status.cc", "\n#include " + header + "\n");
-    EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("core/src/status.cc"))) << header;
+    const SourceTree tree = Planted("core/src/base/status.cc", "\n#include " + header + "\n");
+    EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("core/src/base/status.cc"))) << header;
   }
 }
 
 TEST(Architecture, TheEnvironmentReadInTheCoreIsSeen) {
-  const SourceTree tree = Planted("core/src/status.cc", "\nauto x = std::getenv(\"X\");\n");
+  const SourceTree tree = Planted("core/src/base/status.cc", "\nauto x = std::getenv(\"X\");\n");
   EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("uses getenv")));
 }
 
@@ -79,10 +79,50 @@ TEST(Architecture, TasksHaveOneDoor) { EXPECT_THAT(TasksHaveOneDoor(Project()), 
 
 TEST(Architecture, ASecondDoorToTasksIsSeen) {
   for (const std::string header : {"<tbb/parallel_for.h>", "<oneapi/tbb/task_group.h>"}) {
-    for (const std::string file : {"core/src/field.cc", "server/compute_pool.cc"}) {
+    for (const std::string file : {"core/src/field/field.cc", "server/compute/compute_pool.cc"}) {
       const SourceTree tree = Planted(file, "\n#include " + header + "\n");
       EXPECT_THAT(TasksHaveOneDoor(tree), Contains(HasSubstr(file))) << header;
     }
+  }
+}
+
+TEST(Architecture, FilesKeepTheirRooms) { EXPECT_THAT(FilesKeepTheirRooms(Project()), IsEmpty()); }
+
+TEST(Architecture, AFileWithoutARoomIsSeen) {
+  for (const std::string path : {"core/src/stray.h", "core/src/attic/stray.h", "server/stray.cc"}) {
+    EXPECT_THAT(FilesKeepTheirRooms(Planted(path, "")), Contains(HasSubstr(path + ": lies in no")));
+  }
+}
+
+TEST(Architecture, AnIncludeOfARoomBelowIsSeen) {
+  for (const std::string include : {"mesh/mesh.h", "workspace.h"}) {
+    const SourceTree tree = Planted("core/src/rings/rings.h", "\n#include \"" + include + "\"\n");
+    EXPECT_THAT(FilesKeepTheirRooms(tree), Contains(HasSubstr("rings.h: includes " + include)));
+  }
+  EXPECT_THAT(FilesKeepTheirRooms(
+                  Planted("server/compute/worker.h", "\n#include \"server/stream/session.h\"\n")),
+              Contains(HasSubstr("of a room below its own")));
+}
+
+TEST(Architecture, AnIncludeWithoutItsRoomIsSeen) {
+  const SourceTree tree = Planted("core/src/rings/rings.h", "\n#include \"components.h\"\n");
+  EXPECT_THAT(FilesKeepTheirRooms(tree), Contains(HasSubstr("without its room")));
+}
+
+TEST(Architecture, ARoomThatIsTooFullIsSeen) {
+  SourceTree tree = Project();
+  for (char name = 'a'; name <= 'z'; ++name) {
+    tree["core/src/normals/" + std::string(1, name) + ".h"] = "";
+  }
+  EXPECT_THAT(FilesKeepTheirRooms(tree), Contains("core/src/normals: has 27 stems"));
+}
+
+TEST(Architecture, GrpcStaysInItsRooms) { EXPECT_THAT(GrpcStaysInItsRooms(Project()), IsEmpty()); }
+
+TEST(Architecture, GrpcInAnotherRoomIsSeen) {
+  for (const std::string file : {"server/telemetry/metrics.cc", "server/stream/session.cc"}) {
+    EXPECT_THAT(GrpcStaysInItsRooms(Planted(file, "\n#include <grpcpp/grpcpp.h>\n")),
+                Contains(file + ": includes grpcpp/grpcpp.h"));
   }
 }
 
@@ -91,14 +131,14 @@ TEST(Architecture, StagesKeepTheirOrder) {
 }
 
 TEST(Architecture, AStageThatLooksAheadIsSeen) {
-  const SourceTree direct = Planted("core/src/bins.cc", "\n#include \"rings.h\"\n");
-  EXPECT_THAT(StagesKeepTheirOrder(direct), Contains(HasSubstr("core/src/bins.cc: reaches")));
+  const SourceTree direct = Planted("core/src/bins/bins.cc", "\n#include \"rings/rings.h\"\n");
+  EXPECT_THAT(StagesKeepTheirOrder(direct), Contains(HasSubstr("core/src/bins/bins.cc: reaches")));
 }
 
 TEST(Architecture, AStageThatLooksAheadThroughAnotherHeaderIsSeen) {
-  SourceTree tree = Planted("core/src/field.h", "\n#include \"detour.h\"\n");
-  tree["core/src/detour.h"] = "#include \"mesh.h\"\n";
-  EXPECT_THAT(StagesKeepTheirOrder(tree), Contains(HasSubstr("core/src/field.h: reaches")));
+  SourceTree tree = Planted("core/src/field/field.h", "\n#include \"field/detour.h\"\n");
+  tree["core/src/field/detour.h"] = "#include \"mesh/mesh.h\"\n";
+  EXPECT_THAT(StagesKeepTheirOrder(tree), Contains(HasSubstr("core/src/field/field.h: reaches")));
 }
 
 TEST(Architecture, ASecondFileThatKnowsAllStagesIsSeen) {
@@ -112,13 +152,14 @@ TEST(Architecture, SessionsAreFreeOfGrpc) {
 }
 
 TEST(Architecture, ASessionThatReachesAMessageIsSeen) {
-  for (const std::string file : {"compute_pool.h", "session.cc", "stream_flow.h", "stream_flow.cc",
-                                 "stream_registry.cc", "heap.h"}) {
+  for (const std::string file :
+       {"compute/compute_pool.h", "stream/session.cc", "stream/stream_flow.h",
+        "stream/stream_flow.cc", "stream/stream_registry.cc", "compute/heap.h"}) {
     const SourceTree tree = Planted("server/" + file, "\n#include <grpcpp/grpcpp.h>\n");
     EXPECT_THAT(SessionsAreFreeOfGrpc(tree),
                 Contains("server/" + file + ": reaches grpcpp/grpcpp.h"));
   }
-  SourceTree tree = Planted("server/worker.h", "\n#include \"detour.h\"\n");
+  SourceTree tree = Planted("server/compute/worker.h", "\n#include \"detour.h\"\n");
   tree["server/detour.h"] = "#include \"partiemc/v1/reconstruction.pb.h\"\n";
   EXPECT_THAT(SessionsAreFreeOfGrpc(tree), Contains(HasSubstr("reconstruction.pb.h")));
 }

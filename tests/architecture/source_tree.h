@@ -39,7 +39,7 @@ struct Reached {
 Reached Reach(const SourceTree& tree, const std::string& file);
 
 bool IsCxx(std::string_view path);
-/// "core" for "core/src/bins.cc".
+/// "core" for "core/src/bins/bins.cc".
 std::string_view Room(std::string_view path);
 
 }  // namespace partiemc::architecture

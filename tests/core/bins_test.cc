@@ -1,4 +1,4 @@
-#include "bins.h"
+#include "bins/bins.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "boxes_apart.h"
+#include "base/boxes_apart.h"
 
 #include <gtest/gtest.h>
 

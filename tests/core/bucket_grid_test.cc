@@ -1,4 +1,4 @@
-#include "bucket_grid.h"
+#include "sampler/bucket_grid.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // A frame that is cancelled on its way leaves nothing behind. Also under ThreadSanitizer.
-#include "cancellation.h"
+#include "base/cancellation.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "parallel.h"
+#include "base/parallel.h"
 #include "partiemc/partiemc.h"
 #include "support/particles.h"
 #include "support/random.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "partiemc/validate.h"
-#include "rings.h"
+#include "rings/rings.h"
 #include "support/levels_by_hand.h"
 #include "support/particles.h"
 #include "support/stages.h"

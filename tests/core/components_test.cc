@@ -1,4 +1,4 @@
-#include "components.h"
+#include "rings/components.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "crossings.h"
+#include "crossings/crossings.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "distinct_ids.h"
+#include "frame/distinct_ids.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 #include <vector>
 
-#include "id_hash.h"
+#include "base/id_hash.h"
 #include "support/chosen_ids.h"
 #include "support/random.h"
 

@@ -1,4 +1,4 @@
-#include "field.h"
+#include "field/field.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -11,11 +11,11 @@
 #include <optional>
 #include <vector>
 
+#include "field/tile_kernels.h"
 #include "support/instruction_sets.h"
 #include "support/oracle.h"
 #include "support/particles.h"
 #include "support/stages.h"
-#include "tile_kernels.h"
 
 namespace partiemc {
 namespace {

@@ -1,5 +1,5 @@
 // Which ring continues which: through motion, splits, merges, in any order, on any machine state.
-#include "identities.h"
+#include "identities/identities.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "intersections.h"
+#include "vertices/intersections.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "predicates.h"
+#include "base/predicates.h"
 #include "region_shapes.h"
 
 namespace partiemc {

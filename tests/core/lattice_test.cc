@@ -1,4 +1,4 @@
-#include "lattice.h"
+#include "bins/lattice.h"
 
 #include <gtest/gtest.h>
 

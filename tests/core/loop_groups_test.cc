@@ -1,4 +1,4 @@
-#include "loop_groups.h"
+#include "mesh/loop_groups.h"
 
 #include <gtest/gtest.h>
 

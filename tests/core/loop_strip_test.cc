@@ -1,4 +1,4 @@
-#include "loop_strip.h"
+#include "mesh/loop_strip.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "mesh.h"
+#include "mesh/mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <ostream>
 #include <set>
 
+#include "base/predicates.h"
 #include "partiemc/validate.h"
-#include "predicates.h"
 #include "support/reconstruct.h"
 #include "support/stages.h"
 

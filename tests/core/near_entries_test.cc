@@ -1,4 +1,4 @@
-#include "near_entries.h"
+#include "bins/near_entries.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "node_vertices.h"
+#include "mesh/node_vertices.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "normals.h"
+#include "normals/normals.h"
 
 #include <gtest/gtest.h>
 

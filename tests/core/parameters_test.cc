@@ -7,10 +7,10 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "calibration.h"
+#include "frame/calibration.h"
+#include "frame/scale.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/status.h"
-#include "scale.h"
 #include "support/oracle.h"
 #include "support/particles.h"
 

@@ -1,5 +1,5 @@
 // What particles say of a plane, against a plain sum over all particles.
-#include "plane_support.h"
+#include "vertices/plane_support.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "point_field.h"
+#include "sampler/point_field.h"
 
 #include <gtest/gtest.h>
 
@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "field/level_set_formula.h"
 #include "support/instruction_sets.h"
 #include "support/oracle.h"
 #include "support/particles.h"
@@ -112,7 +113,7 @@ TEST(PointField, APointWithoutSupportSaysSoAndHasNoGradient) {
   stages.Run(particles, {.spacing = 1.0});
   const FieldSample sample = stages.field.Sample(stages.bins.tiles.Find({0, 0}), 20, 20);
   EXPECT_FALSE(sample.has_support);
-  EXPECT_EQ(sample.value, stages.scale.VoidValue());
+  EXPECT_EQ(sample.value, VoidValue(stages.scale));
   EXPECT_EQ(sample.gradient_x, 0);
   EXPECT_EQ(sample.gradient_y, 0);
 }

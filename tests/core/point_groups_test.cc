@@ -1,4 +1,4 @@
-#include "point_groups.h"
+#include "sampler/point_groups.h"
 
 #include <gtest/gtest.h>
 

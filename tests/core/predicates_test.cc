@@ -1,4 +1,4 @@
-#include "predicates.h"
+#include "base/predicates.h"
 
 #include <gtest/gtest.h>
 

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "fork_join.h"
-#include "parallel.h"
+#include "base/fork_join.h"
+#include "base/parallel.h"
 
 namespace partiemc {
 namespace {

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "predicates.h"
+#include "base/predicates.h"
 
 namespace partiemc::testing {
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "predicates.h"
+#include "base/predicates.h"
 
 namespace partiemc::testing {
 

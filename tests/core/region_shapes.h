@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "point.h"
+#include "base/point.h"
 
 namespace partiemc::testing {
 

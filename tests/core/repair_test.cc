@@ -1,10 +1,10 @@
-#include "repair.h"
+#include "vertices/repair.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "measure.h"
+#include "vertices/measure.h"
 
 namespace partiemc {
 namespace {

@@ -1,4 +1,4 @@
-#include "ring_depths.h"
+#include "vertices/ring_depths.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <numeric>
 #include <vector>
 
-#include "intersections.h"
-#include "predicates.h"
+#include "base/predicates.h"
 #include "region_shapes.h"
+#include "vertices/intersections.h"
 
 namespace partiemc {
 namespace {

@@ -1,4 +1,4 @@
-#include "ring_offset.h"
+#include "vertices/ring_offset.h"
 
 #include <gtest/gtest.h>
 

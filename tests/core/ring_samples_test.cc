@@ -1,4 +1,4 @@
-#include "ring_samples.h"
+#include "identities/ring_samples.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -10,7 +10,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "id_hash.h"
+#include "base/id_hash.h"
 #include "support/chosen_ids.h"
 #include "support/random.h"
 #include "support/stages.h"

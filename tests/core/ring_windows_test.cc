@@ -1,5 +1,5 @@
 // Window sums along rings, against walks along the ring that know of neither vectors nor margins.
-#include "ring_windows.h"
+#include "vertices/ring_windows.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <limits>
 #include <vector>
 
-#include "crossings.h"
+#include "crossings/crossings.h"
 #include "support/instruction_sets.h"
 #include "support/random.h"
 

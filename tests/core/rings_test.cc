@@ -1,4 +1,4 @@
-#include "rings.h"
+#include "rings/rings.h"
 
 #include <gtest/gtest.h>
 

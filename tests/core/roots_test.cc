@@ -9,10 +9,10 @@
 #include <string>
 
 #include "partiemc/validate.h"
-#include "placement.h"
-#include "repair.h"
 #include "support/level_sets.h"
 #include "support/stages.h"
+#include "vertices/placement.h"
+#include "vertices/repair.h"
 
 namespace partiemc {
 namespace {

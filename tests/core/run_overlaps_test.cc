@@ -1,4 +1,4 @@
-#include "run_overlaps.h"
+#include "identities/run_overlaps.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "spacing.h"
+#include "frame/spacing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sweep_corners.h"
+#include "mesh/sweep_corners.h"
 
 #include <gtest/gtest.h>
 

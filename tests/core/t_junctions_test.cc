@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "base/point.h"
+#include "base/predicates.h"
 #include "partiemc/validate.h"
-#include "point.h"
-#include "predicates.h"
 #include "support/particles.h"
 #include "support/reconstruct.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "parallel.h"
+#include "base/parallel.h"
 #include "partiemc/partiemc.h"
 #include "support/random.h"
 #include "support/tracked_scene.h"

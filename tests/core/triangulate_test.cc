@@ -1,4 +1,4 @@
-#include "triangulate.h"
+#include "mesh/triangulate.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "predicates.h"
+#include "base/predicates.h"
 #include "region_cover.h"
 #include "region_shapes.h"
 

@@ -1,5 +1,5 @@
 // Margins of unrolled rings, against walks along the ring.
-#include "unrolled_rings.h"
+#include "vertices/unrolled_rings.h"
 
 #include <gtest/gtest.h>
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "check/side_balance.h"
+#include "mesh/triangulate.h"
 #include "region_shapes.h"
-#include "side_balance.h"
-#include "triangulate.h"
 
 namespace partiemc {
 namespace {

@@ -1,4 +1,4 @@
-#include "vertices.h"
+#include "vertices/vertices.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "partiemc/validate.h"
-#include "placement.h"
 #include "support/oracle.h"
 #include "support/particles.h"
 #include "support/stages.h"
+#include "vertices/placement.h"
 
 namespace partiemc {
 namespace {

@@ -1,6 +1,6 @@
 // A checkpoint that comes back from a client: as it comes, and with its header's checksum put
 // right. One that is accepted is gone on from.
-#include "server/checkpoint.h"
+#include "server/stream/checkpoint.h"
 
 #include <string>
 

@@ -8,8 +8,8 @@
 #include "fuzz/require.h"
 #include "fuzz/single_thread.h"
 #include "partiemc/status.h"
-#include "server/stream_messages.h"
-#include "server/watch_pump.h"
+#include "server/rpc/stream_messages.h"
+#include "server/watch/watch_pump.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::fuzz {

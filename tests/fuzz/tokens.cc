@@ -4,7 +4,7 @@
 #include "absl/strings/match.h"
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
-#include "server/bearer_tokens.h"
+#include "server/security/bearer_tokens.h"
 
 namespace partiemc::fuzz {
 

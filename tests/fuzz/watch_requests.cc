@@ -6,9 +6,9 @@
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/watch_flow.h"
-#include "server/watch_hub.h"
-#include "server/watch_pump.h"
+#include "server/watch/watch_flow.h"
+#include "server/watch/watch_hub.h"
+#include "server/watch/watch_pump.h"
 
 namespace partiemc::fuzz {
 namespace {

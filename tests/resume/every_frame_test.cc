@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "resume/workload.h"
-#include "server/checkpoint.h"
-#include "server/session.h"
-#include "server/stream_token.h"
+#include "server/stream/checkpoint.h"
+#include "server/stream/session.h"
+#include "server/stream/stream_token.h"
 
 namespace partiemc::resume {
 namespace {

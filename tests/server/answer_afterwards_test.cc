@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/memory_budget.h"
+#include "server/compute/memory_budget.h"
 #include "server/moving_blob.h"
 #include "server/scripted_door.h"
 

@@ -1,5 +1,5 @@
 // Token files, and who comes in with which token.
-#include "server/bearer_tokens.h"
+#include "server/security/bearer_tokens.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <string>
 
 #include "partiemc/status.h"
-#include "server/authentication.h"
+#include "server/security/authentication.h"
 
 namespace partiemc::server {
 namespace {

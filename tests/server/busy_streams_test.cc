@@ -1,4 +1,4 @@
-#include "server/busy_streams.h"
+#include "server/compute/busy_streams.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What the words behind a token say, and which names a pattern stands for.
-#include "server/caller_terms.h"
+#include "server/security/caller_terms.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "server/name_pattern.h"
+#include "server/base/name_pattern.h"
 
 namespace partiemc::server {
 namespace {

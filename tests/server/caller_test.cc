@@ -1,5 +1,5 @@
 // What a caller may and holds; also under ThreadSanitizer.
-#include "server/caller.h"
+#include "server/security/caller.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "partiemc/status.h"
-#include "server/peer_accounts.h"
+#include "server/security/peer_accounts.h"
 
 namespace partiemc::server {
 namespace {

@@ -1,5 +1,5 @@
 // The keys of checkpoints: what a file of them may hold, and what they sign.
-#include "server/checkpoint_keys.h"
+#include "server/security/checkpoint_keys.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

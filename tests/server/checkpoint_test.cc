@@ -1,6 +1,6 @@
 // Checkpoints: a session that goes on from one gives the bits of one that never stopped, and bytes
 // that are none are refused.
-#include "server/checkpoint.h"
+#include "server/stream/checkpoint.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -12,8 +12,8 @@
 
 #include "partiemc/status.h"
 #include "server/moving_blob.h"
-#include "server/session.h"
-#include "server/stream_token.h"
+#include "server/stream/session.h"
+#include "server/stream/stream_token.h"
 
 namespace partiemc::server {
 namespace {

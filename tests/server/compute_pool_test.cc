@@ -1,6 +1,6 @@
 // The pool that computes: which worker a task gets, and how long a worker keeps its buffers. Also
 // under ThreadSanitizer.
-#include "server/compute_pool.h"
+#include "server/compute/compute_pool.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/task_arena.h>
@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/caller.h"
+#include "server/security/caller.h"
 
 namespace partiemc::server {
 namespace {

@@ -1,11 +1,11 @@
 // How callers share a room.
-#include "server/fair_share.h"
+#include "server/compute/fair_share.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 
-#include "server/caller.h"
+#include "server/security/caller.h"
 
 namespace partiemc::server {
 namespace {

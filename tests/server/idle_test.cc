@@ -7,10 +7,10 @@
 #include <thread>
 
 #include "partiemc/status.h"
-#include "server/idle_timer.h"
 #include "server/memory_door.h"
 #include "server/moving_blob.h"
-#include "server/stream_registry.h"
+#include "server/stream/idle_timer.h"
+#include "server/stream/stream_registry.h"
 
 namespace partiemc::server {
 namespace {

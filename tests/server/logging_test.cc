@@ -1,5 +1,5 @@
 // The log holds nobody up, tells what it left out, and has its last lines written.
-#include "server/logging.h"
+#include "server/telemetry/logging.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -13,8 +13,8 @@
 #include <string>
 #include <thread>
 
-#include "server/log_writer.h"
-#include "server/rate_limit.h"
+#include "server/base/rate_limit.h"
+#include "server/telemetry/log_writer.h"
 
 namespace partiemc::server {
 namespace {

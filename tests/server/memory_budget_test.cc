@@ -1,5 +1,5 @@
 // Who gets memory when, how much a machine has, and what streams do when there is none.
-#include "server/memory_budget.h"
+#include "server/compute/memory_budget.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/machine_memory.h"
+#include "server/base/machine_memory.h"
 #include "server/memory_door.h"
 #include "server/moving_blob.h"
 #include "support/temporary_folder.h"

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "server/session.h"
-#include "server/stream_flow.h"
+#include "server/stream/session.h"
+#include "server/stream/stream_flow.h"
 
 namespace partiemc::server {
 

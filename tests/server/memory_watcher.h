@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "server/watch_flow.h"
-#include "server/watch_hub.h"
+#include "server/watch/watch_flow.h"
+#include "server/watch/watch_hub.h"
 
 namespace partiemc::server {
 

@@ -1,5 +1,5 @@
 // Which of the calls that have not opened gives way; also under ThreadSanitizer.
-#include "server/opening_calls.h"
+#include "server/stream/opening_calls.h"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "partiemc/status.h"
-#include "server/intake_guard.h"
+#include "server/stream/intake_guard.h"
 
 namespace partiemc::server {
 namespace {

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "server/memory_budget.h"
+#include "server/compute/memory_budget.h"
 #include "server/memory_door.h"
-#include "server/session.h"
-#include "server/stream_flow.h"
+#include "server/stream/session.h"
+#include "server/stream/stream_flow.h"
 
 namespace partiemc::server {
 

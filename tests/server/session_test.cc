@@ -1,5 +1,5 @@
 // A session: which frame may come next, and what a refused frame leaves behind.
-#include "server/session.h"
+#include "server/stream/session.h"
 
 #include <gtest/gtest.h>
 #include <malloc.h>

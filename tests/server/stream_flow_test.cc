@@ -1,6 +1,6 @@
 // The flow of messages through a stream, over a transport in memory: order, window, ends, and
 // results that do not depend on who else computes. Also under ThreadSanitizer.
-#include "server/stream_flow.h"
+#include "server/stream/stream_flow.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Who may open a stream, and how all are sent home.
-#include "server/stream_registry.h"
+#include "server/stream/stream_registry.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "partiemc/status.h"
-#include "server/stream_token.h"
+#include "server/stream/stream_token.h"
 
 namespace partiemc::server {
 namespace {

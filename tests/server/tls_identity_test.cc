@@ -1,5 +1,5 @@
 // Files of certificates and keys: what is wrong with them is told when they are read.
-#include "server/tls_identity.h"
+#include "server/security/tls_identity.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // Calls of one request and one answer: whatever happens in whatever order, they end once, hold
 // memory until the connection has taken the answer, and give it back.
-#include "server/unary_flow.h"
+#include "server/stream/unary_flow.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "partiemc/status.h"
-#include "server/stream_flow.h"
-#include "server/unary_registry.h"
+#include "server/stream/stream_flow.h"
+#include "server/stream/unary_registry.h"
 
 namespace partiemc::server {
 namespace {

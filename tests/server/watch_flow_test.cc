@@ -1,6 +1,6 @@
 // Watching over a transport in memory: what passes from a producer to its watchers, in which order,
 // at whose pace. Also under ThreadSanitizer.
-#include "server/watch_flow.h"
+#include "server/watch/watch_flow.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,8 +19,8 @@
 
 #include "partiemc/status.h"
 #include "server/memory_watcher.h"
-#include "server/stream_flow.h"
-#include "server/watch_registry.h"
+#include "server/stream/stream_flow.h"
+#include "server/watch/watch_registry.h"
 
 namespace partiemc::server {
 namespace {

@@ -1,5 +1,5 @@
 // What a worker's buffers may hold, and who gives it back.
-#include "server/worker_memory.h"
+#include "server/compute/worker_memory.h"
 
 #include <gtest/gtest.h>
 

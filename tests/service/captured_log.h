@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "server/logging.h"
+#include "server/telemetry/logging.h"
 
 namespace partiemc::server {
 

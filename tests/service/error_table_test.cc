@@ -8,7 +8,7 @@
 #include <string>
 
 #include "partiemc/status.h"
-#include "server/error_details.h"
+#include "server/rpc/error_details.h"
 
 namespace partiemc::server {
 namespace {

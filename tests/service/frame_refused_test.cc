@@ -10,7 +10,7 @@
 
 #include "partiemc/status.h"
 #include "server/moving_blob.h"
-#include "server/session.h"
+#include "server/stream/session.h"
 #include "service/error_testing.h"
 
 namespace partiemc::server {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "grpc/health/v1/health.grpc.pb.h"
-#include "server/health_check.h"
 #include "server/moving_blob.h"
+#include "server/rpc/health_check.h"
 #include "service/service_testing.h"
 #include "support/temporary_folder.h"
 #include "wire/codec.h"

@@ -12,8 +12,8 @@
 #include "partiemc/status.h"
 #include "partiemc/validate.h"
 #include "server/moving_blob.h"
-#include "server/session.h"
-#include "server/stream_messages.h"
+#include "server/rpc/stream_messages.h"
+#include "server/stream/session.h"
 #include "service/service_testing.h"
 #include "wire/codec.h"
 

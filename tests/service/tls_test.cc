@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/health_check.h"
+#include "server/rpc/health_check.h"
 #include "service/captured_log.h"
 #include "service/security_testing.h"
 

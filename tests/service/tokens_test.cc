@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "server/health_check.h"
+#include "server/rpc/health_check.h"
 #include "service/captured_log.h"
 #include "service/security_testing.h"
 

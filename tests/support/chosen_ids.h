@@ -5,7 +5,7 @@
 
 namespace partiemc::support {
 
-/// The id whose hash is this (core/src/id_hash.h): the steps of HashOf backwards.
+/// The id whose hash is this (core/src/base/id_hash.h): the steps of HashOf backwards.
 inline std::uint64_t IdWithHash(std::uint64_t hash) {
   hash ^= hash >> 31 ^ hash >> 62;
   hash *= 0x319642b2d24d8ec3u;

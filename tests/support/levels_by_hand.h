@@ -5,7 +5,7 @@
 #include <initializer_list>
 #include <utility>
 
-#include "lattice.h"
+#include "bins/lattice.h"
 #include "partiemc/parameters.h"
 #include "support/particles.h"
 

@@ -5,18 +5,18 @@
 #include <functional>
 #include <vector>
 
-#include "bins.h"
-#include "crossings.h"
-#include "field.h"
-#include "mesh.h"
-#include "normals.h"
+#include "bins/bins.h"
+#include "crossings/crossings.h"
+#include "field/field.h"
+#include "frame/scale.h"
+#include "mesh/mesh.h"
+#include "normals/normals.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
-#include "point_field.h"
-#include "rings.h"
-#include "scale.h"
+#include "rings/rings.h"
+#include "sampler/point_field.h"
 #include "support/particles.h"
-#include "vertices.h"
+#include "vertices/vertices.h"
 
 namespace partiemc::support {
 

@@ -1,0 +1,58 @@
+// Geometric predicates that are never wrong: a floating-point filter answers almost every call,
+// exact expansion arithmetic the rest.
+//
+// Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+// Predicates", Discrete & Computational Geometry 18 (1997).
+//
+// Domain: coordinates that are zero or of a magnitude in [kMinMagnitude, kMaxMagnitude]. There no
+// product of two coordinates overflows and no bit of it is subnormal, so that every error-free step
+// is free of errors. Outside of it a sign may be wrong, but nothing worse happens.
+// Needs round-to-nearest and no contraction of a * b + c (-ffp-contract=off).
+#pragma once
+
+#include "base/point.h"
+
+namespace partiemc {
+
+/// Coordinates are multiples of 2^-53 kMinMagnitude > 2^-452, and so are their differences;
+/// products of two are multiples of 2^-904, far above the smallest normal number, 2^-1022.
+inline constexpr double kMinMagnitude = 1e-120;
+/// Six products of two coordinates, and a coordinate times 2^27 + 1, stay below 2^1023.
+inline constexpr double kMaxMagnitude = 1e150;
+
+/// Whether `coordinate` lies in the domain of the predicates. False for NaN and infinities.
+constexpr bool InPredicateDomain(double coordinate) {
+  const double magnitude = coordinate < 0 ? -coordinate : coordinate;
+  return magnitude == 0 || (magnitude >= kMinMagnitude && magnitude <= kMaxMagnitude);
+}
+
+/// Orientation without the filter, for calls that it could not answer.
+int OrientationExact(const Point& a, const Point& b, const Point& c);
+
+/// +1 if a, b, c turn counter-clockwise (c lies left of the line from a to b), -1 if clockwise,
+/// 0 if they are collinear or two of them coincide. Exact in the domain above.
+/// Cost: about 3 ns when the filter answers, 10 ns for points of a lattice that are exactly
+/// collinear, below 1 us always.
+inline int Orientation(const Point& a, const Point& b, const Point& c) {
+  // Shewchuk's bound on the error of `determinant` relative to `magnitude`: (3 + 16 eps) eps with
+  // eps = 2^-53.
+  constexpr double kEpsilon = 0x1p-53;
+  constexpr double kErrorBound = (3.0 + 16.0 * kEpsilon) * kEpsilon;
+
+  const double left = (a.x - c.x) * (b.y - c.y);
+  const double right = (a.y - c.y) * (b.x - c.x);
+  const double determinant = left - right;
+  const double magnitude = (left < 0 ? -left : left) + (right < 0 ? -right : right);
+  const double bound = kErrorBound * magnitude;
+  if (determinant > bound) return 1;
+  if (-determinant > bound) return -1;
+  // A difference or product is only rounded to zero when it is zero.
+  if (magnitude == 0) return 0;
+  return OrientationExact(a, b, c);
+}
+
+/// Whether the closed segments ab and cd have a point in common. Exact in the domain above.
+/// Segments of length zero are points.
+bool SegmentsTouch(const Point& a, const Point& b, const Point& c, const Point& d);
+
+}  // namespace partiemc

@@ -1,0 +1,312 @@
+#include "bins/bins.h"
+
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "base/parallel.h"
+#include "bins/coordinate_block.h"
+#include "bins/reached_tiles.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// How far beyond its kernel a particle needs tiles, in cells: an inside node is within reach of a
+// particle, the rest of an active cell within one cell of it, and any node of a small hole within
+// the radius of a disc of the hole's area of its ring.
+double TileMargin(const Scale& scale) {
+  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
+}
+
+// Particles whose coordinates are looked at together: what is known of them stays in the nearest
+// cache.
+constexpr std::size_t kBlockParticles = 256;
+
+// The homes met last, by the low bits of their coordinates: a body of up to 256 x 256 tiles finds
+// all of its homes here, and thousands of scattered tiles most of theirs, without a probe of the
+// directory that would have to be guessed. Homes whose index is too large are not remembered.
+class RecentHomes {
+ public:
+  explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNone); }
+
+  std::uint32_t Find(TileCoordinate tile) {
+    constexpr int kColumns = (1 << kColumnBits) - 1, kRows = (1 << kRowBits) - 1;
+    std::uint16_t& recent = index_[(tile.y & kRows) << kColumnBits | (tile.x & kColumns)];
+    if (recent != kNone && stretch_.homes[recent] == tile) return recent;
+    const std::uint32_t index = stretch_.homes.Insert(tile);
+    if (index == stretch_.entries.size()) stretch_.entries.push_back(0);
+    recent = static_cast<std::uint16_t>(std::min<std::uint32_t>(index, kNone));
+    return index;
+  }
+
+ private:
+  static constexpr int kColumnBits = 8, kRowBits = 8;
+  static constexpr std::uint16_t kNone = std::numeric_limits<std::uint16_t>::max();
+  BinStretch& stretch_;
+  std::array<std::uint16_t, 1 << (kColumnBits + kRowBits)> index_;
+};
+
+// First pass over a stretch: finds home tiles and counts. Returns false if a particle is too far
+// from the origin, or if there are more than `max_tiles`.
+template <typename Reader>
+bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double units_per_world,
+               std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {
+  stretch.homes.Clear();
+  stretch.entries.clear();
+  RecentHomes recent(stretch);
+  std::array<typename Reader::Number, 2 * kBlockParticles> copy;
+  std::array<std::int32_t, 2 * kBlockParticles> tiles;
+  for (std::size_t start = first; start < last; start += kBlockParticles) {
+    const std::size_t count = std::min(kBlockParticles, last - start);
+    if (!FindTiles(reader.Pairs(start, count, copy.data()), units_per_world, tiles.data(),
+                   scratch.positions.data() + 2 * start)) {
+      return false;
+    }
+    // They come while homes are looked up, which needs no memory that is far away.
+    reader.Prefetch(start + count, std::min(kBlockParticles, last - start - count));
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t home = recent.Find({tiles[2 * k + 1], tiles[2 * k]});
+      ++stretch.entries[home];
+      scratch.home[start + k] = home;
+    }
+    if (stretch.homes.size() > max_tiles) return false;
+  }
+  return true;
+}
+
+// Joins the homes of all stretches in `tiles`, sorted, and tells the stretches where theirs are.
+// Returns false if they are more than `max_tiles`.
+bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles) {
+  for (BinStretch& stretch : scratch.stretches) {
+    stretch.tiles.clear();
+    for (const TileCoordinate& home : stretch.homes.tiles()) {
+      stretch.tiles.push_back(tiles.Insert(home));
+    }
+    if (tiles.size() > max_tiles) return false;
+  }
+  scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
+  tiles.Sort();
+  // One look-up for each home, not for each of each stretch.
+  scratch.next.clear();
+  for (const TileCoordinate& home : scratch.homes) scratch.next.push_back(tiles.Find(home));
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::uint32_t& home : stretch.tiles) home = scratch.next[home];
+  }
+  scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
+  return true;
+}
+
+// Turns the counts of all stretches into the places of their first entries: a tile's list has the
+// entries of the first stretch, then those of the second. Returns how many entries there are.
+std::uint32_t PlaceEntries(BinScratch& scratch) {
+  scratch.next.assign(scratch.homes.size(), 0);
+  for (const BinStretch& stretch : scratch.stretches) {
+    for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
+      scratch.next[stretch.tiles[k]] += stretch.entries[k];
+    }
+  }
+  std::uint32_t total = 0;
+  for (std::uint32_t& next : scratch.next) {
+    const std::uint32_t count = next;
+    next = total;
+    total += count;
+  }
+  scratch.offsets = scratch.next;
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
+      std::uint32_t& next = scratch.next[stretch.tiles[k]];
+      const std::uint32_t count = stretch.entries[k];
+      stretch.entries[k] = next;
+      next += count;
+    }
+  }
+  return total;
+}
+
+// A particle asks for the line behind its own: its list goes on there after hundreds or thousands
+// of others, in which even memory far away has answered.
+constexpr std::size_t kNextLine = 64 / sizeof(BinEntry) + 1;
+
+// Second pass over a stretch: writes its entries.
+void FillEntries(std::size_t first, std::size_t last, std::span<const float> volumes,
+                 double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
+  const float* const positions = bins.scratch.positions.data();
+  const std::uint32_t* const home = bins.scratch.home.data();
+  std::uint32_t* const next = stretch.entries.data();
+  BinEntry* const entries = bins.entries.data();
+  const auto fill = [&](auto set_weight) {
+    for (std::size_t k = first; k < last; ++k) {
+      const std::uint32_t entry = next[home[k]]++;
+      hwy::Prefetch(entries + entry + kNextLine);
+      entries[entry] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
+      set_weight(entry, k);
+    }
+  };
+  if (volumes.empty()) {
+    fill([](std::uint32_t, std::size_t) {});
+  } else {
+    fill([&](std::uint32_t entry, std::size_t k) {
+      bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
+    });
+  }
+}
+
+// Whether the eight neighbours of a tile are in the directory.
+bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (tiles.Find({tile.y + dy, tile.x + dx}) == kNoTile) return false;
+    }
+  }
+  return true;
+}
+
+// Adds the tiles around those that hold particles, and seals the directory. Returns false if they
+// are more than `max_tiles`.
+bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
+  BinScratch& scratch = bins.scratch;
+  const auto homes = static_cast<std::uint32_t>(scratch.homes.size());
+  const ReachedTiles reached(reach);
+  scratch.reached.resize(homes);
+  ParallelFor(homes, [&](std::uint32_t k) {
+    // In the middle of a body nothing is to be added, whatever its particles reach.
+    scratch.reached[k] = 0;
+    if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) return;
+    const std::uint32_t end =
+        k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.entries.size());
+    scratch.reached[k] =
+        reached.Of(std::span(bins.entries).subspan(scratch.offsets[k], end - scratch.offsets[k]));
+  });
+  for (std::uint32_t k = 0; k < homes; ++k) {
+    ReachedTiles::ForEach(scratch.homes[k], scratch.reached[k],
+                          [&](TileCoordinate tile) { bins.tiles.Insert(tile); });
+    if (bins.tiles.size() > max_tiles) return false;
+  }
+  bins.tiles.Seal();
+  return true;
+}
+
+// The first entry of each tile of the sealed directory, those without particles included, and the
+// tiles of the stretches' homes.
+void SetOffsets(ParticleBins& bins) {
+  BinScratch& scratch = bins.scratch;
+  const auto entries = static_cast<std::uint32_t>(bins.entries.size());
+  bins.offsets.resize(bins.tiles.size() + 1);
+  std::size_t home = 0;
+  for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    bins.offsets[tile] = home < scratch.homes.size() ? scratch.offsets[home] : entries;
+    if (home == scratch.homes.size() || scratch.homes[home] != bins.tiles[tile]) continue;
+    scratch.next[home++] = static_cast<std::uint32_t>(tile);
+  }
+  bins.offsets.back() = entries;
+  for (BinStretch& stretch : scratch.stretches) {
+    for (std::uint32_t& tile : stretch.tiles) tile = scratch.next[tile];
+  }
+}
+
+// Why tiles were not found: the first particle too far away, else too many tiles.
+absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::size_t max_tiles) {
+  const double units_per_world = UnitsPerWorld(scale);
+  const Axes axes = AxesOf(frame, plane);
+  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
+    const WorldPosition position = PositionOf(frame, plane, k);
+    for (const auto& [axis, value] :
+         {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
+      if (IsNearOrigin(value * units_per_world)) continue;
+      return InvalidFrame(kReasonOutOfRange, CoordinateField("positions", k, axis),
+                          ShortestNumber(value),
+                          absl::StrCat("must be within 2^30 cells of ",
+                                       ShortestNumber(scale.cell_size), " from the origin"));
+    }
+  }
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonTooManyTiles), "positions",
+       absl::StrCat("more than ", max_tiles, " tiles of 32 x 32 cells"),
+       absl::StrCat("must reach at most ", max_tiles, " tiles: is the spacing of ",
+                    ShortestNumber(scale.spacing * scale.cell_size), " right?")});
+}
+
+// A stretch has at least so many particles, and there are at most so many of them: enough for the
+// tasks to balance, few enough that counts by stretch and tile stay below the particles. Each meets
+// most homes anew, so that one thread has one.
+constexpr std::size_t kMinStretch = 1 << 15;
+constexpr std::size_t kMaxStretches = 16;
+constexpr std::size_t kStretchesPerThread = 4;
+
+std::size_t MaxStretches() {
+  const std::size_t threads = ThreadCount();
+  return threads > 1 ? std::min(kMaxStretches, kStretchesPerThread * threads) : 1;
+}
+
+}  // namespace
+
+void ParticleBins::Clear() {
+  tiles.Clear();
+  offsets.clear();
+  entries.clear();
+  weight.clear();
+}
+
+absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
+                          const FrameLimits& limits, ParticleBins& bins) {
+  bins.tiles.Clear();
+  BinScratch& scratch = bins.scratch;
+  const std::size_t count = frame.ParticleCount();
+  scratch.home.resize(count);
+  scratch.positions.resize(2 * count);
+  const std::size_t most = MaxStretches();
+  const std::size_t length = std::max(kMinStretch, (count + most - 1) / most);
+  const std::size_t stretches = (count + length - 1) / length;
+  if (scratch.all_stretches.size() < stretches) scratch.all_stretches.resize(stretches);
+  scratch.stretches = std::span(scratch.all_stretches).first(stretches);
+  for (std::size_t k = 0; k < stretches; ++k) {
+    scratch.stretches[k].first = k * length;
+    scratch.stretches[k].last = std::min(count, (k + 1) * length);
+  }
+  const auto for_each_stretch = [&](auto visit) {
+    ParallelFor(scratch.stretches.size(), [&](std::size_t k) {
+      BinStretch& stretch = scratch.stretches[k];
+      visit(stretch, stretch.first, stretch.last);
+    });
+  };
+
+  std::atomic<bool> found = true;
+  const double units_per_world = UnitsPerWorld(scale);
+  VisitPositions(frame, plane, [&](const auto& reader) {
+    for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
+      if (!FindHomes(reader, first, last, units_per_world, limits.max_tiles, stretch, scratch)) {
+        found = false;
+      }
+    });
+  });
+  if (!found || !JoinHomes(limits.max_tiles, scratch, bins.tiles)) {
+    return Refusal(frame, plane, scale, limits.max_tiles);
+  }
+  const std::uint32_t entries = PlaceEntries(scratch);
+  bins.entries.resize(entries);
+  bins.weight.resize(frame.volumes.empty() ? 0 : entries);
+  const double weight_per_world_volume =
+      scale.weight_per_volume / scale.cell_size / scale.cell_size;
+  for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
+    FillEntries(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
+  });
+  if (!AddReachedTiles(RoundedUp(scale.kernel_radius + TileMargin(scale)), limits.max_tiles,
+                       bins)) {
+    return Refusal(frame, plane, scale, limits.max_tiles);
+  }
+  SetOffsets(bins);
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

@@ -1,0 +1,140 @@
+// Sets of cells in a tile and around it, as bits: which particles a step has to look at.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "bins/lattice.h"
+
+namespace partiemc {
+
+/// Cells from kMaskMargin before a tile to kMaskMargin beyond it: cell (i, j) is bit
+/// i + kMaskMargin of row j + kMaskMargin.
+inline constexpr int kMaskMargin = kTileSize / 2;
+using CellMask = std::array<std::uint64_t, kTileSize + 2 * kMaskMargin>;
+
+/// Of a tile in its own Neighbourhood.
+inline constexpr int kOwnPlace = 4;
+
+inline bool IsEmpty(const BitRows& rows) {
+  std::uint32_t any = 0;
+  for (const std::uint32_t row : rows) any |= row;
+  return any == 0;
+}
+
+/// Swaps the upper half of each group of 2 kHalf bits with the lower one of the row kHalf above.
+template <int kHalf>
+void SwapHalves(BitRows& rows) {
+  constexpr std::uint32_t kLower = ~std::uint32_t{0} / ((std::uint32_t{1} << kHalf) + 1);
+  for (int first = 0; first < kTileSize; first += 2 * kHalf) {
+    for (int j = first; j < first + kHalf; ++j) {
+      const std::uint32_t swapped = (rows[j] >> kHalf ^ rows[j + kHalf]) & kLower;
+      rows[j + kHalf] ^= swapped;
+      rows[j] ^= swapped << kHalf;
+    }
+  }
+}
+
+/// Bit i of row j becomes bit j of row i.
+inline BitRows Transposed(BitRows rows) {
+  SwapHalves<16>(rows);
+  SwapHalves<8>(rows);
+  SwapHalves<4>(rows);
+  SwapHalves<2>(rows);
+  SwapHalves<1>(rows);
+  return rows;
+}
+
+/// The cells of a mask that lie in the tile's neighbour at `place` (Neighbourhood), or in the tile
+/// itself.
+inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
+  const int dx = place % 3 - 1;
+  const int dy = place / 3 - 1;
+  const int first = dy < 0 ? kTileSize - kMaskMargin : 0;
+  const int end = dy > 0 ? kMaskMargin : kTileSize;
+  // Before the tile its margin are the upper columns of its neighbour.
+  const int up = dx < 0 ? kTileSize - kMaskMargin : 0;
+  const int down = dx < 0 ? 0 : dx > 0 ? kTileSize + kMaskMargin : kMaskMargin;
+  BitRows cells{};
+  for (int j = first; j < end; ++j) {
+    const std::uint64_t bits = mask[j + dy * kTileSize + kMaskMargin];
+    cells[j] = static_cast<std::uint32_t>(bits << up >> down);
+  }
+  return cells;
+}
+
+/// In which of a tile's neighbours a mask has cells: bit `place` (Neighbourhood).
+inline unsigned NeighboursWithCells(const CellMask& mask) {
+  constexpr std::uint64_t kSide = (std::uint64_t{1} << kMaskMargin) - 1;
+  constexpr std::uint64_t kLeft = kSide, kRight = kSide << (kTileSize + kMaskMargin);
+  unsigned places = 0;
+  int row = 0;
+  for (const auto& [end, first_place] :
+       {std::pair(kMaskMargin, 0), std::pair(kMaskMargin + kTileSize, 3),
+        std::pair(kTileSize + 2 * kMaskMargin, 6)}) {
+    std::uint64_t any = 0;
+    for (; row < end; ++row) any |= mask[row];
+    const unsigned left = (any & kLeft) != 0, right = (any & kRight) != 0;
+    const unsigned middle = (any & ~(kLeft | kRight)) != 0;
+    places |= (left | middle << 1 | right << 2) << first_place;
+  }
+  return places;
+}
+
+/// The bits of a tile alone.
+inline CellMask MaskOf(const BitRows& rows) {
+  CellMask mask{};
+  for (int j = 0; j < kTileSize; ++j) mask[j + kMaskMargin] = std::uint64_t{rows[j]} << kMaskMargin;
+  return mask;
+}
+
+/// The bits of a tile, and of its neighbours those in rows up to `margin` beyond its sides.
+/// rows_of(index) are the rows of an existing tile. Requires: 0 <= margin <= kMaskMargin.
+template <typename RowsOf>
+CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int margin,
+                     RowsOf rows_of) {
+  const Neighbourhood& near = directory.neighbours(tile);
+  CellMask mask{};
+  for (int place = 0; place < static_cast<int>(near.size()); ++place) {
+    if (near[place] == kNoTile) continue;
+    const BitRows& rows = rows_of(near[place]);
+    const int dx = place % 3 - 1;
+    const int dy = place / 3 - 1;
+    const int first = dy < 0 ? kTileSize - margin : 0;
+    const int end = dy > 0 ? margin : kTileSize;
+    const int up = dx < 0 ? 0 : kMaskMargin + dx * kTileSize;
+    const int down = dx < 0 ? kTileSize - kMaskMargin : 0;
+    for (int j = first; j < end; ++j) {
+      mask[j + dy * kTileSize + kMaskMargin] |= std::uint64_t{rows[j]} >> down << up;
+    }
+  }
+  return mask;
+}
+
+/// Adds the cells (i + di, j + dj), -before <= di, dj <= after, of every cell (i, j) of the mask.
+/// Of cells beyond the margin nothing is known, so that those that they would add miss. Requires: 0
+/// <= before, after <= kMaskMargin.
+inline void Widen(CellMask& mask, int before, int after) {
+  // What reaches far already takes a step as long and one more without leaving a gap.
+  const auto reach = [](int distance, auto step_by) {
+    for (int reached = 0; reached < distance;) {
+      const int step = std::min(reached + 1, distance - reached);
+      step_by(step);
+      reached += step;
+    }
+  };
+  // No row is read after it took another one in.
+  reach(before, [&](int step) {
+    for (std::uint64_t& row : mask) row |= row >> step;
+    for (std::size_t row = 0; row + step < mask.size(); ++row) mask[row] |= mask[row + step];
+  });
+  reach(after, [&](int step) {
+    for (std::uint64_t& row : mask) row |= row << step;
+    for (std::size_t row = mask.size() - step; row-- > 0;) mask[row + step] |= mask[row];
+  });
+}
+
+}  // namespace partiemc

@@ -1,0 +1,133 @@
+#include "bins/spacing_doubt.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "frame/near_ring.h"
+
+namespace partiemc {
+namespace {
+
+// So many particles are asked; first a few, that clear all frames but those that give cause.
+constexpr std::size_t kAsked = 64;
+constexpr std::size_t kAskedFirst = 16;
+constexpr std::size_t kCause = 3;
+
+// Particles looked at, at the most. Where tiles are full a particle takes two thousand looks.
+constexpr std::size_t kMaxLooks = std::size_t{1} << 20;
+
+// A tile that holds this many particles for each square of the spacing has more than twice as fine
+// ones, wherever in it they are.
+constexpr double kMaxDensity = 4;
+
+// The particle of a tile that is asked as its k-th: the place, not the order, decides.
+const BinEntry& Chosen(std::span<const BinEntry> entries, std::uint64_t k) {
+  const auto hash = [k](const BinEntry& entry) {
+    const std::uint64_t bits = std::uint64_t{std::bit_cast<std::uint32_t>(entry.x)} << 32 |
+                               std::bit_cast<std::uint32_t>(entry.y);
+    const std::uint64_t mixed = (bits + k) * 0x9e3779b97f4a7c15u;
+    return (mixed ^ mixed >> 32) * 0xc2b2ae3d27d4eb4fu;
+  };
+  const BinEntry* chosen = entries.data();
+  std::uint64_t least = hash(*chosen);
+  for (const BinEntry& entry : entries.subspan(1)) {
+    if (const std::uint64_t next = hash(entry); next < least) {
+      least = next;
+      chosen = &entry;
+    }
+  }
+  return *chosen;
+}
+
+// NearRing::Distance() is 1 spacing on lattices and up to 1.2 where simulations have shaken them:
+// what is told is at least a factor of two.
+constexpr double kMaxDistance = 2.4;
+constexpr double kMinDistance = 0.5;
+
+class Probe {
+ public:
+  Probe(const ParticleBins& bins, const Scale& scale)
+      : bins_(bins),
+        spacing_(scale.spacing),
+        most_in_tile_(kMaxDensity * kTileNodes / (scale.spacing * scale.spacing)) {}
+
+  // Whether the k-th particle of `tile` that is asked tells another spacing.
+  bool Contradicts(std::size_t tile, std::uint64_t k) {
+    const auto entries = EntriesOf(tile);
+    if (static_cast<double>(entries.size()) > most_in_tile_) return true;
+    looks_ += entries.size();
+    // All of a small frame are asked.
+    const BinEntry& at = bins_.entries.size() <= kAsked ? entries[k] : Chosen(entries, k);
+    NearRing ring;
+    Gather(tile, tile, at, ring);
+    const Neighbourhood& neighbours = bins_.tiles.neighbours(tile);
+    for (const std::uint32_t neighbour : neighbours) {
+      if (neighbour != kNoTile && neighbour != tile) Gather(neighbour, tile, at, ring);
+    }
+    if (ring.reach_square() > kTileSize * kTileSize) GatherFar(tile, at, ring);
+    if (!ring.IsAround()) return false;
+    const double distance = ring.Distance();
+    return distance > kMaxDistance * spacing_ || distance < kMinDistance * spacing_;
+  }
+
+  bool IsExhausted() const { return looks_ > kMaxLooks; }
+
+ private:
+  std::span<const BinEntry> EntriesOf(std::size_t tile) const {
+    return std::span(bins_.entries).subspan(bins_.offsets[tile], bins_.CountOf(tile));
+  }
+
+  // Takes the particles of `other`, unless all of it is farther away than those that are known.
+  void Gather(std::size_t other, std::size_t tile, const BinEntry& at, NearRing& ring) {
+    const double x =
+        (static_cast<double>(bins_.tiles[other].x) - bins_.tiles[tile].x) * kTileSize - at.x;
+    const double y =
+        (static_cast<double>(bins_.tiles[other].y) - bins_.tiles[tile].y) * kTileSize - at.y;
+    const double across_x = std::max({0.0, x, -x - kTileSize});
+    const double across_y = std::max({0.0, y, -y - kTileSize});
+    if (across_x * across_x + across_y * across_y >= ring.reach_square()) return;
+    const auto entries = EntriesOf(other);
+    looks_ += entries.size();
+    for (const BinEntry& entry : entries) ring.Add(x + entry.x, y + entry.y);
+  }
+
+  // Those of all tiles that are no neighbours.
+  void GatherFar(std::size_t tile, const BinEntry& at, NearRing& ring) {
+    looks_ += bins_.tiles.size();
+    for (std::size_t other = 0; other < bins_.tiles.size() && !IsExhausted(); ++other) {
+      const auto& neighbours = bins_.tiles.neighbours(tile);
+      if (std::find(neighbours.begin(), neighbours.end(), other) != neighbours.end()) continue;
+      if (bins_.CountOf(other) > 0) Gather(other, tile, at, ring);
+    }
+  }
+
+  const ParticleBins& bins_;
+  double spacing_, most_in_tile_;
+  std::size_t looks_ = 0;
+};
+
+}  // namespace
+
+bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale) {
+  const std::size_t count = bins.entries.size();
+  const std::size_t most = std::min(kAsked, count);
+  Probe probe(bins, scale);
+  std::size_t asked = 0, contradicting = 0;
+  for (; asked < most && !probe.IsExhausted(); ++asked) {
+    if (asked == kAskedFirst && contradicting < kCause) return false;
+    // Spread over all particles, the first few too: multiples of an odd step, modulo a power of 2.
+    const std::size_t place = asked * 37 % kAsked;
+    const std::size_t entry = count <= kAsked ? asked : count * place / kAsked;
+    const auto above = std::upper_bound(bins.offsets.begin(), bins.offsets.end(), entry);
+    const auto tile = static_cast<std::size_t>(above - bins.offsets.begin()) - 1;
+    if (probe.Contradicts(tile, entry - bins.offsets[tile])) ++contradicting;
+  }
+  return AreEnough(contradicting, asked);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,123 @@
+// Stage 3 of 7: level set -> active cells and the segments of the isoline through them.
+//
+//    3--2--2     Corners and edges of a cell. Bit k of a cell's case is set where corner k is
+//    |     |     inside (F < 0). A value of exactly 0 counts as outside, in every stage, so that
+//    3     1     an isoline never runs through a node.
+//    |     |
+//    0--0--1     A segment enters the cell through one edge and leaves through another, with the
+//                inside on its left. Cases 5 and 10 have two segments; the asymptotic decider
+//                (Nielson and Hamann 1991) tells whether they join or part the inside corners.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "bins/lattice.h"
+#include "field/field.h"
+
+namespace partiemc {
+
+struct ActiveCell {
+  std::uint32_t tile = 0;
+  std::uint8_t i = 0, j = 0;
+  std::uint8_t corners = 0;  ///< The case, 1 to 14.
+  std::uint8_t joined = 0;   ///< Saddles only: 1 if the inside corners are joined.
+  /// Its segments are this one and, in a saddle, the next. If one runs through edge 0, this does.
+  std::uint32_t first_segment = 0;
+
+  bool IsSaddle() const { return corners == 5 || corners == 10; }
+};
+
+struct Segment {
+  std::uint32_t cell = 0;
+  std::uint8_t entry = 0, exit = 0;  ///< Edges of the cell.
+};
+
+/// A point in cells, in lattice coordinates of the world.
+struct LatticePoint {
+  double x = 0, y = 0;
+};
+
+/// Rows of bits of a tile.
+struct TileBits {
+  BitRows inside{};                                  ///< Node is inside.
+  BitRows active{};                                  ///< Cell has inside and outside corners.
+  std::uint32_t first_cell = 0;                      ///< Index of the tile's first active cell.
+  std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below it.
+};
+
+/// Cells and segments of a tile, or before it.
+struct CrossingCounts {
+  std::uint32_t cells = 0, segments = 0;
+};
+
+struct Crossings {
+  std::vector<TileBits> tiles;
+  std::vector<BitRows> interior;  ///< By tile: all four corners of the cell are inside.
+  std::vector<ActiveCell> cells;  ///< By tile, row, column.
+  std::vector<Segment> segments;  ///< By cell.
+
+  std::vector<CrossingCounts> counts;  ///< Scratch: before each tile, then in all.
+};
+
+/// Finds the active cells of a level set and their segments.
+/// Deterministic, in parallel over tiles: count, prefix sum, fill. Cost: linear in nodes.
+void FindCrossings(const TileDirectory& directory, const LevelSet& level_set, Crossings& crossings);
+
+/// The interior cells that follow from `inside` rows after they were changed by cleaning.
+void MarkInteriorCells(const TileDirectory& directory, Crossings& crossings);
+
+/// Whether a node exists and is inside.
+inline bool IsInside(const Crossings& crossings, const TilePlace& node) {
+  return node.tile != kNoTile && (crossings.tiles[node.tile].inside[node.j] >> node.i & 1) != 0;
+}
+
+/// The inside nodes of a tile with the row above and the column right of it: bit i of row j of
+/// `left` is node (i, j), of `right` node (i + 1, j). Cell (i, j) has bit i of rows j and j + 1 of
+/// both as corners.
+struct NodeRows {
+  std::array<std::uint32_t, kTileSize + 1> left, right;
+};
+NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>& tiles,
+                    std::uint32_t tile);
+
+/// Index of the active cell at a place that is known to be active.
+std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
+
+/// The segment that the isoline takes after `segment`: the one that enters the neighbouring cell
+/// through the edge that this one leaves by.
+std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,
+                          std::uint32_t segment);
+
+/// Lower left node of a cell.
+inline LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
+  const TileCoordinate& tile = directory[cell.tile];
+  return {static_cast<double>((std::int64_t{tile.x} << kTileShift) + cell.i),
+          static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
+}
+
+/// A crossing keeps at least this share of its edge between itself and either node.
+inline constexpr double kEdgeMargin = 1.0 / 4096;
+
+/// Where the isoline crosses `edge` of `cell` by linear interpolation of F. The two cells that
+/// share an edge get the same bits. Kept 2^-12 away from the nodes, so that no rounding to world
+/// coordinates can move it onto or past one.
+/// Inline, and without a branch on which edge it is: those of many cells are found at a time, each
+/// of which waits for memory.
+inline LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
+                                 const ActiveCell& cell, int edge) {
+  // Every edge is walked from its lower or left node, so that both cells compute the same.
+  const int right = edge == 1, up = edge == 2;
+  const int along_x = ~edge & 1, along_y = edge & 1;
+  const int i = cell.i + right;
+  const int j = cell.j + up;
+  const double a = level_set.At(directory, cell.tile, i, j);
+  const double b = level_set.At(directory, cell.tile, i + along_x, j + along_y);
+  const double t = std::clamp(a / (a - b), kEdgeMargin, 1 - kEdgeMargin);
+  const LatticePoint origin = CellOrigin(directory, cell);
+  return {origin.x + (right + along_x * t), origin.y + (up + along_y * t)};
+}
+
+}  // namespace partiemc

@@ -1,0 +1,220 @@
+#include "field/field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include "base/parallel.h"
+#include "base/prefetch.h"
+#include "bins/near_entries.h"
+#include "field/level_set_formula.h"
+#include "field/tile_kernels.h"
+
+namespace partiemc {
+namespace {
+
+// How far the passes have come with a tile.
+enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
+
+// A range of so many tiles has more than a few whose neighbours are all among them.
+constexpr std::size_t kTilesAtOnce = 64;
+
+// Null where they are uniform.
+const float* WeightsOf(const ParticleBins& bins) {
+  return bins.weight.empty() ? nullptr : bins.weight.data();
+}
+
+TileEntries EntriesOf(const ParticleBins& bins, std::uint32_t tile) {
+  const std::uint32_t first = bins.offsets[tile];
+  const float* const weights = WeightsOf(bins);
+  return {bins.entries.data() + first, weights == nullptr ? nullptr : weights + first,
+          bins.CountOf(tile)};
+}
+
+// What a sum of kernels is worth: with weights of their own, particles bring them along.
+float WeightOf(const ParticleBins& bins, const Scale& scale) {
+  return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
+}
+
+// First pass: the kernels of a tile's own particles in the rows that they reach, or, where they
+// reach too far for the margin of the sums, of all around it in every row.
+void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+             LevelSet& level_set) {
+  std::array<float, kTileNodes>& values = level_set.tiles[tile];
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  const bool fits = radius <= kSumMargin;
+  if (fits && bins.CountOf(tile) == 0) return;
+  // Written to as soon as the sums are known, which takes longer than memory far away.
+  PrefetchLines(std::span<const float>(values));
+  if (fits) level_set.rims.Prefetch(tile);
+  alignas(64) NodeSums sums;
+  sums.fill(0);
+  NodeRange rows = kAllNodes;
+  if (fits) {
+    const NodeRange reached = ScatterKernels(EntriesOf(bins, tile), radius, sums);
+    level_set.rims.Keep(tile, sums, reached);
+    rows = level_set.rims.OwnRows(tile);
+  } else {
+    NearWalk(bins, tile, nullptr, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
+      ScatterNearKernels(near, WeightsOf(bins), radius, sums);
+    });
+  }
+  // Of a fixed size and without a call, unlike copy_n.
+  for (int j = rows.first; j <= rows.last; ++j) {
+    std::memcpy(values.data() + j * kTileSize, sums.data() + SumIndex(0, j),
+                kTileSize * sizeof(float));
+  }
+}
+
+// Fills the rows of a tile's values that are among `rows` but not among `kept`, which is a part of
+// them.
+void FillRowsOf(float* values, NodeRange rows, NodeRange kept, float value) {
+  const auto fill = [&](int first, int end) {
+    std::fill(values + first * kTileSize, values + end * kTileSize, value);
+  };
+  if (kept.last < kept.first) {
+    if (rows.first <= rows.last) fill(rows.first, rows.last + 1);
+    return;
+  }
+  fill(rows.first, kept.first);
+  fill(kept.last + 1, rows.last + 1);
+}
+
+// Second pass: the density at every node, and what follows from it alone.
+void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                       LevelSet& level_set) {
+  float* const values = level_set.tiles[tile].data();
+  BitRows& inside = level_set.inside[tile];
+  BitRows& open = level_set.open[tile];
+  NodeRange rows = kAllNodes;
+  if (static_cast<float>(scale.kernel_radius) <= kSumMargin) {
+    const SumRims& rims = level_set.rims;
+    rows = rims.RowsReached(bins.tiles, tile);
+    const NodeRange own = rims.OwnRows(tile);
+    FillRowsOf(values, rows, own, 0);
+    rims.AddTo(bins.tiles, tile, values);
+    FillRowsOf(values, kAllNodes, rows, level_set.void_value);
+    inside.fill(0);
+    open.fill(0);
+  }
+  ClassifyNodes(WeightOf(bins, scale), scale, rows, values, inside, open);
+}
+
+// F at nodes of a tile, from the moments there. Returns those that are inside.
+BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                    const AskedNodes& asked, LevelSet& level_set) {
+  const NodeBlocks blocks = BlocksOf(asked.rows);
+  MomentSums sums;
+  std::fill_n(sums.begin(), blocks.count, BlockSums{});
+  CellMask mask = MaskOf(asked.rows);
+  const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
+  const bool masked = reach < kMaskMargin;
+  // A node is reached from the cells whose far side is less than the radius before it.
+  if (masked) Widen(mask, reach, reach - 1);
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)
+      .ForEachBlock([&](const NearEntries& near) {
+        AddNearMoments(near, radius, blocks, asked.has_kernel_sums, sums);
+      });
+  return EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale,
+                       level_set.tiles[tile].data());
+}
+
+// And, while the sums are in the nearest cache, F where the density leaves the side of a node open.
+void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                  LevelSet& level_set) {
+  ClassifyByDensity(bins, scale, tile, level_set);
+  level_set.passes[tile] = kClassified;
+  const BitRows& open = level_set.open[tile];
+  if (IsEmpty(open)) return;
+  const BitRows inside =
+      SampleNodes(bins, scale, tile, {open, true, bins.weight.empty()}, level_set);
+  for (int j = 0; j < kTileSize; ++j) level_set.inside[tile][j] |= inside[j];
+}
+
+// The nodes that have a neighbour on the other side.
+BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level_set,
+                           std::uint32_t tile) {
+  const Neighbourhood& near = directory.neighbours(tile);
+  const auto row = [&](std::uint32_t of, int j) {
+    return of != kNoTile ? level_set.inside[of][j] : 0;
+  };
+  BitRows ends;
+  std::uint32_t below = row(near[1], kTileSize - 1);
+  for (int j = 0; j < kTileSize; ++j) {
+    const std::uint32_t here = level_set.inside[tile][j];
+    const std::uint32_t above = j + 1 < kTileSize ? level_set.inside[tile][j + 1] : row(near[7], 0);
+    const std::uint32_t left = here << 1 | row(near[3], j) >> (kTileSize - 1);
+    const std::uint32_t right = here >> 1 | row(near[5], j) << (kTileSize - 1);
+    ends[j] = (here ^ below) | (here ^ above) | (here ^ left) | (here ^ right);
+    below = here;
+  }
+  return ends;
+}
+
+// Third pass: F where the density has decided the side, but the isoline crosses an edge.
+void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                       LevelSet& level_set) {
+  level_set.passes[tile] = kSampled;
+  BitRows ends = EndsOfCrossedEdges(bins.tiles, level_set, tile);
+  for (int j = 0; j < kTileSize; ++j) ends[j] &= ~level_set.open[tile][j];
+  if (!IsEmpty(ends)) SampleNodes(bins, scale, tile, {ends, false, false}, level_set);
+}
+
+// The passes over the tiles [first, last). A pass looks at what the one before has left in the
+// tiles around, so that a tile goes through it as soon as these are ready, while they are in a near
+// cache. Tiles next to those of other ranges, which may not be ready, are left as they are.
+void SampleTiles(const ParticleBins& bins, const Scale& scale, std::uint32_t first,
+                 std::uint32_t last, LevelSet& level_set) {
+  // The tile itself is among those around it.
+  const auto last_around = [&](std::uint32_t tile) {
+    std::uint32_t result = tile;
+    for (const std::uint32_t near : bins.tiles.neighbours(tile)) {
+      if (near != kNoTile) result = std::max(result, near);
+    }
+    return result;
+  };
+  const auto are_around = [&](std::uint32_t tile, Passes passes) {
+    return std::ranges::all_of(bins.tiles.neighbours(tile), [&](std::uint32_t near) {
+      return near >= first && (near == kNoTile || level_set.passes[near] >= passes);
+    });
+  };
+  std::uint32_t classified = first, sampled = first;
+  for (std::uint32_t tile = first; tile < last; ++tile) {
+    SumTile(bins, scale, tile, level_set);
+    level_set.passes[tile] = kSummed;
+    for (; classified <= tile && last_around(classified) <= tile; ++classified) {
+      if (are_around(classified, kSummed)) ClassifyTile(bins, scale, classified, level_set);
+    }
+    for (; sampled < classified && last_around(sampled) < classified; ++sampled) {
+      if (are_around(sampled, kClassified)) SampleDecidedEnds(bins, scale, sampled, level_set);
+    }
+  }
+}
+
+}  // namespace
+
+void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set) {
+  const std::size_t tiles = bins.tiles.size();
+  level_set.void_value = static_cast<float>(VoidValue(scale));
+  level_set.tiles.resize(tiles);
+  level_set.inside.resize(tiles);
+  level_set.open.resize(tiles);
+  level_set.passes.assign(tiles, 0);
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  if (radius <= kSumMargin) level_set.rims.Prepare(bins, radius);
+  ParallelForRanges(tiles, kTilesAtOnce, [&](std::size_t first, std::size_t last) {
+    SampleTiles(bins, scale, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+                level_set);
+  });
+  const auto for_the_rest = [&](Passes before, auto pass) {
+    ParallelFor(static_cast<std::uint32_t>(tiles), [&](std::uint32_t tile) {
+      if (level_set.passes[tile] == before) pass(bins, scale, tile, level_set);
+    });
+  };
+  for_the_rest(kSummed, ClassifyTile);
+  for_the_rest(kClassified, SampleDecidedEnds);
+}
+
+}  // namespace partiemc

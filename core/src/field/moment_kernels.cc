@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "field/tile_kernels.h"
+
+// Highway compiles the rest of this file once for each target.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "field/moment_kernels.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "base/compressor-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Lanes = hn::CappedTag<float, NodeBlock::kNodes>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+
+// Particles that a step has chosen: their coordinates along the axis that it chose by, and along
+// the other one.
+struct Chosen {
+  alignas(64) NearEntries::PerEntry<float> along, across;
+  int count;
+};
+
+// Chooses particles whose kernels may reach nodes `first` to `first` + kSide - 1 along an axis.
+// Their coordinates along it are relative to that node from then on.
+HWY_INLINE void Choose(const float* along, const float* across, int count, int first, float radius,
+                       Chosen& chosen) {
+  const Lanes d;
+  const hn::RebindToSigned<Lanes> d_bits;
+  constexpr float kMiddle = (NodeBlock::kSide - 1) / 2.0f;
+  const auto origin = hn::Set(d, static_cast<float>(first));
+  const auto middle = hn::Set(d, kMiddle);
+  const auto reach = hn::Set(d, radius + kMiddle);
+  int chosen_count = 0;
+  for (int k = 0; k < count; k += kLanes) {
+    const Vector at = hn::Sub(hn::LoadU(d, along + k), origin);
+    const auto reaches = hn::Lt(hn::Abs(hn::Sub(at, middle)), reach);
+    const auto is_in = hn::And(hn::RebindMask(d_bits, reaches),
+                               hn::FirstN(d_bits, static_cast<std::size_t>(count - k)));
+    const Compressor compress(is_in);
+    hn::StoreU(compress(d, at), d, chosen.along.data() + chosen_count);
+    hn::StoreU(compress(d, hn::LoadU(d, across + k)), d, chosen.across.data() + chosen_count);
+    chosen_count += static_cast<int>(hn::CountTrue(d_bits, is_in));
+  }
+  chosen.count = chosen_count;
+}
+
+// Columns and rows of a block's nodes.
+alignas(64) constexpr float kColumns[] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+alignas(64) constexpr float kRows[] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
+// Adds the moments of particles at x and y of a block's first node. The sums stay in registers.
+template <bool kKernel>
+HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inverse_square,
+                           BlockSums& sums) {
+  const Lanes d;
+  const Vector scale = hn::Set(d, inverse_square);
+  const Vector one = hn::Set(d, 1.0f);
+  for (int part = 0; part < NodeBlock::kNodes; part += kLanes) {
+    const Vector column = hn::Load(d, kColumns + part), row = hn::Load(d, kRows + part);
+    const auto sum = [&](BlockSums::Channel& of) HWY_ATTR { return hn::Load(d, of.data() + part); };
+    Vector kernel = sum(sums.kernel), moment_x = sum(sums.moment_x), moment_y = sum(sums.moment_y);
+    Vector xx = sum(sums.xx), xy = sum(sums.xy), yy = sum(sums.yy);
+    for (int e = 0; e < count; ++e) {
+      const Vector dx = hn::Sub(hn::Set(d, x[e]), column);
+      const Vector dy = hn::Sub(hn::Set(d, y[e]), row);
+      const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+      const Vector t = hn::Max(hn::Zero(d), hn::Sub(one, hn::Mul(square, scale)));
+      const Vector k = hn::Mul(hn::Mul(t, t), t);
+      if constexpr (kKernel) kernel = hn::Add(kernel, k);
+      const Vector kx = hn::Mul(k, dx);
+      const Vector ky = hn::Mul(k, dy);
+      moment_x = hn::Add(moment_x, kx);
+      moment_y = hn::Add(moment_y, ky);
+      xx = hn::Add(xx, hn::Mul(kx, dx));
+      xy = hn::Add(xy, hn::Mul(kx, dy));
+      yy = hn::Add(yy, hn::Mul(ky, dy));
+    }
+    const auto set = [&](Vector value, BlockSums::Channel& of)
+                         HWY_ATTR { hn::Store(value, d, of.data() + part); };
+    if constexpr (kKernel) set(kernel, sums.kernel);
+    set(moment_x, sums.moment_x);
+    set(moment_y, sums.moment_y);
+    set(xx, sums.xx);
+    set(xy, sums.xy);
+    set(yy, sums.yy);
+  }
+}
+
+void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+                    bool has_kernel_sums, MomentSums& sums) {
+  const float inverse_square = 1 / (radius * radius);
+  Chosen of_rows, of_block;
+  int row = -1;
+  for (int b = 0; b < blocks.count; ++b) {
+    const NodeBlock& block = blocks[b];
+    if (block.row != row) {
+      row = block.row;
+      Choose(near.y.data(), near.x.data(), near.count, row, radius, of_rows);
+    }
+    Choose(of_rows.across.data(), of_rows.along.data(), of_rows.count, block.column, radius,
+           of_block);
+    const auto add = has_kernel_sums ? AddMoments<false> : AddMoments<true>;
+    add(of_block.along.data(), of_block.across.data(), of_block.count, inverse_square, sums[b]);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace partiemc {
+
+HWY_EXPORT(AddNearMoments);
+
+void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+                    bool has_kernel_sums, MomentSums& sums) {
+  HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, radius, blocks, has_kernel_sums, sums);
+}
+
+NodeBlocks BlocksOf(const BitRows& asked) {
+  constexpr int kSide = NodeBlock::kSide, kLast = kTileSize - kSide;
+  constexpr std::uint32_t kColumns = (1u << kSide) - 1;
+  NodeBlocks blocks;
+  BitRows left = asked;
+  for (int j = 0; j < kTileSize; ++j) {
+    if (left[j] == 0) continue;
+    const int row = std::min(j, kLast);
+    std::uint32_t any = left[row] | left[row + 1] | left[row + 2] | left[row + 3];
+    while (any != 0) {
+      const int column = std::min(std::countr_zero(any), kLast);
+      any &= ~(kColumns << column);
+      NodeBlock& block = blocks.blocks[blocks.count++];
+      block = {.column = static_cast<std::uint8_t>(column), .row = static_cast<std::uint8_t>(row)};
+      for (int k = 0; k < kSide; ++k) {
+        const std::uint32_t bits = left[row + k] >> column & kColumns;
+        block.asked = static_cast<std::uint16_t>(block.asked | bits << k * kSide);
+        left[row + k] &= ~(kColumns << column);
+      }
+    }
+  }
+  return blocks;
+}
+
+}  // namespace partiemc
+#endif  // HWY_ONCE

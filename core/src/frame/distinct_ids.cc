@@ -1,0 +1,104 @@
+#include "frame/distinct_ids.h"
+
+#include <algorithm>
+#include <bit>
+#include <numeric>
+#include <tuple>
+
+#include "base/id_hash.h"
+
+namespace partiemc {
+namespace {
+
+// Half as much memory as ids have themselves.
+constexpr std::uint64_t kMaxBitsPerId = 32;
+
+// Bits that have been seen.
+class Bitmap {
+ public:
+  Bitmap(std::uint64_t count, std::vector<std::uint64_t>& words) {
+    words.assign(count / 64 + 1, 0);
+    words_ = words.data();
+  }
+  /// Whether the bit was set; it is from now on.
+  bool Set(std::uint64_t place) {
+    std::uint64_t& word = words_[place / 64];
+    const std::uint64_t bit = std::uint64_t{1} << (place % 64);
+    const bool was_set = (word & bit) != 0;
+    word |= bit;
+    return was_set;
+  }
+  bool Has(std::uint64_t place) const { return (words_[place / 64] >> (place % 64) & 1) != 0; }
+
+ private:
+  std::uint64_t* words_;
+};
+
+bool AllDifferByNumber(std::span<const std::uint64_t> ids, std::uint64_t lowest,
+                       std::uint64_t highest, std::vector<std::uint64_t>& words) {
+  Bitmap seen(highest - lowest + 1, words);
+  for (const std::uint64_t id : ids) {
+    if (seen.Set(id - lowest)) return false;
+  }
+  return true;
+}
+
+// An id that an earlier one equals finds its bit set, as some others do by chance. Equals of these
+// have the same bit: what has such a bit is compared.
+bool AllDifferByHash(std::span<const std::uint64_t> ids, DistinctIdsScratch& s) {
+  const int width = static_cast<int>(std::bit_width(kMaxBitsPerId / 2 * ids.size()));
+  const std::uint64_t places = std::uint64_t{1} << width;
+  const auto place_of = [width](std::uint64_t hash) { return hash >> (64 - width); };
+  s.suspects.clear();
+  Bitmap seen(places, s.seen);
+  for (const std::uint64_t id : ids) {
+    const std::uint64_t hash = HashOf(id);
+    if (seen.Set(place_of(hash))) s.suspects.push_back(hash);
+  }
+  Bitmap suspect(places, s.seen);
+  for (const std::uint64_t hash : s.suspects) suspect.Set(place_of(hash));
+  s.suspects.clear();
+  for (const std::uint64_t id : ids) {
+    const std::uint64_t hash = HashOf(id);
+    if (suspect.Has(place_of(hash))) s.suspects.push_back(hash);
+  }
+  std::sort(s.suspects.begin(), s.suspects.end());
+  return std::adjacent_find(s.suspects.begin(), s.suspects.end()) == s.suspects.end();
+}
+
+// Of ids that do not all differ: whose frame is refused, so that time is no concern.
+RepeatedId FirstRepeated(std::span<const std::uint64_t> ids) {
+  std::vector<std::size_t> places(ids.size());
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  std::sort(places.begin(), places.end(), [&](std::size_t a, std::size_t b) {
+    return std::tie(ids[a], a) < std::tie(ids[b], b);
+  });
+  RepeatedId repeated{ids.size(), ids.size()};
+  for (std::size_t k = 1; k < places.size(); ++k) {
+    if (ids[places[k]] != ids[places[k - 1]] || places[k] >= repeated.again) continue;
+    repeated = {places[k - 1], places[k]};
+  }
+  return repeated;
+}
+
+}  // namespace
+
+std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
+                                       DistinctIdsScratch& scratch) {
+  if (ids.empty()) return std::nullopt;
+  const std::uint64_t places = kMaxBitsPerId * ids.size();
+  std::uint64_t bits = 0;  // No id exceeds their union, which is found faster than the largest id.
+  for (const std::uint64_t id : ids) bits |= id;
+  std::uint64_t lowest = 0, highest = bits;
+  if (bits >= places) {
+    lowest = *std::min_element(ids.begin(), ids.end());
+    highest = *std::max_element(ids.begin(), ids.end());
+  }
+  const bool all_differ = highest - lowest < places
+                              ? AllDifferByNumber(ids, lowest, highest, scratch.seen)
+                              : AllDifferByHash(ids, scratch);
+  if (all_differ) return std::nullopt;
+  return FirstRepeated(ids);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,107 @@
+// The numbers of a frame: how they are read, and whether they are usable.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "absl/status/status.h"
+#include "base/prefetch.h"
+#include "frame/distinct_ids.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+/// One coordinate pair of a frame, in world units.
+struct WorldPosition {
+  double x, y;
+};
+
+/// Reads the coordinate pairs of a frame whose numbers are of type Real.
+template <typename Real>
+class PositionReader {
+ public:
+  /// Requires: `first`, `second` < `components`. `values` may be null where there are no particles.
+  PositionReader(const Real* values, int components, int first, int second)
+      : first_(values == nullptr ? nullptr : values + first),
+        second_(values == nullptr ? nullptr : values + second),
+        components_(components) {}
+
+  WorldPosition operator[](std::size_t particle) const {
+    const std::size_t at = particle * components_;
+    return {static_cast<double>(first_[at]), static_cast<double>(second_[at])};
+  }
+
+  /// The pairs of `count` particles from `first` on, one after the other: in the frame itself where
+  /// it has two components, else copied. Requires: room for them in `copy`.
+  std::span<const Real> Pairs(std::size_t first, std::size_t count, Real* copy) const {
+    if (components_ == 2) return {first_ + 2 * first, 2 * count};
+    for (std::size_t k = 0; k < count; ++k) {
+      copy[2 * k] = first_[(first + k) * components_];
+      copy[2 * k + 1] = second_[(first + k) * components_];
+    }
+    return {copy, 2 * count};
+  }
+
+  /// Asks the memory for the numbers of `count` particles from `first` on.
+  void Prefetch(std::size_t first, std::size_t count) const {
+    PrefetchLines(std::span(first_ + first * components_, count * components_));
+  }
+
+  using Number = Real;
+
+ private:
+  const Real* first_;
+  const Real* second_;
+  std::size_t components_;
+};
+
+/// The axes that span a plane, and the one across it: 0, 1, 2 for x, y, z.
+struct Axes {
+  int first, second, normal;
+};
+Axes AxesOf(Plane plane);
+
+/// Those of a frame: with two components they are taken as they are.
+inline Axes AxesOf(const Frame& frame, Plane plane) {
+  return AxesOf(frame.components == 3 ? plane : Plane::kXy);
+}
+
+/// Calls visit(reader) with the PositionReader of a frame: the type of its numbers is asked once
+/// for all particles. Requires: a frame that CheckFrame has passed.
+template <typename Visit>
+auto VisitPositions(const Frame& frame, Plane plane, Visit visit) {
+  const Axes axes = AxesOf(frame, plane);
+  return std::visit(
+      [&](auto view) {
+        return visit(PositionReader(view.data(), frame.components, axes.first, axes.second));
+      },
+      frame.positions);
+}
+
+/// Position of one particle.
+WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle);
+
+/// A velocity in the plane. Requires: the frame has velocities.
+struct PlaneVelocity {
+  float x, y;
+};
+PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle);
+
+/// "positions[17].x": the name of a coordinate of an array in a Violation.
+std::string CoordinateField(std::string_view array, std::size_t particle, int axis);
+
+/// An error about one field of the frame, with its Violation.
+absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
+                          std::string rule);
+
+/// OK if every number of the frame is usable: coordinates finite and in one plane, volumes
+/// positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a Violation that names
+/// the first particle at fault.
+absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits,
+                        DistinctIdsScratch& scratch);
+
+}  // namespace partiemc

@@ -1,0 +1,131 @@
+#include "partiemc/parameters.h"
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "frame/calibration.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+constexpr std::array kPlacements = {Placement::kMarchingSquares, Placement::kQef,
+                                    Placement::kFarthestParticle, Placement::kVirtualPlane};
+constexpr std::array kFills = {Fill::kNone, Fill::kGrid, Fill::kGreedy, Fill::kConforming,
+                               Fill::kPolygon};
+
+// The widest spacing at which squares and products of lengths neither overflow nor underflow.
+constexpr double kMinSpacing = 1e-60;
+constexpr double kMaxSpacing = 1e60;
+
+absl::Status OutOfRange(std::string_view field, double value, std::string_view rule) {
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonOutOfRange), "parameters." + std::string(field),
+                         ShortestNumber(value), std::string(rule)});
+}
+
+bool Within(double value, double low, double high) { return value >= low && value <= high; }
+
+}  // namespace
+
+absl::Status Validate(const ReconstructionParameters& parameters) {
+  const auto& p = parameters;
+  if (p.spacing && !Within(*p.spacing, kMinSpacing, kMaxSpacing)) {
+    return OutOfRange("spacing", *p.spacing, "must be in [1e-60, 1e60]");
+  }
+  if (!Within(p.kernel_radius, 1.5, 8)) {
+    return OutOfRange("kernel_radius", p.kernel_radius, "must be in [1.5, 8] spacings");
+  }
+  if (!Within(p.cell_size, 0.25, 4)) {
+    return OutOfRange("cell_size", p.cell_size, "must be in [0.25, 4] spacings");
+  }
+  if (p.reference_radius && !(*p.reference_radius > 0 && *p.reference_radius < p.kernel_radius)) {
+    return OutOfRange("reference_radius", *p.reference_radius,
+                      absl::StrCat("must be above 0 and below the kernel radius of ",
+                                   ShortestNumber(p.kernel_radius), " spacings"));
+  }
+  if (!Within(p.surface_offset, -1, 1)) {
+    return OutOfRange("surface_offset", p.surface_offset, "must be in [-1, 1] spacings");
+  }
+  if (!(p.min_component_area >= 0 && std::isfinite(p.min_component_area))) {
+    return OutOfRange("min_component_area", p.min_component_area,
+                      "must be 0 or more squared spacings, and finite");
+  }
+  return absl::OkStatus();
+}
+
+ReconstructionParameters Resolve(ReconstructionParameters parameters) {
+  if (!parameters.reference_radius) {
+    parameters.reference_radius =
+        CalibratedReferenceRadius(parameters.placement, parameters.kernel_radius);
+  }
+  if (!parameters.clean) parameters.clean = parameters.placement == Placement::kVirtualPlane;
+  return parameters;
+}
+
+std::string_view Name(Placement placement) {
+  switch (placement) {
+    case Placement::kMarchingSquares:
+      return "marching-squares";
+    case Placement::kQef:
+      return "qef";
+    case Placement::kFarthestParticle:
+      return "farthest-particle";
+    case Placement::kVirtualPlane:
+      return "virtual-plane";
+  }
+  return "";
+}
+
+std::string_view Name(Fill fill) {
+  switch (fill) {
+    case Fill::kNone:
+      return "none";
+    case Fill::kGrid:
+      return "grid";
+    case Fill::kGreedy:
+      return "greedy";
+    case Fill::kConforming:
+      return "conforming";
+    case Fill::kPolygon:
+      return "polygon";
+  }
+  return "";
+}
+
+std::string_view Name(SpacingRule rule) {
+  return rule == SpacingRule::kFirstFrame ? "first-frame" : "every-frame";
+}
+
+std::string_view Name(Plane plane) {
+  switch (plane) {
+    case Plane::kXy:
+      return "xy";
+    case Plane::kXz:
+      return "xz";
+    case Plane::kYz:
+      return "yz";
+  }
+  return "";
+}
+
+std::span<const Placement> AllPlacements() { return kPlacements; }
+std::span<const Fill> AllFills() { return kFills; }
+
+std::optional<Placement> FindPlacement(std::string_view name) {
+  for (const Placement placement : kPlacements) {
+    if (Name(placement) == name) return placement;
+  }
+  return std::nullopt;
+}
+
+std::optional<Fill> FindFill(std::string_view name) {
+  for (const Fill fill : kFills) {
+    if (Name(fill) == name) return fill;
+  }
+  return std::nullopt;
+}
+
+}  // namespace partiemc

@@ -1,0 +1,53 @@
+#include "frame/scale.h"
+
+#include <algorithm>
+
+namespace partiemc {
+namespace {
+
+// The kernel (1 - s^2)^3 integrates to pi R^2 / 4 over the plane.
+constexpr double kFourOverPi = 1.27323954473516268615;
+
+// The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 = 0.9 / beta^2 is
+// 0.10 at beta = 3, above what the void between two components has, below a lone particle's f.
+constexpr double kGuardFactor = 0.9;
+// A lone particle must survive, hence never more than this share of the lightest one's own f.
+constexpr double kGuardShareOfLightest = 0.7;
+// Above this density a node is inside, whatever the weighted mean says: f is about 1 inside and
+// 0.5 on a flat boundary, and at the edge of a void of six particles' area about 0.6.
+constexpr double kSaturation = 0.85;
+// Gaps between bodies (ibid.): inside of bodies and on their boundaries the spread
+// is 0.1; half-way across a gap of 1.7 spacings it is 0.21.
+constexpr double kGapSpread = 0.21;
+// A lone particle's spread at its reference radius is (r / R)^2. An outline that is asked for
+// farther out than usual must not be cut off: the calibrated radii come to 0.21, too, or less.
+constexpr double kGapSpreadPerReference = 2.4;
+// Slope of the spread outside of a flat boundary, in 1 / R.
+constexpr double kSpreadSlope = 0.45;
+// Slope of f across a flat boundary, measured in 1 / R: makes F a length on both branches.
+constexpr double kBoundarySlope = 1.164;
+
+}  // namespace
+
+Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
+                double lightest_volume) {
+  Scale scale;
+  scale.cell_size = cell_size;
+  scale.spacing = spacing / cell_size;
+  scale.kernel_radius = parameters.kernel_radius * scale.spacing;
+  scale.reference_radius = *parameters.reference_radius * scale.spacing;
+  scale.weight_per_volume = kFourOverPi / (scale.kernel_radius * scale.kernel_radius);
+  scale.uniform_weight = scale.weight_per_volume * scale.spacing * scale.spacing;
+  const double lightest_weight =
+      scale.weight_per_volume * (lightest_volume / cell_size / cell_size);
+  const double beta = parameters.kernel_radius;
+  scale.guard = std::min(kGuardFactor / (beta * beta), kGuardShareOfLightest * lightest_weight);
+  scale.saturation = kSaturation;
+  scale.guard_slope = scale.kernel_radius / kBoundarySlope;
+  const double reference = scale.reference_radius / scale.kernel_radius;
+  scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);
+  scale.gap_slope = scale.kernel_radius / kSpreadSlope;
+  return scale;
+}
+
+}  // namespace partiemc

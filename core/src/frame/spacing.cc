@@ -1,0 +1,254 @@
+#include "frame/spacing.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "frame/near_ring.h"
+
+namespace partiemc {
+namespace {
+
+// About this many particles are asked for their neighbours: the median of so many is within a
+// percent of that of all.
+constexpr std::size_t kSampleSize = 1 << 14;
+
+// A particle whose nearest neighbour is this many medians away is spray and says nothing about the
+// spacing; within a body of fluid distances stay below two medians.
+constexpr double kLonelyRatio = 4;
+
+// Kernel sums that tell the density have this radius, in spacings as known so far. Each round
+// starts from what the one before has found; thinned particles need the third.
+constexpr double kDensityRadius = 3;
+constexpr int kDensityRounds = 3;
+// A point counts where bodies surround it: the mean of the particles is within this share of the
+// radius of it, and their mean square distance is about the 0.2 R^2 of a filled disc.
+constexpr double kMaxImbalance = 0.15;
+constexpr double kMinSpread = 0.17;
+constexpr double kMaxSpread = 0.25;
+// Fewer such points say nothing: bodies are too thin or too small, distances have to do.
+constexpr std::size_t kMinFilledPoints = 32;
+// In small or thin bodies the sums are off by up to this share: where distances agree as well, they
+// are the better answer, on lattices the exact one.
+constexpr double kSumTolerance = 0.05;
+constexpr double kQuarterPi = 0.78539816339744830962;
+
+// Where points lie from their particles, in kernel radii: as far as the kernel reaches, so that the
+// particle itself adds nothing and the sums are those of the plane, whatever the arrangement.
+constexpr WorldPosition kDirections[] = {{1, 0},       {0.8, 0.6},  {0.6, 0.8},  {0, 1},
+                                         {-0.6, 0.8},  {-0.8, 0.6}, {-1, 0},     {-0.8, -0.6},
+                                         {-0.6, -0.8}, {0, -1},     {0.6, -0.8}, {0.8, -0.6}};
+
+double Along(const WorldPosition& position, int axis) {
+  return axis == 0 ? position.x : position.y;
+}
+
+// Below so many positions a task would cost more than it saves.
+constexpr std::size_t kMinParallel = 1 << 13;
+
+// Orders positions into an implicit balanced k-d tree: the middle of a range splits it.
+void BuildTree(std::span<WorldPosition> positions, int axis) {
+  if (positions.size() < 2) return;
+  const std::size_t middle = positions.size() / 2;
+  std::nth_element(positions.begin(), positions.begin() + middle, positions.end(),
+                   [axis](const WorldPosition& a, const WorldPosition& b) {
+                     return Along(a, axis) < Along(b, axis);
+                   });
+  const auto build_lower = [=] { BuildTree(positions.first(middle), 1 - axis); };
+  const auto build_upper = [=] { BuildTree(positions.subspan(middle + 1), 1 - axis); };
+  if (positions.size() >= kMinParallel) {
+    ParallelInvoke(build_lower, build_upper);
+  } else {
+    build_lower();
+    build_upper();
+  }
+}
+
+// Squared distance from `query` to the nearest other position, at most `best`.
+double NearestSquare(std::span<const WorldPosition> tree, const WorldPosition& query, int axis,
+                     double best) {
+  if (tree.empty()) return best;
+  const std::size_t middle = tree.size() / 2;
+  const double dx = tree[middle].x - query.x;
+  const double dy = tree[middle].y - query.y;
+  const double square = dx * dx + dy * dy;
+  if (square > 0) best = std::min(best, square);
+  const double across = Along(query, axis) - Along(tree[middle], axis);
+  const auto lower = tree.first(middle);
+  const auto upper = tree.subspan(middle + 1);
+  best = NearestSquare(across < 0 ? lower : upper, query, 1 - axis, best);
+  if (across * across < best) {
+    best = NearestSquare(across < 0 ? upper : lower, query, 1 - axis, best);
+  }
+  return best;
+}
+
+// Gathers the positions nearest to `query`, the tree's order deciding between equal distances.
+void GatherNearest(std::span<const WorldPosition> tree, const WorldPosition& query, int axis,
+                   NearRing& ring) {
+  if (tree.empty()) return;
+  const std::size_t middle = tree.size() / 2;
+  ring.Add(tree[middle].x - query.x, tree[middle].y - query.y);
+  const double across = Along(query, axis) - Along(tree[middle], axis);
+  const auto lower = tree.first(middle);
+  const auto upper = tree.subspan(middle + 1);
+  GatherNearest(across < 0 ? lower : upper, query, 1 - axis, ring);
+  if (across * across < ring.reach_square()) {
+    GatherNearest(across < 0 ? upper : lower, query, 1 - axis, ring);
+  }
+}
+
+// Calls visit(dx, dy) for the positions closer than `radius` to a point, in the order of the tree.
+template <typename Visit>
+void ForEachWithin(std::span<const WorldPosition> tree, const WorldPosition& point, int axis,
+                   double radius, const Visit& visit) {
+  if (tree.empty()) return;
+  const std::size_t middle = tree.size() / 2;
+  const double across = Along(point, axis) - Along(tree[middle], axis);
+  if (across <= radius) ForEachWithin(tree.first(middle), point, 1 - axis, radius, visit);
+  const double dx = tree[middle].x - point.x;
+  const double dy = tree[middle].y - point.y;
+  if (dx * dx + dy * dy < radius * radius) visit(dx, dy);
+  if (across >= -radius) ForEachWithin(tree.subspan(middle + 1), point, 1 - axis, radius, visit);
+}
+
+// Sum of the kernel at a point, 0 where the particles do not surround it.
+double FilledWeight(std::span<const WorldPosition> tree, const WorldPosition& point,
+                    double radius) {
+  const double inverse = 1 / radius;
+  double weight = 0, moment_x = 0, moment_y = 0, spread = 0;  // In radii.
+  ForEachWithin(tree, point, 0, radius, [&](double dx, double dy) {
+    const double x = dx * inverse;
+    const double y = dy * inverse;
+    const double square = x * x + y * y;
+    const double t = 1 - square;
+    const double k = t * t * t;
+    weight += k;
+    moment_x += k * x;
+    moment_y += k * y;
+    spread += k * square;
+  });
+  const double reach = kMaxImbalance * weight;
+  const bool is_filled = moment_x * moment_x + moment_y * moment_y <= reach * reach &&
+                         spread >= kMinSpread * weight && spread <= kMaxSpread * weight;
+  return is_filled ? weight : 0;
+}
+
+// The spacing whose square, one for each particle, makes up for the density inside of bodies.
+// Nothing where no point is surrounded by them.
+std::optional<double> SpacingOfDensity(std::span<const WorldPosition> tree,
+                                       std::span<const WorldPosition> asked, double radius,
+                                       std::vector<double>& weights) {
+  weights.resize(asked.size());
+  ParallelFor(asked.size(), [&](std::size_t k) {
+    const WorldPosition& direction = kDirections[k % std::size(kDirections)];
+    const WorldPosition point{asked[k].x + radius * direction.x, asked[k].y + radius * direction.y};
+    weights[k] = FilledWeight(tree, point, radius);
+  });
+  std::erase(weights, 0.0);
+  if (weights.size() < kMinFilledPoints) return std::nullopt;
+  double sum = 0;
+  for (const double weight : weights) sum += weight;
+  // The kernel integrates to pi R^2 / 4 over the plane.
+  return radius * std::sqrt(kQuarterPi * static_cast<double>(weights.size()) / sum);
+}
+
+std::uint64_t HashOf(const WorldPosition& position) {
+  // + 0.0 makes one zero of the two.
+  std::uint64_t hash = std::bit_cast<std::uint64_t>(position.x + 0.0) * 0x9e3779b97f4a7c15u;
+  hash ^= hash >> 32;
+  hash = (hash ^ std::bit_cast<std::uint64_t>(position.y + 0.0)) * 0xc2b2ae3d27d4eb4fu;
+  return hash ^ hash >> 29;
+}
+
+double MedianOf(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// What enough of the particles that are asked are surrounded at, within a factor of two: their
+// median distance. Nothing where they do not agree.
+std::optional<double> AgreedDistance(std::span<const WorldPosition> tree,
+                                     std::span<const WorldPosition> asked,
+                                     std::size_t asked_in_company, std::vector<double>& distances) {
+  distances.resize(asked.size());
+  ParallelFor(asked.size(), [&](std::size_t k) {
+    NearRing ring;
+    GatherNearest(tree, asked[k], 0, ring);
+    distances[k] = ring.IsAround() ? ring.Distance() : 0;
+  });
+  std::erase(distances, 0.0);
+  if (!AreEnough(distances.size(), asked_in_company)) return std::nullopt;
+  const double median = MedianOf(distances);
+  const auto agreeing = std::count_if(distances.begin(), distances.end(), [&](double distance) {
+    return distance <= 2 * median && 2 * distance >= median;
+  });
+  if (!AreEnough(static_cast<std::size_t>(agreeing), asked_in_company)) return std::nullopt;
+  return median;
+}
+
+// The spacing by density, starting from a distance between neighbours, and that distance where the
+// two are the same but for the error of the sums, or where no density can be told.
+double RefineSpacing(double distance, SpacingScratch& scratch) {
+  double spacing = distance;
+  for (int round = 0; round < kDensityRounds; ++round) {
+    const std::optional<double> dense = SpacingOfDensity(scratch.positions, scratch.asked,
+                                                         kDensityRadius * spacing, scratch.weights);
+    if (!dense) break;
+    spacing = *dense;
+  }
+  return std::abs(spacing - distance) <= kSumTolerance * distance ? distance : spacing;
+}
+
+}  // namespace
+
+std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
+                                               SpacingScratch& scratch) {
+  const std::size_t count = frame.ParticleCount();
+  auto& [positions, asked, distances, weights] = scratch;
+  positions.resize(count);
+  VisitPositions(frame, plane, [&](const auto& reader) {
+    for (std::size_t k = 0; k < count; ++k) scratch.positions[k] = reader[k];
+  });
+  // Sorted and without duplicates: the tree is the same for any order of the particles, and no
+  // query wades through a million copies of itself.
+  ParallelSort(std::span(positions), [](const WorldPosition& a, const WorldPosition& b) {
+    return a.x != b.x ? a.x < b.x : a.y < b.y;
+  });
+  const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
+  positions.erase(std::unique(positions.begin(), positions.end(), same), positions.end());
+  BuildTree(positions, 0);
+
+  const std::uint64_t stride = std::max<std::size_t>(1, positions.size() / kSampleSize);
+  const double infinity = std::numeric_limits<double>::infinity();
+  asked.clear();
+  for (const WorldPosition& position : positions) {
+    if (HashOf(position) % stride == 0) asked.push_back(position);
+  }
+  distances.resize(asked.size());
+  ParallelFor(asked.size(), [&](std::size_t k) {
+    scratch.distances[k] =
+        std::sqrt(NearestSquare(scratch.positions, scratch.asked[k], 0, infinity));
+  });
+  std::erase(distances, infinity);
+  if (distances.empty()) return std::nullopt;
+  const double median = MedianOf(distances);
+  std::erase_if(distances, [&](double distance) { return distance > kLonelyRatio * median; });
+  const double spacing = RefineSpacing(MedianOf(distances), scratch);
+  const std::optional<double> around =
+      AgreedDistance(positions, asked, distances.size(), scratch.distances);
+  if (!around) return SpacingEstimate{spacing, false};
+  // Neighbours within half of that have all but the place of their neighbour.
+  const bool is_doubled = 2 * spacing < *around;
+  return SpacingEstimate{is_doubled ? RefineSpacing(*around, scratch) : spacing, true};
+}
+
+}  // namespace partiemc

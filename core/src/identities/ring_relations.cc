@@ -1,0 +1,261 @@
+#include "identities/ring_relations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <tuple>
+
+namespace partiemc {
+namespace {
+
+// Rings that share less than this part of the smaller one's nodes are neighbours of which one
+// moved into the other's place, not continuations.
+constexpr std::uint64_t kSmallestPart = 4;
+
+// A full set of samples agrees with the nodes where their shares differ by no more than this many
+// of the sixteen: three standard deviations of a ring that splits in halves.
+constexpr std::uint64_t kTolerance = 6;
+
+// The part of a ring, in quarters, that other rings' samples have to account for before nodes that
+// it shares with a ring none of whose samples it has count for nothing.
+constexpr std::uint64_t kToldQuarters = 3;
+
+// A ring that goes farther within a frame does not do so on this lattice.
+constexpr double kMaxShift = 1u << 31;
+
+void CountNodes(std::span<const NodeRun> runs, std::size_t rings,
+                std::vector<std::uint64_t>& nodes) {
+  nodes.assign(rings, 0);
+  for (const NodeRun& run : runs) nodes[run.ring] += NodeCount(run.first, run.last);
+}
+
+// Holes go with their outer rings.
+template <typename IsHole, typename Outer>
+void MoveHolesAlong(std::vector<CellShift>& shifts, IsHole is_hole, Outer outer) {
+  for (std::size_t ring = 0; ring < shifts.size(); ++ring) {
+    if (is_hole(ring) && outer(ring) != kNoRing) shifts[ring] = shifts[outer(ring)];
+  }
+}
+
+// The lower median, which a few particles that go astray do not move. Not empty.
+std::int64_t MedianOf(std::vector<std::int64_t>& ways) {
+  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>((ways.size() - 1) / 2);
+  std::nth_element(ways.begin(), middle, ways.end());
+  return *middle;
+}
+
+// Each outer ring goes the way of its samples.
+void ShiftBySamples(const RingTracks& tracks, RelationScratch& s) {
+  const std::vector<FoundSample>& found = tracks.by_id.found;
+  for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
+    while (last < found.size() && found[last].before == found[first].before) ++last;
+    const auto median = [&](std::int64_t CellShift::*part) {
+      s.ways.clear();
+      for (std::size_t k = first; k < last; ++k) s.ways.push_back(found[k].way.*part);
+      return MedianOf(s.ways);
+    };
+    s.shift_before[found[first].before] = {median(&CellShift::columns), median(&CellShift::rows)};
+  }
+}
+
+CellShift ShiftOf(double cells_x, double cells_y) {
+  if (!(std::abs(cells_x) <= kMaxShift && std::abs(cells_y) <= kMaxShift)) return {};
+  return {static_cast<std::int64_t>(std::floor(cells_x + 0.5)),
+          static_cast<std::int64_t>(std::floor(cells_y + 0.5))};
+}
+
+// Rings of the last frame go on with their velocities, unless their samples have shown the way;
+// rings of this one go back with theirs.
+void ShiftByVelocities(const RingHistory& previous, const RingsNow& now, bool by_samples,
+                       RelationScratch& s) {
+  if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
+  const double cells = (now.time - *previous.time) / now.cell_size;
+  for (std::size_t ring = 0; ring < previous.rings.size() && !by_samples; ++ring) {
+    const KnownRing& known = previous.rings[ring];
+    s.shift_before[ring] = ShiftOf(known.velocity_x * cells, known.velocity_y * cells);
+  }
+  for (std::size_t ring = 0; ring < s.shift_now.size(); ++ring) {
+    s.shift_now[ring] =
+        ShiftOf(-now.tracks.velocity_x[ring] * cells, -now.tracks.velocity_y[ring] * cells);
+  }
+}
+
+bool AnyMoves(const std::vector<CellShift>& shifts) {
+  return std::any_of(shifts.begin(), shifts.end(),
+                     [](const CellShift& shift) { return shift != CellShift{}; });
+}
+
+// One relation for each pair, with the most that is known of it.
+void Unite(std::vector<RingRelation>& relations) {
+  std::sort(relations.begin(), relations.end(), [](const RingRelation& x, const RingRelation& y) {
+    return std::tie(x.before, x.now) < std::tie(y.before, y.now);
+  });
+  std::size_t kept = 0;
+  for (const RingRelation& relation : relations) {
+    if (kept > 0 && relations[kept - 1].before == relation.before &&
+        relations[kept - 1].now == relation.now) {
+      RingRelation& same = relations[kept - 1];
+      same.nodes = std::max(same.nodes, relation.nodes);
+      same.samples = std::max(same.samples, relation.samples);
+      same.counts = same.counts || relation.counts;
+    } else {
+      relations[kept++] = relation;
+    }
+  }
+  relations.resize(kept);
+}
+
+bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_t before,
+                  std::uint32_t number) {
+  return previous.rings[before].is_hole == (now.is_hole[number] != 0);
+}
+
+// Nodes that rings share once they have moved, forward or, where this frame has velocities, back.
+void RelateByNodes(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
+                   std::vector<RingRelation>& relations) {
+  const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
+    if (AreOfOneKind(previous, now, before, number)) relations.push_back({before, number, nodes});
+  };
+  MoveRuns(previous.runs, s.shift_before, s.moved);
+  FindSharedNodes(s.moved, now.runs, s.newest, s.shared);
+  for (const SharedNodes& pair : s.shared) add(pair.a, pair.b, pair.nodes);
+  if (AnyMoves(s.shift_now)) {
+    MoveRuns(now.runs, s.shift_now, s.moved);
+    FindSharedNodes(s.moved, previous.runs, s.newest, s.shared);
+    for (const SharedNodes& pair : s.shared) add(pair.b, pair.a, pair.nodes);
+  }
+  Unite(relations);
+}
+
+void AddFoundSamples(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
+                     std::vector<RingRelation>& relations) {
+  s.sample_count.assign(previous.rings.size(), 0);
+  for (const ParticleSample& sample : previous.samples) ++s.sample_count[sample.ring];
+  const std::vector<FoundSample>& found = now.tracks.by_id.found;
+  for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
+    while (last < found.size() && found[last].before == found[first].before &&
+           found[last].now == found[first].now) {
+      ++last;
+    }
+    relations.push_back({.before = found[first].before,
+                         .now = found[first].now,
+                         .samples = static_cast<std::uint32_t>(last - first)});
+  }
+  Unite(relations);
+}
+
+// The nodes that a ring's particles carried to another one, as its samples tell.
+std::uint64_t NodesBySamples(const RingRelation& relation, const RelationScratch& s) {
+  const std::uint64_t nodes = s.nodes_before[relation.before];
+  const std::uint64_t count = s.sample_count[relation.before];
+  const std::uint64_t carried =
+      nodes / count * relation.samples + nodes % count * relation.samples / count;
+  return std::min(carried, s.nodes_now[relation.now]);
+}
+
+// Whether the samples of a ring say the same as its nodes, but for chance. Less than a full set is
+// all of its particles, and leaves nothing to chance.
+bool SamplesAgree(std::span<const RingRelation> of_one_ring, const RelationScratch& s) {
+  const std::uint32_t ring = of_one_ring.front().before;
+  if (s.sample_count[ring] < kMaxSamples) return false;
+  const std::uint64_t nodes = s.nodes_before[ring];
+  return std::all_of(of_one_ring.begin(), of_one_ring.end(), [&](const RingRelation& relation) {
+    const std::uint64_t by_nodes = relation.nodes * kMaxSamples;
+    const std::uint64_t by_samples = relation.samples * nodes;
+    const std::uint64_t difference =
+        std::max(by_nodes, by_samples) - std::min(by_nodes, by_samples);
+    return difference <= kTolerance * nodes;
+  });
+}
+
+// What the relations of one ring of the last frame are worth.
+void WeighBySamples(std::span<RingRelation> of_one_ring, const RelationScratch& s) {
+  const bool sampled = s.sample_count[of_one_ring.front().before] > 0;
+  // Nodes are complete, samples are not: where they agree, nodes count.
+  const bool by_nodes = !sampled || SamplesAgree(of_one_ring, s);
+  for (RingRelation& relation : of_one_ring) {
+    if (relation.samples > 0) {
+      if (!by_nodes || relation.nodes == 0) relation.nodes = NodesBySamples(relation, s);
+    } else if (!by_nodes || 4 * s.told[relation.now] >= kToldQuarters * s.nodes_now[relation.now]) {
+      relation.nodes = 0;
+    }
+  }
+}
+
+// Lets the samples of outer rings confirm or replace what nodes say.
+void LetSamplesDecide(const RingHistory& previous, RelationScratch& s,
+                      std::vector<RingRelation>& relations) {
+  s.told.assign(s.nodes_now.size(), 0);
+  for (const RingRelation& relation : relations) {
+    if (relation.samples > 0) s.told[relation.now] += NodesBySamples(relation, s);
+  }
+  for (std::size_t first = 0, last = 0; first < relations.size(); first = last) {
+    while (last < relations.size() && relations[last].before == relations[first].before) ++last;
+    if (previous.rings[relations[first].before].is_hole) continue;
+    WeighBySamples(std::span(relations).subspan(first, last - first), s);
+  }
+  std::erase_if(relations, [](const RingRelation& relation) { return relation.nodes == 0; });
+}
+
+void MarkCounting(RelationScratch& s, std::vector<RingRelation>& relations) {
+  for (RingRelation& relation : relations) {
+    const std::uint64_t smaller =
+        std::min(s.nodes_before[relation.before], s.nodes_now[relation.now]);
+    relation.counts = relation.nodes >= smaller / kSmallestPart + (smaller % kSmallestPart != 0);
+    if (relation.counts) s.linked_before[relation.before] = s.linked_now[relation.now] = 1;
+  }
+}
+
+// Rings that moving has led nowhere may have stayed: a hole that does not follow the body around
+// it, or velocities that are wrong. Not outer rings whose samples have told otherwise.
+void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
+                std::vector<RingRelation>& relations) {
+  FindSharedNodes(previous.runs, now.runs, s.newest, s.shared);
+  for (const SharedNodes& pair : s.shared) {
+    if (!AreOfOneKind(previous, now, pair.a, pair.b)) continue;
+    if (s.linked_before[pair.a] || s.linked_now[pair.b]) continue;
+    if (!s.sample_count.empty() && s.sample_count[pair.a] > 0) continue;
+    relations.push_back({pair.a, pair.b, pair.nodes});
+  }
+  Unite(relations);
+}
+
+}  // namespace
+
+void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
+                 std::vector<RingRelation>& relations) {
+  relations.clear();
+  CountNodes(previous.runs, previous.rings.size(), s.nodes_before);
+  CountNodes(now.runs, now.is_hole.size(), s.nodes_now);
+  s.shift_before.assign(previous.rings.size(), {});
+  s.shift_now.assign(now.is_hole.size(), {});
+  s.sample_count.clear();
+  const bool by_samples = now.has_ids && !previous.samples.empty();
+  if (by_samples) ShiftBySamples(now.tracks, s);
+  ShiftByVelocities(previous, now, by_samples, s);
+  MoveHolesAlong(
+      s.shift_before, [&](std::size_t ring) { return previous.rings[ring].is_hole; },
+      [&](std::size_t ring) { return previous.rings[ring].outer; });
+  MoveHolesAlong(
+      s.shift_now, [&](std::size_t ring) { return now.is_hole[ring] != 0; },
+      [&](std::size_t ring) { return now.outer[ring]; });
+
+  RelateByNodes(previous, now, s, relations);
+  if (by_samples) {
+    AddFoundSamples(previous, now, s, relations);
+    LetSamplesDecide(previous, s, relations);
+  }
+  s.linked_before.assign(previous.rings.size(), 0);
+  s.linked_now.assign(now.is_hole.size(), 0);
+  MarkCounting(s, relations);
+  if (AnyMoves(s.shift_before) || AnyMoves(s.shift_now)) {
+    AddUnmoved(previous, now, s, relations);
+    MarkCounting(s, relations);
+  }
+  std::erase_if(relations, [&](const RingRelation& relation) {
+    return !relation.counts && (s.linked_before[relation.before] || s.linked_now[relation.now]);
+  });
+}
+
+}  // namespace partiemc

@@ -1,0 +1,41 @@
+// What ids and velocities of particles tell of rings: where the particles of a ring have gone, and
+// how fast it moves.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bins/bins.h"
+#include "crossings/crossings.h"
+#include "identities/ring_samples.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/state.h"
+#include "rings/components.h"
+
+namespace partiemc {
+
+/// By numbers of the rings of a frame; keeps its memory from frame to frame.
+struct RingTracks {
+  RingSamples by_id;
+  std::vector<double> velocity_x, velocity_y;  ///< World units per time; 0 for holes.
+  std::vector<std::int64_t> sum_x, sum_y;      // Working memory.
+};
+
+struct TrackInput {
+  const Frame& frame;
+  Plane plane;
+  const ParticleBins& bins;
+  const Crossings& crossings;
+  const Components& components;
+  std::span<const std::uint32_t> ring_of_component;  ///< Number of its outer ring, or kNoRing.
+  std::span<const std::uint64_t> particle_count;     ///< By number, as CountParticles counts.
+};
+
+/// Follows the particles of a checked frame: samples as SampleRings takes them, velocities as means
+/// over the particles, in sums of integers, which have no order. Without ids there are no samples,
+/// without velocities they are 0. Cost: that of SampleRings; with velocities, linear in particles.
+void FollowParticles(const TrackInput& input, const RingHistory& previous, RingTracks& tracks);
+
+}  // namespace partiemc

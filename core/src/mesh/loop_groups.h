@@ -1,0 +1,72 @@
+// Closed loops in groups that are triangulated apart from each other, in parallel.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "mesh/loop_strip.h"
+#include "mesh/triangulate.h"
+
+namespace partiemc {
+
+/// Loops as Triangulator wants them, each in a group. Loops of different groups bound regions that
+/// have no inner point in common; a group's loops are all that bound its region. Two loops alone, a
+/// ring and its staircase, are triangulated as a strip where that will do (loop_strip.h).
+/// Keeps its memory warm from frame to frame.
+class LoopGroups {
+ public:
+  void Clear();
+
+  /// Adds a point to the loop that is being made.
+  void AddPoint(std::uint32_t point) { points_.push_back(point); }
+  /// Adds the points [first, last), one after the other.
+  void AddPoints(std::uint32_t first, std::uint32_t last) {
+    points_.resize(points_.size() + (last - first));
+    std::iota(points_.end() - (last - first), points_.end(), first);
+  }
+  void AddPoints(std::span<const std::uint32_t> points) {
+    points_.insert(points_.end(), points.begin(), points.end());
+  }
+  /// Ends that loop; with `reversed`, its points go the other way round.
+  void EndLoop(std::uint32_t group, bool reversed = false);
+
+  /// Appends the triangles of all groups, in the order of the groups, and forgets the loops.
+  /// Groups are taken together to batches of about the same number of points, whatever the number
+  /// of threads. A group whose loops are seen to break the requirements of Triangulator, which a
+  /// strip does not look for, has no triangles and is added to `broken`.
+  void Triangulate(std::span<const double> points, std::vector<std::uint32_t>& triangles,
+                   std::vector<std::uint32_t>& broken);
+
+ private:
+  // Neighbouring groups that one task triangulates, one after the other.
+  struct Batch {
+    std::size_t first_group = 0, last_group = 0;
+    std::vector<std::uint32_t> points, offsets;  // Of one group.
+    std::vector<std::uint32_t> triangles;
+    LoopStrip strip;
+    Triangulator triangulator;
+    std::vector<std::uint32_t> broken;  // Groups.
+  };
+
+  void SortLoops();
+  std::size_t MakeBatches();
+  std::span<const std::uint32_t> LoopsOf(std::size_t group) const {
+    return std::span(loops_).subspan(loop_offsets_[group],
+                                     loop_offsets_[group + 1] - loop_offsets_[group]);
+  }
+  std::span<const std::uint32_t> PointsOf(std::uint32_t loop) const {
+    return std::span(points_).subspan(offsets_[loop], offsets_[loop + 1] - offsets_[loop]);
+  }
+  bool TriangulateGroup(std::span<const double> points, std::size_t group, Batch& batch) const;
+
+  std::vector<std::uint32_t> points_, offsets_;  // Loop k has [offsets_[k], offsets_[k + 1]).
+  std::vector<std::uint32_t> groups_;            // By loop.
+  std::vector<std::uint32_t> loops_;             // By group.
+  std::vector<std::uint32_t> loop_offsets_;      // Group k has [loop_offsets_[k], [k + 1]) of them.
+  std::vector<Batch> batches_;                   // As many as any frame has had.
+};
+
+}  // namespace partiemc

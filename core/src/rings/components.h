@@ -1,0 +1,170 @@
+// Connected components of the inside nodes: which polygon a node, a ring or a particle belongs to.
+#pragma once
+
+#include <hwy/cache_control.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/bits.h"
+#include "bins/bins.h"
+#include "crossings/crossings.h"
+
+namespace partiemc {
+
+/// Marks a particle that belongs to no component.
+inline constexpr std::uint32_t kNoComponent = 0xffffffff;
+
+/// Inside nodes joined along lattice edges and through the saddles whose inside corners are
+/// joined: exactly the connectivity of the isoline, so that each component has one outer ring.
+class Components {
+ public:
+  /// Labels the inside nodes of `crossings`. Components are numbered in the order of their first
+  /// nodes by tile, row, column. Cost: linear in runs of inside nodes.
+  void Label(const TileDirectory& directory, const Crossings& crossings);
+
+  std::uint32_t size() const { return count_; }
+
+  /// Component of an inside node.
+  std::uint32_t At(const Crossings& crossings, const TilePlace& node) const;
+
+  /// The component that a particle at (x, y) of a tile belongs to: that of the inside corner of its
+  /// cell that is nearest to it. None: kNoComponent.
+  std::uint32_t ComponentOf(const TileDirectory& directory, const Crossings& crossings,
+                            std::uint32_t tile, float x, float y) const;
+
+  /// Asks the memory for what ComponentOf will look up there.
+  void Prefetch(std::uint32_t tile, int row) const {
+    hwy::Prefetch(&first_run_[tile * kTileSize + row]);
+  }
+
+  /// Calls visit(component) for the components of which a tile's particles may be: once or several
+  /// times for each. Cost: linear in the runs of inside nodes on the tile and its upper right rim.
+  template <typename Visit>
+  void ForEachSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                       std::uint32_t tile, Visit visit) const;
+
+  /// Calls visit(tile, j, mask, component) for each run of inside nodes.
+  template <typename Visit>
+  void ForEachRun(const Crossings& crossings, Visit visit) const;
+
+  /// Calls visit(tile, entry, component) for each particle that belongs to one (ComponentOf), by
+  /// its entry in the list of its own tile.
+  template <typename Visit>
+  void ForEachParticle(const ParticleBins& bins, const Crossings& crossings, Visit visit) const;
+  template <typename Visit>
+  void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
+                         Visit visit) const;
+
+  /// Adds the particles of each component to `counts`, and their weights, where particles have
+  /// weights of their own, to `weights`; both have size() elements.
+  /// In parallel over tiles: only where a tile sees several components is a particle asked for its
+  /// nearest corner, and where all of a tile is inside none is asked for anything.
+  void CountParticles(const ParticleBins& bins, const Crossings& crossings,
+                      std::span<std::uint64_t> counts, std::span<double> weights);
+
+ private:
+  // What the particles of one tile add to the components.
+  struct TileShare {
+    std::uint32_t component;  // kNoComponent: none; kSeveralComponents: not counted yet.
+    std::uint32_t count;
+    double weight;
+  };
+
+  std::uint32_t ComponentSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                                  std::uint32_t tile) const;
+  TileShare ShareOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile) const;
+  template <typename Visit>
+  void ForEachRunSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                          std::uint32_t tile, Visit visit) const;
+  std::uint32_t RunAt(const Crossings& crossings, const TilePlace& node) const;
+  std::uint32_t Root(std::uint32_t run);
+  void Unite(std::uint32_t a, std::uint32_t b);
+  void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
+
+  // By tile * 32 + row, and in the end how many. The rows of a tile that is all inside are one run.
+  std::vector<std::uint32_t> first_run_;
+  std::vector<std::uint32_t> label_;  // By run: parent while uniting, then the component.
+  std::vector<TileShare> shares_;     // By tile.
+  std::uint32_t count_ = 0;
+};
+
+/// Whether all nodes of a tile are inside.
+inline bool IsFull(const BitRows& rows) {
+  std::uint32_t all = ~std::uint32_t{0};
+  for (const std::uint32_t row : rows) all &= row;
+  return all == ~std::uint32_t{0};
+}
+
+/// The bits of a row at which a run of ones begins.
+inline std::uint32_t RunStarts(std::uint32_t row) { return row & ~(row << 1); }
+
+/// Whether the ones of a row are one run. Requires: there are some.
+inline bool IsOneRun(std::uint32_t row) { return (RunStarts(row) & (RunStarts(row) - 1)) == 0; }
+
+/// The run of ones of `row` that begins at its lowest set bit.
+inline std::uint32_t LowestRun(std::uint32_t row) { return row & ~(row + (row & -row)); }
+
+template <typename Visit>
+void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
+  for (std::uint32_t tile = 0; tile < crossings.tiles.size(); ++tile) {
+    for (int j = 0; j < kTileSize; ++j) {
+      std::uint32_t run = first_run_[tile * kTileSize + j];
+      for (std::uint32_t row = crossings.tiles[tile].inside[j]; row != 0;) {
+        const std::uint32_t mask = LowestRun(row);
+        visit(tile, j, mask, label_[run++]);
+        row &= ~mask;
+      }
+    }
+  }
+}
+
+// Calls visit(first, count) for the runs of the tile and of its cells' corners beyond it. Runs are
+// numbered by tile, row, column, so that those of the tile are successive, and those of a row.
+template <typename Visit>
+void Components::ForEachRunSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                                    std::uint32_t tile, Visit visit) const {
+  const auto visit_left_nodes = [&](std::uint32_t other, int rows) {
+    for (int j = 0; other != kNoTile && j < rows; ++j) {
+      visit(first_run_[other * kTileSize + j], crossings.tiles[other].inside[j] & 1);
+    }
+  };
+  const Neighbourhood& near = directory.neighbours(tile);
+  const std::uint32_t first = first_run_[tile * kTileSize];
+  visit(first, first_run_[(tile + 1) * kTileSize] - first);
+  if (const std::uint32_t above = near[7]; above != kNoTile) {
+    const std::uint32_t starts = RunStarts(crossings.tiles[above].inside[0]);
+    visit(first_run_[above * kTileSize], static_cast<std::uint32_t>(CountBits(starts)));
+  }
+  visit_left_nodes(near[5], kTileSize);
+  visit_left_nodes(near[8], 1);
+}
+
+template <typename Visit>
+void Components::ForEachSeenFrom(const TileDirectory& directory, const Crossings& crossings,
+                                 std::uint32_t tile, Visit visit) const {
+  ForEachRunSeenFrom(directory, crossings, tile, [&](std::uint32_t first, std::uint32_t count) {
+    for (std::uint32_t run = first; run < first + count; ++run) visit(label_[run]);
+  });
+}
+
+template <typename Visit>
+void Components::ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings,
+                                   std::uint32_t tile, Visit visit) const {
+  for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
+    const BinEntry& at = bins.entries[entry];
+    const std::uint32_t component = ComponentOf(bins.tiles, crossings, tile, at.x, at.y);
+    if (component != kNoComponent) visit(tile, entry, component);
+  }
+}
+
+template <typename Visit>
+void Components::ForEachParticle(const ParticleBins& bins, const Crossings& crossings,
+                                 Visit visit) const {
+  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
+    ForEachParticleOf(bins, crossings, tile, visit);
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,312 @@
+// Sums over the particles near a point, in vectors of floats. Particles within reach are copied
+// together first, so that the sums of all points of a cell run over one short array. Entry k of
+// that array goes to partial sum k modulo sixteen, and the sixteen are added up in one tree,
+// however wide the vectors of the processor are: the bits are the same everywhere. Compiled once
+// for each target, hence the guard that each of them turns.
+#if defined(PARTIEMC_NEAR_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef PARTIEMC_NEAR_LANES_INL_H
+#undef PARTIEMC_NEAR_LANES_INL_H
+#else
+#define PARTIEMC_NEAR_LANES_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "base/compressor-inl.h"
+#include "sampler/near_rows.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kPartialSums = kRowPadding;
+
+using Lanes = hn::CappedTag<float, kPartialSums>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+constexpr int kParts = kPartialSums / kLanes;
+
+// Particles beside each other, in coordinates relative to NearRows' origin, then at least
+// kPartialSums that are far from everything.
+struct NearChunk {
+  static constexpr int kCapacity = 128;
+  static constexpr float kFar = 1e6f;
+  static constexpr int kRoom = kCapacity + kPartialSums;
+
+  HWY_ALIGN float x[kRoom];
+  HWY_ALIGN float y[kRoom];
+  HWY_ALIGN float weight[kRoom];
+  int count;
+};
+
+// Where particles of a query lie, and which of them are within reach, in registers.
+class NearDisc {
+ public:
+  HWY_INLINE explicit NearDisc(const NearRows& near)
+      : xs_(near.x),
+        ys_(near.y),
+        weights_(near.weight),
+        column_(hn::Set(Lanes(), near.column)),
+        centre_x_(hn::Set(Lanes(), near.centre_x)),
+        centre_y_(hn::Set(Lanes(), near.centre_y)),
+        reach_square_(hn::Set(Lanes(), near.reach_square)) {}
+
+  // Writes those of the entries [first, last) of a band, at most kPartialSums, that are within
+  // reach behind the first `to` particles of a chunk, which has room for them. Returns how many it
+  // has then.
+  template <bool kWeighted>
+  HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
+                        NearChunk& chunk) const {
+    const Lanes d;
+    const Compressor::Bits d_bits;
+    const auto period = hn::Set(d, kColumnPeriod);
+    const auto per_period = hn::Set(d, 1 / kColumnPeriod);
+    for (int part = 0; part < kParts; ++part, first += kLanes) {
+      const auto column = hn::Sub(hn::LoadU(d, xs_ + first), column_);
+      const auto x = hn::Sub(column, hn::Mul(hn::Round(hn::Mul(column, per_period)), period));
+      const auto y = hn::Sub(hn::LoadU(d, ys_ + first), origin_y);
+      const auto dx = hn::Sub(x, centre_x_);
+      const auto dy = hn::Sub(y, centre_y_);
+      const auto square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+      const auto is_near = hn::RebindMask(d_bits, hn::Lt(square, reach_square_));
+      const auto place = hn::Add(hn::Iota(d_bits, 0), hn::Set(d_bits, static_cast<int>(first)));
+      const auto is_entry = hn::Lt(place, hn::Set(d_bits, static_cast<int>(last)));
+      const auto is_in = hn::And(is_near, is_entry);
+      const Compressor compress(is_in);
+      hn::StoreU(compress(d, x), d, chunk.x + to);
+      hn::StoreU(compress(d, y), d, chunk.y + to);
+      if constexpr (kWeighted) {
+        hn::StoreU(compress(d, hn::LoadU(d, weights_ + first)), d, chunk.weight + to);
+      }
+      to += static_cast<int>(hn::CountTrue(d_bits, is_in));
+    }
+    return to;
+  }
+
+ private:
+  const float *xs_, *ys_, *weights_;
+  Vector column_, centre_x_, centre_y_, reach_square_;
+};
+
+// Ends a chunk with particles that are far from everything.
+template <bool kWeighted>
+HWY_INLINE void Close(NearChunk& chunk) {
+  const Lanes d;
+  for (int part = 0; part < kParts; ++part) {
+    const int to = chunk.count + part * kLanes;
+    hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.x + to);
+    hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.y + to);
+    if constexpr (kWeighted) hn::StoreU(hn::Zero(d), d, chunk.weight + to);
+  }
+}
+
+// Collects the particles of `near` in a chunk. Whenever there may be no room for more, make_room()
+// has to use it up, or returns false to give up. Returns false if it did.
+template <bool kWeighted, typename MakeRoom>
+HWY_INLINE bool Collect(const NearRows& near, NearChunk& chunk, MakeRoom make_room) {
+  const NearDisc disc(near);
+  int count = 0;
+  for (int b = 0; b < near.band_count; ++b) {
+    const NearBand& band = near.bands[b];
+    const Vector origin_y = hn::Set(Lanes(), band.origin_y);
+    const std::uint32_t* offsets = band.offsets;
+    const std::uint32_t* const end = offsets + band.rows * band.row_stride;
+    for (; offsets != end; offsets += band.row_stride) {
+      std::uint32_t first = offsets[0];
+      const std::uint32_t last = offsets[band.columns];
+      do {
+        if (HWY_UNLIKELY(count + kPartialSums > NearChunk::kCapacity)) {
+          chunk.count = std::exchange(count, 0);
+          if (!make_room()) return false;
+        }
+        count = disc.Append<kWeighted>(origin_y, first, last, count, chunk);
+        first += kPartialSums;
+      } while (HWY_UNLIKELY(first < last));
+    }
+  }
+  chunk.count = count;
+  return true;
+}
+
+// Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
+template <bool kWeighted, typename Visit>
+HWY_INLINE void ForEachChunk(const NearRows& near, NearChunk& chunk, Visit visit) {
+  const auto empty = [&]() HWY_ATTR {
+    Close<kWeighted>(chunk);
+    visit(std::as_const(chunk));
+    return true;
+  };
+  Collect<kWeighted>(near, chunk, empty);
+  if (chunk.count > 0) empty();
+}
+
+// The particles of `near` in one chunk. Returns false if they may not fit.
+template <bool kWeighted>
+HWY_INLINE bool Gather(const NearRows& near, NearChunk& chunk) {
+  const bool fits = Collect<kWeighted>(near, chunk, [] { return false; });
+  if (fits) Close<kWeighted>(chunk);
+  return fits;
+}
+
+// Calls visit(query, chunk, is_all) for the particles of each of a few queries, as many at a time
+// as a chunk holds: is_all where these are all that the query has. First copies those of all
+// queries, so that the sums of one need not wait for what is looked up for it.
+template <bool kWeighted, typename Query, typename Visit>
+HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
+  NearChunk chunks[kQueriesAtOnce];
+  bool fits[kQueriesAtOnce];
+  for (std::size_t k = 0; k < queries.size(); ++k) {
+    fits[k] = Gather<kWeighted>(queries[k].near, chunks[k]);
+  }
+  for (std::size_t k = 0; k < queries.size(); ++k) {
+    if (HWY_LIKELY(fits[k])) {
+      visit(k, chunks[k], true);
+    } else {
+      ForEachChunk<kWeighted>(queries[k].near, chunks[k],
+                              [&](const NearChunk& chunk) HWY_ATTR { visit(k, chunk, false); });
+    }
+  }
+}
+
+// Sixteen partial sums of each of several channels.
+template <int kChannels>
+class PartialSums {
+ public:
+  // Calls add(k, sums) for each vector of a chunk, k its first entry and sums its channels.
+  template <typename Add>
+  HWY_INLINE PartialSums(const NearChunk& chunk, Add add) {
+    for (int part = 0; part < kParts; ++part) {
+      Vector sums[kChannels];
+      for (Vector& sum : sums) sum = hn::Zero(Lanes());
+      for (int k = part * kLanes; k < chunk.count; k += kPartialSums) add(k, sums);
+      for (int channel = 0; channel < kChannels; ++channel) parts_[channel][part] = sums[channel];
+    }
+  }
+
+  // Keeps them for TotalsAtPoints.
+  template <typename Parts>
+  HWY_INLINE void Store(Parts& parts, std::size_t point) const {
+    for (int channel = 0; channel < kChannels; ++channel) {
+      for (int part = 0; part < kParts; ++part) {
+        hn::Store(parts_[channel][part], Lanes(), parts[channel][point] + part * kLanes);
+      }
+    }
+  }
+
+  // Adds the channels' totals to `totals`.
+  HWY_INLINE void AddTo(double (&totals)[kChannels]) {
+    HWY_ALIGN float sums[kGroups * kGroup];
+    for (int group = 0; group < kGroups; ++group) Total(group * kGroup, sums + group * kGroup);
+    for (int channel = 0; channel < kChannels; ++channel) totals[channel] += sums[channel];
+  }
+
+ private:
+  static constexpr int kGroup = 4;  // Channels that are added up at once.
+  static constexpr int kGroups = (kChannels + kGroup - 1) / kGroup;
+  using Group = hn::CappedTag<float, kGroup>;
+
+  // Partial sums i and i + 8, then i and i + 4.
+  HWY_INLINE hn::Vec<Group> Fold(int channel) {
+    if (channel >= kChannels) return hn::Zero(Group());
+    for (int count = kParts / 2; count > 0; count /= 2) {
+      for (int part = 0; part < count; ++part) {
+        parts_[channel][part] = hn::Add(parts_[channel][part], parts_[channel][part + count]);
+      }
+    }
+    return FoldLanes(Lanes(), parts_[channel][0]);
+  }
+  template <class D>
+  static HWY_INLINE hn::Vec<Group> FoldLanes([[maybe_unused]] D d, hn::Vec<D> sums) {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (hn::MaxLanes(D()) > kGroup) {
+      const hn::Half<D> half;
+      return FoldLanes(half, hn::Add(hn::LowerHalf(half, sums), hn::UpperHalf(half, sums)));
+    } else
+#endif
+      return sums;
+  }
+
+  // The totals of four channels: partial sums i and i + 2, then both of them.
+  HWY_INLINE void Total(int channel, float* totals) {
+    const Group d;
+    hn::Vec<Group> sums[kGroup];
+    for (int k = 0; k < kGroup; ++k) sums[k] = Fold(channel + k);
+#if HWY_TARGET == HWY_SCALAR
+    for (int k = 0; k < kGroup; ++k) hn::Store(sums[k], d, totals + k);
+#else
+    const auto pair = [&](int k) HWY_ATTR {
+      return hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
+                     hn::InterleaveUpper(d, sums[k], sums[k + 1]));
+    };
+    const auto first = pair(0);
+    const auto second = pair(2);
+    hn::Store(
+        hn::Add(hn::ConcatLowerLower(d, second, first), hn::ConcatUpperUpper(d, second, first)), d,
+        totals);
+#endif
+  }
+
+  Vector parts_[kChannels][kParts];
+};
+
+// Totals of one channel at kLanes points from the partial sums of each, added up as PartialSums
+// does: lane k is that of parts[first + k], or of parts[last] if that comes before.
+HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t first,
+                                 std::size_t last) {
+  const Lanes d;
+  Vector sums[kLanes];
+  for (std::size_t point = 0; point < kLanes; ++point) {
+    const float* const from = parts[std::min(first + point, last)];
+    Vector folded[kParts];
+    for (int part = 0; part < kParts; ++part) folded[part] = hn::Load(d, from + part * kLanes);
+    for (int count = kParts / 2; count > 0; count /= 2) {
+      for (int part = 0; part < count; ++part) {
+        folded[part] = hn::Add(folded[part], folded[part + count]);
+      }
+    }
+    sums[point] = folded[0];
+  }
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (kLanes == 16) {
+    for (int k = 0; k < 8; ++k) {
+      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 8], sums[k]),
+                        hn::ConcatUpperUpper(d, sums[k + 8], sums[k]));
+    }
+    // In blocks of four lanes: those of k, k + 4, k + 8, k + 12.
+    for (int k = 0; k < 4; ++k) {
+      sums[k] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(sums[k + 4]), sums[k]),
+                        hn::OddEvenBlocks(sums[k + 4], hn::SwapAdjacentBlocks(sums[k])));
+    }
+  } else if constexpr (kLanes == 8) {
+    for (int k = 0; k < 4; ++k) {
+      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 4], sums[k]),
+                        hn::ConcatUpperUpper(d, sums[k + 4], sums[k]));
+    }
+  }
+  const hn::Repartition<double, Lanes> d_pair;
+  const auto pairs = [&](int k) HWY_ATTR {
+    return hn::BitCast(d_pair, hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
+                                       hn::InterleaveUpper(d, sums[k], sums[k + 1])));
+  };
+  const auto lower = pairs(0);
+  const auto upper = pairs(2);
+  return hn::Add(hn::BitCast(d, hn::InterleaveLower(d_pair, lower, upper)),
+                 hn::BitCast(d, hn::InterleaveUpper(d_pair, lower, upper)));
+#else
+  return sums[0];
+#endif
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc
+HWY_AFTER_NAMESPACE();
+
+#endif  // the guard

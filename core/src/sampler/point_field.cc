@@ -1,0 +1,218 @@
+#include "sampler/point_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/parallel.h"
+#include "base/prefetch.h"
+#include "bins/cell_mask.h"
+#include "bins/near_entries.h"
+
+namespace partiemc {
+namespace {
+
+// Marks tiles without a run.
+constexpr std::uint32_t kNoRun = 0xffffffff;
+
+// After so many tiles positions along x begin anew.
+constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
+
+}  // namespace
+
+// Marks the cells of each tile that are asked for, and those that a kernel reaches from them.
+void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander) {
+  const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
+  tiles_.resize(tiles);
+  asked_.resize(tiles);
+  wanted_.resize(tiles);
+  const auto is_active = [&](std::uint32_t tile) {
+    if (tile == kNoTile) return false;
+    const std::size_t end =
+        tile + 1 < tiles ? crossings.tiles[tile + 1].first_cell : crossings.cells.size();
+    return crossings.tiles[tile].first_cell < end;
+  };
+  const auto active_of = [&](std::uint32_t tile) -> const BitRows& {
+    return crossings.tiles[tile].active;
+  };
+  BitRows all_cells;
+  all_cells.fill(~std::uint32_t{0});
+  // Farther than a mask holds all is asked for, and all is wanted.
+  const double distance = std::ceil(wander);
+  const double reach = distance + std::ceil(scale_.kernel_radius);
+  const int margin = static_cast<int>(std::min<double>(reach, kMaskMargin));
+  const auto mark = [](CellMask& mask, double cells) {
+    Widen(mask, static_cast<int>(cells), static_cast<int>(cells));
+    return CellsOfNeighbour(mask, kOwnPlace);
+  };
+  ParallelFor(tiles, [&](std::uint32_t index) {
+    const Neighbourhood& near = bins.tiles.neighbours(index);
+    Tile& tile = tiles_[index];
+    BitRows& asked = asked_[index];
+    asked = {};
+    wanted_[index] = reach > kMaskMargin ? all_cells : BitRows{};
+    if (std::any_of(near.begin(), near.end(), is_active)) {
+      CellMask mask = CellsAround(bins.tiles, index, margin, active_of);
+      asked = distance > kMaskMargin ? all_cells : mark(mask, distance);
+      if (reach <= kMaskMargin) wanted_[index] = mark(mask, reach - distance);
+    }
+    tile.is_asked = !IsEmpty(asked);
+    tile.column = static_cast<float>(bins.tiles[index].x & (kPeriodTiles - 1)) * kTileSize;
+  });
+}
+
+void PointField::Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
+                       double wander, bool tells_sources) {
+  scale_ = scale;
+  grid_ = BucketGrid(scale.kernel_radius);
+  MarkTiles(bins, crossings, wander);
+  FindRuns(bins, tells_sources);
+  ParallelFor(runs_.size(), [&](std::size_t run) { SortRun(bins, runs_[run]); });
+  ParallelFor(static_cast<std::uint32_t>(tiles_.size()),
+              [&](std::uint32_t tile) { LinkRuns(bins.tiles, tile); });
+}
+
+// Joins wanted tiles to runs, and makes room for what these hold.
+void PointField::FindRuns(const ParticleBins& bins, bool tells_sources) {
+  runs_.clear();
+  run_of_.assign(tiles_.size(), kNoRun);
+  std::uint32_t entry_count = 0;
+  for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) {
+    if (bins.CountOf(tile) == 0 || IsEmpty(wanted_[tile])) continue;
+    const TileCoordinate& at = bins.tiles[tile];
+    const auto goes_on = [&](const TileCoordinate& last) {
+      return last.y == at.y && last.x + 2 >= at.x;
+    };
+    if (runs_.empty() || !goes_on(bins.tiles[runs_.back().last_tile])) {
+      runs_.push_back({.first_tile = tile, .first_column = at.x, .first_entry = entry_count});
+    }
+    runs_.back().last_tile = tile;
+    run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
+    // Room for all particles of the tile: to count those that are wanted takes longer.
+    entry_count += bins.CountOf(tile);
+  }
+  std::uint32_t bucket_count = 0;
+  for (Run& run : runs_) {
+    const int tiles = bins.tiles[run.last_tile].x - run.first_column + 1;
+    run.row_stride = static_cast<std::uint32_t>(tiles * grid_.columns.size());
+    run.first_bucket = bucket_count;
+    bucket_count += OffsetCount(run);
+  }
+  bucket_offsets_.resize(bucket_count);
+  x_.resize(entry_count + kRowPadding);
+  y_.resize(entry_count + kRowPadding);
+  chosen_.resize(entry_count);
+  chosen_end_.resize(tiles_.size());
+  source_.resize(tells_sources ? entry_count : 0);
+  weight_.resize(bins.weight.empty() ? 0 : entry_count + kRowPadding);
+}
+
+// Tells a tile where the buckets around it are.
+void PointField::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
+  const Neighbourhood& neighbours = directory.neighbours(tile);
+  for (int y = 0; y < 3; ++y) {
+    RunBeside& beside = tiles_[tile].runs[y];
+    beside = {};
+    // All of these that have a run have the same.
+    for (int x = 0; x < 3; ++x) {
+      const std::uint32_t near = neighbours[y * 3 + x];
+      if (near == kNoTile || run_of_[near] == kNoRun) continue;
+      const Run& run = runs_[run_of_[near]];
+      const int first = (run.first_column - directory[tile].x) * grid_.columns.size();
+      beside = {.bucket = run.first_bucket - static_cast<std::uint32_t>(first),
+                .row_stride = run.row_stride,
+                .first = first,
+                .end = first + static_cast<int>(run.row_stride)};
+      break;
+    }
+  }
+}
+
+// Sorts the wanted particles of a run by bucket.
+void PointField::SortRun(const ParticleBins& bins, const Run& run) {
+  // The counts of buckets stand two places behind them, then where the next entry of a bucket goes
+  // one place behind it, and in the end is where the next bucket starts.
+  const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
+  std::fill(offsets.begin(), offsets.end(), 0);
+  const auto for_each_tile = [&](auto visit) {
+    for (std::uint32_t tile = run.first_tile; tile <= run.last_tile; ++tile) {
+      if (run_of_[tile] != kNoRun) visit(tile);
+    }
+  };
+  std::uint32_t chosen = run.first_entry;
+  // Where those of a tile, if all are wanted, are written: asked for while they are found.
+  std::uint32_t room = run.first_entry;
+  for_each_tile([&](std::uint32_t tile) {
+    const std::uint32_t count = bins.CountOf(tile);
+    const auto ask = [&](const auto& values) {
+      PrefetchLines(std::span(values).subspan(room, count));
+    };
+    ask(std::as_const(chosen_));
+    ask(std::as_const(x_));
+    ask(std::as_const(y_));
+    room += count;
+    const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
+    const auto first = static_cast<std::uint32_t>(columns);
+    NearWalk(bins, tile, wanted_[tile], NearFields::kAll).ForEachBlock([&](const auto& near) {
+      for (int k = 0; k < near.count; ++k) {
+        const std::uint32_t bucket =
+            grid_.rows.InTile(near.y[k]) * run.row_stride + first + grid_.columns.InTile(near.x[k]);
+        chosen_[chosen++] = {bucket, near.entry[k]};
+        ++offsets[bucket + 2];
+      }
+    });
+    chosen_end_[tile] = chosen;
+  });
+  std::uint32_t next = run.first_entry;
+  for (std::uint32_t& offset : offsets) offset = next += offset;
+  chosen = run.first_entry;
+  for_each_tile([&](std::uint32_t tile) {
+    for (; chosen < chosen_end_[tile]; ++chosen) {
+      const auto& [bucket, entry] = chosen_[chosen];
+      const std::uint32_t to = offsets[bucket + 1]++;
+      x_[to] = tiles_[tile].column + bins.entries[entry].x;
+      y_[to] = bins.entries[entry].y;
+      if (!source_.empty()) source_[to] = bins.entries[entry].source;
+      if (!bins.weight.empty()) weight_[to] = bins.weight[entry];
+    }
+  });
+}
+
+FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
+  const LatticePoint point{x, y};
+  PointQuery query;
+  query.points = {&point, 1};
+  FindNear(tile, query.points, scale_.kernel_radius, query.near);
+  PointSamples samples;
+  SampleAtPoints(scale_, {&query, 1}, samples);
+  return {.density = samples.density[0],
+          .mean_x = samples.mean_x[0],
+          .mean_y = samples.mean_y[0],
+          .phi = samples.phi[0],
+          .phi_x = samples.phi_x[0],
+          .phi_y = samples.phi_y[0],
+          .spread = samples.spread[0],
+          .value = samples.value[0],
+          .gradient_x = samples.gradient_x[0],
+          .gradient_y = samples.gradient_y[0],
+          .has_support = samples.kernel[0] > 0};
+}
+
+void PointField::Sample(std::span<const FieldPoints> groups,
+                        std::span<FieldSamples> samples) const {
+  std::array<PointQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].points = std::span(groups[q].points).first(groups[q].count);
+    FindNear(groups[q].tile, queries[q].points, scale_.kernel_radius, queries[q].near);
+  }
+  PointSamples at;
+  SampleAtPoints(scale_, std::span(queries).first(groups.size()), at);
+  std::size_t point = 0;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    for (std::size_t k = 0; k < groups[q].count; ++k, ++point) {
+      samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point]};
+    }
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,215 @@
+// The level set and its gradient at any point near the isoline, not only at nodes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bins/bins.h"
+#include "bins/near_entries.h"
+#include "crossings/crossings.h"
+#include "frame/scale.h"
+#include "sampler/bucket_grid.h"
+#include "sampler/point_groups.h"
+#include "sampler/point_kernels.h"
+
+namespace partiemc {
+
+/// F, phi and their gradients at a point, in cells (gradients are without unit).
+struct FieldSample {
+  double density = 0;                     ///< f
+  double mean_x = 0, mean_y = 0;          ///< xbar - x, the weighted mean relative to the point.
+  double phi = 0;                         ///< |x - xbar| - r
+  double phi_x = 0, phi_y = 0;            ///< grad phi; 0 where x = xbar.
+  double spread = 0;                      ///< s
+  double value = 0;                       ///< F (level_set_formula.h)
+  double gradient_x = 0, gradient_y = 0;  ///< grad F, of the branch that F is.
+  bool has_support = false;               ///< Whether any particle is within the kernel radius.
+};
+
+/// A point of a tile, in cells relative to it; in tile kNoTile where no particle is near.
+struct FieldPoint {
+  std::uint32_t tile = kNoTile;
+  double x = 0, y = 0;
+};
+
+/// F and grad F at a point.
+struct LevelSetSample {
+  double value = 0;
+  double gradient_x = 0, gradient_y = 0;
+};
+using FieldPoints = PointGroup<LatticePoint>;
+using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
+
+/// Particles near the isoline, each once, sorted into rows of buckets (BucketGrid) that run through
+/// tiles side by side: a point looks at the buckets around it, in its tile and its neighbours.
+class PointField {
+ public:
+  /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
+  /// cells away from one, along each axis. Cost: linear in the entries of the tiles around those
+  /// cells; in all entries where kernel and `wander` together reach farther than kMaskMargin.
+  /// SourceOf can be asked if `tells_sources`.
+  void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
+             double wander, bool tells_sources);
+
+  /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
+  /// Requires: the tile is indexed. Particles miss where Covers is false.
+  /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoints).
+  /// Cost: the particles of the rows of buckets within a kernel radius.
+  FieldSample Sample(std::uint32_t tile, double x, double y) const;
+
+  /// The same of points of at most kQueriesAtOnce groups, for less than one after the other. Those
+  /// of a group look at the same particles: neighbours at best.
+  void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
+
+  /// Whether particles weigh each their own.
+  bool HasWeights() const { return !weight_.empty(); }
+
+  /// Calls visit(x, y, entry) for the particles within `radius` of a point of `tile`, in cells
+  /// relative to it, and for some more. Requires: radius <= kernel radius.
+  template <typename Visit>
+  void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
+
+  /// Sets `near` to the particles within `radius` of any of some points, which have x and y, and
+  /// some more, for a kernel of vectors. All of `points` in cells relative to the tile.
+  template <typename Point>
+  void FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
+                NearRows& near) const;
+
+  /// Index in the frame of the particle of an entry. Requires: built to tell it.
+  std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
+
+  bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
+
+  /// Whether a point of a tile, 0 <= x, y < 32, is near enough to an active cell.
+  bool Covers(std::uint32_t tile, double x, double y) const {
+    return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
+  }
+
+ private:
+  // Tiles side by side whose particles are sorted as one: each row of buckets runs through all of
+  // them, so that a query finds one span in it. Where one tile between two is missing, or not
+  // wanted, its buckets are there and empty: no query sees two runs in a row of tiles.
+  struct Run {
+    std::uint32_t first_tile = 0, last_tile = 0;
+    std::int32_t first_column = 0;  // Of tiles.
+    std::uint32_t row_stride = 0;   // Buckets of a row.
+    std::uint32_t first_bucket = 0;
+    std::uint32_t first_entry = 0;
+  };
+
+  // The run above, beside or below a tile, as seen from it.
+  struct RunBeside {
+    std::uint32_t bucket = 0;  // The one in the tile's first column, of the first row, modulo 2^32.
+    std::uint32_t row_stride = 0;
+    int first = 0, end = 0;  // Its columns, from the tile's first.
+  };
+
+  // sqrt(2) - 1, rounded up: a diagonal is at most its box's longer side and so much of the other.
+  static constexpr double kDiagonal = 0.41422;
+
+  // More than floats are off by, in cells: particles that far out add nothing to a sum.
+  static constexpr double kDiscMargin = 1e-3;
+
+  struct Tile {
+    std::array<RunBeside, 3> runs;  // From below to above.
+    float column;                   // Of its first node (kColumnPeriod).
+    bool is_asked;                  // Whether points may lie in any of its cells.
+  };
+
+  void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
+  // Of its buckets, and two more.
+  std::uint32_t OffsetCount(const Run& run) const {
+    return run.row_stride * static_cast<std::uint32_t>(grid_.rows.size()) + 2;
+  }
+  void FindRuns(const ParticleBins& bins, bool tells_sources);
+  void LinkRuns(const TileDirectory& directory, std::uint32_t tile);
+  void SortRun(const ParticleBins& bins, const Run& run);
+
+  Scale scale_;
+  BucketGrid grid_;
+  std::vector<Tile> tiles_;
+  std::vector<BitRows> asked_;   // By tile: the cells in which points may lie.
+  std::vector<BitRows> wanted_;  // By tile: the cells that a kernel reaches from those.
+  std::vector<Run> runs_;
+  std::vector<std::uint32_t> run_of_;  // By tile; kNoRun where there is none.
+  std::vector<std::uint32_t> bucket_offsets_;
+  // Those of each run as they are found: tile after tile, which end at chosen_end_.
+  struct Chosen {
+    std::uint32_t bucket, entry;
+  };
+  std::vector<Chosen> chosen_;
+  std::vector<std::uint32_t> chosen_end_;
+  std::vector<float> x_, y_, weight_;
+  std::vector<std::uint32_t> source_;
+};
+
+template <typename Point>
+void PointField::FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
+                          NearRows& near) const {
+  LatticePoint low{points.front().x, points.front().y};
+  LatticePoint high = low;
+  for (const Point& point : points.subspan(1)) {
+    low = {std::min(low.x, point.x), std::min(low.y, point.y)};
+    high = {std::max(high.x, point.x), std::max(high.y, point.y)};
+  }
+  const Tile& of = tiles_[tile];
+  near.x = x_.data();
+  near.y = y_.data();
+  near.weight = weight_.empty() ? nullptr : weight_.data();
+  near.origin_x = static_cast<float>(static_cast<int>(low.x));
+  near.origin_y = static_cast<float>(static_cast<int>(low.y));
+  near.column = of.column + near.origin_x;
+  near.centre_x = static_cast<float>((low.x + high.x) / 2 - near.origin_x);
+  near.centre_y = static_cast<float>((low.y + high.y) / 2 - near.origin_y);
+  // Half the diagonal of the points' box is at most this.
+  const double width = high.x - low.x, height = high.y - low.y;
+  const double half = (std::max(width, height) + kDiagonal * std::min(width, height)) / 2;
+  const double disc = radius + half + kDiscMargin;
+  near.reach_square = static_cast<float>(disc * disc);
+  // What lies on the rim, or nearer to it than positions are to each other, adds nothing to a sum.
+  const double reach = radius - BucketGrid::kStep / 2;
+  const auto& [columns, rows] = grid_;
+  const int first_column = columns.Along(low.x - reach) - columns.size();
+  const int last_column = columns.Along(high.x + reach) - columns.size();
+  const int first_row = rows.Along(low.y - reach), last_row = rows.Along(high.y + reach);
+  near.band_count = 0;
+  for (int y = rows.TileOf(first_row); y <= rows.TileOf(last_row); ++y) {
+    const RunBeside& run = of.runs[y];
+    const int column = std::max(first_column, run.first);
+    const int end = std::min(last_column + 1, run.end);
+    if (column >= end) continue;
+    const int row = std::max(first_row - y * rows.size(), 0);
+    const std::uint32_t bucket = run.bucket + row * run.row_stride + column;
+    near.bands[near.band_count++] = {
+        .offsets = bucket_offsets_.data() + bucket,
+        .columns = end - column,
+        .rows = std::min(last_row - y * rows.size() + 1, rows.size()) - row,
+        .row_stride = static_cast<int>(run.row_stride),
+        .origin_y = near.origin_y - static_cast<float>((y - 1) * kTileSize)};
+  }
+}
+
+template <typename Visit>
+void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radius,
+                             Visit visit) const {
+  const LatticePoint point{x, y};
+  NearRows near;
+  FindNear(tile, std::span(&point, 1), radius + BucketGrid::kStep, near);
+  for (const NearBand& band : std::span(near.bands).first(near.band_count)) {
+    for (int row = 0; row < band.rows; ++row) {
+      const std::uint32_t* const offsets = band.offsets + row * band.row_stride;
+      for (std::uint32_t e = offsets[0]; e < offsets[band.columns]; ++e) {
+        float along = x_[e] - near.column;
+        if (along > kColumnPeriod / 2) along -= kColumnPeriod;
+        if (along < -kColumnPeriod / 2) along += kColumnPeriod;
+        visit(double{near.origin_x} + along, double{near.origin_y} + (y_[e] - band.origin_y), e);
+      }
+    }
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,85 @@
+// Grids of all sizes in one hash table: a box lies in one cell of the grid of its size.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "base/boxes_apart.h"
+
+namespace partiemc {
+
+// Bits for the column and for the row of a cell, and for the level of its grid, in one key.
+inline constexpr int kGridIndexBits = 29;
+inline constexpr int kGridLevelBits = 5;
+inline constexpr int kGridLevels = 1 << kGridLevelBits;
+static_assert(2 * kGridIndexBits + kGridLevelBits <= 64);
+
+// A box is this much smaller than its cell, so that rounding of an index to the wrong side of
+// a cell's border cannot put it two cells away from one that it touches. Any value well above
+// 2^-24, the error of an index, will do.
+inline constexpr double kGridSlack = 1.0 + 0x1p-10;
+
+template <typename AnyBox>
+double Extent(const AnyBox& box) {
+  return std::max(box.right - box.left, box.top - box.bottom);
+}
+
+/// Level k has square cells of side `finest` * 2^k.
+class HashGrids {
+ public:
+  HashGrids(const Box& bounds, double mean_extent)
+      : origin_{bounds.left, bounds.bottom},
+        // Cells of twice the mean extent hold almost all boxes of like things in one grid and
+        // still make few candidates; the second bound keeps
+        // indices below 2^27, the third keeps sizes above zero when all points coincide.
+        finest_(std::max(
+            {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {
+    for (int level = 0; level < kGridLevels; ++level) per_length_[level] = 1 / CellSize(level);
+  }
+
+  /// The first level whose cells hold a box of `extent`; 28 at most, by the bounds of the finest.
+  int LevelFor(double extent) const {
+    int level = 0;
+    while (level + 1 < kGridLevels && CellSize(level) < kGridSlack * extent) ++level;
+    return level;
+  }
+
+  double CellSize(int level) const { return finest_ * static_cast<double>(1u << level); }
+
+  std::int64_t Column(double x, int level) const {
+    return static_cast<std::int64_t>((x - origin_.x) * per_length_[level]);
+  }
+  std::int64_t Row(double y, int level) const {
+    return static_cast<std::int64_t>((y - origin_.y) * per_length_[level]);
+  }
+
+  static std::uint64_t Key(int level, std::int64_t column, std::int64_t row) {
+    return static_cast<std::uint64_t>(level) << (2 * kGridIndexBits) |
+           static_cast<std::uint64_t>(row) << kGridIndexBits | static_cast<std::uint64_t>(column);
+  }
+
+ private:
+  Point origin_;
+  double finest_;
+  std::array<double, kGridLevels> per_length_;  // By level: 1 / size of its cells.
+};
+
+// Cells of a block of this many by this many share a line of the cache: neighbours on a ring, and
+// all that they are compared with, are found in few of them.
+inline constexpr int kBlockBits = 2;
+inline constexpr std::uint64_t kInBlock = (1u << kBlockBits) - 1;
+inline constexpr std::size_t kBlockSlots = std::size_t{1} << (2 * kBlockBits);
+
+/// Fibonacci hashing of the block: the high bits of the product depend on all bits of the key.
+inline std::size_t SlotOf(std::uint64_t cell, std::size_t slot_count) {
+  const std::uint64_t block = cell & ~(kInBlock << kGridIndexBits | kInBlock);
+  const std::uint64_t in_block =
+      (cell >> kGridIndexBits & kInBlock) << kBlockBits | (cell & kInBlock);
+  const std::uint64_t hash = (block * 0x9e3779b97f4a7c15u) >> 32;
+  return static_cast<std::size_t>(hash * kBlockSlots | in_block) & (slot_count - 1);
+}
+
+}  // namespace partiemc

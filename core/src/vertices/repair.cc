@@ -1,0 +1,182 @@
+#include "vertices/repair.h"
+
+#include <algorithm>
+
+#include "base/cancellation.h"
+#include "base/parallel.h"
+#include "base/predicates.h"
+#include "vertices/measure.h"
+
+namespace partiemc {
+namespace {
+
+constexpr int kGentleRounds = 4;
+
+// Each round costs as much as all of the points, and frames may be made that need one for every few
+// of them: after so many everything goes back at once. Of 59,276 frames of noise, clusters and
+// bodies through each other, one needed nine.
+constexpr int kMostRounds = 24;
+
+// Rings of a round that lie on the wrong side of others. Hardly any frame has one.
+constexpr std::size_t kMostMisplaced = 100;
+
+Point PointAt(const Rings& rings, std::size_t k) {
+  return {rings.points[2 * k], rings.points[2 * k + 1]};
+}
+
+// Marks both ends of a segment and the points before and after it.
+void MarkSegment(const Rings& rings, std::uint32_t segment, std::vector<std::uint8_t>& is_marked) {
+  const auto after = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), segment);
+  const std::uint32_t begin = *(after - 1);
+  const std::uint32_t count = *after - begin;
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    is_marked[begin + (segment - begin + count - 1 + k) % count] = 1;
+  }
+}
+
+void MarkRing(const Rings& rings, std::size_t ring, std::vector<std::uint8_t>& is_marked) {
+  std::fill(is_marked.begin() + rings.offsets[ring], is_marked.begin() + rings.offsets[ring + 1],
+            std::uint8_t{1});
+}
+
+Box BoxOf(const Rings& rings, std::size_t ring) {
+  Box box;
+  for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+    box.Add(PointAt(rings, k));
+  }
+  return box;
+}
+
+// The point with the smallest x, of those the one with the smallest y.
+Point LeftmostOf(const Rings& rings, std::size_t ring) {
+  Point leftmost = PointAt(rings, rings.offsets[ring]);
+  for (std::uint32_t k = rings.offsets[ring] + 1; k < rings.offsets[ring + 1]; ++k) {
+    const Point point = PointAt(rings, k);
+    if (point.x < leftmost.x || (point.x == leftmost.x && point.y < leftmost.y)) leftmost = point;
+  }
+  return leftmost;
+}
+
+void MeasureRings(Rings& rings) {
+  rings.measures.resize(rings.RingCount());
+  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
+    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
+  });
+}
+
+// Lists the rings that are turned inside out or lie on the wrong side of others. Requires: rings
+// were measured, and searched for pairs. Of rings that do not cross, one is in its place if and
+// only if the others wind around it as often as around the region outside of an outer ring (0), or
+// around the fluid that a hole lies in (1). What touches no other ring's box has none around it,
+// and is around none.
+void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
+  scratch.misplaced.clear();
+  scratch.together.clear();
+  for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
+    if (scratch.pairs.is_apart[ring] == 0 || rings.outer_of[ring] != kNoRing) {
+      scratch.together.push_back(ring);
+    } else if (rings.measures[ring].area < 0) {
+      scratch.misplaced.push_back(ring);
+    }
+  }
+  scratch.ring_depths.Find(rings.points, rings.offsets, scratch.together, scratch.depths);
+  for (std::size_t k = 0; k < scratch.together.size(); ++k) {
+    const std::uint32_t ring = scratch.together[k];
+    const bool is_hole = rings.outer_of[ring] != kNoRing;
+    const bool is_turned = (rings.measures[ring].area < 0) != is_hole;
+    if (is_turned || scratch.depths[k] != (is_hole ? 1 : 0)) scratch.misplaced.push_back(ring);
+  }
+}
+
+// Marks the misplaced rings and those around them, by their boxes. If they are many, every ring: to
+// look for those around each would take too long.
+void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
+  if (scratch.misplaced.size() > kMostMisplaced) {
+    std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
+    return;
+  }
+  scratch.leftmost.clear();
+  for (const std::uint32_t ring : scratch.misplaced) {
+    MarkRing(rings, ring, scratch.is_marked);
+    scratch.leftmost.push_back(LeftmostOf(rings, ring));
+  }
+  if (scratch.misplaced.empty()) return;
+  for (const std::uint32_t other : scratch.together) {
+    const Box box = BoxOf(rings, other);
+    for (std::size_t k = 0; k < scratch.misplaced.size(); ++k) {
+      const Point& point = scratch.leftmost[k];
+      // A box that begins as far left goes by the number of its ring: of two, one is around.
+      const bool begins_before =
+          box.left != point.x ? box.left < point.x : other < scratch.misplaced[k];
+      if (!begins_before || point.x > box.right || point.y < box.bottom || point.y > box.top) {
+        continue;
+      }
+      MarkRing(rings, other, scratch.is_marked);
+      break;
+    }
+  }
+}
+
+// Names the outer rings of all that have a marked point.
+void NameTangledRings(const Rings& rings, RepairScratch& scratch) {
+  for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const auto points =
+        std::span(scratch.is_marked)
+            .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
+    if (std::ranges::none_of(points, [](std::uint8_t marked) { return marked != 0; })) continue;
+    const std::uint32_t outer = rings.outer_of[ring];
+    scratch.tangled.push_back(outer == kNoRing ? ring : outer);
+  }
+  std::ranges::sort(scratch.tangled);
+  scratch.tangled.erase(std::unique(scratch.tangled.begin(), scratch.tangled.end()),
+                        scratch.tangled.end());
+}
+
+// Moves the marked points; returns whether any was not at its root yet.
+bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratch& scratch,
+             Rings& rings) {
+  bool has_moved = false;
+  for (std::size_t k = 0; k < rings.points.size(); ++k) {
+    if (!scratch.is_marked[k / 2] || rings.points[k] == roots[k]) continue;
+    rings.points[k] = all_the_way ? roots[k] : (rings.points[k] + roots[k]) / 2;
+    has_moved = true;
+  }
+  return has_moved;
+}
+
+}  // namespace
+
+void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings) {
+  scratch.tangled.clear();
+  for (int round = 0;; ++round) {
+    ThrowIfCancelled();
+    // Only what the round before has marked may have moved.
+    const std::size_t touching =
+        round == 0 ? CountTouchingPairs(rings.points, rings.offsets, scratch.pairs)
+                   : CountTouchingPairsAgain(rings.points, rings.offsets, scratch.is_marked,
+                                             scratch.pairs);
+    scratch.is_marked.assign(rings.PointCount(), 0);
+    bool all_the_way = round >= kGentleRounds;
+    if (touching > 0) {
+      for (const auto& [first, second] : scratch.pairs.pairs) {
+        MarkSegment(rings, first, scratch.is_marked);
+        MarkSegment(rings, second, scratch.is_marked);
+      }
+    } else {
+      MeasureRings(rings);
+      FindMisplacedRings(rings, scratch);
+      if (scratch.misplaced.empty()) return;
+      MarkMisplacedRings(rings, scratch);
+      all_the_way = true;
+    }
+    if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
+    // What is marked is at its roots already, so it is something else that is out of its place.
+    NameTangledRings(rings, scratch);
+    std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
+    if (!Retreat(roots, true, scratch, rings)) break;
+    scratch.tangled.clear();
+  }
+  MeasureRings(rings);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,109 @@
+#include "vertices/ring_depths.h"
+
+#include <algorithm>
+
+#include "base/cancellation.h"
+#include "base/parallel.h"
+#include "base/predicates.h"
+
+namespace partiemc {
+
+void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets,
+                              std::span<const std::uint32_t> rings) {
+  turns_.clear();
+  for (std::uint32_t ring = 0; ring < rings.size(); ++ring) {
+    const std::uint32_t first = offsets[rings[ring]], last = offsets[rings[ring] + 1];
+    const std::size_t before = turns_.size();
+    std::size_t lowest = before;
+    Point point = PointAt(last - 1);
+    bool rises = last - first > 1 && SweepsBefore(PointAt(last - 2), point);
+    for (std::uint32_t next = first; next < last; ++next) {
+      const Point to = PointAt(next);
+      const bool goes_on_rising = SweepsBefore(point, to);
+      if (goes_on_rising != rises) {
+        const std::uint32_t index = (next == first ? last : next) - 1;
+        turns_.push_back({point, index, ring, goes_on_rising, false});
+        if (goes_on_rising &&
+            (!turns_[lowest].is_low || SweepsBefore(point, turns_[lowest].point))) {
+          lowest = turns_.size() - 1;
+        }
+      }
+      rises = goes_on_rising;
+      point = to;
+    }
+    if (turns_.size() > before) turns_[lowest].is_lowest = true;
+  }
+  ParallelSort(std::span(turns_),
+               [](const Turn& a, const Turn& b) { return SweepsBefore(a.point, b.point); });
+}
+
+std::uint32_t RingDepths::Above(const Chain& chain) {
+  if (chain.goes_on) return chain.at + 1 == chain.last ? chain.first : chain.at + 1;
+  return (chain.at == chain.first ? chain.last : chain.at) - 1;
+}
+
+// Whether a chain that the line meets at the height of `point` runs to the left of it.
+bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
+  Chain& c = chains_[chain];
+  std::uint32_t above = Above(c);
+  while (SweepsBefore(PointAt(above), point)) {
+    c.at = above;
+    above = Above(c);
+  }
+  return Orientation(PointAt(c.at), PointAt(above), point) < 0;
+}
+
+void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
+                       std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
+  const IntervalOrder::Cursor right =
+      order_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
+  const std::int32_t depth = order_.IsEnd(right) ? 0 : chains_[order_.At(right)].depth;
+  if (turn.is_lowest) depths[turn.ring] = depth;
+  const std::uint32_t ring = rings[turn.ring];
+  Chain on{turn.index, offsets[ring], offsets[ring + 1], true, depth};
+  Chain back{turn.index, offsets[ring], offsets[ring + 1], false, depth};
+  // A ring that runs upwards on the right winds counter-clockwise around what lies between.
+  const bool on_is_right = Orientation(turn.point, PointAt(Above(on)), PointAt(Above(back))) > 0;
+  (on_is_right ? on : back).depth += on_is_right ? 1 : -1;
+  const auto add = [&](const Chain& chain) {
+    if (unused_.empty()) {
+      unused_.push_back(static_cast<std::uint32_t>(chains_.size()));
+      chains_.emplace_back();
+    }
+    const std::uint32_t id = unused_.back();
+    unused_.pop_back();
+    chains_[id] = chain;
+    return id;
+  };
+  const IntervalOrder::Cursor behind = order_.Insert(right, add(on_is_right ? back : on));
+  order_.Insert(behind, add(on_is_right ? on : back));
+}
+
+void RingDepths::End(const Turn& turn) {
+  IntervalOrder::Cursor cursor =
+      order_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
+  for (int side = 0; side < 2 && !order_.IsEnd(cursor); ++side) {
+    unused_.push_back(order_.At(cursor));
+    cursor = order_.Erase(cursor);
+  }
+}
+
+void RingDepths::Find(std::span<const double> points, std::span<const std::uint32_t> offsets,
+                      std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
+  points_ = points;
+  depths.assign(rings.size(), 0);
+  chains_.clear();
+  unused_.clear();
+  order_.Clear();
+  CollectTurns(offsets, rings);
+  for (const Turn& turn : turns_) {
+    ThrowIfCancelled();
+    if (turn.is_low) {
+      Begin(turn, offsets, rings, depths);
+    } else {
+      End(turn);
+    }
+  }
+}
+
+}  // namespace partiemc

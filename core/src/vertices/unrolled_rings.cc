@@ -1,0 +1,52 @@
+#include "vertices/unrolled_rings.h"
+
+#include <algorithm>
+
+namespace partiemc {
+namespace {
+
+// Windows judge distances in floats, which may take what is this much farther away for near.
+constexpr double kReachTolerance = 1e-6;
+
+}  // namespace
+
+UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach) {
+  const std::size_t count = ring.size();
+  const auto length_after = [&](std::size_t k) {
+    const LatticePoint& from = ring[k];
+    const LatticePoint& to = ring[k + 1 == count ? 0 : k + 1];
+    return std::int64_t{LengthInUnits(UnitsBetween(RingUnits(from.x), RingUnits(to.x)),
+                                      UnitsBetween(RingUnits(from.y), RingUnits(to.y)))};
+  };
+  const auto limit =
+      static_cast<std::int64_t>(reach * (1 + kReachTolerance) * kRingUnitsPerCell) + 1;
+  // Behind the last vertex, and before the first one.
+  std::size_t after = 0;
+  for (std::int64_t distance = length_after(count - 1); distance < limit; ++after) {
+    distance += length_after(after % count);
+  }
+  std::size_t before = 0;
+  for (std::int64_t distance = length_after(count - 1); distance < limit; ++before) {
+    distance += length_after((2 * count - 2 - before % count) % count);
+  }
+  return {static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(std::max(after, before))};
+}
+
+void UnrolledRings::Allocate() {
+  starts_.resize(sizes_.size());
+  std::size_t end = 0;
+  for (std::size_t ring = 0; ring < sizes_.size(); ++ring) {
+    starts_[ring] = end + sizes_[ring].margin;
+    end = starts_[ring] + sizes_[ring].count + sizes_[ring].margin;
+  }
+  for (std::vector<std::int32_t>& array : units_) array.resize(end);
+  for (std::vector<float>& array : floats_) array.resize(end);
+}
+
+UnrolledRing UnrolledRings::operator[](std::size_t ring) {
+  return UnrolledRing::In(
+      sizes_[ring], [&](int array) { return units_[array].data() + starts_[ring]; },
+      [&](int array) { return floats_[array].data() + starts_[ring]; });
+}
+
+}  // namespace partiemc

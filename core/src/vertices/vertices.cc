@@ -1,0 +1,209 @@
+#include "vertices/vertices.h"
+
+#include <cmath>
+#include <numeric>
+#include <span>
+
+#include "base/parallel.h"
+#include "vertices/area.h"
+#include "vertices/measure.h"
+#include "vertices/placement.h"
+#include "vertices/virtual_plane.h"
+
+namespace partiemc {
+namespace {
+
+// Puts coordinates closer to an axis than this many cells on it: an offset that has decayed to next
+// to nothing would else move a vertex from 0 to where the predicates (predicates.h) are not exact.
+constexpr double kAxisReach = 0x1p-96;
+
+void SnapToAxes(double cell_size, std::span<double> coordinates) {
+  const double reach = kAxisReach * cell_size;
+  for (double& coordinate : coordinates) {
+    const bool is_near = (coordinate != 0) & (std::abs(coordinate) < reach);
+    coordinate = is_near ? 0 : coordinate;  // Written in any case, which makes vectors of it.
+  }
+}
+
+void Store(LatticePoint point, double cell_size, double* target) {
+  target[0] = point.x * cell_size;
+  target[1] = point.y * cell_size;
+}
+
+// The vertices of segment k of the topology, `per_segment` of them.
+void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
+  const CellPlane& plane = input.planes[k];
+  const std::uint32_t segment = input.topology.segments[k];
+  const double cell_size = input.scale.cell_size;
+  switch (input.parameters.placement) {
+    case Placement::kMarchingSquares:
+      Store(plane.entry, cell_size, target);
+      break;
+    case Placement::kQef:
+      Store(plane.entry, cell_size, target);
+      Store(ClampToCell(input.bins.tiles, plane.cell, input.crossings.segments[segment],
+                        QefVertex(input, segment, plane)),
+            cell_size, target + 2);
+      break;
+    case Placement::kFarthestParticle: {
+      const WorldPosition vertex = FarthestParticleVertex(input, segment, plane);
+      target[0] = vertex.x;
+      target[1] = vertex.y;
+      break;
+    }
+    case Placement::kVirtualPlane:
+      break;  // Placed ring by ring, below.
+  }
+}
+
+// Outward normals of the cell and of its entry edge, which it shares with the segment before.
+void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>& normals) {
+  double square = x * x + y * y;
+  if (square < kWeakGradientSquare) {
+    x = plane.OutwardX();
+    y = plane.OutwardY();
+    square = x * x + y * y;
+  }
+  const double length = std::sqrt(square);
+  normals.push_back(static_cast<float>(x / length));
+  normals.push_back(static_cast<float>(y / length));
+}
+
+// +1 or -1: what turns the plane's normal outward. The memory of earlier frames may have turned a
+// cell's normal inward; what is told to the outside is always outward.
+double OutwardSign(const CellPlane& plane) {
+  return plane.normal_x * plane.OutwardX() + plane.normal_y * plane.OutwardY() < 0 ? -1 : 1;
+}
+
+void AppendNormals(const VertexInput& input, std::size_t before, std::size_t here, Rings& rings) {
+  const CellPlane& a = input.planes[before];
+  const CellPlane& b = input.planes[here];
+  const double sa = OutwardSign(a);
+  const double sb = OutwardSign(b);
+  const Placement placement = input.parameters.placement;
+  if (placement == Placement::kMarchingSquares || placement == Placement::kQef) {
+    AppendNormal(sa * a.normal_x + sb * b.normal_x, sa * a.normal_y + sb * b.normal_y, b,
+                 rings.normals);
+  }
+  if (placement != Placement::kMarchingSquares) {
+    AppendNormal(sb * b.normal_x, sb * b.normal_y, b, rings.normals);
+  }
+}
+
+bool AreEqual(const double* a, const double* b) { return a[0] == b[0] && a[1] == b[1]; }
+
+// Appends one ring's points without consecutive duplicates. Takes it back and returns false if
+// fewer than three remain.
+bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment, PlacedVertices& placed,
+                Rings& rings) {
+  const std::size_t first = input.topology.offsets[ring];
+  const std::size_t last = input.topology.offsets[ring + 1];
+  const std::size_t start = rings.PointCount();
+  for (std::size_t k = first; k < last; ++k) {
+    const double* source = placed.points.data() + 2 * per_segment * k;
+    const bool repeats = rings.PointCount() > start &&
+                         AreEqual(source, rings.points.data() + rings.points.size() - 2);
+    if (!repeats) {
+      rings.points.insert(rings.points.end(), source, source + 2 * per_segment);
+      AppendNormals(input, k == first ? last - 1 : k - 1, k, rings);
+    }
+    placed.point_of_segment[k] = static_cast<std::uint32_t>(rings.PointCount() - 1);
+  }
+  // The ring is closed: its last point may repeat the first.
+  std::size_t end = rings.PointCount();
+  while (end > start + 1 &&
+         AreEqual(rings.points.data() + 2 * (end - 1), rings.points.data() + 2 * start)) {
+    --end;
+  }
+  const bool keep = end - start >= 3;
+  for (std::size_t k = first; k < last; ++k) {
+    std::uint32_t& point = placed.point_of_segment[k];
+    if (!keep) {
+      point = kNoPoint;
+    } else if (point >= end) {
+      point = static_cast<std::uint32_t>(start);
+    }
+  }
+  rings.points.resize(2 * (keep ? end : start));
+  rings.normals.resize(2 * (keep ? end : start));
+  return keep;
+}
+
+// The rings of `virtual-plane`, moved, matched to their area and repaired.
+void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
+                       PlacedVertices& placed, Rings& rings) {
+  RingVertices& vertices = placed.vertices;
+  PlaceOnVirtualPlanes(input, vertices);
+  const RingTopology& topology = input.topology;
+  const double cell_size = input.scale.cell_size;
+  std::uint32_t count = 0;
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    const auto of = [&](std::size_t segment) { return vertices.is_kept.begin() + 2 * segment; };
+    count = std::accumulate(of(topology.offsets[ring]), of(topology.offsets[ring + 1]), count);
+    rings.offsets.push_back(count);
+  }
+  rings.points.resize(2 * std::size_t{count});
+  rings.normals.resize(2 * std::size_t{count});
+  placed.roots.resize(2 * std::size_t{count});
+  placed.point_of_segment.resize(topology.segments.size());
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    std::size_t point = rings.offsets[ring];
+    for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
+         i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
+      if (!vertices.is_kept[i]) continue;
+      // Of the two vertices of segment i / 2, the cell's comes second and is always kept.
+      placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
+      Store(vertices.point[i], cell_size, &rings.points[2 * point]);
+      Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
+      rings.normals[2 * point] = vertices.normal[i].x;
+      rings.normals[2 * point + 1] = vertices.normal[i].y;
+      ++point;
+    }
+  });
+  rings.outer_of = topology.outer_of;
+  MatchArea(input, placed.offset_points, area_offset, rings);
+  SnapToAxes(cell_size, rings.points);
+  SnapToAxes(cell_size, placed.roots);
+  RepairRings(placed.roots, placed.repair, rings);
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    rings.measures[ring].particle_count = topology.particle_count[ring];
+  }
+}
+
+}  // namespace
+
+void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+                   PlacedVertices& placed, Rings& rings) {
+  rings.Clear();
+  placed.repair.tangled.clear();
+  if (input.parameters.placement == Placement::kVirtualPlane) {
+    PlaceRefinedRings(input, area_offset, placed, rings);
+    return;
+  }
+  const RingTopology& topology = input.topology;
+  const int per_segment = input.parameters.placement == Placement::kQef ? 2 : 1;
+  placed.points.resize(2 * per_segment * topology.segments.size());
+  placed.point_of_segment.resize(topology.segments.size());
+  ParallelFor(topology.segments.size(), [&](std::size_t k) {
+    PlaceSegment(input, k, placed.points.data() + 2 * per_segment * k);
+  });
+  SnapToAxes(input.scale.cell_size, placed.points);
+
+  std::vector<std::uint32_t>& kept_as = placed.kept_as;
+  kept_as.assign(topology.RingCount(), kNoRing);
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    if (!AppendRing(input, ring, per_segment, placed, rings)) continue;
+    kept_as[ring] = static_cast<std::uint32_t>(rings.measures.size());
+    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
+    rings.outer_of.push_back(topology.outer_of[ring]);
+    const std::size_t start = rings.offsets[rings.offsets.size() - 2];
+    rings.measures.push_back(MeasureRing(std::span(rings.points).subspan(2 * start)));
+    rings.measures.back().particle_count = topology.particle_count[ring];
+  }
+  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
+  for (std::uint32_t& outer : rings.outer_of) {
+    if (outer != kNoRing) outer = kept_as[outer];
+  }
+}
+
+}  // namespace partiemc

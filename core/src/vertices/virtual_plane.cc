@@ -1,0 +1,318 @@
+#include "vertices/virtual_plane.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "base/parallel.h"
+#include "base/prefetch.h"
+#include "sampler/point_groups.h"
+#include "vertices/placement.h"
+#include "vertices/plane_estimates.h"
+#include "vertices/ring_windows.h"
+
+namespace partiemc {
+namespace {
+
+// Segments between one and that whose memory is asked for.
+constexpr std::size_t kAskedAhead = 24;
+
+double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
+
+double Distance(const LatticePoint& a, const LatticePoint& b) {
+  const LatticePoint chord{b.x - a.x, b.y - a.y};
+  return std::sqrt(Dot(chord, chord));
+}
+
+VertexNormal UnitOf(const LatticePoint& v) {
+  const double square = Dot(v, v);
+  if (square < kWeakGradientSquare * kWeakGradientSquare) return {1, 0};
+  const double inverse = 1 / std::sqrt(square);
+  return {static_cast<float>(v.x * inverse), static_cast<float>(v.y * inverse)};
+}
+
+// A point beyond the sides of a tile, in cells relative to it.
+FieldPoint LocateBeyond(const VertexInput& input, std::uint32_t tile, double x, double y) {
+  const int i = static_cast<int>(std::floor(x));
+  const int j = static_cast<int>(std::floor(y));
+  const TilePlace place = Normalise(input.bins.tiles, tile, i, j);
+  const bool usable = place.tile != kNoTile && input.field.IsIndexed(place.tile);
+  return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
+}
+
+// Tells where points in or next to the cell of a segment are: in most cases in the tile of that.
+class SegmentLocator {
+ public:
+  SegmentLocator(const VertexInput& input, std::size_t segment)
+      : input_(input),
+        cell_(input.planes[segment].cell),
+        origin_(CellOrigin(input.bins.tiles, cell_)) {}
+
+  FieldPoint Locate(const LatticePoint& point) const {
+    const double x = point.x - origin_.x + cell_.i;
+    const double y = point.y - origin_.y + cell_.j;
+    if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
+      return LocateBeyond(input_, cell_.tile, x, y);
+    }
+    return {cell_.tile, x, y};  // Indexed, as it has an active cell.
+  }
+
+ private:
+  const VertexInput& input_;
+  const ActiveCell& cell_;
+  LatticePoint origin_;
+};
+
+// Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
+// that of a distance stays the same: unless a step is long, normals are those of the points that it
+// begins at.
+void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
+  const VirtualPlaneConstants& constants = input.parameters.constants;
+  const CellPlane& plane = input.planes[segment];
+  const std::size_t edge = 2 * segment;
+  const std::size_t inner = edge + 1;
+  v.root[edge] = plane.entry;
+  v.point[edge] =
+      NewtonStep(plane.entry, plane.entry_value, {plane.entry_gradient_x, plane.entry_gradient_y},
+                 constants.newton_step);
+  v.root[inner] = v.point[inner] = ClampToCell(
+      input.bins.tiles, plane.cell, input.crossings.segments[input.topology.segments[segment]],
+      VirtualPlaneVertex(plane, constants.newton_step));
+  const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
+    const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
+    if (Dot(step, step) > constants.long_step * constants.long_step) {
+      const FieldPoint at = SegmentLocator(input, segment).Locate(v.point[i]);
+      const FieldSample sample =
+          at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
+      gradient = {sample.gradient_x, sample.gradient_y};
+    }
+    v.normal[i] = Dot(gradient, gradient) >= kWeakGradientSquare
+                      ? UnitOf(gradient)
+                      : UnitOf({plane.OutwardX(), plane.OutwardY()});
+  };
+  set_normal(edge, plane.entry, {plane.entry_gradient_x, plane.entry_gradient_y});
+  set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
+}
+
+// Step 1 of a ring.
+void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
+  const std::size_t begin = input.topology.offsets[ring];
+  const std::size_t count = input.topology.offsets[ring + 1] - begin;
+  const auto find = [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = begin + first; k < begin + last; ++k) {
+      if (const std::size_t later = k + kAskedAhead; later < input.planes.size()) {
+        PrefetchLines(std::span(input.planes).subspan(later, 1));
+      }
+      FindRoots(input, k, v);
+    }
+  };
+  count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
+}
+
+// Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
+UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
+  const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
+  const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
+  const auto length_after = [&](std::size_t k) {
+    return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
+  };
+  const double min_length = input.parameters.constants.ShortestRing() * input.scale.spacing;
+  double length = 0;
+  for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
+  if (length < min_length) return {};
+  UnrolledRings::Size size =
+      SizeForWindows(std::span(v.point).subspan(first, count), min_length / 2);
+  size.margin += kWindowPadding;
+  return size;
+}
+
+// Copies what the steps need, and measures the ring.
+void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) {
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    ring.x[k] = RingUnits(v.point[first + k].x);
+    ring.y[k] = RingUnits(v.point[first + k].y);
+    ring.normal_x[k] = v.normal[first + k].x;
+    ring.normal_y[k] = v.normal[first + k].y;
+  }
+  for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
+  for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
+  MeasureArc(ring);
+}
+
+// Calls body(begin, end) for stretches of a ring, in parallel where it is long.
+template <typename Body>
+void ForEachStretch(const UnrolledRing& ring, Body body) {
+  constexpr std::ptrdiff_t kStretch = 512;
+  if (ring.count <= kStretch) {
+    body(0, ring.count);
+    return;
+  }
+  ParallelFor((ring.count + kStretch - 1) / kStretch, [&](std::ptrdiff_t stretch) {
+    const std::ptrdiff_t begin = stretch * kStretch;
+    body(begin, std::min(begin + kStretch, ring.count));
+  });
+}
+
+// Step 2: normals averaged along the ring, first by distance, then also by angle.
+void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
+  const VirtualPlaneConstants& c = input.parameters.constants;
+  for (const bool by_angle : {false, true}) {
+    const double reach = (by_angle ? c.bilateral_reach : c.normal_reach) * input.scale.spacing;
+    ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      MeanNormals(ring, begin, end, reach, by_angle);
+      ring.Repeat(ring.next_x, begin, end);
+      ring.Repeat(ring.next_y, begin, end);
+    });
+    std::swap(ring.normal_x, ring.next_x);
+    std::swap(ring.normal_y, ring.next_y);
+  }
+}
+
+// Mean of a ring's values by length.
+double MeanOf(const UnrolledRing& ring, const float* values) {
+  double sum = 0, weight = 0;
+  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    sum += double{ring.weight[k]} * values[k];
+    weight += ring.weight[k];
+  }
+  return weight > 0 ? sum / weight : 0;
+}
+
+// Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
+// along the ring counts: their mean depends on how the particles are arranged, not on the shape.
+// The more the particles that support a ring's planes scatter, the less they are believed.
+void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRing& ring,
+                 const RingVertices& v) {
+  const double h = input.scale.spacing;
+  const VirtualPlaneSteps& steps = input.parameters.steps;
+  const VirtualPlaneConstants& c = input.parameters.constants;
+  const PlaneEstimator estimator(input.field, input.scale, c);
+  // What the kernel takes off a bend grows with the square of its radius R: R^2 kappa / 18.
+  const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
+  float* scatter = ring.next_x;
+  ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    MeanCurvature(ring, begin, end, c.curvature_reach * h);
+    auto planes = CollectPoints<BentPlane>([&](std::span<const PlaneEstimator::Planes> groups) {
+      std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates;
+      estimator.Estimate(groups, estimates);
+      for (std::size_t q = 0; q < groups.size(); ++q) {
+        for (std::size_t of = 0; of < groups[q].count; ++of) {
+          const std::size_t i = groups[q].vertices[of];
+          const auto [offset, spread] = estimates[q][of];
+          ring.shift[i] = static_cast<float>(offset) - ring.base[i];
+          scatter[i] = static_cast<float>(spread);
+        }
+      }
+    });
+    // Each segment has two vertices.
+    for (std::ptrdiff_t k = begin; k < end; k += 2) {
+      if (BeginsGroup(k / 2)) planes.Part();
+      const SegmentLocator locator(input, first_segment + k / 2);
+      for (std::ptrdiff_t i = k; i < k + 2; ++i) {
+        // Nothing bends within less than a spacing.
+        const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
+        ring.base[i] = steps.curvature ? static_cast<float>(rounding * curvature) : 0;
+        ring.shift[i] = -ring.base[i];  // What is kept where nothing tells where a plane belongs.
+        scatter[i] = 0;
+        if (!steps.support) continue;
+        const FieldPoint at = locator.Locate(v.point[2 * first_segment + i]);
+        if (at.tile == kNoTile) continue;
+        planes.Add(i, at.tile,
+                   {.x = at.x,
+                    .y = at.y,
+                    .normal_x = ring.normal_x[i],
+                    .normal_y = ring.normal_y[i],
+                    .curvature = curvature});
+      }
+    }
+    planes.Finish();
+  });
+  if (steps.support) {
+    const double mean = MeanOf(ring, ring.shift);
+    const double trust = c.support_scatter / (c.support_scatter + MeanOf(ring, scatter));
+    for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean));
+    }
+  }
+  ring.Repeat(ring.base, 0, ring.count);
+}
+
+// Step 3, its end: every vertex to the weighted mean of what its neighbours' planes say, along its
+// normal. A circle stays as it is: of two points of it, the mean normal is perpendicular to their
+// chord.
+void SmoothPositions(const VertexInput& input, std::size_t first, const UnrolledRing& ring,
+                     RingVertices& v) {
+  const double reach = input.parameters.constants.smoothing_reach * input.scale.spacing;
+  ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    if (input.parameters.steps.smoothing) {
+      MeanShift(ring, begin, end, reach);
+    } else {
+      std::copy(ring.base + begin, ring.base + end, ring.shift + begin);
+    }
+    for (std::ptrdiff_t k = begin; k < end; ++k) {
+      v.normal[first + k] = {ring.normal_x[k], ring.normal_y[k]};
+      LatticePoint& point = v.point[first + k];
+      point.x += double{ring.shift[k]} * ring.normal_x[k];
+      point.y += double{ring.shift[k]} * ring.normal_y[k];
+    }
+  });
+}
+
+// Steps 2 and 3 of a ring.
+void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, RingVertices& v) {
+  const std::size_t first_segment = input.topology.offsets[r];
+  Unroll(v, 2 * first_segment, ring);
+  if (input.parameters.steps.normals) SmoothNormals(input, ring);
+  ShiftPlanes(input, first_segment, ring, v);
+  SmoothPositions(input, 2 * first_segment, ring, v);
+}
+
+// Drops edge vertices that lie on the chord of the cell vertices beside them.
+void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
+  const double min_distance = input.parameters.constants.thinning_distance * input.scale.spacing;
+  const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
+  const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
+  for (std::size_t k = first; k < last; k += 2) {
+    const LatticePoint& a = v.point[(k == first ? last : k) - 1];
+    const LatticePoint& p = v.point[k];
+    const LatticePoint& b = v.point[k + 1];
+    const LatticePoint chord{b.x - a.x, b.y - a.y};
+    const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
+    v.is_kept[k] = input.parameters.steps.edge_vertices &&
+                   std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));
+    v.is_kept[k + 1] = 1;
+  }
+}
+
+}  // namespace
+
+void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
+  const RingTopology& topology = input.topology;
+  vertices.Resize(2 * topology.segments.size());
+  UnrolledRings& unrolled = vertices.unrolled;
+  unrolled.sizes().assign(topology.RingCount(), {});
+  // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    FindRingRoots(input, ring, vertices);
+    const UnrolledRings::Size size = SizeOf(input, ring, vertices);
+    if (size.count > 0 && !ShortRing::Holds(size)) {
+      unrolled.sizes()[ring] = size;
+      return;
+    }
+    if (size.count > 0) {
+      ShortRing memory;
+      RefineRing(input, ring, memory.Of(size), vertices);
+    }
+    Thin(input, ring, vertices);
+  });
+  unrolled.Allocate();
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    if (unrolled.sizes()[ring].count == 0) return;
+    RefineRing(input, ring, unrolled[ring], vertices);
+    Thin(input, ring, vertices);
+  });
+}
+
+}  // namespace partiemc

@@ -1,0 +1,16 @@
+// The default placement: vertices on the level set, then on virtual planes that their surroundings
+// support (core/METHOD.md, "The default placement").
+#pragma once
+
+#include "vertices/ring_vertices.h"
+#include "vertices/vertices.h"
+
+namespace partiemc {
+
+/// Steps 1 to 5: roots, normals, planes, smoothing, thinning. Requires: the point field indexed
+/// with neighbours. Leaves area and repair to area.h and repair.h.
+/// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
+/// samples and a window of about twenty vertices per vertex.
+void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);
+
+}  // namespace partiemc

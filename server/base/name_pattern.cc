@@ -1,0 +1,32 @@
+#include "server/base/name_pattern.h"
+
+#include <cstddef>
+#include <optional>
+
+namespace partiemc::server {
+
+// Only the last `*` ever has to take more characters: what stands before it fits as early as it
+// can, which leaves the most to the rest.
+bool MatchesPattern(std::string_view pattern, std::string_view name) {
+  std::size_t p = 0, n = 0;
+  std::optional<std::size_t> after_star;
+  std::size_t star_ends = 0;
+  while (n < name.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      after_star = ++p;
+      star_ends = n;
+    } else if (p < pattern.size() && (pattern[p] == '?' || pattern[p] == name[n])) {
+      ++p;
+      ++n;
+    } else if (after_star) {
+      p = *after_star;
+      n = ++star_ends;
+    } else {
+      return false;
+    }
+  }
+  while (p < pattern.size() && pattern[p] == '*') ++p;
+  return p == pattern.size();
+}
+
+}  // namespace partiemc::server

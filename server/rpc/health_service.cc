@@ -1,0 +1,43 @@
+#include "server/rpc/health_service.h"
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "grpc/health/v1/health.pb.h"
+#include "partiemc/status.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "server/rpc/unary_reactor.h"
+#include "server/rpc/unary_requests.h"
+#include "wire/message_bytes.h"
+
+namespace partiemc::server {
+namespace {
+
+namespace health = grpc::health::v1;
+
+absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
+  health::HealthCheckRequest request;
+  if (auto status = ParseRequest(bytes, kMaxInformationBytes, request); !status.ok()) return status;
+  // Of the server as a whole, or of the one service that it is there for.
+  if (!request.service().empty() && request.service() != ServiceName()) {
+    return absl::NotFoundError("unknown service");
+  }
+  health::HealthCheckResponse response;
+  response.set_status(serving ? health::HealthCheckResponse::SERVING
+                              : health::HealthCheckResponse::NOT_SERVING);
+  return wire::ToBytes(response);
+}
+
+}  // namespace
+
+HealthService::HealthService(const Authentication& authentication, OpeningCalls& opening,
+                             UnaryRegistry& calls, MemoryBudget& budget) {
+  Serve("/grpc.health.v1.Health/Check", [&, this](grpc::CallbackServerContext* context) {
+    return new UnaryReactor(
+        *context, AdmitAnybody(authentication, *context), UnaryKind::kInformation, opening, calls,
+        budget, nullptr,
+        [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
+  });
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,111 @@
+#include "server/rpc/reconstruct_reactor.h"
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "partiemc/status.h"
+#include "server/telemetry/logging.h"
+
+namespace partiemc::server {
+namespace {
+
+void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
+            const absl::Status& status) {
+  if (!stream) {
+    LogRefusal("stream refused", peer, status);
+    return;
+  }
+  const auto violation = FindViolation(status);
+  const std::chrono::duration<double> open = std::chrono::steady_clock::now() - stream->opened;
+  LogEvent(spdlog::level::info, "stream closed",
+           {{"id", stream->id},
+            {"name", stream->description.name},
+            {"frames", stream->counts.frames},
+            {"frame_errors", stream->counts.frame_errors},
+            {"watch_waits", stream->description.hub->producer_waits()},
+            {"seconds", open.count()},
+            {"status", absl::StatusCodeToString(status.code())},
+            {"reason", violation ? violation->reason : std::string()}});
+}
+
+}  // namespace
+
+ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
+                                       absl::StatusOr<AdmittedCall> admission,
+                                       const ServerLimits& limits, OpeningCalls& opening,
+                                       StreamRegistry& registry, MemoryBudget& budget,
+                                       ComputePool& pool, WatchPump& pump,
+                                       const CurrentCheckpointKeys& checkpoint_keys)
+    : ByteCall(context, std::move(admission)),
+      registry_(registry),
+      messages_(limits, registry, pump, checkpoint_keys),
+      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget,
+                                         limits.frames_in_flight, caller().account())) {
+  absl::Status status = this->admission();
+  if (status.ok()) status = registry_.Enter(flow_, caller());
+  if (status.ok()) MayGiveWay(opening, flow_);
+  flow_->Start(std::move(status));
+}
+
+void ReconstructReactor::OnReadDone(bool ok) {
+  RequestCame();
+  if (ok) {
+    flow_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
+  } else {
+    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
+    if (IsCancelled()) flow_->Cancelled();
+    flow_->ReadEnded();
+  }
+}
+
+void ReconstructReactor::OnWriteDone(bool ok) {
+  messages_.Written(written_, written_slot_);
+  flow_->WriteDone(ok);
+}
+
+void ReconstructReactor::OnCancel() { flow_->Cancelled(); }
+
+void ReconstructReactor::Left() { registry_.Leave(*flow_); }
+
+void ReconstructReactor::StartRead(std::size_t slot) {
+  read_slot_ = slot;
+  ServerBidiReactor::StartRead(&messages_.request(slot));
+}
+
+void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
+  written_ = what;
+  written_slot_ = slot;
+  ServerBidiReactor::StartWrite(&messages_.response(what, slot));
+}
+
+absl::Status ReconstructReactor::Open(std::size_t slot) {
+  const auto stream = messages_.Open(slot, *flow_);
+  if (!stream.ok()) return stream.status();
+  const StreamDescription& description = stream->description;
+  LogEvent(spdlog::level::info, "stream opened",
+           {{"id", stream->id},
+            {"name", description.name},
+            {"peer", peer()},
+            {"client", caller().name()},
+            {"placement", std::string(Name(description.parameters.placement))},
+            {"fill", std::string(Name(description.parameters.fill))}});
+  return absl::OkStatus();
+}
+
+Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
+  return messages_.Answer(slot, worker, flow_->cancelled());
+}
+
+void ReconstructReactor::Cut() { CancelCall(); }
+
+void ReconstructReactor::Finish(const absl::Status& status) {
+  // Closed first: a client that sees the end may open the same name again at once.
+  const auto stream = registry_.Close(*flow_);
+  LogEnd(stream, peer(), status);
+  if (stream) stream->description.hub->End(WatchEnd::OfStream(status));
+  End(status);
+}
+
+}  // namespace partiemc::server

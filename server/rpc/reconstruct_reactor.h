@@ -1,0 +1,51 @@
+// The gRPC door of a producer's stream: translates between gRPC's callbacks and a StreamFlow.
+// Messages pass as bytes: a frame is parsed where it is computed, into memory that is warm.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/compute/compute_pool.h"
+#include "server/compute/memory_budget.h"
+#include "server/rpc/byte_call.h"
+#include "server/rpc/stream_messages.h"
+#include "server/stream/limits.h"
+#include "server/stream/stream_flow.h"
+#include "server/stream/stream_registry.h"
+
+namespace partiemc::server {
+
+class ReconstructReactor final : public ByteCall, private StreamDoor {
+ public:
+  /// What is passed by reference outlives the call.
+  ReconstructReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
+                     const ServerLimits& limits, OpeningCalls& opening, StreamRegistry& registry,
+                     MemoryBudget& budget, ComputePool& pool, WatchPump& pump,
+                     const CurrentCheckpointKeys& checkpoint_keys);
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override;
+
+ private:
+  void StartRead(std::size_t slot) override;
+  void StartWrite(Outgoing what, std::size_t slot) override;
+  absl::Status Open(std::size_t slot) override;
+  Answered Answer(std::size_t slot, Worker& worker) override;
+  void Cut() override;
+  void Finish(const absl::Status& status) override;
+  void Left() override;
+
+  StreamRegistry& registry_;
+  StreamMessages messages_;
+  std::size_t read_slot_ = 0;  // Of the read that is going on.
+  // The write that is going on.
+  Outgoing written_ = Outgoing::kAnswer;
+  std::size_t written_slot_ = 0;
+  std::shared_ptr<StreamFlow> flow_;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,62 @@
+#include "server/rpc/resume.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/stream/stream_token.h"
+
+namespace partiemc::server {
+namespace {
+
+std::uint32_t NumberOf(const wire::Outputs& outputs) {
+  // Names each part, so that a new one does not compile until it is bound, too.
+  const auto& [rings, mesh, normals, relative_float32, echo_particles] = outputs;
+  std::uint32_t number = 0;
+  for (const bool part : {rings, mesh, normals, relative_float32, echo_particles}) {
+    number = number << 1 | std::uint32_t{part};
+  }
+  return number;
+}
+
+}  // namespace
+
+StreamTerms TermsOf(const v1::OpenStream& open, const wire::Outputs& outputs,
+                    std::string_view token) {
+  return {.lineage = LineageOf(token),
+          .name = open.stream_name(),
+          .labels = FingerprintOf({open.labels().begin(), open.labels().end()}),
+          .outputs = NumberOf(outputs),
+          .checkpoint_interval = open.checkpoint_interval()};
+}
+
+absl::Status Resume(const v1::ResumeStream& resume, const ServerLimits& limits,
+                    const CurrentCheckpointKeys& keys, Session& session, StreamTerms& terms) {
+  if (auto status = CheckStreamToken(resume.stream_token()); !status.ok()) return status;
+  const std::uint64_t bytes = resume.checkpoint().size();
+  if (bytes > limits.MaxCheckpointBytes()) {
+    return ViolationError(
+        absl::StatusCode::kResourceExhausted,
+        {std::string(kReasonCheckpointBytes), "open.resume.checkpoint",
+         absl::StrCat(bytes, " bytes"),
+         absl::StrCat("must be at most ", limits.MaxCheckpointBytes(), " bytes")});
+  }
+  auto checkpoint =
+      ParseCheckpoint(resume.checkpoint(), session.parameters(), terms, keys.Get().get());
+  if (!checkpoint.ok()) return checkpoint.status();
+  terms.name = checkpoint->name;
+  session.GoOnFrom(*std::move(checkpoint));
+  return absl::OkStatus();
+}
+
+std::string CheckpointAfter(std::uint64_t sequence, const Session& session,
+                            const StreamTerms& terms, const ServerLimits& limits,
+                            const CurrentCheckpointKeys& keys) {
+  const bool used_number = session.next_sequence() > sequence;
+  if (terms.checkpoint_interval == 0 || !used_number || sequence % terms.checkpoint_interval != 0) {
+    return {};
+  }
+  return session.MakeCheckpoint(terms, keys.Get().get(), limits.MaxCheckpointBytes());
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,249 @@
+#include "server/rpc/stream_messages.h"
+
+#include <chrono>
+#include <memory>
+#include <new>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/rpc/watch_reactor.h"
+#include "server/stream/stream_token.h"
+#include "wire/message_bytes.h"
+
+namespace partiemc::server {
+namespace {
+
+// Not worth giving up.
+constexpr std::size_t kSmallBuffers = std::size_t{4} << 20;
+
+// What a worker keeps warm of messages: a frame's arrays are views into `request`.
+struct FrameMessages final : DoorBuffers {
+  v1::ReconstructRequest request;
+  v1::ReconstructResponse result;  // Never an error, whose coming would drop its buffers.
+};
+
+// Taken from the worker for as long as they are used: a session that has run out of memory drops
+// all that its worker holds. No other kind of door has put anything else there.
+std::unique_ptr<FrameMessages> TakeMessages(Worker& worker) {
+  if (worker.door_buffers == nullptr) return std::make_unique<FrameMessages>();
+  return std::unique_ptr<FrameMessages>(static_cast<FrameMessages*>(worker.door_buffers.release()));
+}
+
+// Parses a request that holds a frame into `request`, whose buffers are used again. What is not
+// known of it is passed over, and kept nowhere.
+absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request) {
+  request.mutable_frame()->Clear();
+  try {
+    if (wire::HasFewFields(bytes, *request.GetDescriptor()) && wire::MergeBytes(bytes, request)) {
+      request.DiscardUnknownFields();
+      return absl::OkStatus();
+    }
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory(absl::StrCat(bytes.Length(), " bytes"));
+  }
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonMalformed), "frame", absl::StrCat(bytes.Length(), " bytes"),
+       absl::StrCat("must be a ParticleFrame of at most ", wire::kMaxFields, " fields")});
+}
+
+absl::Status TooLargeOpen(std::size_t bytes, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOpenBytes), "open", absl::StrCat(bytes, " bytes"), std::move(rule)});
+}
+
+// Parses a request that holds an `open`, and gives its bytes up.
+absl::Status ParseOpen(grpc::ByteBuffer& bytes, std::uint64_t max_bytes,
+                       v1::ReconstructRequest& request) {
+  const std::size_t size = bytes.Length();
+  if (size > max_bytes) {
+    return TooLargeOpen(size, absl::StrCat("must be at most ", max_bytes, " bytes"));
+  }
+  const bool parsed =
+      wire::HasFewFields(bytes, *request.GetDescriptor()) && wire::MergeBytes(bytes, request);
+  bytes.Clear();
+  if (!parsed) {
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonProtocol), "request", "malformed",
+         absl::StrCat("must be a ReconstructRequest of at most ", wire::kMaxFields, " fields")});
+  }
+  if (size > kQuickOpenBytes + request.open().resume().checkpoint().size()) {
+    return TooLargeOpen(
+        size, absl::StrCat("must be at most ", kQuickOpenBytes, " bytes beside its checkpoint"));
+  }
+  return absl::OkStatus();
+}
+
+// Gives up buffers that have grown far beyond the request that they were last used for: fields that
+// take turns at being large would add up.
+void ShrinkBuffers(std::uint64_t bytes, v1::ReconstructRequest& request) {
+  if (request.SpaceUsedLong() > 4 * bytes + kSmallBuffers) request = {};
+}
+
+}  // namespace
+
+void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
+  message.set_max_particles_per_frame(limits.frame.max_particles);
+  message.set_max_frame_bytes(limits.max_frame_bytes);
+  message.set_max_tiles_per_frame(limits.frame.max_tiles);
+  message.set_max_streams(limits.max_streams);
+  // Rounded up: 0 would mean none.
+  message.set_idle_timeout_seconds(static_cast<std::uint32_t>(
+      std::chrono::ceil<std::chrono::seconds>(limits.idle.streaming).count()));
+  message.set_max_watchers(limits.max_watchers);
+}
+
+absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame,
+                                        const ServerLimits& limits) {
+  if (const std::size_t bytes = frame.ByteSizeLong(); bytes > limits.max_frame_bytes) {
+    return ViolationError(absl::StatusCode::kResourceExhausted,
+                          {std::string(kReasonFrameBytes), "frame", absl::StrCat(bytes, " bytes"),
+                           absl::StrCat("must be at most ", limits.max_frame_bytes, " bytes")});
+  }
+  return wire::DecodeFrame(frame);
+}
+
+absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
+                         const wire::Outputs& outputs, Session& session, Worker& worker,
+                         const std::atomic<bool>& cancelled, v1::ReconstructedFrame& message) {
+  const auto deliver = [&](const Result& result, const StageClock& clock) {
+    return wire::EncodeResult(result, {clock.stages_ms(), clock.TotalMs()}, outputs, message);
+  };
+  auto status = session.Answer(sequence, frame, worker, deliver, &cancelled);
+  if (status.ok()) message.set_time(frame->time);
+  return status;
+}
+
+StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,
+                               WatchPump& pump, const CurrentCheckpointKeys& checkpoint_keys)
+    : limits_(limits),
+      registry_(registry),
+      checkpoint_keys_(checkpoint_keys),
+      hub_(std::make_shared<WatchHub>(pump,
+                                      WatchHub::Limits{.tap_bytes = limits.max_watcher_bytes,
+                                                       .kept_bytes = limits.KeptResultBytes()})),
+      requests_(limits.frames_in_flight),
+      answers_(limits.frames_in_flight) {
+  v1::ReconstructResponse draining;
+  v1::StreamNotice& notice = *draining.mutable_notice();
+  notice.set_kind(v1::StreamNotice::KIND_DRAINING);
+  notice.set_message("the server is going away: finish reading, then connect elsewhere");
+  draining_ = wire::ToBytes(draining);
+}
+
+RequestKind StreamMessages::Kind(std::size_t slot) {
+  using v1::ReconstructRequest;
+  switch (wire::HeldField(requests_[slot], ReconstructRequest::kFrameFieldNumber).value_or(-1)) {
+    case ReconstructRequest::kOpenFieldNumber:
+      return RequestKind::kOpen;
+    case ReconstructRequest::kFrameFieldNumber:
+      return RequestKind::kFrame;
+    case 0:
+      return RequestKind::kEmpty;
+    default:
+      return RequestKind::kMalformed;
+  }
+}
+
+grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
+  switch (what) {
+    case Outgoing::kOpened:
+      return opened_;
+    case Outgoing::kDraining:
+      return draining_;
+    case Outgoing::kAnswer:
+      break;
+  }
+  return answers_[slot];
+}
+
+absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
+  v1::ReconstructRequest request;
+  if (auto status = ParseOpen(requests_[slot], limits_.MaxOpenBytes(), request); !status.ok()) {
+    return status;
+  }
+  const v1::OpenStream& open = request.open();
+  const auto parameters = wire::DecodeParameters(open.parameters());
+  if (!parameters.ok()) return parameters.status();
+  const auto outputs = wire::DecodeOutputs(open.outputs(), open.has_outputs());
+  if (!outputs.ok()) return outputs.status();
+  auto session = Session::Open(*parameters, limits_.frame);
+  if (!session.ok()) return session.status();
+  const std::string token = open.has_resume() ? open.resume().stream_token() : NewStreamToken();
+  StreamTerms terms = TermsOf(open, *outputs, token);
+  if (open.has_resume()) {
+    auto status = Resume(open.resume(), limits_, checkpoint_keys_, *session, terms);
+    if (!status.ok()) return status;
+  }
+  auto stream = registry_.Open(flow,
+                               {.name = terms.name,
+                                .labels = {open.labels().begin(), open.labels().end()},
+                                .parameters = session->parameters(),
+                                .hub = hub_},
+                               token);
+  if (!stream.ok()) return stream.status();
+  session_ = *std::move(session);
+  outputs_ = *outputs;
+  terms_ = std::move(terms);
+  terms_.name = stream->description.name;
+
+  v1::ReconstructResponse response;
+  v1::StreamOpened& opened = *response.mutable_opened();
+  opened.set_stream_id(stream->id);
+  opened.set_stream_token(token);
+  wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
+  opened.set_frames_in_flight(limits_.frames_in_flight);
+  EncodeLimits(limits_, *opened.mutable_limits());
+  opened.set_next_sequence(session_->next_sequence());
+  opened_ = wire::ToBytes(response);
+  return stream;
+}
+
+Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
+                                const std::atomic<bool>& cancelled) {
+  std::unique_ptr<FrameMessages> messages = TakeMessages(worker);
+  Answered answered;
+  const std::uint64_t request_bytes = requests_[slot].Length();
+  const absl::Status parsed = ParseFrame(requests_[slot], messages->request);
+  if (!outputs_.echo_particles) requests_[slot].Clear();
+  const v1::ParticleFrame& request = messages->request.frame();
+  v1::ReconstructedFrame& result = *messages->result.mutable_frame();
+  const std::uint64_t next_sequence = session_->next_sequence();
+  const absl::Status status =
+      AnswerFrame(parsed.ok() ? DecodeFrameWithin(request, limits_) : parsed, request.sequence(),
+                  outputs_, *session_, worker, cancelled, result);
+  std::string checkpoint =
+      CheckpointAfter(next_sequence, *session_, terms_, limits_, checkpoint_keys_);
+  if (status.ok()) {
+    result.set_sequence(request.sequence());
+    messages->result.set_checkpoint(std::move(checkpoint));
+    answers_[slot] = wire::ToBytes(messages->result);
+    if (ShowWatchers(slot, request)) answered.afterwards = [hub = hub_] { hub->Announce(); };
+  } else {
+    v1::ReconstructResponse error;
+    wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
+                           *error.mutable_error());
+    error.set_checkpoint(std::move(checkpoint));
+    answers_[slot] = wire::ToBytes(error);
+    messages->request.Clear();  // Nothing has checked its size.
+  }
+  ShrinkBuffers(request_bytes, messages->request);
+  requests_[slot].Clear();
+  worker.door_buffers = std::move(messages);
+  answered.is_result = status.ok();
+  answered.last_sequence = session_->next_sequence() - 1;
+  answered.bytes = answers_[slot].Length();
+  return answered;
+}
+
+// They share the bytes of the answer, and of the request where particles are echoed.
+bool StreamMessages::ShowWatchers(std::size_t slot, const v1::ParticleFrame& request) {
+  wire::WatchedBytes bytes(answers_[slot]);
+  if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
+  return hub_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
+}
+
+}  // namespace partiemc::server

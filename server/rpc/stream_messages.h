@@ -1,0 +1,80 @@
+// The messages of one stream and the session behind them, whatever door they travel through.
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "server/rpc/resume.h"
+#include "server/stream/limits.h"
+#include "server/stream/session.h"
+#include "server/stream/stream_flow.h"
+#include "server/stream/stream_registry.h"
+#include "server/watch/watch_hub.h"
+#include "wire/codec.h"
+
+namespace partiemc::server {
+
+/// Beside the reasons of streams, of sessions, of the core and of the codec (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonFrameBytes = "FRAME_BYTES";
+inline constexpr std::string_view kReasonOpenBytes = "OPEN_BYTES";
+
+void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
+
+/// As wire::DecodeFrame. Errors: those of it; FRAME_BYTES for a frame that is larger than was
+/// announced.
+absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits);
+
+/// Has `session` answer `frame`, taken to have the given sequence number, and writes the result
+/// into `message`. Errors: those of Session::Answer.
+absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
+                         const wire::Outputs& outputs, Session& session, Worker& worker,
+                         const std::atomic<bool>& cancelled, v1::ReconstructedFrame& message);
+
+/// Slots hold messages as bytes, and only from their reading or until their writing: what a frame
+/// needs besides belongs to the worker that answers it, so that an idle stream holds next to
+/// nothing. Not thread-safe as a whole: StreamFlow's promises to a StreamDoor are what it relies
+/// on.
+class StreamMessages {
+ public:
+  /// One slot for each of limits.frames_in_flight.
+  StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchPump& pump,
+                 const CurrentCheckpointKeys& checkpoint_keys);
+
+  grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
+  RequestKind Kind(std::size_t slot);
+  const grpc::ByteBuffer& response(Outgoing what, std::size_t slot) { return Response(what, slot); }
+  /// The response has been written: lets go of it.
+  void Written(Outgoing what, std::size_t slot) { Response(what, slot).Clear(); }
+
+  /// As StreamDoor::Open and StreamDoor::Answer; gives the stream as it was opened.
+  absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamFlow& flow);
+  Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled);
+
+ private:
+  grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
+  // True if somebody watches and is to be told.
+  bool ShowWatchers(std::size_t slot, const v1::ParticleFrame& request);
+
+  const ServerLimits& limits_;
+  StreamRegistry& registry_;
+  const CurrentCheckpointKeys& checkpoint_keys_;
+  const std::shared_ptr<WatchHub> hub_;
+  std::vector<grpc::ByteBuffer> requests_;
+  std::vector<grpc::ByteBuffer> answers_;
+  grpc::ByteBuffer opened_;
+  grpc::ByteBuffer draining_;
+  std::optional<Session> session_;  // Once open.
+  StreamTerms terms_;
+  wire::Outputs outputs_;
+};
+
+}  // namespace partiemc::server

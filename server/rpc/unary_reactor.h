@@ -1,0 +1,50 @@
+// The gRPC door of a call of one request and one answer: translates between gRPC's callbacks and a
+// UnaryFlow.
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/rpc/byte_call.h"
+#include "server/stream/unary_flow.h"
+#include "server/stream/unary_registry.h"
+
+namespace partiemc::server {
+
+class UnaryReactor final : public ByteCall, private UnaryDoor {
+ public:
+  /// Turns a request into an answer, as UnaryDoor::Answer, unless `cancelled`. The request may be
+  /// cleared.
+  using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
+      grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
+
+  /// The references outlive the call; without a pool the method is run by gRPC's own thread.
+  UnaryReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
+               UnaryKind kind, OpeningCalls& opening, UnaryRegistry& calls, MemoryBudget& budget,
+               ComputePool* pool, Method method);
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override;
+
+ private:
+  void StartRead() override;
+  absl::StatusOr<std::uint64_t> Answer(Worker* worker) override;
+  void StartWrite() override;
+  void Cut() override;
+  void Finish(const absl::Status& status) override;
+  void Left() override;
+
+  UnaryRegistry& calls_;
+  const Method method_;
+  grpc::ByteBuffer request_, answer_;
+  std::shared_ptr<UnaryFlow> flow_;
+};
+
+}  // namespace partiemc::server

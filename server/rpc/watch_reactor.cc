@@ -1,0 +1,153 @@
+#include "server/rpc/watch_reactor.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/telemetry/logging.h"
+#include "server/watch/watch_hub.h"
+#include "wire/codec.h"
+#include "wire/message_bytes.h"
+
+namespace partiemc::server {
+namespace {
+
+// Far above what an `open` or a `credit` takes, so small that nobody fills memory with them.
+constexpr std::size_t kMaxRequestBytes = 4096;
+
+absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
+  switch (mode) {
+    case v1::WATCH_MODE_UNSPECIFIED:
+    case v1::WATCH_MODE_LATEST:
+      return WatchMode::kLatest;
+    case v1::WATCH_MODE_EVERY:
+      return WatchMode::kEvery;
+    default:
+      return ViolationError(absl::StatusCode::kInvalidArgument,
+                            {std::string(wire::kReasonUnsupported), "open.mode", absl::StrCat(mode),
+                             "must be WATCH_MODE_LATEST or WATCH_MODE_EVERY"});
+  }
+}
+
+}  // namespace
+
+WatchReactor::WatchReactor(grpc::CallbackServerContext& context,
+                           absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
+                           OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers)
+    : ByteCall(context, std::move(admission)),
+      streams_(streams),
+      watchers_(watchers),
+      flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), limits.max_watcher_bytes)) {
+  absl::Status status = this->admission();
+  if (status.ok()) status = streams_.CheckServing();
+  if (status.ok()) status = watchers_.Enter(flow_);
+  if (status.ok()) MayGiveWay(opening, flow_);
+  flow_->Start(std::move(status));
+}
+
+void WatchReactor::OnReadDone(bool ok) {
+  RequestCame();
+  if (!ok) {
+    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
+    if (IsCancelled()) flow_->Cancelled();
+    return flow_->ReadEnded();
+  }
+  WatchRequest request;
+  parsed_.Clear();
+  if (request_.Length() <= kMaxRequestBytes && wire::MergeBytes(request_, parsed_)) {
+    using Kind = WatchRequest::Kind;
+    request.kind = parsed_.has_open()     ? Kind::kOpen
+                   : parsed_.has_credit() ? Kind::kCredit
+                                          : Kind::kEmpty;
+    request.credit = parsed_.credit().frames();
+  }
+  request_.Clear();
+  flow_->ReadDone(request);
+}
+
+void WatchReactor::OnWriteDone(bool ok) {
+  response_.Clear();
+  flow_->WriteDone(ok);
+}
+
+void WatchReactor::OnCancel() { flow_->Cancelled(); }
+
+void WatchReactor::Left() { watchers_.Leave(*flow_); }
+
+void WatchReactor::StartRead() { ServerBidiReactor::StartRead(&request_); }
+
+absl::StatusOr<WatchTerms> WatchReactor::Open() {
+  const v1::OpenWatch& open = parsed_.open();
+  const auto mode = DecodeMode(open.mode());
+  if (!mode.ok()) return mode.status();
+  if (open.credits() == 0) {
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonOutOfRange), "open.credits", "0", "must be at least 1"});
+  }
+  const auto stream = streams_.Find(open.stream_name(), caller());
+  if (!stream.ok()) return stream.status();
+  if (auto status = watchers_.Open(*flow_, caller()); !status.ok()) return status;
+  const StreamDescription& description = stream->description;
+  stream_name_ = description.name;
+  v1::WatchOpened& opened = *opened_.mutable_opened();
+  opened.set_stream_id(stream->id);
+  opened.set_lineage(stream->lineage);
+  wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
+  opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
+  LogEvent(spdlog::level::info, "watch opened",
+           {{"stream", stream->id},
+            {"name", stream_name_},
+            {"mode", *mode == WatchMode::kEvery ? "every" : "latest"},
+            {"peer", peer()},
+            {"client", caller().name()}});
+  return WatchTerms{.hub = description.hub, .mode = *mode, .credit = open.credits()};
+}
+
+void WatchReactor::WriteOpened() { Write(wire::ToBytes(opened_)); }
+
+void WatchReactor::WriteFrame(const WatchFrame& frame, std::uint64_t dropped) {
+  Write(static_cast<const WatchedResult&>(frame).bytes.ToResponse(dropped));
+}
+
+void WatchReactor::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
+  end_reason_ = end.reason;
+  v1::WatchStreamResponse response;
+  response.mutable_ended()->set_reason(end.reason);
+  response.mutable_ended()->set_message(end.message);
+  response.mutable_ended()->set_dropped(dropped);
+  Write(wire::ToBytes(response));
+}
+
+void WatchReactor::Write(grpc::ByteBuffer response) {
+  response_.Swap(&response);
+  StartWrite(&response_);
+}
+
+void WatchReactor::Cut() { CancelCall(); }
+
+void WatchReactor::Finish(const absl::Status& status) {
+  watchers_.Close(*flow_);  // Who hears of the end may come again at once.
+  LogEnd(status);
+  End(status);
+}
+
+void WatchReactor::LogEnd(const absl::Status& status) const {
+  if (stream_name_.empty()) {
+    LogRefusal("watch refused", peer(), status);
+    return;
+  }
+  const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;
+  const WatchCounts counts = flow_->counts();
+  LogEvent(spdlog::level::info, "watch closed",
+           {{"stream", opened_.opened().stream_id()},
+            {"name", stream_name_},
+            {"frames", counts.frames},
+            {"dropped", counts.dropped},
+            {"most_held_bytes", std::uint64_t{counts.most_held_bytes}},
+            {"seconds", open.count()},
+            {"reason", end_reason_.empty() ? "LEFT" : end_reason_},
+            {"status", absl::StatusCodeToString(status.code())}});
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,136 @@
+#include "server/security/caller_terms.h"
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "server/base/name_pattern.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::size_t kMaxNameBytes = 64;
+// As long as a stream's name may be; longer ones are nobody's.
+constexpr std::size_t kMaxStreamNameBytes = 128;
+// Each open stream is compared with all of them when streams are listed.
+constexpr std::size_t kMaxPatterns = 32;
+
+constexpr char kMayRule[] = "may= must have one or more of produce,watch,list, each once";
+constexpr char kNamesRule[] =
+    "names= must have 1 to 32 patterns of [A-Za-z0-9._*?-] with commas between them, each of at "
+    "most 128 characters";
+constexpr char kCountRule[] = "calls=, streams= and watchers= must be whole numbers from 1 on";
+constexpr char kBytesRule[] =
+    "bytes= must be a whole number from 1 on, and a unit (B, KB, MB, GB, TB) or none";
+constexpr char kWordRule[] =
+    "after the token and a name may stand may=, names=, calls=, streams=, watchers= and bytes=, "
+    "each once and nothing else";
+constexpr char kNameRule[] = "a name must be at most 64 characters of [A-Za-z0-9._-]";
+
+bool Consists(std::string_view text, std::string_view of) {
+  return std::all_of(text.begin(), text.end(), [of](char c) {
+    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || of.find(c) != of.npos;
+  });
+}
+
+std::vector<std::string> Split(std::string_view text) {
+  return absl::StrSplit(std::string(text), ',');
+}
+
+bool ReadMay(std::string_view text, CallerTerms& terms) {
+  terms.may_produce = terms.may_watch = terms.may_list = false;
+  for (const std::string& word : Split(text)) {
+    bool* const may = word == "produce" ? &terms.may_produce
+                      : word == "watch" ? &terms.may_watch
+                      : word == "list"  ? &terms.may_list
+                                        : nullptr;
+    if (may == nullptr || std::exchange(*may, true)) return false;
+  }
+  return true;
+}
+
+bool ReadNames(std::string_view text, CallerTerms& terms) {
+  terms.names = Split(text);
+  return terms.names.size() <= kMaxPatterns &&
+         std::ranges::all_of(terms.names, [](const std::string& pattern) {
+           return !pattern.empty() && pattern.size() <= kMaxStreamNameBytes &&
+                  Consists(pattern, "._*?-");
+         });
+}
+
+// Leaves in `text` what follows the number.
+template <typename Number>
+bool ReadNumber(std::string_view& text, std::optional<Number>& number) {
+  const auto [end, error] =
+      std::from_chars(text.data(), text.data() + text.size(), number.emplace());
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return error == std::errc() && *number > 0;
+}
+
+bool ReadCount(std::string_view text, std::optional<std::uint32_t>& count) {
+  return ReadNumber(text, count) && text.empty();
+}
+
+bool ReadBytes(std::string_view text, std::optional<std::uint64_t>& bytes) {
+  if (!ReadNumber(text, bytes)) return false;
+  constexpr std::string_view kUnits = "kmgt";
+  const std::string unit = absl::AsciiStrToLower(std::string(text));
+  if (unit.empty() || unit == "b") return true;
+  const std::size_t power = kUnits.find(unit.front());
+  if (power == kUnits.npos || unit.substr(1) != "b") return false;
+  const std::uint64_t factor = std::uint64_t{1} << (10 * (power + 1));
+  if (*bytes > std::numeric_limits<std::uint64_t>::max() / factor) return false;
+  *bytes *= factor;
+  return true;
+}
+
+// The rule that `value` breaks; null if none.
+const char* Read(std::string_view key, std::string_view value, CallerTerms& terms) {
+  CallerQuota& quota = terms.quota;
+  if (key == "may") return ReadMay(value, terms) ? nullptr : kMayRule;
+  if (key == "names") return ReadNames(value, terms) ? nullptr : kNamesRule;
+  if (key == "calls") return ReadCount(value, quota.calls) ? nullptr : kCountRule;
+  if (key == "streams") return ReadCount(value, quota.streams) ? nullptr : kCountRule;
+  if (key == "watchers") return ReadCount(value, quota.watchers) ? nullptr : kCountRule;
+  if (key == "bytes") return ReadBytes(value, quota.bytes) ? nullptr : kBytesRule;
+  return kWordRule;
+}
+
+}  // namespace
+
+bool CallerTerms::MayUse(std::string_view stream_name) const {
+  return std::ranges::any_of(names, [stream_name](const std::string& pattern) {
+    return pattern == "*" ||
+           (stream_name.size() <= kMaxStreamNameBytes && MatchesPattern(pattern, stream_name));
+  });
+}
+
+absl::StatusOr<CallerTerms> ParseCallerTerms(std::span<const std::string> words) {
+  CallerTerms terms;
+  std::set<std::string_view> seen;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string_view word = words[i];
+    const std::size_t equals = word.find('=');
+    const char* broken = nullptr;
+    if (equals != word.npos) {
+      const std::string_view key = word.substr(0, equals);
+      broken = seen.insert(key).second ? Read(key, word.substr(equals + 1), terms) : kWordRule;
+    } else if (i > 0) {
+      broken = kWordRule;
+    } else {
+      broken = word.size() <= kMaxNameBytes && Consists(word, "._-") ? nullptr : kNameRule;
+      terms.name = word;
+    }
+    if (broken != nullptr) {
+      return absl::InvalidArgumentError(absl::StrCat("word ", i + 2, ": ", broken));
+    }
+  }
+  return terms;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,75 @@
+#include "server/security/file_reloader.h"
+
+#include <sys/stat.h>
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/telemetry/logging.h"
+
+namespace partiemc::server {
+namespace {
+
+// Differs whenever a file was written, replaced (behind a symbolic link too, as Kubernetes does
+// it), removed, or given another owner or mode.
+std::string StampOf(const std::vector<std::string>& files) {
+  std::string stamp;
+  for (const std::string& file : files) {
+    struct stat status {};
+    if (stat(file.c_str(), &status) != 0) {
+      absl::StrAppend(&stamp, "absent;");
+      continue;
+    }
+    absl::StrAppend(&stamp, status.st_dev, ",", status.st_ino, ",", status.st_size, ",",
+                    status.st_mtim.tv_sec, ",", status.st_mtim.tv_nsec, ",", status.st_ctim.tv_sec,
+                    ",", status.st_ctim.tv_nsec, ";");
+  }
+  return stamp;
+}
+
+}  // namespace
+
+FileReloader::~FileReloader() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  stop_asked_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+absl::Status FileReloader::Add(std::string what, std::vector<std::string> files, Load load) {
+  // The stamp is taken first: what changes during the load is seen as a change.
+  std::string stamp = StampOf(files);
+  if (auto status = load(); !status.ok()) return status;
+  watched_.push_back({std::move(what), std::move(files), std::move(load), std::move(stamp)});
+  return absl::OkStatus();
+}
+
+void FileReloader::Start(std::chrono::milliseconds interval) {
+  if (!watched_.empty()) thread_ = std::thread([this, interval] { Run(interval); });
+}
+
+void FileReloader::Run(std::chrono::milliseconds interval) {
+  std::unique_lock lock(mutex_);
+  while (!stop_asked_.wait_for(lock, interval, [this] { return stopping_; })) {
+    lock.unlock();
+    for (Watched& watched : watched_) Look(watched);
+    lock.lock();
+  }
+}
+
+void FileReloader::Look(Watched& watched) {
+  std::string stamp = StampOf(watched.files);
+  if (stamp == watched.stamp) return;
+  watched.stamp = std::move(stamp);
+  if (const auto status = watched.load(); status.ok()) {
+    LogEvent(spdlog::level::info, watched.what + " reloaded", {});
+  } else {
+    LogEvent(spdlog::level::err,
+             watched.what + " not reloaded, what was loaded before stays in force",
+             {{"error", std::string(status.message())}});
+  }
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,217 @@
+#include "server/stream/checkpoint.h"
+
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/byte_string.h"
+#include "partiemc/reconstructor.h"
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+namespace {
+
+// Layout, little-endian: magic, version, version of the method, whether it is signed, lineage,
+// fingerprints of parameters and labels, outputs, checkpoint interval, next sequence number, bytes
+// of the name, name, checksum of all that; the state, which has a checksum of its own; the
+// signature of everything before it, if there is one.
+constexpr std::uint32_t kMagic = 0x43504d45;  // "EMPC"
+constexpr std::uint32_t kVersion = 2;
+constexpr std::size_t kLineageBytes = 32;
+constexpr std::size_t kHeaderBytes = 4 * 4 + kLineageBytes + 2 * 8 + 2 * 4 + 8 + 4;
+constexpr std::size_t kChecksumBytes = 8;
+constexpr std::size_t kMaxNameBytes = 128;
+static_assert(kHeaderBytes + kMaxNameBytes + kChecksumBytes + CheckpointKeys::kSignatureBytes <=
+              kMaxCheckpointOverhead);
+
+constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
+
+// The numbers that parameters are made of, one after the other.
+std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
+  // Names each part, so that a new one does not compile until it is bound, too.
+  const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
+               surface_offset, normal_memory, clean, steps, constants, min_component_area,
+               min_component_particles, plane] = parameters;
+  const auto& [edge_vertices, normals, curvature, support, smoothing, area] = steps;
+  std::string bytes;
+  const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
+  const auto put_optional = [&](std::optional<double> value) {
+    put_small(value.has_value());
+    PutNumber(value.value_or(0), bytes);
+  };
+  put_small(placement);
+  put_small(fill);
+  put_optional(spacing);
+  put_small(spacing_rule);
+  PutNumber(kernel_radius, bytes);
+  PutNumber(cell_size, bytes);
+  put_optional(reference_radius);
+  PutNumber(surface_offset, bytes);
+  put_small(normal_memory);
+  put_small(clean ? (*clean ? 2 : 1) : 0);
+  for (const bool step : {edge_vertices, normals, curvature, support, smoothing, area}) {
+    put_small(step);
+  }
+  for (const NamedConstant& constant : AllConstants()) PutNumber(constants.*constant.value, bytes);
+  PutNumber(min_component_area, bytes);
+  PutNumber(min_component_particles, bytes);
+  put_small(plane);
+  return ChecksumOf(bytes);
+}
+
+absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string value,
+                     std::string rule) {
+  return ViolationError(
+      code, {std::string(reason), "open.resume.checkpoint", std::move(value), std::move(rule)});
+}
+
+absl::Status Corrupt(std::string value) {
+  return Refused(absl::StatusCode::kInvalidArgument, kReasonCorruptCheckpoint, std::move(value),
+                 kAsSent);
+}
+
+absl::Status Mismatch(std::string value, std::string rule) {
+  return Refused(absl::StatusCode::kFailedPrecondition, kReasonCheckpointMismatch, std::move(value),
+                 std::move(rule));
+}
+
+absl::Status CheckSignature(std::string_view bytes, const CheckpointKeys& keys) {
+  constexpr std::size_t kTail = CheckpointKeys::kSignatureBytes;
+  if (bytes.size() > kTail &&
+      keys.Verify(bytes.substr(0, bytes.size() - kTail), bytes.substr(bytes.size() - kTail))) {
+    return absl::OkStatus();
+  }
+  return Refused(absl::StatusCode::kFailedPrecondition, kReasonCheckpointSignature,
+                 "not signed by this server's keys",
+                 "must come from a server with a key of this one's --checkpoint-key-file; resume "
+                 "on such a server, or start the stream anew");
+}
+
+struct Header {
+  std::uint32_t method_version = 0;
+  bool is_signed = false;
+  std::uint64_t parameters = 0;  // Their fingerprint.
+  StreamTerms terms;
+  std::uint64_t next_sequence = 0;
+};
+
+absl::StatusOr<Header> TakeHeader(std::string_view& bytes) {
+  const std::string_view whole = bytes;
+  if (whole.size() < kHeaderBytes + kChecksumBytes) {
+    return Corrupt(absl::StrCat(whole.size(), " bytes"));
+  }
+  if (TakeNumber<std::uint32_t>(bytes) != kMagic) return Corrupt("other bytes");
+  // First of all: other versions have other layouts.
+  if (const auto version = TakeNumber<std::uint32_t>(bytes); version != kVersion) {
+    return Mismatch(absl::StrCat("version ", version),
+                    absl::StrCat("must be of version ", kVersion, "; resume on the server's like"));
+  }
+  Header header;
+  StreamTerms& terms = header.terms;
+  header.method_version = TakeNumber<std::uint32_t>(bytes);
+  const auto is_signed = TakeNumber<std::uint32_t>(bytes);
+  header.is_signed = is_signed == 1;
+  terms.lineage = bytes.substr(0, kLineageBytes);
+  bytes.remove_prefix(kLineageBytes);
+  header.parameters = TakeNumber<std::uint64_t>(bytes);
+  terms.labels = TakeNumber<std::uint64_t>(bytes);
+  terms.outputs = TakeNumber<std::uint32_t>(bytes);
+  terms.checkpoint_interval = TakeNumber<std::uint32_t>(bytes);
+  header.next_sequence = TakeNumber<std::uint64_t>(bytes);
+  const auto name_bytes = TakeNumber<std::uint32_t>(bytes);
+  if (name_bytes == 0 || name_bytes > kMaxNameBytes || bytes.size() < name_bytes + kChecksumBytes) {
+    return Corrupt(absl::StrCat("a name of ", name_bytes, " bytes"));
+  }
+  terms.name = bytes.substr(0, name_bytes);
+  bytes.remove_prefix(name_bytes);
+  const std::uint64_t checksum = ChecksumOf(whole.substr(0, whole.size() - bytes.size()));
+  if (TakeNumber<std::uint64_t>(bytes) != checksum) return Corrupt("a wrong checksum");
+  if (is_signed > 1) return Corrupt("neither signed nor unsigned");
+  if (header.next_sequence == 0) return Corrupt("next sequence 0");
+  return header;
+}
+
+absl::Status CheckBound(const Header& header, const ReconstructionParameters& parameters,
+                        const StreamTerms& terms) {
+  if (header.method_version != kMethodVersion) {
+    return Mismatch(absl::StrCat("method version ", header.method_version),
+                    absl::StrCat("must be of method version ", kMethodVersion,
+                                 "; resume on a server of that version, or start the stream anew"));
+  }
+  const StreamTerms& made = header.terms;
+  const std::pair<bool, const char*> differences[] = {
+      {made.lineage != terms.lineage, "another stream"},
+      {header.parameters != FingerprintOf(parameters), "other parameters"},
+      {made.outputs != terms.outputs, "other outputs"},
+      {made.checkpoint_interval != terms.checkpoint_interval, "another checkpoint_interval"},
+      {made.labels != terms.labels, "other labels"},
+      {!terms.name.empty() && made.name != terms.name, "another stream_name"}};
+  for (const auto& [differs, what] : differences) {
+    if (differs) return Mismatch(what, "must be resumed with all of `open` that it was made with");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::uint64_t FingerprintOf(const std::map<std::string, std::string>& labels) {
+  std::string bytes;
+  for (const auto& [key, value] : labels) {
+    for (const std::string& text : {key, value}) {
+      PutNumber(std::uint64_t{text.size()}, bytes);
+      bytes += text;
+    }
+  }
+  return ChecksumOf(bytes);
+}
+
+std::string Serialize(std::uint64_t next_sequence, const State& state,
+                      const ReconstructionParameters& parameters, const StreamTerms& terms,
+                      const CheckpointKeys* keys) {
+  const std::string state_bytes = partiemc::Serialize(state);
+  std::string bytes;
+  bytes.reserve(kMaxCheckpointOverhead + state_bytes.size());
+  PutNumber(kMagic, bytes);
+  PutNumber(kVersion, bytes);
+  PutNumber(kMethodVersion, bytes);
+  PutNumber(std::uint32_t{keys != nullptr}, bytes);
+  bytes += terms.lineage;
+  PutNumber(FingerprintOf(parameters), bytes);
+  PutNumber(terms.labels, bytes);
+  PutNumber(terms.outputs, bytes);
+  PutNumber(terms.checkpoint_interval, bytes);
+  PutNumber(next_sequence, bytes);
+  PutNumber(static_cast<std::uint32_t>(terms.name.size()), bytes);
+  bytes += terms.name;
+  PutNumber(ChecksumOf(bytes), bytes);
+  bytes += state_bytes;
+  if (keys != nullptr) bytes += keys->Sign(bytes);
+  return bytes;
+}
+
+absl::StatusOr<Checkpoint> ParseCheckpoint(std::string_view bytes,
+                                           const ReconstructionParameters& parameters,
+                                           const StreamTerms& terms, const CheckpointKeys* keys) {
+  if (bytes.empty()) return Checkpoint{.name = terms.name};
+  if (keys != nullptr) {
+    if (auto status = CheckSignature(bytes, *keys); !status.ok()) return status;
+  }
+  auto header = TakeHeader(bytes);
+  if (!header.ok()) return header.status();
+  if (auto status = CheckBound(*header, parameters, terms); !status.ok()) return status;
+  if (header->is_signed) {
+    if (bytes.size() < CheckpointKeys::kSignatureBytes) return Corrupt("a signature cut off");
+    bytes.remove_suffix(CheckpointKeys::kSignatureBytes);
+  }
+  auto state = ParseState(bytes);
+  if (!state.ok()) {
+    return Refused(absl::StatusCode::kInvalidArgument, kReasonCorruptState,
+                   FindViolation(state.status())->value, kAsSent);
+  }
+  return Checkpoint{.next_sequence = header->next_sequence,
+                    .name = std::move(header->terms.name),
+                    .state = *std::move(state)};
+}
+
+}  // namespace partiemc::server

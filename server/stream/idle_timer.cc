@@ -1,0 +1,51 @@
+#include "server/stream/idle_timer.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+// For as long one that comes only now cannot have waited for too long.
+milliseconds ShortestLimit(const ServerLimits& limits) {
+  milliseconds shortest = milliseconds::max();
+  for (const milliseconds limit :
+       {limits.idle.opening, limits.idle.streaming, limits.unary.request, limits.unary.answer}) {
+    if (limit > milliseconds(0)) shortest = std::min(shortest, limit);
+  }
+  return shortest;
+}
+
+}  // namespace
+
+IdleTimer::IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
+                     const ServerLimits& limits)
+    : streams_(streams), watchers_(watchers), calls_(calls), limits_(limits) {
+  if (ShortestLimit(limits) < milliseconds::max()) thread_ = std::thread([this] { Run(); });
+}
+
+IdleTimer::~IdleTimer() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  stop_came_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void IdleTimer::Run() {
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    lock.unlock();
+    const auto now = std::chrono::steady_clock::now();
+    const auto next = std::min({streams_.EndIdle(limits_.idle, now),
+                                watchers_.EndSilent(limits_.idle.opening, now),
+                                calls_.EndIdle(limits_.unary, now), now + ShortestLimit(limits_)});
+    lock.lock();
+    stop_came_.wait_until(lock, next, [this] { return stopping_; });
+  }
+}
+
+}  // namespace partiemc::server

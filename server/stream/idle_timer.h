@@ -1,0 +1,38 @@
+// The one thread that ends calls whose clients keep them waiting.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "server/stream/limits.h"
+#include "server/stream/stream_registry.h"
+#include "server/stream/unary_registry.h"
+#include "server/watch/watch_registry.h"
+
+namespace partiemc::server {
+
+/// Sleeps until the first of them may have waited for too long.
+class IdleTimer {
+ public:
+  /// The registries live longer.
+  IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
+            const ServerLimits& limits);
+  ~IdleTimer();
+  IdleTimer(const IdleTimer&) = delete;
+  IdleTimer& operator=(const IdleTimer&) = delete;
+
+ private:
+  void Run();
+
+  StreamRegistry& streams_;
+  WatchRegistry& watchers_;
+  UnaryRegistry& calls_;
+  const ServerLimits limits_;
+  std::mutex mutex_;
+  std::condition_variable stop_came_;
+  bool stopping_ = false;  // Guarded by mutex_.
+  std::thread thread_;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,43 @@
+#include "server/stream/intake_guard.h"
+
+#include <pthread.h>
+
+#include <chrono>
+#include <utility>
+
+namespace partiemc::server {
+namespace {
+
+// A fast connection brings 15 MB meanwhile.
+constexpr std::chrono::milliseconds kPeriod(10);
+
+// Giving back a hundred megabytes takes 15 ms, in which nobody allocates.
+constexpr std::chrono::seconds kBetweenGivingBack(2);
+
+}  // namespace
+
+IntakeGuard::IntakeGuard(OpeningCalls& opening, std::uint64_t most, Process process)
+    : opening_(opening), most_(most), process_(std::move(process)), thread_([this] { Run(); }) {}
+
+IntakeGuard::~IntakeGuard() {
+  opening_.StopWaiting();
+  thread_.join();
+}
+
+void IntakeGuard::Run() {
+  pthread_setname_np(pthread_self(), "intake");
+  auto give_back = std::chrono::steady_clock::time_point::min();
+  while (opening_.WaitForOne()) {
+    const auto now = std::chrono::steady_clock::now();
+    if (IsTooMuch() && now >= give_back) {  // Some of it may be free already.
+      process_.give_back_freed();
+      give_back = now + kBetweenGivingBack;
+    }
+    if (IsTooMuch()) opening_.GiveWayToAll();
+    std::this_thread::sleep_for(kPeriod);
+  }
+}
+
+bool IntakeGuard::IsTooMuch() const { return process_.resident_bytes() > most_; }
+
+}  // namespace partiemc::server

@@ -1,0 +1,43 @@
+// Bounds what comes in before anybody has been told of it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <thread>
+
+#include "server/stream/opening_calls.h"
+
+namespace partiemc::server {
+
+/// gRPC puts a message together before it says how large it is, even one larger than it may
+/// receive, so nobody can count what calls without a request hold. This looks at the memory of the
+/// whole process instead, every few milliseconds and only while there are such calls: as long as it
+/// is too much, half of the calls of the caller that has most of them give way, the oldest first.
+/// Whose request comes at once is next to never among them.
+///
+/// Frames of open streams that are on their way stay, one a stream, whatever their size.
+class IntakeGuard {
+ public:
+  /// What the process is asked for; another for tests.
+  struct Process {
+    std::function<std::uint64_t()> resident_bytes;
+    std::function<void()> give_back_freed;
+  };
+
+  /// `most` is what the process may hold, in bytes. `opening` lives longer.
+  IntakeGuard(OpeningCalls& opening, std::uint64_t most, Process process);
+  ~IntakeGuard();
+  IntakeGuard(const IntakeGuard&) = delete;
+  IntakeGuard& operator=(const IntakeGuard&) = delete;
+
+ private:
+  void Run();
+  bool IsTooMuch() const;
+
+  OpeningCalls& opening_;
+  const std::uint64_t most_;
+  const Process process_;
+  std::thread thread_;
+};
+
+}  // namespace partiemc::server

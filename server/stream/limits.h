@@ -1,0 +1,76 @@
+// What a server allows, announced to clients in StreamOpened and GetServerInfo.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+
+#include "partiemc/frame.h"
+#include "server/stream/stream_flow.h"
+#include "server/stream/unary_flow.h"
+
+namespace partiemc::server {
+
+/// At the worst, requests, answers and the buffers of compute threads hold `memory_budget`, and one
+/// frame for each stream. Outside of it each thread has 16 MiB for its buffers, and may take up to
+/// 500 bytes for each particle of a frame where the budget is used up (worker_memory.h): 50 are
+/// usual. A frame whose tiles need more than that is refused unless the budget has room for them.
+struct ServerLimits {
+  /// Of one frame. More suits larger simulations; memory grows with it as said above.
+  FrameLimits frame{.max_particles = 4'000'000, .max_tiles = 131'072};
+
+  /// Of one serialised ParticleFrame; by default DefaultFrameBytes(frame.max_particles), and of a
+  /// server's command line at most an eighth of its memory budget.
+  std::uint64_t max_frame_bytes = DefaultFrameBytes(4'000'000);
+
+  /// Of one checkpoint, sent or taken. A state has a byte or two for each particle of a body, 370
+  /// or more for each that lies alone; what tiles and particles bound it to is far beyond any
+  /// message, so nothing but that does: `open` is to be no larger than a frame.
+  std::uint64_t MaxCheckpointBytes() const { return max_frame_bytes; }
+
+  /// Streams that are open at once, and, counted apart, calls of ReconstructFrame.
+  std::uint32_t max_streams = 32;
+
+  /// Frames of a stream that are read ahead of the last answer that its client has taken. Two keep
+  /// large frames flowing, four small ones; more only costs memory.
+  std::uint32_t frames_in_flight = 4;
+
+  /// Bytes that requests, answers and compute threads hold together. While it is used up, a stream
+  /// is read from only when nothing of it is in flight. More suits many large streams.
+  std::uint64_t memory_budget = std::uint64_t{1} << 30;
+
+  /// A stream costs next to nothing while it waits, but it keeps its name and its place.
+  IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};
+
+  /// Of calls of one request. An answer that is not taken in time is given up, as it holds memory.
+  UnaryLimits unary{.request = std::chrono::seconds(30), .answer = std::chrono::minutes(2)};
+
+  /// Watchers of all streams together.
+  std::uint32_t max_watchers = 64;
+
+  /// What one watcher may keep from being freed: the frames that it has not taken yet, of which
+  /// most are shared with other watchers. A larger frame cannot be watched.
+  std::uint64_t max_watcher_bytes = std::uint64_t{16} << 20;
+
+  /// The newest result of a stream is kept for watchers to come if it is no larger: 64 MiB for all
+  /// streams together.
+  std::uint64_t KeptResultBytes() const { return (std::uint64_t{64} << 20) / max_streams; }
+
+  /// Calls of all methods that have begun without their request.
+  std::uint32_t MaxOpeningCalls() const { return std::max(64u, max_streams + max_watchers); }
+
+  /// Calls of one caller, of all methods, unless its token says otherwise: room for all that is
+  /// limited by itself, and for what just ends and begins.
+  std::uint32_t CallsOfOneCaller() const { return 4 * MaxOpeningCalls(); }
+
+  /// Of a serialised `open`: its checkpoint, and what little stands beside it.
+  std::uint64_t MaxOpenBytes() const { return MaxCheckpointBytes() + kQuickOpenBytes; }
+
+  /// Room for the widest usual particle (three float64, id, volume, velocity: 44 bytes) and for
+  /// what a message has besides. Recordings with many scalars want a larger limit by hand.
+  static constexpr std::uint64_t DefaultFrameBytes(std::uint64_t max_particles) {
+    return 48 * max_particles + 4096;
+  }
+};
+
+}  // namespace partiemc::server

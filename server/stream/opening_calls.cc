@@ -1,0 +1,121 @@
+#include "server/stream/opening_calls.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+namespace {
+
+absl::Status TooManyOpening(std::string found) {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonTooManyOpening), "calls without a request", std::move(found),
+       "must send the first request at once: of the caller with most of them the oldest gives way; "
+       "try again"});
+}
+
+}  // namespace
+
+OpeningCalls::Place::~Place() {
+  if (calls_ != nullptr) calls_->Leave(caller_, number_);
+}
+
+OpeningCalls::Rank OpeningCalls::RankOf(const Line& line) {
+  return {line.size(), -static_cast<std::int64_t>(line.begin()->first)};
+}
+
+void OpeningCalls::Add(const CallerAccount* caller, std::uint64_t number, GiveWay give_way) {
+  Line& line = lines_[caller];
+  if (!line.empty()) ranks_.erase(RankOf(line));
+  line.emplace(number, std::move(give_way));
+  ranks_.emplace(RankOf(line), caller);
+  ++count_;
+}
+
+// Empty where it has gone already.
+OpeningCalls::GiveWay OpeningCalls::Remove(const CallerAccount* caller, std::uint64_t number) {
+  const auto line = lines_.find(caller);
+  if (line == lines_.end()) return {};
+  const auto call = line->second.find(number);
+  if (call == line->second.end()) return {};
+  ranks_.erase(RankOf(line->second));
+  GiveWay give_way = std::move(call->second);
+  line->second.erase(call);
+  if (line->second.empty()) {
+    lines_.erase(line);
+  } else {
+    ranks_.emplace(RankOf(line->second), caller);
+  }
+  --count_;
+  return give_way;
+}
+
+// Of those who have most the oldest. Requires: there is one.
+OpeningCalls::GiveWay OpeningCalls::RemoveNext() {
+  const CallerAccount* const most = ranks_.rbegin()->second;
+  return Remove(most, lines_.at(most).begin()->first);
+}
+
+void OpeningCalls::GiveWayToAll() {
+  std::vector<GiveWay> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    if (count_ == 0) return;
+    const CallerAccount* const most = ranks_.rbegin()->second;
+    for (std::size_t left = (lines_.at(most).size() + 1) / 2; left > 0; --left) {
+      gone.push_back(Remove(most, lines_.at(most).begin()->first));
+    }
+  }
+  for (const GiveWay& give_way : gone) {
+    give_way(TooManyOpening("more than there is memory for"));
+  }
+}
+
+bool OpeningCalls::WaitForOne() {
+  std::unique_lock lock(mutex_);
+  waits_for_one_ = true;
+  one_came_.wait(lock, [this] { return stopped_ || count_ > 0; });
+  waits_for_one_ = false;
+  return !stopped_;
+}
+
+void OpeningCalls::StopWaiting() {
+  const std::lock_guard lock(mutex_);
+  stopped_ = true;
+  one_came_.notify_one();
+}
+
+OpeningCalls::Place OpeningCalls::Enter(const CallerAccount& caller, GiveWay give_way) {
+  Place place;
+  GiveWay other;
+  {
+    const std::lock_guard lock(mutex_);
+    // First out, then in: who comes does not count as one of its caller's.
+    if (count_ >= std::max<std::size_t>(places_, 1)) other = RemoveNext();
+    place.calls_ = this;
+    place.caller_ = &caller;
+    place.number_ = ++came_;
+    Add(&caller, place.number_, std::move(give_way));
+    if (waits_for_one_) one_came_.notify_one();
+  }
+  if (other) other(TooManyOpening(absl::StrCat("more than ", places_)));
+  return place;
+}
+
+void OpeningCalls::Leave(const CallerAccount* caller, std::uint64_t number) {
+  GiveWay forgotten;  // What it holds goes without the lock.
+  const std::lock_guard lock(mutex_);
+  forgotten = Remove(caller, number);
+}
+
+std::size_t OpeningCalls::count() const {
+  const std::lock_guard lock(mutex_);
+  return count_;
+}
+
+}  // namespace partiemc::server

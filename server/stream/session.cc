@@ -1,0 +1,111 @@
+#include "server/stream/session.h"
+
+#include <new>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+namespace {
+
+// The account of a worker, for one frame.
+class FrameMemory final : public MemoryGuard {
+ public:
+  FrameMemory(WorkerMemory& account, std::size_t particles)
+      : account_(account), particles_(particles) {}
+  bool Reserve(std::uint64_t bytes) override { return account_.Reserve(bytes, particles_); }
+
+ private:
+  WorkerMemory& account_;
+  const std::size_t particles_;
+};
+
+}  // namespace
+
+absl::Status OutOfMemory(std::string value) {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonOutOfMemory), "frame", std::move(value),
+       "must fit into the server's memory; send a smaller frame or try again later"});
+}
+
+absl::StatusOr<Session> Session::Open(const ReconstructionParameters& parameters,
+                                      const FrameLimits& limits) {
+  auto reconstructor = Reconstructor::Create(parameters, limits);
+  if (!reconstructor.ok()) return reconstructor.status();
+  return Session(*std::move(reconstructor));
+}
+
+void Session::GoOnFrom(Checkpoint checkpoint) {
+  next_sequence_ = checkpoint.next_sequence;
+  state_ = std::move(checkpoint.state);
+}
+
+std::string Session::MakeCheckpoint(const StreamTerms& terms, const CheckpointKeys* keys,
+                                    std::uint64_t max_bytes) const {
+  if (SerializedBytes(state_) + kMaxCheckpointOverhead > max_bytes) return {};
+  return Serialize(next_sequence_, state_, parameters(), terms, keys);
+}
+
+absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
+                             Worker& worker, Deliver deliver, const std::atomic<bool>* cancelled) {
+  absl::Status status = TryAnswer(sequence, frame, worker, deliver, cancelled);
+  if (absl::IsCancelled(status)) {
+    --next_sequence_;
+    worker.Empty();
+    return status;
+  }
+  if (!status.ok() && worker.observer != nullptr) {
+    const auto violation = FindViolation(status);
+    worker.observer->FrameRefused(violation ? std::string_view(violation->reason) : "INTERNAL");
+  }
+  return status;
+}
+
+absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,
+                                Worker& worker, Deliver deliver,
+                                const std::atomic<bool>* cancelled) {
+  if (sequence != next_sequence_) {
+    const bool gap = sequence > next_sequence_;
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(gap ? kReasonSequenceGap : kReasonSequenceDuplicate), "sequence",
+         absl::StrCat(sequence),
+         absl::StrCat("must be ", next_sequence_,
+                      gap ? "; a frame before it is missing" : "; this number has been used")});
+  }
+  ++next_sequence_;
+  if (!frame.ok()) return frame.status();
+  try {
+    return Reconstruct(*frame, worker, deliver, cancelled);
+  } catch (const std::bad_alloc&) {
+    worker.Empty();  // Its memory is wanted.
+    return OutOfMemory(absl::StrCat(frame->ParticleCount(), " particles"));
+  }
+}
+
+absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver,
+                                  const std::atomic<bool>* cancelled) {
+  worker.particles.Used(frame.ParticleCount(), WarmSize::Clock::now());
+  // The core commits a frame that it accepts, but `deliver` may still refuse it: work on a copy.
+  worker.next_state = state_;
+  StageClock clock;
+  FrameMemory memory(worker.memory, frame.ParticleCount());
+  absl::Status status =
+      reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result,
+                                 {.observer = &clock, .memory = &memory, .cancelled = cancelled});
+  if (status.ok()) status = deliver(worker.result, clock);
+  if (!status.ok()) return status;
+  // Another copy: the worker's own has room for the largest stream that it served, which would pass
+  // from stream to stream. Memory that runs out here leaves the state as it was.
+  State next = worker.next_state;
+  state_ = std::move(next);
+  if (worker.observer != nullptr) {
+    worker.observer->FrameReconstructed(frame.ParticleCount(), clock);
+  }
+  return status;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,335 @@
+#include "server/stream/stream_flow.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+
+namespace partiemc::server {
+namespace {
+
+using TimePoint = std::chrono::steady_clock::time_point;
+
+std::string Name(RequestKind kind) {
+  switch (kind) {
+    case RequestKind::kMalformed:
+      return "malformed";
+    case RequestKind::kEmpty:
+      return "empty";
+    case RequestKind::kOpen:
+      return "open";
+    case RequestKind::kFrame:
+      return "frame";
+  }
+  return "";
+}
+
+absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
+
+}  // namespace
+
+StreamFlow::StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget,
+                       std::size_t window, std::shared_ptr<const CallerAccount> caller)
+    : door_(door),
+      pool_(pool),
+      budget_(budget),
+      caller_(std::move(caller)),
+      window_(std::max<std::size_t>(window, 1)),
+      slot_bytes_(window_) {}
+
+// Lets something happen to the state and does what follows from it.
+template <typename Event>
+void StreamFlow::On(Event event) {
+  Actions actions;
+  {
+    const std::lock_guard lock(mutex_);
+    event();
+    actions = Decide();
+  }
+  Perform(std::move(actions));
+}
+
+void StreamFlow::Start(absl::Status admission) {
+  On([&] {
+    if (!admission.ok()) End(std::move(admission));
+  });
+}
+
+void StreamFlow::ReadDone(RequestKind kind, std::uint64_t bytes) {
+  bool open = false;
+  On([&] {
+    reading_ = false;
+    counts_.last_activity = std::chrono::steady_clock::now();
+    TakeRequest(kind, bytes);
+    surplus_ += std::exchange(set_aside_, 0);  // Now it is known what there is.
+    open = opening_;
+  });
+  if (!open) return;
+  if (bytes <= kQuickOpenBytes) return Open();
+  pool_.Submit([self = shared_from_this()](Worker&) { self->Open(); }, [] {}, nullptr,
+               caller_.get());
+}
+
+void StreamFlow::TakeRequest(RequestKind kind, std::uint64_t bytes) {
+  if (phase_ == Phase::kOpening) {
+    opening_ = kind == RequestKind::kOpen;
+    if (opening_) return SetSlotBytes(0, bytes);
+    End(ProtocolError(Name(kind), "the first must be `open`"));
+  } else if (phase_ == Phase::kStreaming) {
+    switch (kind) {
+      case RequestKind::kFrame:
+        last_bytes_ = std::max<std::uint64_t>(bytes, 1);
+        SetSlotBytes(read_++, bytes);
+        break;
+      case RequestKind::kOpen:
+        End(ProtocolError(Name(kind), "comes once; after it every request must be `frame`"));
+        break;
+      case RequestKind::kMalformed:
+      case RequestKind::kEmpty:
+        End(ProtocolError(Name(kind), "must be `frame`"));
+        break;
+    }
+  }
+}
+
+void StreamFlow::Open() {
+  absl::Status status = cancelled_ ? ClientGone() : door_.Open(0);
+  On([&] {
+    opening_ = false;
+    SetSlotBytes(0, 0);
+    if (!status.ok()) {
+      End(std::move(status));
+    } else if (phase_ == Phase::kOpening) {
+      phase_ = Phase::kStreaming;
+      owes_opened_ = true;
+    }
+  });
+}
+
+void StreamFlow::ReadEnded() {
+  On([&] {
+    reading_ = false;
+    End(phase_ == Phase::kOpening ? ProtocolError("none", "the first must be `open`")
+                                  : absl::OkStatus());
+  });
+}
+
+void StreamFlow::WriteDone(bool ok) {
+  On([&] {
+    writing_ = false;
+    if (in_flight_ == Outgoing::kAnswer) SetSlotBytes(written_++, 0);
+    counts_.last_activity = std::chrono::steady_clock::now();
+    if (!ok) Abandon(ClientGone());
+  });
+}
+
+void StreamFlow::Cancelled() {
+  On([&] { Abandon(ClientGone()); });
+}
+
+void StreamFlow::Granted(std::uint64_t bytes) {
+  On([&] {
+    // What comes after the flow has gone on without it goes back at once.
+    (waiting_ ? set_aside_ : surplus_) += bytes;
+    waiting_ = false;
+  });
+}
+
+void StreamFlow::TakenOver() {
+  On([&] {
+    // Of one that is over there is nothing to take, and no door to cut any more.
+    if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+    Abandon(ViolationError(absl::StatusCode::kAborted, {std::string(kReasonTakenOver), "stream",
+                                                        "resumed by its producer in another call",
+                                                        "must be read where it was resumed"}));
+    owes_cut_ = writing_;  // Whoever takes no answers would keep it from ending.
+  });
+}
+
+void StreamFlow::GiveWay(const absl::Status& status) {
+  On([&] {
+    if (phase_ == Phase::kOpening && !opening_) End(status);
+  });
+}
+
+void StreamFlow::Drain() {
+  On([&] {
+    if (phase_ == Phase::kStreaming) owes_notice_ = true;
+    End(DrainingError());
+  });
+}
+
+TimePoint StreamFlow::EndIfIdle(const IdleLimits& limits, TimePoint now) {
+  TimePoint look_again = TimePoint::max();
+  On([&] {
+    if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+    const auto limit = phase_ == Phase::kOpening ? limits.opening : limits.streaming;
+    if (limit <= limit.zero()) {
+      // An opening stream may come under the other limit at any time.
+      if (phase_ == Phase::kOpening && limits.streaming > limit.zero()) {
+        look_again = now + limits.streaming;
+      }
+      return;
+    }
+    const bool ours = opening_ || computing_;
+    const TimePoint due = (ours ? now : counts_.last_activity) + limit;
+    if (now < due) {
+      look_again = due;
+    } else if (writing_) {
+      Abandon(IdleError("takes no answer", limit));
+      owes_cut_ = true;
+    } else {
+      End(IdleError(phase_ == Phase::kOpening ? "sends no `open`" : "sends no frame", limit));
+    }
+  });
+  return look_again;
+}
+
+StreamCounts StreamFlow::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+void StreamFlow::Compute(std::size_t slot, Worker& worker) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (phase_ == Phase::kAbandoned) return;
+  }
+  answered_ = door_.Answer(slot, worker);
+}
+
+void StreamFlow::Computed() {
+  // Taken before any other frame can be computed.
+  const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
+  On([&] {
+    computing_ = false;
+    ++computed_;
+    if (!answered) return;
+    SetSlotBytes(computed_ - 1, answered->bytes);
+    ++(answered->is_result ? counts_.frames : counts_.frame_errors);
+    counts_.last_sequence = answered->last_sequence;
+  });
+  if (answered && answered->afterwards) answered->afterwards();
+}
+
+void StreamFlow::End(absl::Status status) {
+  if (phase_ != Phase::kOpening && phase_ != Phase::kStreaming) return;
+  phase_ = Phase::kEnding;
+  status_ = std::move(status);
+}
+
+void StreamFlow::Abandon(absl::Status status) {
+  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+  phase_ = Phase::kAbandoned;
+  status_ = std::move(status);
+  cancelled_ = true;
+}
+
+// Counts what frame number `frame`, from 0, holds now instead of what it held before.
+void StreamFlow::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
+  std::uint64_t& held = slot_bytes_[frame % window_];
+  if (bytes > held) {
+    budget_.Take(bytes - held, caller_.get());
+  } else {
+    surplus_ += held - bytes;
+  }
+  held = bytes;
+}
+
+StreamFlow::Actions StreamFlow::Decide() {
+  Actions actions;
+  if (!opening_ && !reading_ && !starting_read_ && MayRead(actions)) {
+    reading_ = starting_read_ = true;
+    actions.read = read_ % window_;
+  }
+  const bool answers = phase_ == Phase::kStreaming || phase_ == Phase::kEnding;
+  if (answers && !computing_ && computed_ < read_) {
+    computing_ = true;
+    actions.compute = computed_ % window_;
+  }
+  if (answers && !writing_) DecideWrite(actions);
+  const bool all_said = phase_ == Phase::kAbandoned ||
+                        (phase_ == Phase::kEnding && written_ == read_ && !owes_notice_);
+  // Once finished there may be no door any more.
+  if (std::exchange(owes_cut_, false) && phase_ != Phase::kFinished) {
+    actions.cut = cutting_ = true;
+  }
+  if (all_said && !opening_ && !computing_ && !writing_ && !starting_read_ && !cutting_) {
+    phase_ = Phase::kFinished;
+    actions.finish = status_;
+  }
+  DecideMemory(actions);
+  return actions;
+}
+
+// Asked only when the next read could begin at once.
+bool StreamFlow::MayRead(Actions& actions) {
+  if (phase_ == Phase::kOpening) return true;
+  if (phase_ != Phase::kStreaming || read_ - written_ >= window_) return false;
+  if (read_ == written_) {
+    actions.stop_waiting = std::exchange(waiting_, false);
+    return true;
+  }
+  if (set_aside_ > 0) return true;
+  if (waiting_) return false;
+  if (budget_.TakeOrWait(last_bytes_, shared_from_this(), caller_.get())) {
+    set_aside_ = last_bytes_;
+    return true;
+  }
+  waiting_ = true;
+  return false;
+}
+
+// Room is set aside for a read only while the stream has something else in flight: what an idle
+// stream reads next costs nothing until it comes.
+void StreamFlow::DecideMemory(Actions& actions) {
+  if (phase_ != Phase::kStreaming && std::exchange(waiting_, false)) actions.stop_waiting = true;
+  if (phase_ != Phase::kStreaming || read_ == written_) surplus_ += std::exchange(set_aside_, 0);
+  if (phase_ == Phase::kFinished) {
+    for (std::uint64_t& bytes : slot_bytes_) surplus_ += std::exchange(bytes, 0);
+  }
+  actions.give_back = std::exchange(surplus_, 0);
+}
+
+void StreamFlow::DecideWrite(Actions& actions) {
+  if (owes_opened_) {
+    owes_opened_ = false;
+    actions.write = Outgoing::kOpened;
+  } else if (owes_notice_) {
+    owes_notice_ = false;
+    actions.write = Outgoing::kDraining;
+  } else if (written_ < computed_) {
+    actions.write = Outgoing::kAnswer;
+    actions.write_slot = written_ % window_;
+  } else {
+    return;
+  }
+  writing_ = true;
+  in_flight_ = *actions.write;
+}
+
+void StreamFlow::Perform(Actions actions) {
+  const auto self = shared_from_this();
+  for (;;) {
+    // Before anything that may end the stream elsewhere: it ends with nothing held.
+    if (actions.stop_waiting) budget_.StopWaiting(self);
+    if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
+    if (actions.compute) {
+      pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
+                   [self] { self->Computed(); }, &busy_mark_, caller_.get());
+    }
+    if (actions.write) door_.StartWrite(*actions.write, actions.write_slot);
+    if (actions.cut) door_.Cut();
+    if (actions.finish) door_.Finish(*actions.finish);
+    if (!actions.read && !actions.cut) return;
+    if (actions.read) door_.StartRead(*actions.read);
+    const std::lock_guard lock(mutex_);
+    if (actions.read) starting_read_ = false;
+    if (actions.cut) cutting_ = false;
+    actions = Decide();
+  }
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,270 @@
+#include "server/stream/stream_registry.h"
+
+#include <algorithm>
+#include <random>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "partiemc/printable.h"
+#include "partiemc/status.h"
+#include "server/stream/stream_token.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::size_t kMaxNameBytes = 128;
+constexpr std::size_t kMaxLabels = 16;
+constexpr std::size_t kMaxLabelBytes = 128;
+
+absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string field,
+                     std::string value, std::string rule) {
+  return ViolationError(code,
+                        {std::string(reason), std::move(field), std::move(value), std::move(rule)});
+}
+
+// Text of a client as it may stand in a message or in a log: short, and one line.
+std::string Quoted(const std::string& text) {
+  constexpr std::size_t kShown = 40;
+  return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
+                      text.size() > kShown ? "..." : "");
+}
+
+bool IsNameCharacter(char c) {
+  return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';
+}
+
+absl::Status CheckName(const std::string& name) {
+  if (name.size() <= kMaxNameBytes && std::all_of(name.begin(), name.end(), IsNameCharacter)) {
+    return absl::OkStatus();
+  }
+  return Refused(absl::StatusCode::kInvalidArgument, kReasonName, "open.stream_name", Quoted(name),
+                 "must be at most 128 characters of [A-Za-z0-9._-]");
+}
+
+absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
+  if (labels.size() > kMaxLabels) {
+    return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels",
+                   absl::StrCat(labels.size(), " labels"), "must be at most 16");
+  }
+  for (const auto& [key, value] : labels) {
+    if (key.size() > kMaxLabelBytes || value.size() > kMaxLabelBytes) {
+      return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels", Quoted(key),
+                     "must have a key and a value of at most 128 bytes each");
+    }
+    if (!IsPrintable(key) || !IsPrintable(value)) {
+      return Refused(absl::StatusCode::kInvalidArgument, kReasonLabels, "open.labels", Quoted(key),
+                     "must have a key and a value of UTF-8 without control characters");
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+StreamRegistry::StreamRegistry(std::uint32_t max_streams)
+    : max_streams_(max_streams),
+      id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
+
+absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow, Caller caller) {
+  const std::lock_guard lock(mutex_);
+  if (auto status = CheckServingLocked(); !status.ok()) return status;
+  const StreamFlow* key = flow.get();
+  Entry& entry = entries_[key];
+  entry.flow = std::move(flow);
+  entry.caller = std::move(caller);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
+                                                   StreamDescription description,
+                                                   std::string token) {
+  if (auto status = CheckName(description.name); !status.ok()) return status;
+  if (auto status = CheckLabels(description.labels); !status.ok()) return status;
+  if (auto status = CheckStreamToken(token); !status.ok()) return status;
+
+  std::unique_lock lock(mutex_);
+  if (auto status = CheckServingLocked(); !status.ok()) return status;
+  Entry& entry = entries_.at(&flow);
+  Entry* const former = FindOpen(token);
+  if (former != nullptr && description.name.empty()) {
+    description.name = former->stream->description.name;
+  }
+  const std::string id = absl::StrCat(id_prefix_, opened_ + 1);
+  const bool is_named = !description.name.empty();
+  if (!is_named) description.name = absl::StrCat("stream-", id);
+  if (auto status = entry.caller.CheckMayUse(description.name); !status.ok()) return status;
+  if (auto status = CheckPlace(former, is_named ? description.name : ""); !status.ok()) {
+    return status;
+  }
+  if (auto status = TakePlace(entry, former); !status.ok()) return status;
+  entry.stream.emplace();
+  entry.stream->number = ++opened_;
+  entry.stream->id = id;
+  entry.stream->lineage = LineageOf(token);
+  entry.stream->opened = std::chrono::steady_clock::now();
+  entry.stream->description = std::move(description);
+  entry.token = std::move(token);
+  StreamSummary opened = *entry.stream;
+  if (former == nullptr) return opened;
+  former->taken_over = true;
+  const std::shared_ptr<StreamFlow> former_flow = former->flow;
+  lock.unlock();  // A flow may leave at once.
+  former_flow->TakenOver();
+  return opened;
+}
+
+absl::Status StreamRegistry::CheckPlace(const Entry* former, const std::string& name) const {
+  std::uint32_t open_streams = 0;
+  for (const auto& [key, entry] : entries_) {
+    if (!entry.IsOpen() || &entry == former) continue;
+    ++open_streams;
+    if (!name.empty() && entry.stream->description.name == name) {
+      return Refused(absl::StatusCode::kAlreadyExists, kReasonNameInUse, "open.stream_name",
+                     Quoted(name),
+                     "must not be the name of an open stream; choose another, or none");
+    }
+  }
+  if (open_streams < max_streams_) return absl::OkStatus();
+  return Refused(absl::StatusCode::kResourceExhausted, kReasonTooManyStreams, "streams",
+                 absl::StrCat(open_streams, " open"),
+                 absl::StrCat("must be at most ", max_streams_,
+                              "; try again when one has ended, or start the server with a larger "
+                              "--max-streams"));
+}
+
+absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
+  CallerAccount& account = *entry.caller.account();
+  if (former != nullptr && former->place.account() == &account) {
+    entry.place = std::move(former->place);
+    return absl::OkStatus();
+  }
+  auto place = account.Take(CallerAccount::Kind::kStream);
+  if (place.ok()) entry.place = *std::move(place);
+  return place.status();
+}
+
+StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {
+  for (auto& [key, entry] : entries_) {
+    if (entry.IsOpen() && SameToken(entry.token, token)) return &entry;
+  }
+  return nullptr;
+}
+
+std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
+  std::optional<StreamSummary> summary;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = entries_.find(&flow);
+    if (found != entries_.end()) {
+      found->second.place = {};
+      summary.swap(found->second.stream);
+    }
+  }
+  if (summary) summary->counts = flow.counts();
+  return summary;
+}
+
+void StreamRegistry::Leave(const StreamFlow& flow) {
+  const std::lock_guard lock(mutex_);
+  const auto found = entries_.find(&flow);
+  if (found == entries_.end()) return;  // It was not let in.
+  entries_.erase(found);
+  // With the lock held: whoever waits for the last flow may take the registry away after that.
+  left_.notify_all();
+}
+
+absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
+                                                   const Caller& caller) const {
+  if (auto status = caller.CheckMayUse(name); !status.ok()) return status;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [flow, entry] : entries_) {
+    if (!entry.IsOpen() || entry.stream->description.name != name) continue;
+    StreamSummary summary = *entry.stream;
+    summary.counts = flow->counts();
+    return summary;
+  }
+  return Refused(absl::StatusCode::kNotFound, kReasonNoSuchStream, "open.stream_name", Quoted(name),
+                 "must be the name of an open stream; ListStreams tells them");
+}
+
+std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count,
+                                                const Caller& caller) const {
+  std::vector<StreamSummary> summaries;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [flow, entry] : entries_) {
+    if (!entry.IsOpen() || entry.stream->number <= after) continue;
+    if (!caller.MayUse(entry.stream->description.name)) continue;
+    summaries.push_back(*entry.stream);
+    summaries.back().counts = flow->counts();
+  }
+  std::sort(summaries.begin(), summaries.end(),
+            [](const auto& a, const auto& b) { return a.number < b.number; });
+  if (summaries.size() > count) summaries.resize(count);
+  return summaries;
+}
+
+std::size_t StreamRegistry::OpenCount() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(std::count_if(
+      entries_.begin(), entries_.end(), [](const auto& item) { return item.second.IsOpen(); }));
+}
+
+std::vector<std::shared_ptr<StreamFlow>> StreamRegistry::Flows() const {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  flows.reserve(entries_.size());
+  for (const auto& [key, entry] : entries_) flows.push_back(entry.flow);
+  return flows;
+}
+
+void StreamRegistry::Drain() {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+    flows = Flows();
+  }
+  // Without the lock: a flow that drains may leave at once.
+  for (const auto& flow : flows) flow->Drain();
+}
+
+std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
+    const IdleLimits& limits, std::chrono::steady_clock::time_point now) {
+  std::vector<std::shared_ptr<StreamFlow>> flows;
+  {
+    const std::lock_guard lock(mutex_);
+    flows = Flows();
+  }
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  for (const auto& flow : flows) look_again = std::min(look_again, flow->EndIfIdle(limits, now));
+  return look_again;
+}
+
+absl::Status StreamRegistry::CheckServing() {
+  const std::lock_guard lock(mutex_);
+  return CheckServingLocked();
+}
+
+absl::Status StreamRegistry::CheckServingLocked() {
+  if (!draining_) return absl::OkStatus();
+  ++turned_away_;
+  return DrainingError();
+}
+
+std::uint64_t StreamRegistry::turned_away() const {
+  const std::lock_guard lock(mutex_);
+  return turned_away_;
+}
+
+bool StreamRegistry::draining() const {
+  const std::lock_guard lock(mutex_);
+  return draining_;
+}
+
+bool StreamRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return left_.wait_until(lock, deadline, [this] { return entries_.empty(); });
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,127 @@
+// The streams of this server: who may come in, who is there, and how all are sent home.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/parameters.h"
+#include "server/security/caller.h"
+#include "server/stream/stream_flow.h"
+#include "server/watch/watch_hub.h"
+
+namespace partiemc::server {
+
+/// The reasons for which a stream is not opened, beside those of the core (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonName = "NAME";
+inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
+inline constexpr std::string_view kReasonLabels = "LABELS";
+inline constexpr std::string_view kReasonTooManyStreams = "TOO_MANY_STREAMS";
+inline constexpr std::string_view kReasonNoSuchStream = "NO_SUCH_STREAM";
+/// Of a ListStreams that wants a page that is none.
+inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
+
+struct StreamDescription {
+  std::string name;  ///< Empty: the registry makes one up.
+  std::map<std::string, std::string> labels;
+  ReconstructionParameters parameters;  ///< As resolved.
+  std::shared_ptr<WatchHub> hub;        ///< Shows its results to watchers.
+};
+
+struct StreamSummary {
+  std::string id;
+  std::string lineage;       ///< LineageOf its token.
+  std::uint64_t number = 0;  ///< 1 for the first stream that was opened, then one more each.
+  StreamDescription description;
+  StreamCounts counts;
+  std::chrono::steady_clock::time_point opened;
+};
+
+/// Safe from any thread.
+class StreamRegistry {
+ public:
+  explicit StreamRegistry(std::uint32_t max_streams);
+
+  /// A flow of `caller` comes in, not open yet: those are counted elsewhere (OpeningCalls).
+  /// Errors: UNAVAILABLE (DRAINING).
+  absl::Status Enter(std::shared_ptr<StreamFlow> flow, Caller caller = {});
+
+  /// Opens the stream of a flow that has entered. Where an open stream has the same `token`, the
+  /// new one takes over from it: its place, its name if none is given, and its flow ends.
+  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN),
+  /// PERMISSION_DENIED (NOT_PERMITTED: the name is not one of the caller's), ALREADY_EXISTS
+  /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS), UNAVAILABLE (DRAINING).
+  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description,
+                                     std::string token);
+
+  /// The flow's stream ends: its name and its place are free. What it was, if it had been opened.
+  std::optional<StreamSummary> Close(const StreamFlow& flow);
+  /// The flow has gone: its last word has been sent.
+  void Leave(const StreamFlow& flow);
+
+  /// The open stream of that name, for `caller` to watch. Errors: PERMISSION_DENIED (NOT_PERMITTED)
+  /// for a name that is not one of the caller's, whether there is such a stream or not; NOT_FOUND
+  /// (NO_SUCH_STREAM).
+  absl::StatusOr<StreamSummary> Find(const std::string& name, const Caller& caller = {}) const;
+  /// Of the open streams those whose names `caller` may use, in the order of their numbers: at most
+  /// `count`, with numbers above `after`.
+  std::vector<StreamSummary> List(std::uint64_t after, std::size_t count,
+                                  const Caller& caller = {}) const;
+  std::size_t OpenCount() const;
+
+  /// Lets nobody in any more and drains every flow.
+  void Drain();
+  bool draining() const;
+  /// OK, or, told to whoever comes now, UNAVAILABLE (DRAINING).
+  absl::Status CheckServing();
+  /// Who has been told so: grows for as long as somebody still comes.
+  std::uint64_t turned_away() const;
+  /// Ends the flows that have waited for their clients for too long. Gives the time before which
+  /// none of those that are here now will have.
+  std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
+                                                std::chrono::steady_clock::time_point now);
+  /// Whether all flows have left before the deadline.
+  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
+
+ private:
+  struct Entry {
+    std::shared_ptr<StreamFlow> flow;
+    Caller caller;
+    CallerAccount::Place place;           // While open.
+    std::optional<StreamSummary> stream;  // While open; its counts are asked of the flow.
+    std::string token;                    // Of the stream.
+    bool taken_over = false;  // By another entry: the stream is not this one's any more.
+
+    bool IsOpen() const { return stream && !taken_over; }
+  };
+
+  // With the lock held:
+  absl::Status CheckServingLocked();
+  // Whether there is a place, that of `former` counted as free, and whether `name` is free.
+  absl::Status CheckPlace(const Entry* former, const std::string& name) const;
+  // Of the caller of `entry`, where `former` has none to pass on.
+  static absl::Status TakePlace(Entry& entry, Entry* former);
+  std::vector<std::shared_ptr<StreamFlow>> Flows() const;
+  Entry* FindOpen(std::string_view token);
+
+  const std::uint32_t max_streams_;
+  const std::string id_prefix_;  // Tells the ids of one run of a server from those of another.
+
+  mutable std::mutex mutex_;  // Guards everything below.
+  std::condition_variable left_;
+  std::map<const StreamFlow*, Entry> entries_;
+  std::uint64_t opened_ = 0;
+  bool draining_ = false;
+  std::uint64_t turned_away_ = 0;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,198 @@
+#include "server/stream/unary_flow.h"
+
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/stream/stream_flow.h"
+
+namespace partiemc::server {
+namespace {
+
+using TimePoint = std::chrono::steady_clock::time_point;
+
+absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
+
+absl::Status NoRequest() {
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonMalformed), "request", "none", "must be one message"});
+}
+
+absl::Status NoRoom(FairShare::Fit fit, std::string field, std::uint64_t bytes,
+                    std::uint64_t budget) {
+  if (fit == FairShare::Fit::kMoreThanShare) return TooManyBytesOfCaller(bytes);
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonMemoryBudget), std::move(field), absl::StrCat(bytes, " bytes"),
+       absl::StrCat("must fit with what is being worked on into ", budget,
+                    " bytes; try again later, or start the server with a larger "
+                    "--memory-budget")});
+}
+
+}  // namespace
+
+// Lets something happen to the state and does what follows from it.
+template <typename Event>
+void UnaryFlow::On(Event event) {
+  Actions actions;
+  {
+    const std::lock_guard lock(mutex_);
+    event();
+    actions = Decide();
+  }
+  Perform(std::move(actions));
+}
+
+void UnaryFlow::Start(absl::Status admission) {
+  On([&] {
+    owes_read_ = admission.ok() && phase_ == Phase::kReading;
+    if (!admission.ok()) End(std::move(admission));
+  });
+}
+
+void UnaryFlow::ReadDone(std::uint64_t bytes) {
+  On([&] {
+    reading_ = false;
+    if (phase_ != Phase::kReading) return;
+    if (auto status = TakeBytes("request", bytes); !status.ok()) return End(std::move(status));
+    phase_ = Phase::kWorking;
+    owes_answer_ = true;
+  });
+}
+
+void UnaryFlow::ReadEnded() {
+  On([&] {
+    reading_ = false;
+    if (phase_ == Phase::kReading) End(NoRequest());
+  });
+}
+
+// What the call holds from now on.
+absl::Status UnaryFlow::TakeBytes(std::string field, std::uint64_t bytes) {
+  if (kind_ == UnaryKind::kInformation) {
+    budget_.Take(bytes, caller_.get());
+  } else if (const auto fit = budget_.TryTake(bytes, caller_.get()); fit != FairShare::Fit::kYes) {
+    return NoRoom(fit, std::move(field), bytes, budget_.bytes());
+  }
+  held_bytes_ = bytes;
+  return absl::OkStatus();
+}
+
+void UnaryFlow::Answer(Worker* worker) {
+  absl::StatusOr<std::uint64_t> bytes = ClientGone();
+  if (!cancelled_) bytes = door_.Answer(worker);
+  // The request is gone, so that its answer may have all that its caller may.
+  On([&] { surplus_ += std::exchange(held_bytes_, 0); });
+  On([&] {
+    working_ = false;
+    if (phase_ != Phase::kWorking) return;
+    if (!bytes.ok()) return End(bytes.status());
+    if (auto status = TakeBytes("answer", *bytes); !status.ok()) return End(std::move(status));
+    phase_ = Phase::kWriting;
+    phase_began_ = std::chrono::steady_clock::now();
+    owes_write_ = true;
+  });
+}
+
+void UnaryFlow::WriteDone(bool ok) {
+  On([&] {
+    writing_ = false;
+    if (phase_ != Phase::kWriting) return;
+    if (ok) {
+      End(absl::OkStatus());
+    } else {
+      Abandon(ClientGone());
+    }
+  });
+}
+
+void UnaryFlow::Cancelled() {
+  On([&] { Abandon(ClientGone()); });
+}
+
+void UnaryFlow::GiveWay(const absl::Status& status) {
+  On([&] {
+    if (phase_ == Phase::kReading) End(status);
+  });
+}
+
+void UnaryFlow::Drain() {
+  On([&] {
+    if (phase_ == Phase::kReading) End(DrainingError());
+  });
+}
+
+TimePoint UnaryFlow::EndIfIdle(const UnaryLimits& limits, TimePoint now) {
+  TimePoint look_again = TimePoint::max();
+  On([&] {
+    if (phase_ != Phase::kReading && phase_ != Phase::kWriting) return;
+    const auto limit = phase_ == Phase::kReading ? limits.request : limits.answer;
+    if (limit <= limit.zero()) return;
+    if (now < phase_began_ + limit) {
+      look_again = phase_began_ + limit;
+    } else if (phase_ == Phase::kReading) {
+      End(IdleError("sends no request", limit));
+    } else {
+      Abandon(IdleError("takes no answer", limit));
+      owes_cut_ = true;
+    }
+  });
+  return look_again;
+}
+
+void UnaryFlow::End(absl::Status status) {
+  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+  phase_ = Phase::kEnding;
+  status_ = std::move(status);
+}
+
+void UnaryFlow::Abandon(absl::Status status) {
+  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+  phase_ = Phase::kAbandoned;
+  status_ = std::move(status);
+  cancelled_ = true;
+}
+
+UnaryFlow::Actions UnaryFlow::Decide() {
+  Actions actions;
+  if (std::exchange(owes_read_, false)) actions.read = reading_ = calling_ = true;
+  if (std::exchange(owes_answer_, false)) actions.answer = working_ = true;
+  if (std::exchange(owes_write_, false) && phase_ == Phase::kWriting) {
+    actions.write = writing_ = true;
+  }
+  const bool over = phase_ == Phase::kEnding || phase_ == Phase::kAbandoned;
+  if (!calling_ && std::exchange(owes_cut_, false) && over) actions.cut = calling_ = true;
+  if (over && !working_ && !writing_ && !calling_) {
+    phase_ = Phase::kFinished;
+    surplus_ += std::exchange(held_bytes_, 0);
+    actions.finish = status_;
+  }
+  actions.give_back = std::exchange(surplus_, 0);
+  return actions;
+}
+
+void UnaryFlow::Perform(Actions actions) {
+  const auto self = shared_from_this();
+  for (;;) {
+    if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
+    if (actions.answer) {
+      if (pool_ == nullptr) {
+        Answer(nullptr);
+      } else {
+        pool_->Submit([self](Worker& worker) { self->Answer(&worker); }, [] {}, nullptr,
+                      caller_.get());
+      }
+    }
+    if (actions.write) door_.StartWrite();
+    if (actions.cut) door_.Cut();
+    if (actions.finish) door_.Finish(*actions.finish);
+    if (!actions.read && !actions.cut) return;
+    if (actions.read) door_.StartRead();
+    const std::lock_guard lock(mutex_);
+    calling_ = false;
+    actions = Decide();
+  }
+}
+
+}  // namespace partiemc::server

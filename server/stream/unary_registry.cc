@@ -1,0 +1,91 @@
+#include "server/stream/unary_registry.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/stream/stream_flow.h"
+
+namespace partiemc::server {
+namespace {
+
+std::size_t IndexOf(UnaryKind kind) { return static_cast<std::size_t>(kind); }
+
+absl::Status TooMany(UnaryKind kind, const FairShare& places, const CallerAccount& caller) {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonTooManyCalls),
+       kind == UnaryKind::kFrame ? "calls of ReconstructFrame" : "calls for information",
+       absl::StrCat(places.held(), " going on, ", places.held_by(&caller), " of this caller"),
+       absl::StrCat("must be at most ", places.room(),
+                    ", and of one caller no more than are free; try again later")});
+}
+
+}  // namespace
+
+absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryFlow> call, UnaryKind kind) {
+  const std::lock_guard lock(mutex_);
+  if (draining_ && kind == UnaryKind::kFrame) return DrainingError();
+  const UnaryFlow* key = call.get();
+  calls_[key] = {std::move(call), kind};
+  return absl::OkStatus();
+}
+
+absl::Status UnaryRegistry::TakePlace(const UnaryFlow& call, const CallerAccount& caller) {
+  const std::lock_guard lock(mutex_);
+  Entry& entry = calls_.at(&call);
+  FairShare& places = places_[IndexOf(entry.kind)];
+  if (places.Fits(&caller, 1) != FairShare::Fit::kYes) return TooMany(entry.kind, places, caller);
+  places.Take(&caller, 1);
+  entry.caller = &caller;
+  return absl::OkStatus();
+}
+
+void UnaryRegistry::Leave(const UnaryFlow& call) {
+  const std::lock_guard lock(mutex_);
+  const auto found = calls_.find(&call);
+  if (found == calls_.end()) return;  // It was not let in.
+  const Entry& entry = found->second;
+  if (entry.caller != nullptr) places_[IndexOf(entry.kind)].GiveBack(entry.caller, 1);
+  calls_.erase(found);
+  // With the lock held: whoever waits for the last one may take the registry away after that.
+  left_.notify_all();
+}
+
+std::size_t UnaryRegistry::count() const {
+  const std::lock_guard lock(mutex_);
+  return calls_.size();
+}
+
+std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
+    const UnaryLimits& limits, std::chrono::steady_clock::time_point now) {
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  // Without the lock: one that ends may leave at once.
+  for (const auto& call : All()) look_again = std::min(look_again, call->EndIfIdle(limits, now));
+  return look_again;
+}
+
+std::vector<std::shared_ptr<UnaryFlow>> UnaryRegistry::All() const {
+  std::vector<std::shared_ptr<UnaryFlow>> all;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, entry] : calls_) all.push_back(entry.call);
+  return all;
+}
+
+// Calls are told without the lock: one that ends may leave at once.
+void UnaryRegistry::Drain() {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  for (const auto& call : All()) call->Drain();
+}
+
+bool UnaryRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return left_.wait_until(lock, deadline, [this] { return calls_.empty(); });
+}
+
+}  // namespace partiemc::server

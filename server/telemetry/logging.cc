@@ -1,0 +1,207 @@
+#include "server/telemetry/logging.h"
+
+#include <grpc/support/log.h>
+#include <signal.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <ctime>
+#include <iterator>
+#include <mutex>
+#include <utility>
+
+#include "partiemc/printable.h"
+#include "partiemc/status.h"
+#include "server/base/rate_limit.h"
+#include "server/telemetry/log_writer.h"
+
+namespace partiemc::server {
+namespace {
+
+// Begins the payload of a line whose fields are JSON already; nothing else can begin with it.
+constexpr char kFieldsFollow = '\x1e';
+
+constexpr std::uint32_t kRefusalsPerSecond = 20;
+constexpr std::chrono::milliseconds kPatienceOnAbort(500);
+
+std::atomic<LogFormat> log_format = LogFormat::kText;
+RateLimit refusals(kRefusalsPerSecond);
+std::shared_ptr<LogWriter> writer;  // Since SetUpLogging.
+
+// Valid JSON, whatever comes: bytes that are no UTF-8 become U+FFFD.
+void AppendEscaped(std::string_view text, std::string& out) {
+  while (!text.empty()) {
+    const std::string_view before = text;
+    const auto character = TakeCharacter(text);
+    if (character == U'"' || character == U'\\') {
+      out += '\\';
+      out += before.front();
+    } else if (!character) {
+      out += "\\ufffd";
+    } else if (IsControl(*character)) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(*character));
+    } else {
+      out += before.substr(0, before.size() - text.size());
+    }
+  }
+}
+
+std::string Quoted(std::string_view text) {
+  std::string quoted = "\"";
+  AppendEscaped(text, quoted);
+  return quoted + "\"";
+}
+
+bool IsPlain(std::string_view text) {
+  return !text.empty() && std::ranges::all_of(text, [](char c) {
+    return c > 0x20 && c < 0x7f && c != '"' && c != '\\' && c != '=';
+  });
+}
+
+std::string ToText(const LogField& field, bool json) {
+  if (const auto* text = std::get_if<std::string>(&field.value)) {
+    return json || !IsPlain(*text) ? Quoted(*text) : *text;
+  }
+  if (const auto* count = std::get_if<std::uint64_t>(&field.value)) return std::to_string(*count);
+  return fmt::format("{:.3f}", std::get<double>(field.value));
+}
+
+// One JSON object a line: {"time":"2024-05-01T12:00:00.000Z","level":"info","message":"..."}.
+class JsonFormatter final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
+    const auto time = std::chrono::floor<std::chrono::milliseconds>(message.time);
+    const auto milliseconds = time.time_since_epoch().count() % 1000;
+    const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
+    std::tm parts{};
+    gmtime_r(&seconds, &parts);
+    const auto level = spdlog::level::to_string_view(message.level);
+    const std::string_view payload(message.payload.data(), message.payload.size());
+    const bool fields = payload.starts_with(kFieldsFollow);
+    fmt::format_to(std::back_inserter(out),
+                   R"({{"time":"{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03}Z","level":"{}",)"
+                   R"("message":{}}})"
+                   "\n",
+                   parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday, parts.tm_hour,
+                   parts.tm_min, parts.tm_sec, milliseconds,
+                   fmt::string_view(level.data(), level.size()),
+                   fields ? std::string(payload.substr(1)) : Quoted(payload));
+  }
+
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<JsonFormatter>();
+  }
+};
+
+// Errors are about gRPC's own insides; what went wrong for a user is told in our own words. What it
+// says below that level is for its developers, and may show what travels.
+void LogFromGrpc(gpr_log_func_args* message) {
+  if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
+  LogEvent(spdlog::level::debug, "grpc", {{"says", std::string(message->message)}});
+}
+
+class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit WriterSink(std::shared_ptr<LogWriter> to) : to_(std::move(to)) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    to_->Write({line.data(), line.size()});
+  }
+  void flush_() override {}
+
+  const std::shared_ptr<LogWriter> to_;
+};
+
+// Lines about lines that are missing.
+void TellLosses() {
+  if (const auto count = refusals.TakeHeldBack(); count > 0) {
+    LogEvent(spdlog::level::warn, "more refusals", {{"count", count}});
+  }
+  static std::atomic<std::uint64_t> told = 0;
+  const std::uint64_t dropped = LossesOfLog().dropped_lines;
+  if (const auto before = told.exchange(dropped); dropped > before) {
+    LogEvent(spdlog::level::warn, "log lines dropped", {{"count", dropped - before}});
+  }
+}
+
+void OnAbort(int signal) {
+  if (writer) writer->FlushInSignal(kPatienceOnAbort);
+  raise(signal);  // By default again (SA_RESETHAND).
+}
+
+}  // namespace
+
+std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format) {
+  if (format == LogFormat::kJson) return std::make_unique<JsonFormatter>();
+  return std::make_unique<spdlog::pattern_formatter>("%Y-%m-%d %H:%M:%S.%e %l %v");
+}
+
+void LogEvent(spdlog::level::level_enum level, std::string_view event,
+              std::initializer_list<LogField> fields) {
+  const bool json = log_format == LogFormat::kJson;
+  std::string line = json ? kFieldsFollow + Quoted(event) : std::string(event);
+  for (const LogField& field : fields) {
+    line += json ? ",\"" : " ";
+    line += field.name;
+    line += json ? "\":" : "=";
+    line += ToText(field, json);
+  }
+  spdlog::log(level, fmt::string_view("{}"), line);
+}
+
+void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status) {
+  if (!refusals.Allow(RateLimit::Clock::now())) return;
+  const auto violation = FindViolation(status);
+  LogEvent(spdlog::level::warn, event,
+           {{"peer", peer},
+            {"status", absl::StatusCodeToString(status.code())},
+            {"reason", violation ? violation->reason : std::string()},
+            {"error", std::string(status.message())}});
+}
+
+void SetUpLogging(const std::string& level, LogFormat format) {
+  log_format = format;
+  writer = std::make_shared<LogWriter>(LogWriter::Options{.every_second = &TellLosses});
+  auto logger =
+      std::make_shared<spdlog::logger>("partiemc-server", std::make_shared<WriterSink>(writer));
+  logger->set_formatter(MakeLogFormatter(format));
+  logger->set_level(spdlog::level::from_str(level));
+  spdlog::set_default_logger(std::move(logger));
+  // Before what it logs to goes.
+  static const int registered = std::atexit([] {
+    FlushLog();
+    writer.reset();
+  });
+  static_cast<void>(registered);
+  gpr_set_log_function(&LogFromGrpc);
+}
+
+void RefuseTraces() {
+  if (std::getenv("GRPC_TRACE") == nullptr) return;
+  unsetenv("GRPC_TRACE");
+  LogEvent(spdlog::level::warn, "GRPC_TRACE ignored",
+           {{"error", "gRPC's traces print tokens; the log holds none"}});
+}
+
+void FlushLogOnAbort() {
+  struct sigaction action = {};
+  action.sa_handler = OnAbort;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGABRT, &action, nullptr);
+}
+
+void FlushLog(std::chrono::milliseconds patience) {
+  TellLosses();
+  if (writer) writer->Flush(patience);
+}
+
+LogLosses LossesOfLog() { return {writer ? writer->dropped() : 0, refusals.held_back_in_all()}; }
+
+}  // namespace partiemc::server

@@ -1,0 +1,35 @@
+// Serves metrics to Prometheus over HTTP.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/status/statusor.h"
+#include "server/base/address.h"
+#include "server/telemetry/metrics.h"
+
+namespace prometheus {
+class Exposer;
+}
+
+namespace partiemc::server {
+
+/// GET /metrics answers with all of them. Runs in two threads of its own until it is destroyed.
+class MetricsEndpoint {
+ public:
+  /// Errors: INVALID_ARGUMENT for a Unix socket, UNAVAILABLE where it cannot listen.
+  static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Listen(
+      const Address& address, const std::shared_ptr<Metrics>& metrics);
+  ~MetricsEndpoint();
+
+  /// With the port that it got.
+  const Address& address() const { return address_; }
+
+ private:
+  MetricsEndpoint(Address address, std::unique_ptr<prometheus::Exposer> exposer);
+
+  const Address address_;
+  std::unique_ptr<prometheus::Exposer> exposer_;
+};
+
+}  // namespace partiemc::server

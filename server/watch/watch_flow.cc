@@ -1,0 +1,341 @@
+#include "server/watch/watch_flow.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/base/call_errors.h"
+#include "server/watch/watch_hub.h"
+
+namespace partiemc::server {
+namespace {
+
+// A watch that ends with an error says the same in its last message.
+WatchEnd EndWith(absl::Status status) {
+  const auto violation = FindViolation(status);
+  return {.reason = violation ? violation->reason : absl::StatusCodeToString(status.code()),
+          .message = std::string(status.message()),
+          .status = std::move(status)};
+}
+
+WatchEnd FellBehind(std::size_t frames, std::size_t bytes, std::size_t max_bytes) {
+  return EndWith(ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonFellBehind), "watcher",
+       absl::StrCat(frames, " frames of ", bytes, " bytes behind"),
+       absl::StrCat("must be at most ", max_bytes,
+                    " bytes behind in mode `every`; give credit sooner, or watch in mode "
+                    "`latest`")}));
+}
+
+WatchEnd TooLarge(std::size_t bytes, std::size_t max_bytes) {
+  return EndWith(ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonWatchedBytes), "frame", absl::StrCat(bytes, " bytes"),
+       absl::StrCat("must be at most ", max_bytes,
+                    " to be watched; have the producer ask for less, or start the server with a "
+                    "larger --max-watcher-bytes")}));
+}
+
+}  // namespace
+
+WatchEnd WatchEnd::OfStream(const absl::Status& status) {
+  if (status.ok()) return {std::string(kReasonFinished), "the producer has finished", {}};
+  if (absl::IsCancelled(status)) {
+    return {std::string(kReasonProducerLost), "the producer's connection is gone", {}};
+  }
+  WatchEnd end = EndWith(status);
+  // It is the producer that broke a rule, not the watcher.
+  if (!absl::IsUnavailable(status)) end.status = absl::OkStatus();
+  return end;
+}
+
+// Lets something happen to the state and does what follows from it.
+template <typename Event>
+void WatchFlow::On(Event event) {
+  Actions actions;
+  {
+    const std::lock_guard lock(mutex_);
+    event();
+    actions = Decide();
+  }
+  Perform(std::move(actions));
+}
+
+void WatchFlow::Start(absl::Status admission) {
+  On([&] {
+    if (!admission.ok()) Refuse(std::move(admission));
+  });
+}
+
+void WatchFlow::ReadDone(const WatchRequest& request) {
+  bool open = false;
+  On([&] {
+    reading_ = false;
+    TakeRequest(request);
+    open = opening_;
+  });
+  if (open) Open();
+}
+
+void WatchFlow::TakeRequest(const WatchRequest& request) {
+  using Kind = WatchRequest::Kind;
+  if (phase_ == Phase::kOpening) {
+    opening_ = request.kind == Kind::kOpen;
+    if (!opening_) Refuse(ProtocolError("no `open`", "the first must be `open`"));
+  } else if (phase_ != Phase::kWatching && phase_ != Phase::kEnding) {
+    return;
+  } else if (request.kind != Kind::kCredit) {
+    End(EndWith(ProtocolError(request.kind == Kind::kOpen ? "open" : "no `credit`",
+                              "after the first every request must be `credit`")));
+  } else if (request.credit == 0) {
+    End(EndWith(ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonOutOfRange), "credit.frames", "0", "must be at least 1"})));
+  } else {
+    credit_ += request.credit;
+  }
+}
+
+// The watcher joins before it is told that it is in, so that it misses nothing that is published
+// after that. Nothing is written, and nothing ends, until then.
+void WatchFlow::Open() {
+  absl::StatusOr<WatchTerms> terms = door_.Open();
+  std::shared_ptr<WatchHub> hub;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!terms.ok()) {
+      Refuse(terms.status());
+    } else if (phase_ == Phase::kOpening) {
+      phase_ = Phase::kWatching;
+      owes_opened_ = true;
+      mode_ = terms->mode;
+      credit_ = terms->credit;
+      hub = hub_ = terms->hub;
+    }
+  }
+  if (hub != nullptr) hub->Join(shared_from_this());
+  On([&] { opening_ = false; });
+}
+
+void WatchFlow::ReadEnded() {
+  On([&] {
+    reading_ = false;
+    half_closed_ = true;
+    if (phase_ == Phase::kOpening && !opening_) {
+      Refuse(ProtocolError("none", "the first must be `open`"));
+    }
+  });
+}
+
+void WatchFlow::WriteDone(bool ok) {
+  Published written;  // Its memory is given back without the lock.
+  On([&] {
+    writing_ = false;
+    if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
+    written = std::exchange(in_write_, {});
+    if (!ok) Abandon();
+  });
+}
+
+void WatchFlow::Cancelled() {
+  On([&] { Abandon(); });
+}
+
+void WatchFlow::Offer(std::span<const Published> frames) {
+  On([&] {
+    for (const Published& published : frames) {
+      if (phase_ != Phase::kWatching) return;
+      if (published.number > offered_) Take(published);
+    }
+  });
+}
+
+void WatchFlow::Take(const Published& published) {
+  if (offered_ == 0) next_told_ = published.number;
+  const std::uint64_t missed = offered_ == 0 ? 0 : published.number - offered_ - 1;
+  offered_ = published.number;
+  counts_.dropped += missed;
+  const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
+  if (bytes > max_bytes_) {
+    ++counts_.dropped;
+    return End(TooLarge(published.frame->bytes(), max_bytes_));
+  }
+  if (mode_ == WatchMode::kLatest) {
+    DropPending();
+  } else if (missed > 0 || held_bytes_ + bytes > max_bytes_) {
+    ++counts_.dropped;
+    return End(FellBehind(pending_.size() + missed + 1, held_bytes_ + bytes, max_bytes_));
+  }
+  pending_.push_back(published);
+  held_bytes_ += bytes;
+  counts_.most_held_bytes = std::max(counts_.most_held_bytes, held_bytes_);
+}
+
+void WatchFlow::StreamEnded(const WatchEnd& end) {
+  On([&] {
+    if (phase_ != Phase::kWatching) return;
+    if (end.status.ok()) {
+      phase_ = Phase::kEnding;
+      end_ = end;
+      owes_ended_ = true;
+    } else {
+      End(end);
+    }
+  });
+}
+
+void WatchFlow::Drain() {
+  On([&] {
+    if (phase_ == Phase::kOpening) Refuse(DrainingError());
+    if (phase_ == Phase::kWatching || phase_ == Phase::kEnding) End(EndWith(DrainingError()));
+  });
+}
+
+std::chrono::steady_clock::time_point WatchFlow::EndIfSilent(
+    std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  On([&] {
+    if (phase_ != Phase::kOpening || opening_ || limit <= limit.zero()) return;
+    if (now < came_ + limit) {
+      look_again = came_ + limit;
+    } else {
+      Refuse(IdleError("sends no `open`", limit));
+    }
+  });
+  return look_again;
+}
+
+void WatchFlow::GiveWay(const absl::Status& status) {
+  On([&] {
+    if (phase_ == Phase::kOpening && !opening_) Refuse(status);
+  });
+}
+
+void WatchFlow::Cut() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (phase_ == Phase::kFinished || cutting_) return;
+    cutting_ = true;
+  }
+  door_.Cut();
+  On([&] {
+    cutting_ = false;
+    Abandon();
+  });
+}
+
+WatchCounts WatchFlow::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+std::size_t WatchFlow::held_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return held_bytes_;
+}
+
+void WatchFlow::DropPending() {
+  counts_.dropped += pending_.size();
+  for (const Published& dropped : pending_) held_bytes_ -= dropped.frame->bytes() + kPublishedBytes;
+  pending_.clear();
+}
+
+// What is held is given up: there is no time to wait for credit, or no sense in it.
+void WatchFlow::End(WatchEnd end) {
+  if (phase_ == Phase::kEnding && !owes_ended_) return;  // Another end has been told.
+  phase_ = Phase::kEnding;
+  end_ = std::move(end);
+  owes_ended_ = true;
+  DropPending();
+}
+
+// Before the watch was open: the status says it all.
+void WatchFlow::Refuse(absl::Status status) {
+  if (phase_ != Phase::kOpening) return;
+  phase_ = Phase::kEnding;
+  end_ = EndWith(std::move(status));
+}
+
+void WatchFlow::Abandon() {
+  if (phase_ == Phase::kFinished) return;
+  phase_ = Phase::kAbandoned;
+  end_.status = absl::CancelledError("the watcher went away");
+  DropPending();
+}
+
+WatchFlow::Actions WatchFlow::Decide() {
+  Actions actions;
+  const bool no_more_credit = half_closed_ && credit_ == 0;
+  if (no_more_credit && phase_ == Phase::kWatching && !writing_) {
+    End({std::string(kReasonCreditUsed), "half-closed, and all credit is used", {}});
+  }
+  if (no_more_credit && phase_ == Phase::kEnding) DropPending();
+  const bool open = phase_ == Phase::kWatching || phase_ == Phase::kEnding;
+  if ((phase_ == Phase::kOpening || open) && !half_closed_ && !opening_ && !reading_ &&
+      !starting_read_) {
+    actions.read = reading_ = starting_read_ = true;
+  }
+  if (open && !writing_ && !opening_) DecideWrite(actions);
+  const bool all_said =
+      phase_ == Phase::kAbandoned || (phase_ == Phase::kEnding && !owes_ended_ && !owes_opened_);
+  if (all_said && !opening_ && !writing_ && !starting_read_ && !cutting_) {
+    phase_ = Phase::kFinished;
+    actions.finish = end_.status;
+    actions.leave = std::exchange(hub_, nullptr);
+  }
+  return actions;
+}
+
+void WatchFlow::DecideWrite(Actions& actions) {
+  if (owes_opened_) {
+    owes_opened_ = false;
+    actions.write = Write::kOpened;
+  } else if (!pending_.empty() && credit_ > 0) {
+    --credit_;
+    ++counts_.frames;
+    actions.write = Write::kFrame;
+    in_write_ = std::move(pending_.front());
+    pending_.pop_front();
+    actions.frame = in_write_;
+    actions.dropped = in_write_.number - next_told_;
+    next_told_ = in_write_.number + 1;
+  } else if (owes_ended_ && pending_.empty()) {
+    owes_ended_ = false;
+    actions.write = Write::kEnded;
+    actions.end = end_;
+    actions.dropped = offered_ == 0 ? 0 : offered_ + 1 - next_told_;
+  } else {
+    return;
+  }
+  writing_ = true;
+}
+
+void WatchFlow::Perform(Actions actions) {
+  const auto self = shared_from_this();
+  for (;;) {
+    if (actions.write) {
+      switch (*actions.write) {
+        case Write::kOpened:
+          door_.WriteOpened();
+          break;
+        case Write::kFrame:
+          door_.WriteFrame(*actions.frame.frame, actions.dropped);
+          break;
+        case Write::kEnded:
+          door_.WriteEnded(actions.end, actions.dropped);
+          break;
+      }
+    }
+    if (actions.leave != nullptr) actions.leave->Leave(*this);
+    if (actions.finish) door_.Finish(*actions.finish);
+    if (!actions.read) return;
+    door_.StartRead();
+    const std::lock_guard lock(mutex_);
+    starting_read_ = false;
+    actions = Decide();
+  }
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,190 @@
+// How results flow to one watcher: credits, drops, ends. It knows neither what the messages are nor
+// how they travel; a door (gRPC, or a test's memory) does.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/watch/watch_tap.h"
+
+namespace partiemc::server {
+
+class WatchHub;
+
+/// The reasons for which a watch ends, beside those of StreamFlow (proto/PROTOCOL.md).
+inline constexpr std::string_view kReasonFellBehind = "FELL_BEHIND";
+inline constexpr std::string_view kReasonWatchedBytes = "WATCHED_BYTES";
+inline constexpr std::string_view kReasonFinished = "FINISHED";
+inline constexpr std::string_view kReasonProducerLost = "PRODUCER_LOST";
+inline constexpr std::string_view kReasonCreditUsed = "CREDIT_USED";
+
+enum class WatchMode { kLatest, kEvery };
+
+/// Why a watch ends, told to its watcher.
+struct WatchEnd {
+  std::string reason;
+  std::string message;  ///< For a person.
+  absl::Status status;  ///< Of the call.
+
+  /// For the watchers of a stream that ended with `status`.
+  static WatchEnd OfStream(const absl::Status& status);
+};
+
+/// What a watcher asked for when it came.
+struct WatchTerms {
+  std::shared_ptr<WatchHub> hub;  ///< Of the stream.
+  WatchMode mode = WatchMode::kLatest;
+  std::uint64_t credit = 1;
+};
+
+/// What a request turned out to be.
+struct WatchRequest {
+  enum class Kind { kMalformed, kEmpty, kOpen, kCredit };
+  Kind kind = Kind::kMalformed;
+  std::uint64_t credit = 0;
+};
+
+/// Where a watcher's messages come in and go out. WatchFlow never has more than one read and one
+/// write going on, and never calls the door with a lock held.
+class WatchDoor {
+ public:
+  virtual ~WatchDoor() = default;
+
+  /// Begins to read the next request; ends in WatchFlow::ReadDone or ReadEnded.
+  virtual void StartRead() = 0;
+  /// Looks at the `open` that was just read, and prepares what WriteOpened sends. An error ends the
+  /// watch.
+  virtual absl::StatusOr<WatchTerms> Open() = 0;
+
+  /// Each begins to write; ends in WatchFlow::WriteDone.
+  virtual void WriteOpened() = 0;
+  virtual void WriteFrame(const WatchFrame& frame, std::uint64_t dropped) = 0;
+  virtual void WriteEnded(const WatchEnd& end, std::uint64_t dropped) = 0;
+
+  /// Has reads and writes that go on fail soon, whatever the other side does.
+  virtual void Cut() = 0;
+  /// The last call that the door gets; a read may still be going on, nothing else.
+  virtual void Finish(const absl::Status& status) = 0;
+};
+
+/// Frames count from the first that was offered on.
+struct WatchCounts {
+  std::uint64_t frames = 0;         ///< Given to the door.
+  std::uint64_t dropped = 0;        ///< Never to be.
+  std::size_t most_held_bytes = 0;  ///< At any one time, of those not taken yet.
+};
+
+/// The state machine of one watcher:
+///
+///   opening --open--> watching --stream ends, fell behind, drain--> ending ----> finished
+///      |                 |                                            |             ^
+///      |                 +------------ cancelled, write failed -------+-> abandoned
+///      +-- no open, or refused: finished
+///
+/// A frame is written when there is credit and no other write goes on. Until then `latest` holds
+/// the newest one only; `every` holds all of them, at most `max_bytes`, the one being written
+/// included, and the watch ends when there would be more. Ending because the stream did, what is
+/// held is still written as credit comes. Safe from any thread.
+class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
+ public:
+  /// `door` lives until its Finish returns. Held by shared_ptr only. A frame of more than
+  /// `max_bytes` ends the watch.
+  WatchFlow(WatchDoor& door, std::size_t max_bytes) : door_(door), max_bytes_(max_bytes) {}
+
+  /// Begins with the first read, or, where `admission` is an error, ends with it at once. Called
+  /// once. Every end of a watch goes through this state machine, that of a refused one too, so that
+  /// WatchDoor::Finish is called exactly once, whatever the watcher does meanwhile.
+  void Start(absl::Status admission = absl::OkStatus());
+
+  /// The read that was begun last has brought this request.
+  void ReadDone(const WatchRequest& request);
+  /// ... has found that no request will come any more: what there is credit for is still written.
+  void ReadEnded();
+  void WriteDone(bool ok);
+  /// Nobody is there any more.
+  void Cancelled();
+
+  /// New frames, in the order of their numbers; those that were offered before are passed over.
+  void Offer(std::span<const Published> frames);
+  /// No more will come.
+  void StreamEnded(const WatchEnd& end);
+  /// The server is going away: says so and ends, credit or not.
+  void Drain();
+  /// Ends a watch with DEADLINE_EXCEEDED (IDLE) that at `now` has not sent its `open` for `limit`;
+  /// 0: for ever. Gives the time before which there is no need to look again.
+  std::chrono::steady_clock::time_point EndIfSilent(std::chrono::milliseconds limit,
+                                                    std::chrono::steady_clock::time_point now);
+  /// Ends a watch that has not sent its `open` with this error; others go on.
+  void GiveWay(const absl::Status& status);
+  /// Ends at once, said or not.
+  void Cut();
+
+  WatchCounts counts() const;
+  /// Of the frames that the watcher has not taken yet.
+  std::size_t held_bytes() const;
+
+ private:
+  enum class Phase { kOpening, kWatching, kEnding, kAbandoned, kFinished };
+  enum class Write { kOpened, kFrame, kEnded };
+
+  // What to do once the lock is released; the flags of what is going on are set already.
+  struct Actions {
+    bool read = false;
+    std::optional<Write> write;
+    Published frame;
+    WatchEnd end;
+    std::uint64_t dropped = 0;
+    std::optional<absl::Status> finish;
+    std::shared_ptr<WatchHub> leave;
+  };
+
+  // With the lock held:
+  Actions Decide();
+  void DecideWrite(Actions& actions);
+  void TakeRequest(const WatchRequest& request);
+  void Take(const Published& published);
+  void End(WatchEnd end);
+  void Refuse(absl::Status status);
+  void Abandon();
+  void DropPending();
+  // Without:
+  template <typename Event>
+  void On(Event event);
+  void Perform(Actions actions);
+  void Open();
+
+  WatchDoor& door_;
+  const std::size_t max_bytes_;
+
+  const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
+
+  mutable std::mutex mutex_;  // Guards everything below.
+  Phase phase_ = Phase::kOpening;
+  WatchEnd end_;  // From kEnding on.
+  std::shared_ptr<WatchHub> hub_;
+  WatchMode mode_ = WatchMode::kLatest;
+  std::uint64_t credit_ = 0;
+  bool half_closed_ = false;
+  std::deque<Published> pending_;  // Not yet written.
+  Published in_write_;             // Its memory is the connection's for now.
+  std::size_t held_bytes_ = 0;     // Of both.
+  std::uint64_t offered_ = 0;      // The number of the last frame offered; 0: none yet.
+  std::uint64_t next_told_ = 0;    // The number that the next frame has if none is dropped.
+  bool reading_ = false, writing_ = false, opening_ = false;
+  // Between the decision and the return of the door's call: the door has to stay.
+  bool starting_read_ = false, cutting_ = false;
+  bool owes_opened_ = false, owes_ended_ = false;
+  WatchCounts counts_;
+};
+
+}  // namespace partiemc::server

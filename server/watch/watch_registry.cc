@@ -1,0 +1,94 @@
+#include "server/watch/watch_registry.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/base/call_errors.h"
+
+namespace partiemc::server {
+
+absl::Status WatchRegistry::Enter(std::shared_ptr<WatchFlow> watcher) {
+  const std::lock_guard lock(mutex_);
+  if (draining_) return DrainingError();
+  const WatchFlow* key = watcher.get();
+  watchers_[key] = std::move(watcher);
+  return absl::OkStatus();
+}
+
+absl::Status WatchRegistry::Open(const WatchFlow& watcher, const Caller& caller) {
+  const std::lock_guard lock(mutex_);
+  if (placed_.size() >= max_watchers_) {
+    return ViolationError(
+        absl::StatusCode::kResourceExhausted,
+        {std::string(kReasonTooManyWatchers), "watchers", absl::StrCat(placed_.size(), " watch"),
+         absl::StrCat("must be at most ", max_watchers_,
+                      "; try again when one has left, or start the server with a larger "
+                      "--max-watchers")});
+  }
+  auto place = caller.account()->Take(CallerAccount::Kind::kWatcher);
+  if (!place.ok()) return place.status();
+  placed_.emplace(&watcher, *std::move(place));
+  return absl::OkStatus();
+}
+
+void WatchRegistry::Close(const WatchFlow& watcher) {
+  const std::lock_guard lock(mutex_);
+  placed_.erase(&watcher);
+}
+
+void WatchRegistry::Leave(const WatchFlow& watcher) {
+  const std::lock_guard lock(mutex_);
+  placed_.erase(&watcher);
+  watchers_.erase(&watcher);
+  // With the lock held: whoever waits for the last one may take the registry away after that.
+  left_.notify_all();
+}
+
+std::size_t WatchRegistry::count() const {
+  const std::lock_guard lock(mutex_);
+  return placed_.size();
+}
+
+std::uint64_t WatchRegistry::held_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& watcher : All()) bytes += watcher->held_bytes();
+  return bytes;
+}
+
+std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
+    std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
+  auto look_again = std::chrono::steady_clock::time_point::max();
+  // Without the lock: one that ends may leave at once.
+  for (const auto& watcher : All()) {
+    look_again = std::min(look_again, watcher->EndIfSilent(limit, now));
+  }
+  return look_again;
+}
+
+std::vector<std::shared_ptr<WatchFlow>> WatchRegistry::All() const {
+  std::vector<std::shared_ptr<WatchFlow>> all;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
+  return all;
+}
+
+// Flows are told without the lock: one that drains may leave at once.
+void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  for (const auto& watcher : All()) watcher->Drain();
+  if (WaitUntilEmpty(patience)) return;
+  for (const auto& watcher : All()) watcher->Cut();
+}
+
+bool WatchRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return left_.wait_until(lock, deadline, [this] { return watchers_.empty(); });
+}
+
+}  // namespace partiemc::server
