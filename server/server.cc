@@ -39,6 +39,7 @@ constexpr int kUnreadBytes = 256 << 10;
 
 // A connection that does not get as far as HTTP/2 (and TLS) ends after this.
 constexpr int kHandshakeTimeoutMs = 10'000;
+constexpr int kReflectionThreads = 16;
 
 constexpr std::chrono::milliseconds kTimeToCut(250);
 // For the last words to arrive, and connections to close in the orderly way. gRPC itself waits
@@ -217,11 +218,16 @@ absl::Status Server::Listen() {
   // on has all of its message let in, so that large frames come as fast, but for one round trip.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
-  // A caller has no more calls, in however many connections.
+  // A caller has no more calls, in however many connections, unless its token says otherwise: then
+  // those beyond them wait in the client, or go by another connection.
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(options_.limits.CallsOfOneCaller()));
   // Otherwise two servers share a port without noticing, and clients reach one of them.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // Reflection alone is not ours: each of its calls has a thread for as long as it goes on.
+  grpc::ResourceQuota quota;
+  quota.SetMaxThreads(kReflectionThreads);
+  builder.SetResourceQuota(quota);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) {
     return absl::UnavailableError(absl::StrCat("cannot listen on ", address_.ToString(),
@@ -264,7 +270,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
   // to the last word: a connection that closes with requests unread takes back what was just
   // written.
   registry_.WaitUntilEmpty(deadline);
-  calls_.WaitUntilEmpty(deadline);
+  calls_.WaitForFrames(deadline);
   pump_.Flush();  // So that watchers hear of the last results before they are sent home.
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);

@@ -81,7 +81,9 @@ std::optional<ComputePool::Task> ComputePool::WaitForTask(std::unique_lock<std::
     if (auto task = NextTask()) return task;
     if (stopping_) return std::nullopt;
     const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
-    if (warm) {
+    if (waiting_ > 0) {  // For a thread that may be kept free of nobody by then.
+      task_came_.wait_for(lock, kSharingTime);
+    } else if (warm) {
       task_came_.wait_for(lock, warm_time_);
     } else {
       task_came_.wait(lock);

@@ -46,7 +46,7 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
 
   /// Whether the caller was let in.
   const absl::Status& admission() const { return admission_; }
-  /// Requires: it was.
+  /// Of one who was not let in: nobody in particular.
   const Caller& caller() const { return call_.caller; }
 
   /// From here until RequestCame the call gives way to others if need be: `flow->GiveWay` ends it.

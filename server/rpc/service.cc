@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "server/rpc/stream_messages.h"
 #include "server/rpc/unary_requests.h"
 #include "server/rpc/watch_reactor.h"
+#include "server/stream/session.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {
@@ -25,9 +27,8 @@ std::uint64_t MaxCallBytes(const ServerLimits& limits) {
   return limits.max_frame_bytes + limits.max_frame_bytes / 4;
 }
 
-absl::StatusOr<grpc::ByteBuffer> AnswerFrameCall(grpc::ByteBuffer& bytes,
-                                                 const ServerLimits& limits, Worker& worker,
-                                                 const std::atomic<bool>& cancelled) {
+absl::StatusOr<grpc::ByteBuffer> AnswerOrThrow(grpc::ByteBuffer& bytes, const ServerLimits& limits,
+                                               Worker& worker, const std::atomic<bool>& cancelled) {
   v1::ReconstructFrameRequest request;
   if (auto status = ParseRequest(bytes, MaxCallBytes(limits), request); !status.ok()) return status;
   const auto parameters = wire::DecodeParameters(request.parameters());
@@ -43,6 +44,17 @@ absl::StatusOr<grpc::ByteBuffer> AnswerFrameCall(grpc::ByteBuffer& bytes,
                   *session, worker, cancelled, *response.mutable_frame());
   if (!status.ok()) return status;
   return wire::ToBytes(response);
+}
+
+absl::StatusOr<grpc::ByteBuffer> AnswerFrameCall(grpc::ByteBuffer& bytes,
+                                                 const ServerLimits& limits, Worker& worker,
+                                                 const std::atomic<bool>& cancelled) {
+  const std::size_t size = bytes.Length();
+  try {
+    return AnswerOrThrow(bytes, limits, worker, cancelled);
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory(absl::StrCat(size, " bytes"));
+  }
 }
 
 absl::Status BadPage(std::string_view reason, std::string field, std::string value,
@@ -113,7 +125,10 @@ Service::Service(const ServerLimits& limits, const Authentication& authenticatio
 
 Service::Reactor* Service::ReconstructFrame(grpc::CallbackServerContext& context) {
   auto admission = Admit(authentication_, context, &Caller::CheckMayProduce);
-  if (auto status = registry_.CheckServing(); admission.ok() && !status.ok()) admission = status;
+  // Who is let in alone counts as somebody that a drain turns away.
+  if (admission.ok()) {
+    if (auto status = registry_.CheckServing(); !status.ok()) admission = std::move(status);
+  }
   return new UnaryReactor(
       context, std::move(admission), UnaryKind::kFrame, opening_, calls_, budget_, &pool_,
       [this](grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled) {

@@ -1,5 +1,9 @@
 #include "server/security/peer_accounts.h"
 
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <array>
 #include <map>
 #include <mutex>
 
@@ -10,16 +14,40 @@ struct PeerAccounts::Known {
   std::map<std::string, std::weak_ptr<CallerAccount>> accounts;  // Guarded by mutex.
 };
 
-std::string PeerWithoutPort(std::string_view peer) {
+namespace {
+
+// The network of 2^64 addresses that one host is given, or the address itself where it is none of
+// IPv6 proper: "[2001:db8::1]" gives "2001:db8::".
+std::string NetworkOf(std::string_view host) {
+  // gRPC writes brackets, and the sign before a zone, as in a URI.
+  for (const std::string_view before : {"[", "%5B"}) {
+    if (host.starts_with(before)) host.remove_prefix(before.size());
+  }
+  host = host.substr(0, std::min(host.find('%'), host.find(']')));
+  std::array<std::uint8_t, 16> address{};
+  if (inet_pton(AF_INET6, std::string(host).c_str(), address.data()) != 1) return std::string(host);
+  if (IN6_IS_ADDR_V4MAPPED(reinterpret_cast<const in6_addr*>(address.data()))) {
+    return std::string(host);
+  }
+  std::fill(address.begin() + 8, address.end(), std::uint8_t{0});
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  return inet_ntop(AF_INET6, address.data(), text.data(), text.size());
+}
+
+}  // namespace
+
+std::string HostOfPeer(std::string_view peer) {
   if (peer.starts_with("unix")) return "unix";
-  if (!peer.starts_with("ipv4:") && !peer.starts_with("ipv6:")) return std::string(peer);
-  return std::string(peer.substr(0, peer.rfind(':')));
+  const std::string_view host = peer.substr(0, peer.rfind(':'));
+  if (peer.starts_with("ipv4:")) return std::string(host);
+  if (peer.starts_with("ipv6:")) return "ipv6:" + NetworkOf(host.substr(5));
+  return std::string(peer);
 }
 
 std::shared_ptr<PeerAccounts::Known> PeerAccounts::MakeKnown() { return std::make_shared<Known>(); }
 
 std::shared_ptr<CallerAccount> PeerAccounts::Of(std::string_view peer) {
-  std::string key = PeerWithoutPort(peer);
+  std::string key = HostOfPeer(peer);
   const std::lock_guard lock(known_->mutex);
   std::weak_ptr<CallerAccount>& known = known_->accounts[key];
   if (auto account = known.lock()) return account;

@@ -10,9 +10,10 @@
 
 namespace partiemc::server {
 
-/// "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7", "ipv6:[::1]:51234" -> "ipv6:[::1]" (brackets as gRPC
-/// writes them, "%5B" and "%5D" too); all who come over a Unix socket are "unix".
-std::string PeerWithoutPort(std::string_view peer);
+/// "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Of IPv6 the first 64 bits, as one host may have all
+/// addresses that begin with them: "ipv6:[2001:db8::1]:51234" -> "ipv6:2001:db8::". All who come
+/// over a Unix socket are "unix".
+std::string HostOfPeer(std::string_view peer);
 
 /// Safe from any thread.
 class PeerAccounts {

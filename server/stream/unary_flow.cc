@@ -53,7 +53,6 @@ void UnaryFlow::Start(absl::Status admission) {
 
 void UnaryFlow::ReadDone(std::uint64_t bytes) {
   On([&] {
-    reading_ = false;
     if (phase_ != Phase::kReading) return;
     if (auto status = TakeBytes("request", bytes); !status.ok()) return End(std::move(status));
     phase_ = Phase::kWorking;
@@ -63,7 +62,6 @@ void UnaryFlow::ReadDone(std::uint64_t bytes) {
 
 void UnaryFlow::ReadEnded() {
   On([&] {
-    reading_ = false;
     if (phase_ == Phase::kReading) End(NoRequest());
   });
 }
@@ -156,7 +154,7 @@ void UnaryFlow::Abandon(absl::Status status) {
 
 UnaryFlow::Actions UnaryFlow::Decide() {
   Actions actions;
-  if (std::exchange(owes_read_, false)) actions.read = reading_ = calling_ = true;
+  if (std::exchange(owes_read_, false)) actions.read = calling_ = true;
   if (std::exchange(owes_answer_, false)) actions.answer = working_ = true;
   if (std::exchange(owes_write_, false) && phase_ == Phase::kWriting) {
     actions.write = writing_ = true;

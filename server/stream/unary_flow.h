@@ -122,7 +122,7 @@ class UnaryFlow final : public std::enable_shared_from_this<UnaryFlow> {
   mutable std::mutex mutex_;  // Guards everything below.
   Phase phase_ = Phase::kReading;
   absl::Status status_;
-  bool reading_ = false, working_ = false, writing_ = false;
+  bool working_ = false, writing_ = false;
   bool owes_read_ = false, owes_answer_ = false, owes_write_ = false, owes_cut_ = false;
   // Between the decision and the return of the door's call: the door has to stay.
   bool calling_ = false;

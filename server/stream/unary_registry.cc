@@ -83,9 +83,12 @@ void UnaryRegistry::Drain() {
   for (const auto& call : All()) call->Drain();
 }
 
-bool UnaryRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+bool UnaryRegistry::WaitForFrames(std::chrono::steady_clock::time_point deadline) {
   std::unique_lock lock(mutex_);
-  return left_.wait_until(lock, deadline, [this] { return calls_.empty(); });
+  return left_.wait_until(lock, deadline, [this] {
+    return std::ranges::none_of(
+        calls_, [](const auto& call) { return call.second.kind == UnaryKind::kFrame; });
+  });
 }
 
 }  // namespace partiemc::server

@@ -52,8 +52,8 @@ class UnaryRegistry {
 
   /// Lets no frame in any more and ends the calls whose request has not come.
   void Drain();
-  /// Whether all have left before the deadline.
-  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
+  /// Whether all that have frames have left before the deadline. Calls for information may go on.
+  bool WaitForFrames(std::chrono::steady_clock::time_point deadline);
 
  private:
   struct Entry {

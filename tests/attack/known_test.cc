@@ -8,6 +8,8 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -183,6 +185,26 @@ TEST_F(Known, AFloodOfEmptyMessages) {
     if (!client.SendData(call, many, false, milliseconds(200))) break;
   }
   ExpectBorne("up to 900,000 empty messages");
+}
+
+// Reflection is gRPC's own, and has a thread for each call that goes on.
+TEST_F(Known, ReflectionThatSaysNothingTakesFewThreads) {
+  const auto threads = [this] {
+    const std::filesystem::path tasks =
+        "/proc/" + std::to_string(server_.process().process()) + "/task";
+    return std::distance(std::filesystem::directory_iterator(tasks), {});
+  };
+  const auto before = threads();
+  Http2Client client(server_.address());
+  for (int k = 0; k < 200; ++k) {
+    client.Call(CallHeaders("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"));
+  }
+  client.Flush(kPatience);
+  client.Read(seconds(1));
+  std::printf("200 mute calls of reflection: %td -> %td threads\n", before, threads());
+  EXPECT_LE(threads() - before, 20);
+  client.Close(false);
+  ExpectBorne("reflection that says nothing");
 }
 
 // Sockets that say nothing, or not all: they end by themselves, those that owe TLS too.

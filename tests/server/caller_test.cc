@@ -136,16 +136,24 @@ TEST(Caller, OfNobodyInParticularMayEverythingOnAnAccountOfItsOwn) {
   EXPECT_NE(one.account(), other.account());
 }
 
+TEST(PeerAccounts, AreOneForAllAddressesThatAHostOfIpv6HasForTheAsking) {
+  EXPECT_EQ(HostOfPeer("ipv6:[2001:db8::1]:80"), "ipv6:2001:db8::");
+  EXPECT_EQ(HostOfPeer("ipv6:%5B2001:db8::1%5D:80"), "ipv6:2001:db8::");
+  EXPECT_EQ(HostOfPeer("ipv6:%5B2001:db8::ffff:1:2:3%5D:81"), "ipv6:2001:db8::");
+  EXPECT_EQ(HostOfPeer("ipv6:%5B2001:db8:0:1::1%5D:80"), "ipv6:2001:db8:0:1::");
+  EXPECT_EQ(HostOfPeer("ipv6:%5Bfe80::1%25eth0%5D:80"), "ipv6:fe80::");
+  EXPECT_EQ(HostOfPeer("ipv6:%5B::1%5D:80"), "ipv6:::");
+  EXPECT_EQ(HostOfPeer("ipv6:%5B::ffff:192.0.2.7%5D:80"), "ipv6:::ffff:192.0.2.7");
+}
+
 TEST(PeerAccounts, AreOneForEachAddressWhateverThePort) {
   PeerAccounts peers({.calls = 7});
   const auto account = peers.Of("ipv4:192.0.2.7:5000");
   EXPECT_EQ(account->quota().calls, 7u);
   EXPECT_EQ(peers.Of("ipv4:192.0.2.7:5001"), account);
   EXPECT_NE(peers.Of("ipv4:192.0.2.8:5000"), account);
-  EXPECT_EQ(PeerWithoutPort("ipv6:[2001:db8::1]:80"), "ipv6:[2001:db8::1]");
-  EXPECT_EQ(PeerWithoutPort("ipv6:%5B2001:db8::1%5D:80"), "ipv6:%5B2001:db8::1%5D");
-  EXPECT_EQ(PeerWithoutPort("unix:"), PeerWithoutPort("unix:/run/partiemc.sock"));
-  EXPECT_EQ(PeerWithoutPort("inproc"), "inproc");
+  EXPECT_EQ(HostOfPeer("unix:"), HostOfPeer("unix:/run/partiemc.sock"));
+  EXPECT_EQ(HostOfPeer("inproc"), "inproc");
 }
 
 TEST(PeerAccounts, AreForgottenWithTheLastWhoHoldsThem) {

@@ -247,6 +247,22 @@ TEST(ComputePool, ACallerAloneHasAllThreadsAgainAfterAWhile) {
   EXPECT_EQ(places, 2);
 }
 
+// Nothing else happens at the end of that time: no job comes, and none ends.
+TEST(ComputePool, AJobThatWaitsForACallerWhoHasGoneRunsAfterAWhile) {
+  const CallerAccount gone, stays;
+  std::promise<void> held_up, through;
+  const auto go_on = held_up.get_future().share();
+  ComputePool pool(2);
+  std::promise<void> left;
+  pool.Submit([](Worker&) {}, [&] { left.set_value(); }, nullptr, &gone);
+  left.get_future().wait();
+  pool.Submit([&](Worker&) { go_on.wait(); }, [] {}, nullptr, &stays);
+  pool.Submit([](Worker&) {}, [&] { through.set_value(); }, nullptr, &stays);
+  EXPECT_EQ(through.get_future().wait_for(kLongEnough), std::future_status::ready)
+      << "a thread is idle beside it";
+  held_up.set_value();
+}
+
 // Tells when it is destroyed.
 class Mourned final : public DoorBuffers {
  public:

@@ -292,9 +292,18 @@ TEST(UnaryRegistry, ADrainLetsNoFrameInAndEndsCallsWhoseRequestHasNotCome) {
   registry.Drain();
   EXPECT_EQ(call.Reason(), kReasonDraining);
   EXPECT_EQ(FindViolation(registry.Enter(late.flow, UnaryKind::kFrame))->reason, kReasonDraining);
-  EXPECT_FALSE(registry.WaitUntilEmpty(steady_clock::now()));
+  EXPECT_FALSE(registry.WaitForFrames(steady_clock::now()));
   registry.Leave(*call.flow);
-  EXPECT_TRUE(registry.WaitUntilEmpty(steady_clock::now()));
+  EXPECT_TRUE(registry.WaitForFrames(steady_clock::now()));
+}
+
+TEST(UnaryRegistry, NoDrainWaitsForACallForInformation) {
+  MemoryBudget budget(kBudget);
+  UnaryRegistry registry(2);
+  registry.Drain();
+  ScriptedCall mute(budget, nullptr, {}, UnaryKind::kInformation);
+  ASSERT_TRUE(registry.Enter(mute.flow, UnaryKind::kInformation).ok());
+  EXPECT_TRUE(registry.WaitForFrames(steady_clock::now()));
 }
 
 }  // namespace
