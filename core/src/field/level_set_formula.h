@@ -20,8 +20,8 @@ inline double LargerEigenvalue(double xx, double xy, double yy) {
 ///   phi = |x - xbar| - r_0;
 ///   the spread sigma, the larger eigenvalue of sum k D D^T / (R^2 sum k), D = x_i - x.
 /// Where f is at most f_0, or above f_1, the density alone decides the side: phi and sigma are
-/// needed in between only. All branches are lengths. In vectors it is in NodeFormula (tile_kernels.cc) and,
-/// with its gradient, PointFormula (point_formula-inl.h).
+/// needed in between only. All branches are lengths. In vectors it is in NodeFormula
+/// (tile_kernels.cc) and, with its gradient, PointFormula (point_formula-inl.h).
 inline double LevelSetValue(const Scale& scale, double density, double phi, double spread) {
   // Positive where the density is below f_0.
   const double guard = (scale.guard - density) * scale.guard_slope;

@@ -17,8 +17,8 @@ struct Scale {
   double guard = 0;              ///< f_0: where f is below it there is no inside.
   double saturation = 0;         ///< f_1: where f is above it there is no outside.
   double guard_slope = 0;        ///< R / 1.164: turns a lack of density into a length.
-  double gap_spread = 0;         ///< sigma_0: where particles are spread wider than it, there is a gap.
-  double gap_slope = 0;          ///< R / 0.45: turns spread into a length.
+  double gap_spread = 0;  ///< sigma_0: where particles are spread wider than it, there is a gap.
+  double gap_slope = 0;   ///< R / 0.45: turns spread into a length.
 };
 
 /// `spacing` and `cell_size` in world units; `lightest_volume` in world units squared (h^2 where
