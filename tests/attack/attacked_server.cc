@@ -75,6 +75,10 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments) {
   if (std::find(arguments.begin(), arguments.end(), "--log-level") == arguments.end()) {
     arguments.insert(arguments.end(), {"--log-level", "off"});
   }
+  // On a busy machine four seconds may not be enough for what an attacker has left behind.
+  if (std::find(arguments.begin(), arguments.end(), "--grace-seconds") == arguments.end()) {
+    arguments.insert(arguments.end(), {"--grace-seconds", "20"});
+  }
   // Somebody else may take the port before the server does.
   for (int attempt = 0; serving_ == nullptr; ++attempt) {
     metrics_address_ = "127.0.0.1:" + std::to_string(FreePort());

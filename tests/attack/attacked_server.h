@@ -14,7 +14,7 @@ namespace partiemc::attack {
 
 class AttackedServer {
  public:
-  /// With metrics, its log off, and two threads unless `arguments` say otherwise.
+  /// With metrics; unless `arguments` say otherwise, its log off, two threads, 20 s to drain.
   explicit AttackedServer(std::vector<std::string> arguments = {});
 
   const std::string& address() const { return serving_->address(); }
