@@ -71,9 +71,15 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
   return secrets;
 }
 
-// What the process may hold: the budget, what it has begun with, and its workers.
-std::uint64_t MostResidentBytes(const ServerOptions& options) {
-  return options.limits.memory_budget + ResidentBytes() + options.threads * kWorkerBytes;
+// How the process is watched. It may hold what it has begun with, its workers, and the budget, or
+// what was taken of that where it is more: a frame of each stream may be taken beyond it, and what
+// streams hold is no reason to turn away others.
+IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget) {
+  const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes;
+  return {.resident_bytes = ResidentBytes,
+          .most_bytes = [outside,
+                         &budget] { return outside + std::max(budget.bytes(), budget.held()); },
+          .give_back_freed = GiveBackFreedMemory};
 }
 
 // For watchers to be told that the server drains; one that does not read is cut then.
@@ -93,7 +99,7 @@ Server::Server(const ServerOptions& options)
       budget_(options.limits.memory_budget),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, MostResidentBytes(options), {ResidentBytes, GiveBackFreedMemory}),
+      intake_guard_(opening_, WatchedProcess(options, budget_)),
       service_(std::make_unique<Service>(options_.limits, authentication_, opening_, registry_,
                                          calls_, budget_, pool_, watchers_, pump_,
                                          checkpoint_keys_)),

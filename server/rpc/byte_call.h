@@ -53,10 +53,12 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
   /// To be called before the flow begins.
   template <typename Flow>
   void MayGiveWay(OpeningCalls& opening, const std::shared_ptr<Flow>& flow) {
-    const auto give_way = [flow = std::weak_ptr<Flow>(flow)](const absl::Status& status) {
-      if (const auto alive = flow.lock()) alive->GiveWay(status);
-    };
-    opening_ = opening.Enter(*caller().account(), give_way);
+    opening_ = opening.Enter(*caller().account(), Ending<Flow>(flow, &Flow::GiveWay));
+  }
+  /// The same of a watcher that is about to read another request: `flow->GiveUp` ends it.
+  template <typename Flow>
+  void MayGiveUp(OpeningCalls& opening, const std::shared_ptr<Flow>& flow) {
+    opening_ = opening.EnterWatcher(*caller().account(), Ending<Flow>(flow, &Flow::GiveUp));
   }
   void RequestCame() { opening_ = {}; }
 
@@ -65,6 +67,13 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
   std::string peer() const { return context_.peer(); }
 
  private:
+  template <typename Flow>
+  static OpeningCalls::GiveWay Ending(std::weak_ptr<Flow> flow,
+                                      void (Flow::*end)(const absl::Status&)) {
+    return [flow = std::move(flow), end](const absl::Status& status) {
+      if (const auto alive = flow.lock()) (*alive.*end)(status);
+    };
+  }
   using grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>::Finish;
 
   grpc::CallbackServerContext& context_;

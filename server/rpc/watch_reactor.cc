@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "server/rpc/unary_requests.h"
 #include "server/telemetry/logging.h"
 #include "server/watch/watch_hub.h"
 #include "wire/codec.h"
@@ -11,9 +12,6 @@
 
 namespace partiemc::server {
 namespace {
-
-// Far above what an `open` or a `credit` takes, so small that nobody fills memory with them.
-constexpr std::size_t kMaxRequestBytes = 4096;
 
 absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
   switch (mode) {
@@ -35,6 +33,7 @@ WatchReactor::WatchReactor(grpc::CallbackServerContext& context,
                            absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
                            OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers)
     : ByteCall(context, std::move(admission)),
+      opening_calls_(opening),
       streams_(streams),
       watchers_(watchers),
       flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), limits.max_watcher_bytes)) {
@@ -54,7 +53,7 @@ void WatchReactor::OnReadDone(bool ok) {
   }
   WatchRequest request;
   parsed_.Clear();
-  if (request_.Length() <= kMaxRequestBytes && wire::MergeBytes(request_, parsed_)) {
+  if (request_.Length() <= kMaxSmallRequestBytes && wire::MergeBytes(request_, parsed_)) {
     using Kind = WatchRequest::Kind;
     request.kind = parsed_.has_open()     ? Kind::kOpen
                    : parsed_.has_credit() ? Kind::kCredit
@@ -74,7 +73,10 @@ void WatchReactor::OnCancel() { flow_->Cancelled(); }
 
 void WatchReactor::Left() { watchers_.Leave(*flow_); }
 
-void WatchReactor::StartRead() { ServerBidiReactor::StartRead(&request_); }
+void WatchReactor::StartRead() {
+  if (!stream_name_.empty()) MayGiveUp(opening_calls_, flow_);
+  ServerBidiReactor::StartRead(&request_);
+}
 
 absl::StatusOr<WatchTerms> WatchReactor::Open() {
   const v1::OpenWatch& open = parsed_.open();

@@ -52,6 +52,7 @@ class WatchReactor final : public ByteCall, private WatchDoor {
   void Write(grpc::ByteBuffer response);
   void LogEnd(const absl::Status& status) const;
 
+  OpeningCalls& opening_calls_;
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
   grpc::ByteBuffer request_, response_;

@@ -16,8 +16,8 @@ constexpr std::chrono::seconds kBetweenGivingBack(2);
 
 }  // namespace
 
-IntakeGuard::IntakeGuard(OpeningCalls& opening, std::uint64_t most, Process process)
-    : opening_(opening), most_(most), process_(std::move(process)), thread_([this] { Run(); }) {}
+IntakeGuard::IntakeGuard(OpeningCalls& opening, Process process)
+    : opening_(opening), process_(std::move(process)), thread_([this] { Run(); }) {}
 
 IntakeGuard::~IntakeGuard() {
   opening_.StopWaiting();
@@ -38,6 +38,6 @@ void IntakeGuard::Run() {
   }
 }
 
-bool IntakeGuard::IsTooMuch() const { return process_.resident_bytes() > most_; }
+bool IntakeGuard::IsTooMuch() const { return process_.resident_bytes() > process_.most_bytes(); }
 
 }  // namespace partiemc::server

@@ -10,10 +10,11 @@
 namespace partiemc::server {
 
 /// gRPC puts a message together before it says how large it is, even one larger than it may
-/// receive, so nobody can count what calls without a request hold. This looks at the memory of the
-/// whole process instead, every few milliseconds and only while there are such calls: as long as it
-/// is too much, half of the calls of the caller that has most of them give way, the oldest first.
-/// Whose request comes at once is next to never among them.
+/// receive, so nobody can count what calls without a request hold, nor what watchers send. This
+/// looks at the memory of the whole process instead, every few milliseconds and only while there
+/// are such calls: as long as it is too much, half of the calls of the caller that has most of them
+/// give way, the oldest first, watchers last. Whose request comes at once is next to never among
+/// them.
 ///
 /// Frames of open streams that are on their way stay, one a stream, whatever their size.
 class IntakeGuard {
@@ -21,11 +22,12 @@ class IntakeGuard {
   /// What the process is asked for; another for tests.
   struct Process {
     std::function<std::uint64_t()> resident_bytes;
+    std::function<std::uint64_t()> most_bytes;  ///< That it may hold now.
     std::function<void()> give_back_freed;
   };
 
-  /// `most` is what the process may hold, in bytes. `opening` lives longer.
-  IntakeGuard(OpeningCalls& opening, std::uint64_t most, Process process);
+  /// `opening` lives longer.
+  IntakeGuard(OpeningCalls& opening, Process process);
   ~IntakeGuard();
   IntakeGuard(const IntakeGuard&) = delete;
   IntakeGuard& operator=(const IntakeGuard&) = delete;
@@ -35,7 +37,6 @@ class IntakeGuard {
   bool IsTooMuch() const;
 
   OpeningCalls& opening_;
-  const std::uint64_t most_;
   const Process process_;
   std::thread thread_;
 };

@@ -11,6 +11,8 @@
 namespace partiemc::server {
 namespace {
 
+constexpr char kMoreThanMemory[] = "more than there is memory for";
+
 absl::Status TooManyOpening(std::string found) {
   return ViolationError(
       absl::StatusCode::kResourceExhausted,
@@ -19,17 +21,28 @@ absl::Status TooManyOpening(std::string found) {
        "try again"});
 }
 
+absl::Status TooManyWatchers() {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonTooManyOpening), "watchers", kMoreThanMemory,
+       "must send each request at once: of the caller with most of them those give way that have "
+       "sent none for longest; try again"});
+}
+
 }  // namespace
 
 OpeningCalls::Place::~Place() {
-  if (calls_ != nullptr) calls_->Leave(caller_, number_);
+  if (calls_ == nullptr) return;
+  GiveWay forgotten;  // What it holds goes without the lock.
+  const std::lock_guard lock(calls_->mutex_);
+  forgotten = lines_->Remove(caller_, number_);
 }
 
-OpeningCalls::Rank OpeningCalls::RankOf(const Line& line) {
+OpeningCalls::Lines::Rank OpeningCalls::Lines::RankOf(const Line& line) {
   return {line.size(), -static_cast<std::int64_t>(line.begin()->first)};
 }
 
-void OpeningCalls::Add(const CallerAccount* caller, std::uint64_t number, GiveWay give_way) {
+void OpeningCalls::Lines::Add(const CallerAccount* caller, std::uint64_t number, GiveWay give_way) {
   Line& line = lines_[caller];
   if (!line.empty()) ranks_.erase(RankOf(line));
   line.emplace(number, std::move(give_way));
@@ -37,8 +50,8 @@ void OpeningCalls::Add(const CallerAccount* caller, std::uint64_t number, GiveWa
   ++count_;
 }
 
-// Empty where it has gone already.
-OpeningCalls::GiveWay OpeningCalls::Remove(const CallerAccount* caller, std::uint64_t number) {
+OpeningCalls::GiveWay OpeningCalls::Lines::Remove(const CallerAccount* caller,
+                                                  std::uint64_t number) {
   const auto line = lines_.find(caller);
   if (line == lines_.end()) return {};
   const auto call = line->second.find(number);
@@ -55,31 +68,39 @@ OpeningCalls::GiveWay OpeningCalls::Remove(const CallerAccount* caller, std::uin
   return give_way;
 }
 
-// Of those who have most the oldest. Requires: there is one.
-OpeningCalls::GiveWay OpeningCalls::RemoveNext() {
+OpeningCalls::GiveWay OpeningCalls::Lines::RemoveNext() {
   const CallerAccount* const most = ranks_.rbegin()->second;
   return Remove(most, lines_.at(most).begin()->first);
 }
 
+std::vector<OpeningCalls::GiveWay> OpeningCalls::Lines::RemoveHalf() {
+  std::vector<GiveWay> gone;
+  const CallerAccount* const most = ranks_.rbegin()->second;
+  for (std::size_t left = (lines_.at(most).size() + 1) / 2; left > 0; --left) {
+    gone.push_back(Remove(most, lines_.at(most).begin()->first));
+  }
+  return gone;
+}
+
 void OpeningCalls::GiveWayToAll() {
   std::vector<GiveWay> gone;
+  bool opening = false;
   {
     const std::lock_guard lock(mutex_);
-    if (count_ == 0) return;
-    const CallerAccount* const most = ranks_.rbegin()->second;
-    for (std::size_t left = (lines_.at(most).size() + 1) / 2; left > 0; --left) {
-      gone.push_back(Remove(most, lines_.at(most).begin()->first));
-    }
+    opening = opening_.count() > 0;
+    Lines& lines = opening ? opening_ : watchers_;
+    if (lines.count() > 0) gone = lines.RemoveHalf();
   }
   for (const GiveWay& give_way : gone) {
-    give_way(TooManyOpening("more than there is memory for"));
+    give_way(opening ? TooManyOpening(kMoreThanMemory) : TooManyWatchers());
   }
 }
 
 bool OpeningCalls::WaitForOne() {
   std::unique_lock lock(mutex_);
   waits_for_one_ = true;
-  one_came_.wait(lock, [this] { return stopped_ || count_ > 0; });
+  one_came_.wait(lock,
+                 [this] { return stopped_ || opening_.count() > 0 || watchers_.count() > 0; });
   waits_for_one_ = false;
   return !stopped_;
 }
@@ -90,32 +111,39 @@ void OpeningCalls::StopWaiting() {
   one_came_.notify_one();
 }
 
+OpeningCalls::Place OpeningCalls::Take(Lines& lines, const CallerAccount& caller,
+                                       GiveWay give_way) {
+  Place place;
+  place.calls_ = this;
+  place.lines_ = &lines;
+  place.caller_ = &caller;
+  place.number_ = ++came_;
+  lines.Add(&caller, place.number_, std::move(give_way));
+  if (waits_for_one_) one_came_.notify_one();
+  return place;
+}
+
 OpeningCalls::Place OpeningCalls::Enter(const CallerAccount& caller, GiveWay give_way) {
   Place place;
   GiveWay other;
   {
     const std::lock_guard lock(mutex_);
     // First out, then in: who comes does not count as one of its caller's.
-    if (count_ >= std::max<std::size_t>(places_, 1)) other = RemoveNext();
-    place.calls_ = this;
-    place.caller_ = &caller;
-    place.number_ = ++came_;
-    Add(&caller, place.number_, std::move(give_way));
-    if (waits_for_one_) one_came_.notify_one();
+    if (opening_.count() >= std::max<std::size_t>(places_, 1)) other = opening_.RemoveNext();
+    place = Take(opening_, caller, std::move(give_way));
   }
   if (other) other(TooManyOpening(absl::StrCat("more than ", places_)));
   return place;
 }
 
-void OpeningCalls::Leave(const CallerAccount* caller, std::uint64_t number) {
-  GiveWay forgotten;  // What it holds goes without the lock.
+OpeningCalls::Place OpeningCalls::EnterWatcher(const CallerAccount& caller, GiveWay give_way) {
   const std::lock_guard lock(mutex_);
-  forgotten = Remove(caller, number);
+  return Take(watchers_, caller, std::move(give_way));
 }
 
 std::size_t OpeningCalls::count() const {
   const std::lock_guard lock(mutex_);
-  return count_;
+  return opening_.count();
 }
 
 }  // namespace partiemc::server

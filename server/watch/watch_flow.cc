@@ -38,6 +38,8 @@ WatchEnd TooLarge(std::size_t bytes, std::size_t max_bytes) {
                     "larger --max-watcher-bytes")}));
 }
 
+absl::Status WatcherGone() { return absl::CancelledError("the watcher went away"); }
+
 }  // namespace
 
 WatchEnd WatchEnd::OfStream(const absl::Status& status) {
@@ -135,12 +137,12 @@ void WatchFlow::WriteDone(bool ok) {
     writing_ = false;
     if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
     written = std::exchange(in_write_, {});
-    if (!ok) Abandon();
+    if (!ok) Abandon(WatcherGone());
   });
 }
 
 void WatchFlow::Cancelled() {
-  On([&] { Abandon(); });
+  On([&] { Abandon(WatcherGone()); });
 }
 
 void WatchFlow::Offer(std::span<const Published> frames) {
@@ -213,6 +215,16 @@ void WatchFlow::GiveWay(const absl::Status& status) {
   });
 }
 
+void WatchFlow::GiveUp(const absl::Status& status) {
+  bool cut = false;
+  On([&] {
+    if (phase_ != Phase::kWatching && phase_ != Phase::kEnding) return;
+    cut = writing_;
+    Abandon(status);
+  });
+  if (cut) Cut();
+}
+
 void WatchFlow::Cut() {
   {
     const std::lock_guard lock(mutex_);
@@ -222,7 +234,7 @@ void WatchFlow::Cut() {
   door_.Cut();
   On([&] {
     cutting_ = false;
-    Abandon();
+    Abandon(WatcherGone());
   });
 }
 
@@ -258,10 +270,10 @@ void WatchFlow::Refuse(absl::Status status) {
   end_ = EndWith(std::move(status));
 }
 
-void WatchFlow::Abandon() {
-  if (phase_ == Phase::kFinished) return;
+void WatchFlow::Abandon(absl::Status status) {
+  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kAbandoned;
-  end_.status = absl::CancelledError("the watcher went away");
+  end_.status = std::move(status);
   DropPending();
 }
 

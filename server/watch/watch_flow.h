@@ -126,6 +126,9 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
                                                     std::chrono::steady_clock::time_point now);
   /// Ends a watch that has not sent its `open` with this error; others go on.
   void GiveWay(const absl::Status& status);
+  /// Ends an open watch with this error, at once: what is held is not written, nor `ended`. One
+  /// that is being written to is cut, as nobody knows when it will take that.
+  void GiveUp(const absl::Status& status);
   /// Ends at once, said or not.
   void Cut();
 
@@ -155,7 +158,7 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   void Take(const Published& published);
   void End(WatchEnd end);
   void Refuse(absl::Status status);
-  void Abandon();
+  void Abandon(absl::Status status);
   void DropPending();
   // Without:
   template <typename Event>

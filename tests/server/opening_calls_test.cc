@@ -11,6 +11,7 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
@@ -35,7 +36,16 @@ class Calls : public ::testing::Test {
     }));
     return number;
   }
-  // Its first request has come, or it is over.
+  // One that is open and waits for a request.
+  int Watch(const CallerAccount& caller) {
+    const int number = static_cast<int>(places_.size());
+    places_.push_back(opening_.EnterWatcher(caller, [this, number](const absl::Status& status) {
+      gone_.push_back(number);
+      status_ = status;
+    }));
+    return number;
+  }
+  // Its request has come, or it is over.
   void Opens(int number) { places_[static_cast<std::size_t>(number)] = {}; }
 
   OpeningCalls opening_{4};
@@ -86,6 +96,22 @@ TEST_F(Calls, OfWhoHasMostTheOlderHalfGiveWayWhereMemoryIsShort) {
   EXPECT_EQ(opening_.count(), 0u);
 }
 
+TEST_F(Calls, ThatWatchGiveWayWhereMemoryIsShortAndNoOtherIsLeft) {
+  for (int i = 0; i < 5; ++i) Watch(mallory_);
+  Watch(alice_);
+  const int opening = Begin(bob_);
+  EXPECT_TRUE(gone_.empty()) << "they take no place from those that open";
+  EXPECT_EQ(opening_.count(), 1u);
+  opening_.GiveWayToAll();
+  EXPECT_EQ(gone_, (std::vector<int>{opening}));
+  Opens(0);
+  Watch(mallory_);  // Has sent a request and may send another.
+  opening_.GiveWayToAll();
+  EXPECT_EQ(gone_, (std::vector<int>{opening, 1, 2, 3})) << "the silent ones first";
+  EXPECT_EQ(FindViolation(status_)->reason, kReasonTooManyOpening);
+  EXPECT_EQ(FindViolation(status_)->field, "watchers");
+}
+
 // A process whose memory the test sets.
 class Guarded : public Calls {
  protected:
@@ -100,20 +126,21 @@ class Guarded : public Calls {
     return condition();
   }
 
-  std::atomic<std::uint64_t> resident_ = 0, freed_ = 0;
+  std::atomic<std::uint64_t> resident_ = 0, freed_ = 0, most_ = kMost;
   std::atomic<int> gave_back_ = 0, looks_ = 0;
-  IntakeGuard guard_{opening_,
-                     kMost,
-                     {.resident_bytes =
-                          [this] {
-                            ++looks_;
-                            return resident_.load();
-                          },
-                      .give_back_freed =
-                          [this] {
-                            ++gave_back_;
-                            resident_ -= freed_.exchange(0);
-                          }}};
+  std::optional<IntakeGuard> guard_{
+      std::in_place, opening_,
+      IntakeGuard::Process{.resident_bytes =
+                               [this] {
+                                 ++looks_;
+                                 return resident_.load();
+                               },
+                           .most_bytes = [this] { return most_.load(); },
+                           .give_back_freed =
+                               [this] {
+                                 ++gave_back_;
+                                 resident_ -= freed_.exchange(0);
+                               }}};
 };
 
 TEST_F(Guarded, CallsGiveWayAsLongAsMemoryIsTooMuch) {
@@ -126,6 +153,30 @@ TEST_F(Guarded, CallsGiveWayAsLongAsMemoryIsTooMuch) {
   EXPECT_EQ(opening_.count(), 3u) << "it is not too much";
   resident_ = kMost + 1;
   EXPECT_TRUE(Eventually([&] { return opening_.count() == 0; }));
+}
+
+TEST_F(Guarded, CallsStayWhereStreamsHaveBeenGrantedMore) {
+  most_ = 2 * kMost;
+  resident_ = 2 * kMost;
+  Begin(alice_);
+  const int looked = looks_;
+  ASSERT_TRUE(Eventually([&] { return looks_ > looked + 3; }));
+  EXPECT_EQ(opening_.count(), 1u);
+  most_ = kMost;  // They have given it back, and somebody else has it.
+  EXPECT_TRUE(Eventually([&] { return opening_.count() == 0; }));
+}
+
+TEST_F(Guarded, WatchersGiveWayToo) {
+  Watch(mallory_);
+  resident_ = kMost + 1;
+  // Looks no more once nobody is left.
+  ASSERT_TRUE(Eventually([&] {
+    const int looked = looks_;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return looked > 0 && looks_ == looked;
+  }));
+  guard_.reset();
+  EXPECT_EQ(gone_, (std::vector<int>{0}));
 }
 
 TEST_F(Guarded, CallsStayWhereItIsEnoughToGiveBackWhatIsFree) {

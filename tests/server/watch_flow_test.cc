@@ -167,9 +167,10 @@ class StepDoor final : public WatchDoor {
     ++under_way;
     ended = {end.reason, dropped};
   }
-  void Cut() override {}
+  void Cut() override { cut = true; }
   void Finish(const absl::Status& end) override { status = end; }
 
+  bool cut = false;
   int under_way = 0;
   std::vector<SeenFrame> written;
   std::optional<std::pair<std::string, std::uint64_t>> ended;
@@ -232,6 +233,28 @@ TEST_F(WatchTest, ASilentOneGivesWayAndOneThatHasOpenedDoesNot) {
   open_flow->Cancelled();
   open_flow->WriteDone(false);
   EXPECT_TRUE(open.status.has_value());
+}
+
+TEST_F(WatchTest, WhereMemoryIsShortAnOpenOneEndsWithoutItsFramesAndOneThatIsWrittenToIsCut) {
+  StepDoor idle({hub_, WatchMode::kEvery, 1}), writing({hub_, WatchMode::kEvery, 1}),
+      silent({hub_, WatchMode::kLatest, 1});
+  std::vector<std::shared_ptr<WatchFlow>> flows;
+  for (StepDoor* const door : {&idle, &writing, &silent}) {
+    flows.push_back(std::make_shared<WatchFlow>(*door, kMaxBytes));
+    flows.back()->Start();
+    if (door != &silent) flows.back()->ReadDone({WatchRequest::Kind::kOpen, 0});
+  }
+  flows[0]->WriteDone(true);
+  for (const auto& flow : flows) flow->GiveUp(absl::ResourceExhaustedError("no memory"));
+  ASSERT_TRUE(idle.status.has_value());
+  EXPECT_EQ(idle.status->message(), "no memory");
+  EXPECT_TRUE(writing.cut);
+  EXPECT_FALSE(writing.status.has_value()) << "the write has not come back";
+  flows[1]->WriteDone(false);
+  ASSERT_TRUE(writing.status.has_value());
+  EXPECT_EQ(writing.status->message(), "no memory");
+  EXPECT_FALSE(silent.status.has_value()) << "it is not open";
+  flows[2]->Cancelled();
 }
 
 TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
