@@ -22,12 +22,14 @@ ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
       parallelism_(oneapi::tbb::global_control::max_allowed_parallelism, threads_),
       arena_(threads_),
       busy_(warm_time) {
+  if (budget_ != nullptr) budget_->OnShortage([this] { MemoryIsShort(); });
   running_.reserve(threads_);
   runners_.reserve(threads_);
   for (unsigned i = 0; i < threads_; ++i) runners_.emplace_back([this] { Run(); });
 }
 
 ComputePool::~ComputePool() {
+  if (budget_ != nullptr) budget_->OnShortage({});
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
@@ -133,18 +135,27 @@ void ComputePool::PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* str
   --working_;
 }
 
+void ComputePool::MemoryIsShort() {
+  const std::lock_guard lock(mutex_);
+  memory_is_short_ = true;
+  task_came_.notify_one();
+}
+
 ComputePool::Workers ComputePool::TakeOutlived() {
   Workers outlived;
   const auto now = WarmSize::Clock::now();
   std::size_t workers = working_ + idle_.size();
   std::erase_if(idle_, [&](std::unique_ptr<Worker>& worker) {
     const WarmSize& particles = worker->particles;
-    if (!particles.Outlived(now, warm_time_)) return false;
-    if (busy_.Count(WarmSize::LeastFor(particles.largest()), now) >= workers) return false;
+    if (!memory_is_short_ || !worker->memory.counts()) {
+      if (!particles.Outlived(now, warm_time_)) return false;
+      if (busy_.Count(WarmSize::LeastFor(particles.largest()), now) >= workers) return false;
+    }
     --workers;
     outlived.push_back(std::move(worker));
     return true;
   });
+  if (working_ == 0) memory_is_short_ = false;  // What works now goes when it is idle.
   return outlived;
 }
 

@@ -98,6 +98,7 @@ class ComputePool {
   void End(const Task& task);
   std::unique_ptr<Worker> TakeWorker();
   void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream);
+  void MemoryIsShort();
   Workers TakeOutlived();
   void GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock);
 
@@ -117,6 +118,7 @@ class ComputePool {
   Workers idle_;             // The one that was used last is the last.
   std::size_t working_ = 0;  // Workers that are not idle.
   BusyStreams busy_;
+  bool memory_is_short_ = false;  // Somebody wants what idle workers keep warm.
   WarmSize::Clock::time_point gave_back_ = WarmSize::Clock::now();
   bool stopping_ = false;
 

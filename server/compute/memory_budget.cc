@@ -37,6 +37,7 @@ Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
   const std::lock_guard lock(mutex_);
   const Fit fit = FitsNow({{}, bytes, caller, most});
   if (fit == Fit::kYes) share_.Take(caller, bytes);
+  if (fit != Fit::kYes && tell_shortage_) tell_shortage_();
   return fit;
 }
 
@@ -49,6 +50,7 @@ bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>
     share_.Take(caller, bytes);
   } else {
     wishes_.push_back(std::move(wish));
+    if (tell_shortage_) tell_shortage_();
   }
   return fits;
 }
@@ -93,6 +95,11 @@ void MemoryBudget::Grant() {
     }
   }
   for (const auto& [waiter, bytes] : granted) waiter->Granted(bytes);
+}
+
+void MemoryBudget::OnShortage(std::function<void()> tell) {
+  const std::lock_guard lock(mutex_);
+  tell_shortage_ = std::move(tell);
 }
 
 std::uint64_t MemoryBudget::held() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -46,6 +47,10 @@ class MemoryBudget {
   /// To be called without a lock: others may be granted what they wait for.
   void GiveBack(std::uint64_t bytes, const CallerAccount* caller = nullptr);
 
+  /// From now on `tell` is called whenever somebody is refused or has to wait; empty: nobody is
+  /// told. It must not call this.
+  void OnShortage(std::function<void()> tell);
+
   std::uint64_t held() const;
   std::uint64_t bytes() const { return share_.room(); }
 
@@ -68,6 +73,7 @@ class MemoryBudget {
   mutable std::mutex mutex_;  // Guards everything below.
   FairShare share_;           // More than its room may be held.
   std::list<Wish> wishes_;
+  std::function<void()> tell_shortage_;
 };
 
 }  // namespace partiemc::server

@@ -35,6 +35,9 @@ class WorkerMemory {
   /// The buffers were freed.
   void GiveBack();
 
+  /// Whether it holds any of the budget.
+  bool counts() const { return counted_ > 0; }
+
  private:
   MemoryBudget* const budget_;
   std::uint64_t counted_ = 0;  // In the budget.

@@ -305,6 +305,24 @@ TEST(ComputePool, AWorkerThatIsTooLargeForItsFramesIsDroppedAfterAWhile) {
   }
 }
 
+TEST(ComputePool, WhatIdleWorkersHoldIsGivenBackWhenSomebodyWantsIt) {
+  constexpr std::uint64_t kMib = std::uint64_t{1} << 20;
+  MemoryBudget budget(100 * kMib);
+  ComputePool pool(2, kLongEnough, nullptr, &budget);
+  RunAndWait(pool, [](Worker& worker) {
+    worker.particles.Used(1'000'000, WarmSize::Clock::now());
+    worker.memory.Reserve(kWorkerBytes + 90 * kMib, 1'000'000);
+  });
+  EXPECT_EQ(budget.held(), 90 * kMib) << "it is warm";
+  EXPECT_EQ(budget.TryTake(20 * kMib), FairShare::Fit::kNoRoom);
+  const TimePoint give_up = WarmSize::Clock::now() + kLongEnough;
+  while (budget.held() > 0 && WarmSize::Clock::now() < give_up) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(budget.TryTake(20 * kMib), FairShare::Fit::kYes);
+  budget.GiveBack(20 * kMib);
+}
+
 // Has two workers work on large frames at once; each future is there when the buffers of one are
 // gone.
 std::array<std::future<void>, 2> WorkOnTwoLargeFramesAtOnce(ComputePool& pool) {
