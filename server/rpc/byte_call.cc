@@ -10,6 +10,7 @@ void ByteCall::End(const absl::Status& status) {
     LogEvent(spdlog::level::err, "a call was ended twice", {{"peer", peer()}});
     return;
   }
+  call_.place = {};  // Who hears of the end may come again at once.
   Finish(ToGrpcStatus(status, context_));
 }
 

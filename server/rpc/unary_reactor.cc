@@ -18,7 +18,6 @@ UnaryReactor::UnaryReactor(grpc::CallbackServerContext& context,
   absl::Status status = this->admission();
   if (status.ok()) status = calls_.Enter(flow_, kind);
   if (status.ok()) MayGiveWay(opening, flow_);
-  if (!status.ok()) LogRefusal("call refused", peer(), status);
   flow_->Start(std::move(status));
 }
 
@@ -26,7 +25,6 @@ void UnaryReactor::OnReadDone(bool ok) {
   RequestCame();
   if (ok) {
     if (auto status = calls_.TakePlace(*flow_, *caller().account()); !status.ok()) {
-      LogRefusal("call refused", peer(), status);
       return flow_->GiveWay(status);
     }
     flow_->ReadDone(request_.Length());
@@ -61,7 +59,9 @@ void UnaryReactor::StartWrite() { ServerBidiReactor::StartWrite(&answer_); }
 void UnaryReactor::Cut() { CancelCall(); }
 
 void UnaryReactor::Finish(const absl::Status& status) {
-  answer_.Clear();  // One that was not sent.
+  answer_.Clear();               // One that was not sent.
+  calls_.GiveBackPlace(*flow_);  // Who hears of the end may come again at once.
+  if (!status.ok() && !absl::IsCancelled(status)) LogRefusal("call refused", peer(), status);
   End(status);
 }
 

@@ -115,12 +115,6 @@ void UnaryFlow::GiveWay(const absl::Status& status) {
   });
 }
 
-void UnaryFlow::Drain() {
-  On([&] {
-    if (phase_ == Phase::kReading) End(DrainingError());
-  });
-}
-
 TimePoint UnaryFlow::EndIfIdle(const UnaryLimits& limits, TimePoint now) {
   TimePoint look_again = TimePoint::max();
   On([&] {

@@ -80,9 +80,6 @@ class UnaryFlow final : public std::enable_shared_from_this<UnaryFlow> {
   void Cancelled();
   /// Ends a call whose request has not come, or has no place, with this error; others go on.
   void GiveWay(const absl::Status& status);
-  /// The server is going away: a call whose request has not come ends with UNAVAILABLE, any other
-  /// is answered.
-  void Drain();
   /// Ends the call with DEADLINE_EXCEEDED (IDLE), or by cutting it, if at `now` it has waited for
   /// its client for too long. Gives the time before which there is no need to look again.
   std::chrono::steady_clock::time_point EndIfIdle(const UnaryLimits& limits,

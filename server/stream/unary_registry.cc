@@ -43,13 +43,18 @@ absl::Status UnaryRegistry::TakePlace(const UnaryFlow& call, const CallerAccount
   return absl::OkStatus();
 }
 
-void UnaryRegistry::Leave(const UnaryFlow& call) {
+void UnaryRegistry::GiveBackPlace(const UnaryFlow& call) {
   const std::lock_guard lock(mutex_);
   const auto found = calls_.find(&call);
   if (found == calls_.end()) return;  // It was not let in.
-  const Entry& entry = found->second;
+  Entry& entry = found->second;
   if (entry.caller != nullptr) places_[IndexOf(entry.kind)].GiveBack(entry.caller, 1);
-  calls_.erase(found);
+  entry.caller = nullptr;
+}
+
+void UnaryRegistry::Leave(const UnaryFlow& call) {
+  const std::lock_guard lock(mutex_);
+  calls_.erase(&call);
   // With the lock held: whoever waits for the last one may take the registry away after that.
   left_.notify_all();
 }
@@ -80,7 +85,7 @@ void UnaryRegistry::Drain() {
     const std::lock_guard lock(mutex_);
     draining_ = true;
   }
-  for (const auto& call : All()) call->Drain();
+  for (const auto& call : All()) call->GiveWay(DrainingError());
 }
 
 bool UnaryRegistry::WaitForFrames(std::chrono::steady_clock::time_point deadline) {

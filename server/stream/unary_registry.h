@@ -36,10 +36,12 @@ class UnaryRegistry {
   /// A call comes in, without a request yet: those are counted elsewhere (OpeningCalls). Errors,
   /// each with a Violation: UNAVAILABLE (DRAINING), for frames only.
   absl::Status Enter(std::shared_ptr<UnaryFlow> call, UnaryKind kind);
-  /// Its request has come, and it gets a place until it leaves; the account lives until then.
+  /// Its request has come, and it gets a place; the account lives until it gives that back.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
   absl::Status TakePlace(const UnaryFlow& call, const CallerAccount& caller);
-  /// The connection has taken its last word.
+  /// It has its last word, and its place is free for others. It may have had none.
+  void GiveBackPlace(const UnaryFlow& call);
+  /// The connection has taken its last word; it has given its place back.
   void Leave(const UnaryFlow& call);
 
   /// Of both kinds.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "partiemc/status.h"
+#include "server/base/call_errors.h"
 #include "server/stream/stream_flow.h"
 #include "server/stream/unary_registry.h"
 
@@ -143,7 +144,7 @@ TEST(UnaryFlow, OneThatIsNotLetInReadsNothingAndEndsOnceAlthoughItIsCancelled) {
   EXPECT_FALSE(call.reading);
   EXPECT_EQ(call.Reason(), kReasonDraining);
   call.flow->Cancelled();
-  call.flow->Drain();
+  call.flow->GiveWay(DrainingError());
   EXPECT_EQ(call.Reason(), kReasonDraining);
 }
 
@@ -185,8 +186,8 @@ TEST(UnaryFlow, ADrainAnswersWhatHasComeAndRefusesTheRest) {
   MemoryBudget budget(kBudget);
   ScriptedCall waiting(budget, nullptr), answered(budget, nullptr);
   answered.Bring(10);
-  waiting.flow->Drain();
-  answered.flow->Drain();
+  waiting.flow->GiveWay(DrainingError());
+  answered.flow->GiveWay(DrainingError());
   EXPECT_EQ(waiting.Reason(), kReasonDraining);
   answered.EndWrite(true);
   EXPECT_TRUE(answered.finished.value().ok());
@@ -218,7 +219,7 @@ TEST(UnaryFlow, InAnyOrderItEndsOnceWithNothingHeld) {
     if (random() % 4 == 0) call.answer = absl::InternalError("");
     if (random() % 4 == 0) call.answer = random() % 1500;
     const std::vector<std::function<void()>> outside = {
-        [&] { call.flow->Cancelled(); }, [&] { call.flow->Drain(); },
+        [&] { call.flow->Cancelled(); }, [&] { call.flow->GiveWay(DrainingError()); },
         [&] { call.flow->EndIfIdle(kLimits, steady_clock::now() + seconds(random() % 200)); }};
     if (random() % 2 == 0) call.while_answering = outside[random() % outside.size()];
     for (int step = 0; step < 6; ++step) {
@@ -280,8 +281,9 @@ TEST(UnaryRegistry, EachKindOfCallsHasPlacesOfItsOwn) {
   EXPECT_TRUE(registry.TakePlace(*probe.flow, greedy).ok());
   registry.Leave(*never.flow);  // Was never in.
   EXPECT_EQ(registry.count(), 5u);
+  registry.GiveBackPlace(*first.flow);
+  EXPECT_TRUE(registry.TakePlace(*second.flow, greedy).ok()) << "before the first has left";
   registry.Leave(*first.flow);
-  EXPECT_TRUE(registry.TakePlace(*second.flow, greedy).ok());
 }
 
 TEST(UnaryRegistry, ADrainLetsNoFrameInAndEndsCallsWhoseRequestHasNotCome) {

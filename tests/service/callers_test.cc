@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <thread>
@@ -182,6 +183,43 @@ TEST_F(Callers, HaveNoMoreCallsThanTheirLineSays) {
   EXPECT_EQ(CallFrame(kAlice), "OK");
   EXPECT_EQ(first.EndReason(), "");
   EXPECT_TRUE(Eventually([&] { return CallFrame(kMallory) == "OK"; }));
+}
+
+TEST_F(Callers, WhoHearsOfAnEndHasThePlaceAgainAtOnce) {
+  Serve("alice calls=1", "mallory");
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_EQ(CallFrame(kAlice), "OK") << "call " << i;
+    Stream stream = BeginStream(kAlice);
+    ASSERT_TRUE(stream.Ask(OpenRequest()).has_opened()) << "stream " << i;
+    ASSERT_EQ(stream.EndReason(), "");
+    Info(kAlice);
+  }
+}
+
+// A watcher may send a request at any time, and nobody sees how large before all of it has come.
+TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
+  options_.limits.memory_budget = 1;
+  Serve("alice", "mallory");
+  Stream stream = BeginStream(kAlice);
+  ASSERT_TRUE(stream.Ask(OpenRequest("tank")).has_opened());
+  v1::WatchStreamRequest large;
+  large.mutable_open()->set_stream_name(std::string(64 << 20, 'x'));
+  std::vector<Watch> watches;
+  for (int i = 0; i < 4; ++i) {
+    watches.push_back(BeginWatch(kMallory));
+    ASSERT_TRUE(watches.back().Ask(OpenWatch("tank")).has_opened());
+  }
+  std::atomic<int> gave_way = 0;
+  std::vector<std::thread> senders;
+  for (Watch& watch : watches) {
+    senders.emplace_back([&] {
+      watch.rpc->Write(large);
+      if (watch.EndReason() == "TOO_MANY_OPENING") ++gave_way;
+    });
+  }
+  for (std::thread& sender : senders) sender.join();
+  EXPECT_GE(gave_way, 1);
+  EXPECT_TRUE(stream.Ask(BlobRequest(1, 1, 0)).has_frame());
 }
 
 TEST_F(Callers, MayDoAndSeeWhatTheirLineSays) {

@@ -12,6 +12,7 @@
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "server/moving_blob.h"
 #include "server/rpc/health_check.h"
+#include "service/captured_log.h"
 #include "service/service_testing.h"
 #include "support/temporary_folder.h"
 #include "wire/codec.h"
@@ -64,6 +65,18 @@ TEST_F(Operation, ReconstructFrameRefusesABadFrameWithItsReason) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(ReasonOf(context), "BYTE_COUNT");
   EXPECT_THAT(status.error_message(), HasSubstr("positions"));
+}
+
+TEST_F(Operation, ACallThatIsRefusedIsLoggedOnceWithItsReason) {
+  const CapturedLog log;
+  auto request = UnaryRequest(1, 0);
+  request.mutable_frame()->mutable_positions()->pop_back();
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::ReconstructFrameResponse response;
+  ASSERT_FALSE(stub_->ReconstructFrame(&context, request, &response).ok());
+  EXPECT_EQ(log.Count("call refused"), 1u);
+  EXPECT_EQ(log.Count("reason=" + ReasonOf(context)), 1u);
 }
 
 TEST_F(Operation, TheServerTellsWhatItIsAndWhatItAllows) {
