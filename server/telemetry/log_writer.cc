@@ -51,7 +51,8 @@ LogWriter::LogWriter(Options options)
     : state_(std::make_shared<State>(std::move(options))),
       thread_([state = state_] { Run(state); }) {}
 
-LogWriter::~LogWriter() {
+void LogWriter::Stop() {
+  if (!thread_.joinable()) return;
   Flush(kLastPatience);
   std::unique_lock lock(state_->mutex);
   state_->stop = true;
@@ -68,7 +69,7 @@ LogWriter::~LogWriter() {
 
 void LogWriter::Write(std::string_view line) {
   const std::lock_guard lock(state_->mutex);
-  if (state_->waiting.size() + line.size() > state_->options.capacity) {
+  if (state_->stop || state_->waiting.size() + line.size() > state_->options.capacity) {
     ++state_->dropped;
     return;
   }
@@ -101,11 +102,13 @@ void LogWriter::Run(const std::shared_ptr<State>& state) {
     const std::string_view left = WriteAll(state->options.file, lines);
     state->dropped += static_cast<std::uint64_t>(std::count(left.begin(), left.end(), '\n'));
     lines.clear();
-    if (std::chrono::steady_clock::now() >= next_tick) {
+    lock.lock();
+    if (!state->stop && std::chrono::steady_clock::now() >= next_tick) {
+      lock.unlock();
       if (state->options.every_second) state->options.every_second();
       next_tick = std::chrono::steady_clock::now() + kTick;
+      lock.lock();
     }
-    lock.lock();
     state->behind = !state->waiting.empty();
     state->changed.notify_all();
   }

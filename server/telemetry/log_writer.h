@@ -25,8 +25,7 @@ class LogWriter {
   };
 
   explicit LogWriter(Options options);
-  /// Flush with half a second's patience. A thread that a full pipe holds is left behind.
-  ~LogWriter();
+  ~LogWriter() { Stop(); }
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
 
@@ -39,6 +38,10 @@ class LogWriter {
 
   /// The same for a signal handler: it takes no lock.
   void FlushInSignal(std::chrono::milliseconds patience) const;
+
+  /// Flush with half a second's patience, and the end of the thread: it calls `every_second` no
+  /// more, and lines that come from now on are dropped. One that a full pipe holds is left behind.
+  void Stop();
 
   std::uint64_t dropped() const;
 

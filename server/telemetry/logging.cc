@@ -30,7 +30,9 @@ constexpr std::chrono::milliseconds kPatienceOnAbort(500);
 
 std::atomic<LogFormat> log_format = LogFormat::kText;
 RateLimit refusals(kRefusalsPerSecond);
-std::shared_ptr<LogWriter> writer;  // Since SetUpLogging.
+// Since SetUpLogging. It is never taken away: threads that are left behind at the end of the
+// process may log until the last moment.
+std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
 
 // Valid JSON, whatever comes: bytes that are no UTF-8 become U+FFFD.
 void AppendEscaped(std::string_view text, std::string& out) {
@@ -174,10 +176,10 @@ void SetUpLogging(const std::string& level, LogFormat format) {
   logger->set_formatter(MakeLogFormatter(format));
   logger->set_level(spdlog::level::from_str(level));
   spdlog::set_default_logger(std::move(logger));
-  // Before what it logs to goes.
+  // Before spdlog goes, which its thread logs by.
   static const int registered = std::atexit([] {
     FlushLog();
-    writer.reset();
+    writer->Stop();
   });
   static_cast<void>(registered);
   gpr_set_log_function(&LogFromGrpc);

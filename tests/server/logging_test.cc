@@ -104,6 +104,19 @@ TEST(LogWriter, AReaderThatHasGoneIsNoEnd) {
   EXPECT_EQ(writer.dropped(), 1u);
 }
 
+TEST(LogWriter, ThatHasStoppedCountsWhatComesAsDropped) {
+  Pipe pipe;
+  LogWriter writer({.file = pipe.ends[1]});
+  writer.Write(Line(1));
+  writer.Stop();
+  writer.Stop();
+  EXPECT_EQ(writer.dropped(), 0u);
+  writer.Write(Line(2));
+  EXPECT_EQ(writer.dropped(), 1u);
+  EXPECT_TRUE(writer.Flush(kPatience)) << "nothing waits";
+  close(pipe.ends[1]);
+}
+
 TEST(RateLimit, LetsSoManyThroughASecondAndCountsTheOthers) {
   RateLimit limit(3);
   const RateLimit::Clock::time_point start = RateLimit::Clock::now();
@@ -176,6 +189,23 @@ TEST(LoggingDeathTest, AnExitHasWhatWasLoggedBeforeItWritten) {
         exit(0);
       },
       testing::ExitedWithCode(0), "line 999");
+}
+
+// The thread that is left behind logs while the process tears itself down.
+TEST(LoggingDeathTest, AThreadMayLogUntilTheProcessIsGone) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_LOG(
+      {
+        std::thread([] {
+          for (;;) {
+            LossesOfLog();
+            FlushLog(milliseconds(0));
+          }
+        }).detach();
+        std::this_thread::sleep_for(milliseconds(50));
+        exit(0);
+      },
+      testing::ExitedWithCode(0), "");
 }
 
 TEST(LoggingDeathTest, WhatATerminalWouldObeyIsEscaped) {
