@@ -17,7 +17,8 @@ namespace health = grpc::health::v1;
 
 absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
   health::HealthCheckRequest request;
-  if (auto status = ParseRequest(bytes, kMaxInformationBytes, request); !status.ok()) return status;
+  if (auto status = ParseRequest(bytes, kMaxSmallRequestBytes, request); !status.ok())
+    return status;
   // Of the server as a whole, or of the one service that it is there for.
   if (!request.service().empty() && request.service() != ServiceName()) {
     return absl::NotFoundError("unknown service");

@@ -146,7 +146,7 @@ Service::Reactor* Service::Information(grpc::CallbackServerContext& context, Per
       [answer, caller](grpc::ByteBuffer& bytes, Worker*,
                        auto&) -> absl::StatusOr<grpc::ByteBuffer> {
         Request request;
-        if (auto status = ParseRequest(bytes, kMaxInformationBytes, request); !status.ok())
+        if (auto status = ParseRequest(bytes, kMaxSmallRequestBytes, request); !status.ok())
           return status;
         const auto response = answer(request, caller);
         if (!response.ok()) return response.status();

@@ -1,4 +1,4 @@
-// Requests of unary calls: from bytes, within bounds.
+// Requests from bytes, within bounds.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -12,8 +12,9 @@
 
 namespace partiemc::server {
 
-/// Far above what a request for information takes, so small that nobody fills memory with them.
-inline constexpr std::size_t kMaxInformationBytes = 4096;
+/// Far above what a request for information takes, or one of a watcher; so small that nobody fills
+/// memory with them.
+inline constexpr std::size_t kMaxSmallRequestBytes = 4096;
 
 /// "partiemc.v1.ReconstructionService".
 const std::string& ServiceName();

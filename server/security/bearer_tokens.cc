@@ -8,26 +8,14 @@
 #include <sstream>
 #include <utility>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "server/security/secrets.h"
 
 namespace partiemc::server {
 namespace {
 
-// A token shorter than this can be guessed; a longer one than that is no token.
-constexpr std::size_t kMinTokenBytes = 16;
-constexpr std::size_t kMaxTokenBytes = 512;
 // Each call is compared with all of them.
 constexpr std::size_t kMaxTokens = 1000;
-
-bool IsToken(std::string_view text) {
-  constexpr std::string_view kOthers = "-._~+/=";
-  return text.size() >= kMinTokenBytes && text.size() <= kMaxTokenBytes &&
-         std::ranges::all_of(text, [kOthers](char c) {
-           return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
-                  kOthers.find(c) != kOthers.npos;
-         });
-}
 
 absl::Status Wrong(std::size_t line, const std::string& rule) {
   return absl::InvalidArgumentError(absl::StrCat("line ", line, ", ", rule));
@@ -50,8 +38,8 @@ absl::StatusOr<BearerTokens> BearerTokens::Parse(std::string_view text) {
     std::istringstream split(line);
     const std::vector<std::string> words(std::istream_iterator<std::string>(split), {});
     if (words.empty() || words[0].front() == '#') continue;
-    if (!IsToken(words[0])) {
-      return Wrong(number, "word 1: must be a token of 16 to 512 characters of [A-Za-z0-9-._~+/=]");
+    if (!IsSecret(words[0])) {
+      return Wrong(number, absl::StrCat("word 1: must be a token ", kSecretRule));
     }
     const Digest digest = DigestOf(words[0]);
     if (tokens.Find(digest) != nullptr) return Wrong(number, "word 1: must not repeat a token");

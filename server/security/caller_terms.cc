@@ -15,8 +15,6 @@ namespace partiemc::server {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 64;
-// As long as a stream's name may be; longer ones are nobody's.
-constexpr std::size_t kMaxStreamNameBytes = 128;
 // Each open stream is compared with all of them when streams are listed.
 constexpr std::size_t kMaxPatterns = 32;
 

@@ -10,26 +10,15 @@
 #include <utility>
 
 #include "absl/status/status.h"
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "server/security/secrets.h"
 
 namespace partiemc::server {
 namespace {
 
-// As a bearer token's (server/security/bearer_tokens.h).
-constexpr std::size_t kMinKeyBytes = 16;
-constexpr std::size_t kMaxKeyBytes = 512;
 constexpr std::size_t kMaxKeys = 2;  // The one in use, and the one before or after it.
 
 using Signature = std::array<unsigned char, CheckpointKeys::kSignatureBytes>;
-
-bool IsKey(std::string_view text) {
-  return text.size() >= kMinKeyBytes && text.size() <= kMaxKeyBytes &&
-         std::all_of(text.begin(), text.end(), [](char c) {
-           return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
-                  std::string_view("-._~+/=").find(c) != std::string_view::npos;
-         });
-}
 
 Signature SignatureOf(std::string_view bytes, const std::string& key) {
   Signature signature;
@@ -54,8 +43,8 @@ absl::StatusOr<CheckpointKeys> CheckpointKeys::Parse(std::string_view text) {
     std::istringstream words(line);
     std::string key, more;
     if (!(words >> key) || key.front() == '#') continue;
-    if (!IsKey(key) || words >> more) {
-      return Wrong(number, "must be a key of 16 to 512 characters of [A-Za-z0-9-._~+/=]");
+    if (!IsSecret(key) || words >> more) {
+      return Wrong(number, absl::StrCat("must be a key ", kSecretRule));
     }
     if (std::ranges::count(keys.keys_, key) > 0) return Wrong(number, "must not repeat a key");
     if (keys.keys_.size() == kMaxKeys) {

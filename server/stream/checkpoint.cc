@@ -8,6 +8,7 @@
 #include "partiemc/byte_string.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/status.h"
+#include "server/base/name_pattern.h"
 
 namespace partiemc::server {
 namespace {
@@ -21,8 +22,8 @@ constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kLineageBytes = 32;
 constexpr std::size_t kHeaderBytes = 4 * 4 + kLineageBytes + 2 * 8 + 2 * 4 + 8 + 4;
 constexpr std::size_t kChecksumBytes = 8;
-constexpr std::size_t kMaxNameBytes = 128;
-static_assert(kHeaderBytes + kMaxNameBytes + kChecksumBytes + CheckpointKeys::kSignatureBytes <=
+static_assert(kHeaderBytes + kMaxStreamNameBytes + kChecksumBytes +
+                  CheckpointKeys::kSignatureBytes <=
               kMaxCheckpointOverhead);
 
 constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
@@ -120,7 +121,8 @@ absl::StatusOr<Header> TakeHeader(std::string_view& bytes) {
   terms.checkpoint_interval = TakeNumber<std::uint32_t>(bytes);
   header.next_sequence = TakeNumber<std::uint64_t>(bytes);
   const auto name_bytes = TakeNumber<std::uint32_t>(bytes);
-  if (name_bytes == 0 || name_bytes > kMaxNameBytes || bytes.size() < name_bytes + kChecksumBytes) {
+  if (name_bytes == 0 || name_bytes > kMaxStreamNameBytes ||
+      bytes.size() < name_bytes + kChecksumBytes) {
     return Corrupt(absl::StrCat("a name of ", name_bytes, " bytes"));
   }
   terms.name = bytes.substr(0, name_bytes);

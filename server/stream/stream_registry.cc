@@ -9,12 +9,12 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/printable.h"
 #include "partiemc/status.h"
+#include "server/base/name_pattern.h"
 #include "server/stream/stream_token.h"
 
 namespace partiemc::server {
 namespace {
 
-constexpr std::size_t kMaxNameBytes = 128;
 constexpr std::size_t kMaxLabels = 16;
 constexpr std::size_t kMaxLabelBytes = 128;
 
@@ -36,7 +36,8 @@ bool IsNameCharacter(char c) {
 }
 
 absl::Status CheckName(const std::string& name) {
-  if (name.size() <= kMaxNameBytes && std::all_of(name.begin(), name.end(), IsNameCharacter)) {
+  if (name.size() <= kMaxStreamNameBytes &&
+      std::all_of(name.begin(), name.end(), IsNameCharacter)) {
     return absl::OkStatus();
   }
   return Refused(absl::StatusCode::kInvalidArgument, kReasonName, "open.stream_name", Quoted(name),
