@@ -136,9 +136,9 @@ int Serve(const CommandLine& line) {
 int main(int argc, char** argv) {
   using namespace partiemc::server;
   const auto parsed = ParseCommandLine(argc, argv);
-  if (const auto* leave = std::get_if<Leave>(&parsed)) {
-    std::fputs(leave->text.c_str(), leave->code == 0 ? stdout : stderr);
-    return leave->code;
+  if (const auto* early = std::get_if<EarlyExit>(&parsed)) {
+    std::fputs(early->text.c_str(), early->code == 0 ? stdout : stderr);
+    return early->code;
   }
   const auto& line = std::get<CommandLine>(parsed);
   if (!line.health_check) return Serve(line);

@@ -228,7 +228,7 @@ void AddLogging(CLI::App& app, Raw& raw) {
       ->group(kGroup);
 }
 
-Leave Wrong(const std::string& message) {
+EarlyExit Wrong(const std::string& message) {
   std::string line = message;
   std::replace(line.begin(), line.end(), '\n', ' ');
   return {2, "partiemc-server: " + line + "; see --help\n"};
@@ -239,7 +239,7 @@ std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(std::ceil(seconds * 1000)));
 }
 
-std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
+std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
   const auto address = ParseAddress(raw.address);
   if (!address.ok()) return Wrong(std::string(address.status().message()));
   raw.line.server.address = *address;
@@ -278,7 +278,7 @@ std::variant<CommandLine, Leave> Check(Raw raw, const CLI::App& app) {
 
 }  // namespace
 
-std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* argv) {
+std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* const* argv) {
   CLI::App app(kDescription, "partiemc-server");
   app.footer(kFooter);
   Raw raw;
@@ -307,9 +307,9 @@ std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* a
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    return Leave{0, app.help()};
+    return EarlyExit{0, app.help()};
   } catch (const CLI::CallForVersion&) {
-    return Leave{0, "partiemc-server " PARTIEMC_VERSION "\n"};
+    return EarlyExit{0, "partiemc-server " PARTIEMC_VERSION "\n"};
   } catch (const CLI::ParseError& error) {
     return Wrong(error.what());
   }

@@ -26,11 +26,11 @@ struct CommandLine {
 };
 
 /// Nothing is left to do but to print `text` and to leave with `code`.
-struct Leave {
+struct EarlyExit {
   int code = 0;      ///< 0 for --help and --version, 2 for a wrong command line.
   std::string text;  ///< For standard output if `code` is 0, else one line for standard error.
 };
 
-std::variant<CommandLine, Leave> ParseCommandLine(int argc, const char* const* argv);
+std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* const* argv);
 
 }  // namespace partiemc::server

@@ -101,7 +101,7 @@ Server::Server(const ServerOptions& options)
       idle_timer_(registry_, watchers_, calls_, options.limits),
       intake_guard_(opening_, WatchedProcess(options, budget_)),
       service_(std::make_unique<Service>(options_.limits, authentication_, opening_, registry_,
-                                         calls_, budget_, pool_, watchers_, pump_,
+                                         calls_, budget_, pool_, watchers_, dispatcher_,
                                          checkpoint_keys_)),
       health_(std::make_unique<HealthService>(authentication_, opening_, calls_, budget_)) {}
 
@@ -277,7 +277,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
   // written.
   registry_.WaitUntilEmpty(deadline);
   calls_.WaitForFrames(deadline);
-  pump_.Flush();  // So that watchers hear of the last results before they are sent home.
+  dispatcher_.Flush();  // So that watchers hear of the last results before they are sent home.
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
   const auto left = std::clamp<std::chrono::steady_clock::duration>(

@@ -22,7 +22,7 @@
 #include "server/stream/unary_registry.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_endpoint.h"
-#include "server/watch/watch_pump.h"
+#include "server/watch/watch_dispatcher.h"
 #include "server/watch/watch_registry.h"
 
 namespace grpc {
@@ -109,7 +109,7 @@ class Server {
   std::unique_ptr<CurrentTlsIdentity> tls_identity_;
   std::shared_ptr<grpc::ServerCredentials> credentials_;
   OpeningCalls opening_;
-  WatchPump pump_;
+  WatchDispatcher dispatcher_;
   WatchRegistry watchers_;
   StreamRegistry registry_;
   UnaryRegistry calls_;

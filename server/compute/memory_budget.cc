@@ -22,14 +22,14 @@ void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
 }
 
 // Whether nobody who came before is to have it first.
-Fit MemoryBudget::FitsNow(const Wish& wish) const {
-  for (const Wish& before : wishes_) {
+Fit MemoryBudget::FitsNow(const Claim& claim) const {
+  for (const Claim& before : claims_) {
     const Fit fit = Fits(before);
-    if (fit == Fit::kNoRoom || before.caller == wish.caller) {
+    if (fit == Fit::kNoRoom || before.caller == claim.caller) {
       return fit == Fit::kMoreThanShare ? fit : Fit::kNoRoom;
     }
   }
-  return Fits(wish);
+  return Fits(claim);
 }
 
 Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
@@ -43,13 +43,13 @@ Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
 
 bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
                               const CallerAccount* caller) {
-  Wish wish{waiter, bytes, caller, MostOf(caller)};
+  Claim claim{waiter, bytes, caller, MostOf(caller)};
   const std::lock_guard lock(mutex_);
-  const bool fits = FitsNow(wish) == Fit::kYes;
+  const bool fits = FitsNow(claim) == Fit::kYes;
   if (fits) {
     share_.Take(caller, bytes);
   } else {
-    wishes_.push_back(std::move(wish));
+    claims_.push_back(std::move(claim));
     if (tell_shortage_) tell_shortage_();
   }
   return fits;
@@ -58,8 +58,8 @@ bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>
 void MemoryBudget::StopWaiting(const std::shared_ptr<Waiter>& waiter) {
   {
     const std::lock_guard lock(mutex_);
-    std::erase_if(wishes_, [&](const Wish& wish) {
-      return !wish.waiter.owner_before(waiter) && !waiter.owner_before(wish.waiter);
+    std::erase_if(claims_, [&](const Claim& claim) {
+      return !claim.waiter.owner_before(waiter) && !waiter.owner_before(claim.waiter);
     });
   }
   Grant();  // It may have stood before somebody who wants less.
@@ -77,21 +77,21 @@ void MemoryBudget::Grant() {
   std::vector<std::pair<std::shared_ptr<Waiter>, std::uint64_t>> granted;
   {
     const std::lock_guard lock(mutex_);
-    std::set<const CallerAccount*> waiting;  // Callers whose first wish has to wait.
-    for (auto wish = wishes_.begin(); wish != wishes_.end();) {
-      auto waiter = wish->waiter.lock();
-      const Fit fit = waiter == nullptr ? Fit::kYes : Fits(*wish);
+    std::set<const CallerAccount*> waiting;  // Callers whose first claim has to wait.
+    for (auto claim = claims_.begin(); claim != claims_.end();) {
+      auto waiter = claim->waiter.lock();
+      const Fit fit = waiter == nullptr ? Fit::kYes : Fits(*claim);
       if (fit == Fit::kNoRoom) break;
-      if (fit == Fit::kMoreThanShare) waiting.insert(wish->caller);
-      if (waiter != nullptr && waiting.contains(wish->caller)) {
-        ++wish;
+      if (fit == Fit::kMoreThanShare) waiting.insert(claim->caller);
+      if (waiter != nullptr && waiting.contains(claim->caller)) {
+        ++claim;
         continue;
       }
       if (waiter != nullptr) {
-        share_.Take(wish->caller, wish->bytes);
-        granted.emplace_back(std::move(waiter), wish->bytes);
+        share_.Take(claim->caller, claim->bytes);
+        granted.emplace_back(std::move(waiter), claim->bytes);
       }
-      wish = wishes_.erase(wish);
+      claim = claims_.erase(claim);
     }
   }
   for (const auto& [waiter, bytes] : granted) waiter->Granted(bytes);

@@ -55,7 +55,7 @@ class MemoryBudget {
   std::uint64_t bytes() const { return share_.room(); }
 
  private:
-  struct Wish {
+  struct Claim {
     std::weak_ptr<Waiter> waiter;
     std::uint64_t bytes = 0;
     const CallerAccount* caller = nullptr;
@@ -63,16 +63,16 @@ class MemoryBudget {
   };
 
   // With the lock held:
-  FairShare::Fit Fits(const Wish& wish) const {
-    return share_.Fits(wish.caller, wish.bytes, wish.most);
+  FairShare::Fit Fits(const Claim& claim) const {
+    return share_.Fits(claim.caller, claim.bytes, claim.most);
   }
-  FairShare::Fit FitsNow(const Wish& wish) const;
+  FairShare::Fit FitsNow(const Claim& claim) const;
   // Without:
   void Grant();
 
   mutable std::mutex mutex_;  // Guards everything below.
   FairShare share_;           // More than its room may be held.
-  std::list<Wish> wishes_;
+  std::list<Claim> claims_;
   std::function<void()> tell_shortage_;
 };
 

@@ -44,9 +44,9 @@ class WarmSize {
 };
 
 /// The buffers of whoever turns messages into frames and back; sessions know nothing of them.
-class DoorBuffers {
+class MessageBuffers {
  public:
-  virtual ~DoorBuffers() = default;
+  virtual ~MessageBuffers() = default;
 };
 
 /// What a worker keeps warm from frame to frame, whichever stream they belong to.
@@ -55,7 +55,7 @@ struct Worker {
   Workspace workspace;
   Result result;
   State next_state;  ///< Copied to the stream once the frame has been answered.
-  std::unique_ptr<DoorBuffers> door_buffers;
+  std::unique_ptr<MessageBuffers> message_buffers;
   WarmSize particles;                 ///< Of the frames that it has worked on.
   FrameObserver* observer = nullptr;  ///< Told of each frame; none: nobody asks.
 
@@ -67,7 +67,7 @@ struct Worker {
     workspace = Workspace();
     result = Result();
     next_state = State();
-    door_buffers.reset();
+    message_buffers.reset();
     particles = WarmSize();
     memory.GiveBack();
   }

@@ -20,8 +20,9 @@
 namespace partiemc::server {
 
 /// Reads, writes and ends one call. At most one read and one write go on at once, and End comes
-/// once, after the last write: the state machines (StreamFlow, WatchFlow, UnaryFlow) see to that,
-/// whatever the client does. Deletes itself when gRPC is done with it. No callback of it blocks.
+/// once, after the last write: the state machines (StreamStateMachine, WatchStateMachine,
+/// UnaryStateMachine) see to that, whatever the client does. Deletes itself when gRPC is done with
+/// it. No callback of it blocks.
 class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   /// `admission`: the caller and its place, or why it is not let in.
@@ -49,16 +50,17 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
   /// Of one who was not let in: nobody in particular.
   const Caller& caller() const { return call_.caller; }
 
-  /// From here until RequestCame the call gives way to others if need be: `flow->GiveWay` ends it.
-  /// To be called before the flow begins.
-  template <typename Flow>
-  void MayGiveWay(OpeningCalls& opening, const std::shared_ptr<Flow>& flow) {
-    opening_ = opening.Enter(*caller().account(), Ending<Flow>(flow, &Flow::GiveWay));
+  /// From here until RequestCame the call gives way to others if need be: `machine->GiveWay` ends
+  /// it. To be called before the machine begins.
+  template <typename Machine>
+  void MayGiveWay(OpeningCalls& opening, const std::shared_ptr<Machine>& machine) {
+    opening_ = opening.Enter(*caller().account(), Ending<Machine>(machine, &Machine::GiveWay));
   }
-  /// The same of a watcher that is about to read another request: `flow->GiveUp` ends it.
-  template <typename Flow>
-  void MayGiveUp(OpeningCalls& opening, const std::shared_ptr<Flow>& flow) {
-    opening_ = opening.EnterWatcher(*caller().account(), Ending<Flow>(flow, &Flow::GiveUp));
+  /// The same of a watcher that is about to read another request: `machine->GiveUp` ends it.
+  template <typename Machine>
+  void MayGiveUp(OpeningCalls& opening, const std::shared_ptr<Machine>& machine) {
+    opening_ =
+        opening.EnterWatcher(*caller().account(), Ending<Machine>(machine, &Machine::GiveUp));
   }
   void RequestCame() { opening_ = {}; }
 
@@ -67,11 +69,11 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
   std::string peer() const { return context_.peer(); }
 
  private:
-  template <typename Flow>
-  static OpeningCalls::GiveWay Ending(std::weak_ptr<Flow> flow,
-                                      void (Flow::*end)(const absl::Status&)) {
-    return [flow = std::move(flow), end](const absl::Status& status) {
-      if (const auto alive = flow.lock()) (*alive.*end)(status);
+  template <typename Machine>
+  static OpeningCalls::GiveWay Ending(std::weak_ptr<Machine> machine,
+                                      void (Machine::*end)(const absl::Status&)) {
+    return [machine = std::move(machine), end](const absl::Status& status) {
+      if (const auto alive = machine.lock()) (*alive.*end)(status);
     };
   }
   using grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>::Finish;

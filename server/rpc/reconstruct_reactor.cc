@@ -24,7 +24,7 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
             {"name", stream->description.name},
             {"frames", stream->counts.frames},
             {"frame_errors", stream->counts.frame_errors},
-            {"watch_waits", stream->description.hub->producer_waits()},
+            {"watch_waits", stream->description.broadcaster->producer_waits()},
             {"seconds", open.count()},
             {"status", absl::StatusCodeToString(status.code())},
             {"reason", violation ? violation->reason : std::string()}});
@@ -36,38 +36,39 @@ ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
                                        absl::StatusOr<AdmittedCall> admission,
                                        const ServerLimits& limits, OpeningCalls& opening,
                                        StreamRegistry& registry, MemoryBudget& budget,
-                                       ComputePool& pool, WatchPump& pump,
+                                       ComputePool& pool, WatchDispatcher& dispatcher,
                                        const CurrentCheckpointKeys& checkpoint_keys)
     : ByteCall(context, std::move(admission)),
       registry_(registry),
-      messages_(limits, registry, pump, checkpoint_keys),
-      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget,
-                                         limits.frames_in_flight, caller().account())) {
+      messages_(limits, registry, dispatcher, checkpoint_keys),
+      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), pool,
+                                                    budget, limits.frames_in_flight,
+                                                    caller().account())) {
   absl::Status status = this->admission();
-  if (status.ok()) status = registry_.Enter(flow_, caller());
-  if (status.ok()) MayGiveWay(opening, flow_);
-  flow_->Start(std::move(status));
+  if (status.ok()) status = registry_.Enter(machine_, caller());
+  if (status.ok()) MayGiveWay(opening, machine_);
+  machine_->Start(std::move(status));
 }
 
 void ReconstructReactor::OnReadDone(bool ok) {
   RequestCame();
   if (ok) {
-    flow_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
+    machine_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
   } else {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (IsCancelled()) flow_->Cancelled();
-    flow_->ReadEnded();
+    if (IsCancelled()) machine_->Cancelled();
+    machine_->ReadEnded();
   }
 }
 
 void ReconstructReactor::OnWriteDone(bool ok) {
   messages_.Written(written_, written_slot_);
-  flow_->WriteDone(ok);
+  machine_->WriteDone(ok);
 }
 
-void ReconstructReactor::OnCancel() { flow_->Cancelled(); }
+void ReconstructReactor::OnCancel() { machine_->Cancelled(); }
 
-void ReconstructReactor::Left() { registry_.Leave(*flow_); }
+void ReconstructReactor::Left() { registry_.Leave(*machine_); }
 
 void ReconstructReactor::StartRead(std::size_t slot) {
   read_slot_ = slot;
@@ -81,7 +82,7 @@ void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
 }
 
 absl::Status ReconstructReactor::Open(std::size_t slot) {
-  const auto stream = messages_.Open(slot, *flow_);
+  const auto stream = messages_.Open(slot, *machine_);
   if (!stream.ok()) return stream.status();
   const StreamDescription& description = stream->description;
   LogEvent(spdlog::level::info, "stream opened",
@@ -95,16 +96,16 @@ absl::Status ReconstructReactor::Open(std::size_t slot) {
 }
 
 Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
-  return messages_.Answer(slot, worker, flow_->cancelled());
+  return messages_.Answer(slot, worker, machine_->cancelled());
 }
 
 void ReconstructReactor::Cut() { CancelCall(); }
 
 void ReconstructReactor::Finish(const absl::Status& status) {
   // Closed first: a client that sees the end may open the same name again at once.
-  const auto stream = registry_.Close(*flow_);
+  const auto stream = registry_.Close(*machine_);
   LogEnd(stream, peer(), status);
-  if (stream) stream->description.hub->End(WatchEnd::OfStream(status));
+  if (stream) stream->description.broadcaster->End(WatchEnd::OfStream(status));
   End(status);
 }
 

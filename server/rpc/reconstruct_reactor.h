@@ -1,5 +1,6 @@
-// The gRPC door of a producer's stream: translates between gRPC's callbacks and a StreamFlow.
-// Messages pass as bytes: a frame is parsed where it is computed, into memory that is warm.
+// The gRPC transport of a producer's stream: translates between gRPC's callbacks and a
+// StreamStateMachine. Messages pass as bytes: a frame is parsed where it is computed, into memory
+// that is warm.
 #pragma once
 
 #include <cstddef>
@@ -13,17 +14,17 @@
 #include "server/rpc/byte_call.h"
 #include "server/rpc/stream_messages.h"
 #include "server/stream/limits.h"
-#include "server/stream/stream_flow.h"
 #include "server/stream/stream_registry.h"
+#include "server/stream/stream_state_machine.h"
 
 namespace partiemc::server {
 
-class ReconstructReactor final : public ByteCall, private StreamDoor {
+class ReconstructReactor final : public ByteCall, private StreamTransport {
  public:
   /// What is passed by reference outlives the call.
   ReconstructReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
                      const ServerLimits& limits, OpeningCalls& opening, StreamRegistry& registry,
-                     MemoryBudget& budget, ComputePool& pool, WatchPump& pump,
+                     MemoryBudget& budget, ComputePool& pool, WatchDispatcher& dispatcher,
                      const CurrentCheckpointKeys& checkpoint_keys);
 
   void OnReadDone(bool ok) override;
@@ -45,7 +46,7 @@ class ReconstructReactor final : public ByteCall, private StreamDoor {
   // The write that is going on.
   Outgoing written_ = Outgoing::kAnswer;
   std::size_t written_slot_ = 0;
-  std::shared_ptr<StreamFlow> flow_;
+  std::shared_ptr<StreamStateMachine> machine_;
 };
 
 }  // namespace partiemc::server

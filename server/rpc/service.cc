@@ -76,7 +76,7 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
   message.set_last_sequence(stream.counts.last_sequence);
   message.set_frames(stream.counts.frames);
   message.set_frame_errors(stream.counts.frame_errors);
-  message.set_watchers(stream.description.hub->watcher_count());
+  message.set_watchers(stream.description.broadcaster->watcher_count());
   message.set_open_seconds(seconds_since(stream.opened));
   message.set_idle_seconds(std::max(0.0, seconds_since(stream.counts.last_activity)));
 }
@@ -85,8 +85,8 @@ void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_
 
 Service::Service(const ServerLimits& limits, const Authentication& authentication,
                  OpeningCalls& opening, StreamRegistry& registry, UnaryRegistry& calls,
-                 MemoryBudget& budget, ComputePool& pool, WatchRegistry& watchers, WatchPump& pump,
-                 const CurrentCheckpointKeys& checkpoint_keys)
+                 MemoryBudget& budget, ComputePool& pool, WatchRegistry& watchers,
+                 WatchDispatcher& dispatcher, const CurrentCheckpointKeys& checkpoint_keys)
     : limits_(limits),
       authentication_(authentication),
       opening_(opening),
@@ -95,7 +95,7 @@ Service::Service(const ServerLimits& limits, const Authentication& authenticatio
       budget_(budget),
       pool_(pool),
       watchers_(watchers),
-      pump_(pump),
+      dispatcher_(dispatcher),
       checkpoint_keys_(checkpoint_keys) {
   const auto serve = [this](const char* method, Method handler) {
     Serve(absl::StrCat("/", ServiceName(), "/", method), std::move(handler));
@@ -103,7 +103,7 @@ Service::Service(const ServerLimits& limits, const Authentication& authenticatio
   serve("Reconstruct", [this](grpc::CallbackServerContext* context) {
     return new ReconstructReactor(
         *context, Admit(authentication_, *context, &Caller::CheckMayProduce), limits_, opening_,
-        registry_, budget_, pool_, pump_, checkpoint_keys_);
+        registry_, budget_, pool_, dispatcher_, checkpoint_keys_);
   });
   serve("ReconstructFrame",
         [this](grpc::CallbackServerContext* context) { return ReconstructFrame(*context); });

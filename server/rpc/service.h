@@ -14,7 +14,7 @@
 #include "server/stream/opening_calls.h"
 #include "server/stream/stream_registry.h"
 #include "server/stream/unary_registry.h"
-#include "server/watch/watch_pump.h"
+#include "server/watch/watch_dispatcher.h"
 #include "server/watch/watch_registry.h"
 
 namespace partiemc::server {
@@ -26,7 +26,8 @@ class Service final : public ByteService {
   /// The arguments outlive the service.
   Service(const ServerLimits& limits, const Authentication& authentication, OpeningCalls& opening,
           StreamRegistry& registry, UnaryRegistry& calls, MemoryBudget& budget, ComputePool& pool,
-          WatchRegistry& watchers, WatchPump& pump, const CurrentCheckpointKeys& checkpoint_keys);
+          WatchRegistry& watchers, WatchDispatcher& dispatcher,
+          const CurrentCheckpointKeys& checkpoint_keys);
 
  private:
   Reactor* ReconstructFrame(grpc::CallbackServerContext& context);
@@ -45,7 +46,7 @@ class Service final : public ByteService {
   MemoryBudget& budget_;
   ComputePool& pool_;
   WatchRegistry& watchers_;
-  WatchPump& pump_;
+  WatchDispatcher& dispatcher_;
   const CurrentCheckpointKeys& checkpoint_keys_;
 };
 

@@ -18,16 +18,17 @@ namespace {
 constexpr std::size_t kSmallBuffers = std::size_t{4} << 20;
 
 // What a worker keeps warm of messages: a frame's arrays are views into `request`.
-struct FrameMessages final : DoorBuffers {
+struct FrameMessages final : MessageBuffers {
   v1::ReconstructRequest request;
   v1::ReconstructResponse result;  // Never an error, whose coming would drop its buffers.
 };
 
 // Taken from the worker for as long as they are used: a session that has run out of memory drops
-// all that its worker holds. No other kind of door has put anything else there.
+// all that its worker holds. No other kind of transport has put anything else there.
 std::unique_ptr<FrameMessages> TakeMessages(Worker& worker) {
-  if (worker.door_buffers == nullptr) return std::make_unique<FrameMessages>();
-  return std::unique_ptr<FrameMessages>(static_cast<FrameMessages*>(worker.door_buffers.release()));
+  if (worker.message_buffers == nullptr) return std::make_unique<FrameMessages>();
+  return std::unique_ptr<FrameMessages>(
+      static_cast<FrameMessages*>(worker.message_buffers.release()));
 }
 
 // Parses a request that holds a frame into `request`, whose buffers are used again. What is not
@@ -118,13 +119,14 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 }
 
 StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,
-                               WatchPump& pump, const CurrentCheckpointKeys& checkpoint_keys)
+                               WatchDispatcher& dispatcher,
+                               const CurrentCheckpointKeys& checkpoint_keys)
     : limits_(limits),
       registry_(registry),
       checkpoint_keys_(checkpoint_keys),
-      hub_(std::make_shared<WatchHub>(pump,
-                                      WatchHub::Limits{.tap_bytes = limits.max_watcher_bytes,
-                                                       .kept_bytes = limits.KeptResultBytes()})),
+      broadcaster_(std::make_shared<ResultBroadcaster>(
+          dispatcher, ResultBroadcaster::Limits{.mailbox_bytes = limits.max_watcher_bytes,
+                                                .kept_bytes = limits.KeptResultBytes()})),
       requests_(limits.frames_in_flight),
       answers_(limits.frames_in_flight) {
   v1::ReconstructResponse draining;
@@ -160,7 +162,8 @@ grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
   return answers_[slot];
 }
 
-absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const StreamFlow& flow) {
+absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot,
+                                                   const StreamStateMachine& machine) {
   v1::ReconstructRequest request;
   if (auto status = ParseOpen(requests_[slot], limits_.MaxOpenBytes(), request); !status.ok()) {
     return status;
@@ -178,11 +181,11 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot, const Strea
     auto status = Resume(open.resume(), limits_, checkpoint_keys_, *session, terms);
     if (!status.ok()) return status;
   }
-  auto stream = registry_.Open(flow,
+  auto stream = registry_.Open(machine,
                                {.name = terms.name,
                                 .labels = {open.labels().begin(), open.labels().end()},
                                 .parameters = session->parameters(),
-                                .hub = hub_},
+                                .broadcaster = broadcaster_},
                                token);
   if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
@@ -221,7 +224,8 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
     result.set_sequence(request.sequence());
     messages->result.set_checkpoint(std::move(checkpoint));
     answers_[slot] = wire::ToBytes(messages->result);
-    if (ShowWatchers(slot, request)) answered.afterwards = [hub = hub_] { hub->Announce(); };
+    if (ShowWatchers(slot, request))
+      answered.afterwards = [broadcaster = broadcaster_] { broadcaster->Announce(); };
   } else {
     v1::ReconstructResponse error;
     wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
@@ -232,7 +236,7 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
   }
   ShrinkBuffers(request_bytes, messages->request);
   requests_[slot].Clear();
-  worker.door_buffers = std::move(messages);
+  worker.message_buffers = std::move(messages);
   answered.is_result = status.ok();
   answered.last_sequence = session_->next_sequence() - 1;
   answered.bytes = answers_[slot].Length();
@@ -243,7 +247,7 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
 bool StreamMessages::ShowWatchers(std::size_t slot, const v1::ParticleFrame& request) {
   wire::WatchedBytes bytes(answers_[slot]);
   if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
-  return hub_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
+  return broadcaster_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
 }
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// The messages of one stream and the session behind them, whatever door they travel through.
+// The messages of one stream and the session behind them, whatever transport they travel through.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -16,9 +16,9 @@
 #include "server/rpc/resume.h"
 #include "server/stream/limits.h"
 #include "server/stream/session.h"
-#include "server/stream/stream_flow.h"
 #include "server/stream/stream_registry.h"
-#include "server/watch/watch_hub.h"
+#include "server/stream/stream_state_machine.h"
+#include "server/watch/result_broadcaster.h"
 #include "wire/codec.h"
 
 namespace partiemc::server {
@@ -41,12 +41,12 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 
 /// Slots hold messages as bytes, and only from their reading or until their writing: what a frame
 /// needs besides belongs to the worker that answers it, so that an idle stream holds next to
-/// nothing. Not thread-safe as a whole: StreamFlow's promises to a StreamDoor are what it relies
-/// on.
+/// nothing. Not thread-safe as a whole: StreamStateMachine's promises to a StreamTransport are what
+/// it relies on.
 class StreamMessages {
  public:
   /// One slot for each of limits.frames_in_flight.
-  StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchPump& pump,
+  StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchDispatcher& dispatcher,
                  const CurrentCheckpointKeys& checkpoint_keys);
 
   grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
@@ -55,8 +55,8 @@ class StreamMessages {
   /// The response has been written: lets go of it.
   void Written(Outgoing what, std::size_t slot) { Response(what, slot).Clear(); }
 
-  /// As StreamDoor::Open and StreamDoor::Answer; gives the stream as it was opened.
-  absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamFlow& flow);
+  /// As StreamTransport::Open and StreamTransport::Answer; gives the stream as it was opened.
+  absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamStateMachine& machine);
   Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled);
 
  private:
@@ -67,7 +67,7 @@ class StreamMessages {
   const ServerLimits& limits_;
   StreamRegistry& registry_;
   const CurrentCheckpointKeys& checkpoint_keys_;
-  const std::shared_ptr<WatchHub> hub_;
+  const std::shared_ptr<ResultBroadcaster> broadcaster_;
   std::vector<grpc::ByteBuffer> requests_;
   std::vector<grpc::ByteBuffer> answers_;
   grpc::ByteBuffer opened_;

@@ -13,41 +13,41 @@ UnaryReactor::UnaryReactor(grpc::CallbackServerContext& context,
     : ByteCall(context, std::move(admission)),
       calls_(calls),
       method_(std::move(method)),
-      flow_(std::make_shared<UnaryFlow>(static_cast<UnaryDoor&>(*this), budget, pool,
-                                        caller().account(), kind)) {
+      machine_(std::make_shared<UnaryStateMachine>(static_cast<UnaryTransport&>(*this), budget,
+                                                   pool, caller().account(), kind)) {
   absl::Status status = this->admission();
-  if (status.ok()) status = calls_.Enter(flow_, kind);
-  if (status.ok()) MayGiveWay(opening, flow_);
-  flow_->Start(std::move(status));
+  if (status.ok()) status = calls_.Enter(machine_, kind);
+  if (status.ok()) MayGiveWay(opening, machine_);
+  machine_->Start(std::move(status));
 }
 
 void UnaryReactor::OnReadDone(bool ok) {
   RequestCame();
   if (ok) {
-    if (auto status = calls_.TakePlace(*flow_, *caller().account()); !status.ok()) {
-      return flow_->GiveWay(status);
+    if (auto status = calls_.TakePlace(*machine_, *caller().account()); !status.ok()) {
+      return machine_->GiveWay(status);
     }
-    flow_->ReadDone(request_.Length());
+    machine_->ReadDone(request_.Length());
   } else {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (IsCancelled()) flow_->Cancelled();
-    flow_->ReadEnded();
+    if (IsCancelled()) machine_->Cancelled();
+    machine_->ReadEnded();
   }
 }
 
 void UnaryReactor::OnWriteDone(bool ok) {
   answer_.Clear();
-  flow_->WriteDone(ok);
+  machine_->WriteDone(ok);
 }
 
-void UnaryReactor::OnCancel() { flow_->Cancelled(); }
+void UnaryReactor::OnCancel() { machine_->Cancelled(); }
 
-void UnaryReactor::Left() { calls_.Leave(*flow_); }
+void UnaryReactor::Left() { calls_.Leave(*machine_); }
 
 void UnaryReactor::StartRead() { ServerBidiReactor::StartRead(&request_); }
 
 absl::StatusOr<std::uint64_t> UnaryReactor::Answer(Worker* worker) {
-  auto answer = method_(request_, worker, flow_->cancelled());
+  auto answer = method_(request_, worker, machine_->cancelled());
   request_.Clear();
   if (!answer.ok()) return answer.status();
   answer_.Swap(&*answer);
@@ -59,8 +59,8 @@ void UnaryReactor::StartWrite() { ServerBidiReactor::StartWrite(&answer_); }
 void UnaryReactor::Cut() { CancelCall(); }
 
 void UnaryReactor::Finish(const absl::Status& status) {
-  answer_.Clear();               // One that was not sent.
-  calls_.GiveBackPlace(*flow_);  // Who hears of the end may come again at once.
+  answer_.Clear();                  // One that was not sent.
+  calls_.GiveBackPlace(*machine_);  // Who hears of the end may come again at once.
   if (!status.ok() && !absl::IsCancelled(status)) LogRefusal("call refused", peer(), status);
   End(status);
 }

@@ -1,5 +1,5 @@
-// The gRPC door of a call of one request and one answer: translates between gRPC's callbacks and a
-// UnaryFlow.
+// The gRPC transport of a call of one request and one answer: translates between gRPC's callbacks
+// and a UnaryStateMachine.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -12,15 +12,15 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/rpc/byte_call.h"
-#include "server/stream/unary_flow.h"
 #include "server/stream/unary_registry.h"
+#include "server/stream/unary_state_machine.h"
 
 namespace partiemc::server {
 
-class UnaryReactor final : public ByteCall, private UnaryDoor {
+class UnaryReactor final : public ByteCall, private UnaryTransport {
  public:
-  /// Turns a request into an answer, as UnaryDoor::Answer, unless `cancelled`. The request may be
-  /// cleared.
+  /// Turns a request into an answer, as UnaryTransport::Answer, unless `cancelled`. The request may
+  /// be cleared.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
 
@@ -44,7 +44,7 @@ class UnaryReactor final : public ByteCall, private UnaryDoor {
   UnaryRegistry& calls_;
   const Method method_;
   grpc::ByteBuffer request_, answer_;
-  std::shared_ptr<UnaryFlow> flow_;
+  std::shared_ptr<UnaryStateMachine> machine_;
 };
 
 }  // namespace partiemc::server

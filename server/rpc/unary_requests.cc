@@ -3,7 +3,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {

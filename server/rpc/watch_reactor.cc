@@ -6,7 +6,7 @@
 #include "partiemc/status.h"
 #include "server/rpc/unary_requests.h"
 #include "server/telemetry/logging.h"
-#include "server/watch/watch_hub.h"
+#include "server/watch/result_broadcaster.h"
 #include "wire/codec.h"
 #include "wire/message_bytes.h"
 
@@ -36,20 +36,21 @@ WatchReactor::WatchReactor(grpc::CallbackServerContext& context,
       opening_calls_(opening),
       streams_(streams),
       watchers_(watchers),
-      flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), limits.max_watcher_bytes)) {
+      machine_(std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this),
+                                                   limits.max_watcher_bytes)) {
   absl::Status status = this->admission();
   if (status.ok()) status = streams_.CheckServing();
-  if (status.ok()) status = watchers_.Enter(flow_);
-  if (status.ok()) MayGiveWay(opening, flow_);
-  flow_->Start(std::move(status));
+  if (status.ok()) status = watchers_.Enter(machine_);
+  if (status.ok()) MayGiveWay(opening, machine_);
+  machine_->Start(std::move(status));
 }
 
 void WatchReactor::OnReadDone(bool ok) {
   RequestCame();
   if (!ok) {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (IsCancelled()) flow_->Cancelled();
-    return flow_->ReadEnded();
+    if (IsCancelled()) machine_->Cancelled();
+    return machine_->ReadEnded();
   }
   WatchRequest request;
   parsed_.Clear();
@@ -61,20 +62,20 @@ void WatchReactor::OnReadDone(bool ok) {
     request.credit = parsed_.credit().frames();
   }
   request_.Clear();
-  flow_->ReadDone(request);
+  machine_->ReadDone(request);
 }
 
 void WatchReactor::OnWriteDone(bool ok) {
   response_.Clear();
-  flow_->WriteDone(ok);
+  machine_->WriteDone(ok);
 }
 
-void WatchReactor::OnCancel() { flow_->Cancelled(); }
+void WatchReactor::OnCancel() { machine_->Cancelled(); }
 
-void WatchReactor::Left() { watchers_.Leave(*flow_); }
+void WatchReactor::Left() { watchers_.Leave(*machine_); }
 
 void WatchReactor::StartRead() {
-  if (!stream_name_.empty()) MayGiveUp(opening_calls_, flow_);
+  if (!stream_name_.empty()) MayGiveUp(opening_calls_, machine_);
   ServerBidiReactor::StartRead(&request_);
 }
 
@@ -89,7 +90,7 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
   }
   const auto stream = streams_.Find(open.stream_name(), caller());
   if (!stream.ok()) return stream.status();
-  if (auto status = watchers_.Open(*flow_, caller()); !status.ok()) return status;
+  if (auto status = watchers_.Open(*machine_, caller()); !status.ok()) return status;
   const StreamDescription& description = stream->description;
   stream_name_ = description.name;
   v1::WatchOpened& opened = *opened_.mutable_opened();
@@ -103,7 +104,8 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
             {"mode", *mode == WatchMode::kEvery ? "every" : "latest"},
             {"peer", peer()},
             {"client", caller().name()}});
-  return WatchTerms{.hub = description.hub, .mode = *mode, .credit = open.credits()};
+  return WatchTerms{
+      .broadcaster = description.broadcaster, .mode = *mode, .credit = open.credits()};
 }
 
 void WatchReactor::WriteOpened() { Write(wire::ToBytes(opened_)); }
@@ -129,7 +131,7 @@ void WatchReactor::Write(grpc::ByteBuffer response) {
 void WatchReactor::Cut() { CancelCall(); }
 
 void WatchReactor::Finish(const absl::Status& status) {
-  watchers_.Close(*flow_);  // Who hears of the end may come again at once.
+  watchers_.Close(*machine_);  // Who hears of the end may come again at once.
   LogEnd(status);
   End(status);
 }
@@ -140,7 +142,7 @@ void WatchReactor::LogEnd(const absl::Status& status) const {
     return;
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;
-  const WatchCounts counts = flow_->counts();
+  const WatchCounts counts = machine_->counts();
   LogEvent(spdlog::level::info, "watch closed",
            {{"stream", opened_.opened().stream_id()},
             {"name", stream_name_},

@@ -1,5 +1,5 @@
-// The gRPC door of a watcher: translates between gRPC's callbacks and a WatchFlow. Frames pass as
-// bytes that all watchers of a stream share.
+// The gRPC transport of a watcher: translates between gRPC's callbacks and a WatchStateMachine.
+// Frames pass as bytes that all watchers of a stream share.
 #pragma once
 
 #include <chrono>
@@ -13,13 +13,13 @@
 #include "server/rpc/byte_call.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
-#include "server/watch/watch_flow.h"
 #include "server/watch/watch_registry.h"
+#include "server/watch/watch_state_machine.h"
 #include "wire/watched_bytes.h"
 
 namespace partiemc::server {
 
-/// A result as this door hands it to watchers.
+/// A result as this transport hands it to watchers.
 class WatchedResult final : public WatchFrame {
  public:
   explicit WatchedResult(wire::WatchedBytes result)
@@ -28,7 +28,7 @@ class WatchedResult final : public WatchFrame {
   const wire::WatchedBytes bytes;
 };
 
-class WatchReactor final : public ByteCall, private WatchDoor {
+class WatchReactor final : public ByteCall, private WatchTransport {
  public:
   /// What is passed by reference outlives the call.
   WatchReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
@@ -61,7 +61,7 @@ class WatchReactor final : public ByteCall, private WatchDoor {
   std::string stream_name_;
   std::string end_reason_;
   std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
-  std::shared_ptr<WatchFlow> flow_;
+  std::shared_ptr<WatchStateMachine> machine_;
 };
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// Whether a caller may come in, and as whom: by its bearer token, whichever door it knocks at.
+// Whether a caller may come in, and as whom: by its bearer token, whichever method it calls.
 #pragma once
 
 #include <cstdint>

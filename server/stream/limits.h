@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "partiemc/frame.h"
-#include "server/stream/stream_flow.h"
-#include "server/stream/unary_flow.h"
+#include "server/stream/stream_state_machine.h"
+#include "server/stream/unary_state_machine.h"
 
 namespace partiemc::server {
 

@@ -68,17 +68,17 @@ StreamRegistry::StreamRegistry(std::uint32_t max_streams)
     : max_streams_(max_streams),
       id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
 
-absl::Status StreamRegistry::Enter(std::shared_ptr<StreamFlow> flow, Caller caller) {
+absl::Status StreamRegistry::Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller) {
   const std::lock_guard lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
-  const StreamFlow* key = flow.get();
+  const StreamStateMachine* key = machine.get();
   Entry& entry = entries_[key];
-  entry.flow = std::move(flow);
+  entry.machine = std::move(machine);
   entry.caller = std::move(caller);
   return absl::OkStatus();
 }
 
-absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
+absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& machine,
                                                    StreamDescription description,
                                                    std::string token) {
   if (auto status = CheckName(description.name); !status.ok()) return status;
@@ -87,7 +87,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
 
   std::unique_lock lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
-  Entry& entry = entries_.at(&flow);
+  Entry& entry = entries_.at(&machine);
   Entry* const former = FindOpen(token);
   if (former != nullptr && description.name.empty()) {
     description.name = former->stream->description.name;
@@ -110,9 +110,9 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamFlow& flow,
   StreamSummary opened = *entry.stream;
   if (former == nullptr) return opened;
   former->taken_over = true;
-  const std::shared_ptr<StreamFlow> former_flow = former->flow;
-  lock.unlock();  // A flow may leave at once.
-  former_flow->TakenOver();
+  const std::shared_ptr<StreamStateMachine> former_machine = former->machine;
+  lock.unlock();  // A machine may leave at once.
+  former_machine->TakenOver();
   return opened;
 }
 
@@ -153,26 +153,26 @@ StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {
   return nullptr;
 }
 
-std::optional<StreamSummary> StreamRegistry::Close(const StreamFlow& flow) {
+std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& machine) {
   std::optional<StreamSummary> summary;
   {
     const std::lock_guard lock(mutex_);
-    const auto found = entries_.find(&flow);
+    const auto found = entries_.find(&machine);
     if (found != entries_.end()) {
       found->second.place = {};
       summary.swap(found->second.stream);
     }
   }
-  if (summary) summary->counts = flow.counts();
+  if (summary) summary->counts = machine.counts();
   return summary;
 }
 
-void StreamRegistry::Leave(const StreamFlow& flow) {
+void StreamRegistry::Leave(const StreamStateMachine& machine) {
   const std::lock_guard lock(mutex_);
-  const auto found = entries_.find(&flow);
+  const auto found = entries_.find(&machine);
   if (found == entries_.end()) return;  // It was not let in.
   entries_.erase(found);
-  // With the lock held: whoever waits for the last flow may take the registry away after that.
+  // With the lock held: whoever waits for the last machine may take the registry away after that.
   left_.notify_all();
 }
 
@@ -180,10 +180,10 @@ absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
                                                    const Caller& caller) const {
   if (auto status = caller.CheckMayUse(name); !status.ok()) return status;
   const std::lock_guard lock(mutex_);
-  for (const auto& [flow, entry] : entries_) {
+  for (const auto& [machine, entry] : entries_) {
     if (!entry.IsOpen() || entry.stream->description.name != name) continue;
     StreamSummary summary = *entry.stream;
-    summary.counts = flow->counts();
+    summary.counts = machine->counts();
     return summary;
   }
   return Refused(absl::StatusCode::kNotFound, kReasonNoSuchStream, "open.stream_name", Quoted(name),
@@ -194,11 +194,11 @@ std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t
                                                 const Caller& caller) const {
   std::vector<StreamSummary> summaries;
   const std::lock_guard lock(mutex_);
-  for (const auto& [flow, entry] : entries_) {
+  for (const auto& [machine, entry] : entries_) {
     if (!entry.IsOpen() || entry.stream->number <= after) continue;
     if (!caller.MayUse(entry.stream->description.name)) continue;
     summaries.push_back(*entry.stream);
-    summaries.back().counts = flow->counts();
+    summaries.back().counts = machine->counts();
   }
   std::sort(summaries.begin(), summaries.end(),
             [](const auto& a, const auto& b) { return a.number < b.number; });
@@ -212,33 +212,34 @@ std::size_t StreamRegistry::OpenCount() const {
       entries_.begin(), entries_.end(), [](const auto& item) { return item.second.IsOpen(); }));
 }
 
-std::vector<std::shared_ptr<StreamFlow>> StreamRegistry::Flows() const {
-  std::vector<std::shared_ptr<StreamFlow>> flows;
-  flows.reserve(entries_.size());
-  for (const auto& [key, entry] : entries_) flows.push_back(entry.flow);
-  return flows;
+std::vector<std::shared_ptr<StreamStateMachine>> StreamRegistry::Machines() const {
+  std::vector<std::shared_ptr<StreamStateMachine>> machines;
+  machines.reserve(entries_.size());
+  for (const auto& [key, entry] : entries_) machines.push_back(entry.machine);
+  return machines;
 }
 
 void StreamRegistry::Drain() {
-  std::vector<std::shared_ptr<StreamFlow>> flows;
+  std::vector<std::shared_ptr<StreamStateMachine>> machines;
   {
     const std::lock_guard lock(mutex_);
     draining_ = true;
-    flows = Flows();
+    machines = Machines();
   }
-  // Without the lock: a flow that drains may leave at once.
-  for (const auto& flow : flows) flow->Drain();
+  // Without the lock: a machine that drains may leave at once.
+  for (const auto& machine : machines) machine->Drain();
 }
 
 std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
     const IdleLimits& limits, std::chrono::steady_clock::time_point now) {
-  std::vector<std::shared_ptr<StreamFlow>> flows;
+  std::vector<std::shared_ptr<StreamStateMachine>> machines;
   {
     const std::lock_guard lock(mutex_);
-    flows = Flows();
+    machines = Machines();
   }
   auto look_again = std::chrono::steady_clock::time_point::max();
-  for (const auto& flow : flows) look_again = std::min(look_again, flow->EndIfIdle(limits, now));
+  for (const auto& machine : machines)
+    look_again = std::min(look_again, machine->EndIfIdle(limits, now));
   return look_again;
 }
 

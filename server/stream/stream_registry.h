@@ -16,8 +16,8 @@
 #include "absl/status/statusor.h"
 #include "partiemc/parameters.h"
 #include "server/security/caller.h"
-#include "server/stream/stream_flow.h"
-#include "server/watch/watch_hub.h"
+#include "server/stream/stream_state_machine.h"
+#include "server/watch/result_broadcaster.h"
 
 namespace partiemc::server {
 
@@ -33,8 +33,8 @@ inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
 struct StreamDescription {
   std::string name;  ///< Empty: the registry makes one up.
   std::map<std::string, std::string> labels;
-  ReconstructionParameters parameters;  ///< As resolved.
-  std::shared_ptr<WatchHub> hub;        ///< Shows its results to watchers.
+  ReconstructionParameters parameters;             ///< As resolved.
+  std::shared_ptr<ResultBroadcaster> broadcaster;  ///< Shows its results to watchers.
 };
 
 struct StreamSummary {
@@ -51,22 +51,23 @@ class StreamRegistry {
  public:
   explicit StreamRegistry(std::uint32_t max_streams);
 
-  /// A flow of `caller` comes in, not open yet: those are counted elsewhere (OpeningCalls).
+  /// A call of `caller` comes in, not open yet: those are counted elsewhere (OpeningCalls).
   /// Errors: UNAVAILABLE (DRAINING).
-  absl::Status Enter(std::shared_ptr<StreamFlow> flow, Caller caller = {});
+  absl::Status Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller = {});
 
-  /// Opens the stream of a flow that has entered. Where an open stream has the same `token`, the
-  /// new one takes over from it: its place, its name if none is given, and its flow ends.
+  /// Opens the stream of a machine that has entered. Where an open stream has the same `token`, the
+  /// new one takes over from it: its place, its name if none is given, and its machine ends.
   /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN),
   /// PERMISSION_DENIED (NOT_PERMITTED: the name is not one of the caller's), ALREADY_EXISTS
   /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS), UNAVAILABLE (DRAINING).
-  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, StreamDescription description,
-                                     std::string token);
+  absl::StatusOr<StreamSummary> Open(const StreamStateMachine& machine,
+                                     StreamDescription description, std::string token);
 
-  /// The flow's stream ends: its name and its place are free. What it was, if it had been opened.
-  std::optional<StreamSummary> Close(const StreamFlow& flow);
-  /// The flow has gone: its last word has been sent.
-  void Leave(const StreamFlow& flow);
+  /// The machine's stream ends: its name and its place are free. What it was, if it had been
+  /// opened.
+  std::optional<StreamSummary> Close(const StreamStateMachine& machine);
+  /// The machine has gone: its last word has been sent.
+  void Leave(const StreamStateMachine& machine);
 
   /// The open stream of that name, for `caller` to watch. Errors: PERMISSION_DENIED (NOT_PERMITTED)
   /// for a name that is not one of the caller's, whether there is such a stream or not; NOT_FOUND
@@ -78,26 +79,26 @@ class StreamRegistry {
                                   const Caller& caller = {}) const;
   std::size_t OpenCount() const;
 
-  /// Lets nobody in any more and drains every flow.
+  /// Lets nobody in any more and drains every machine.
   void Drain();
   bool draining() const;
   /// OK, or, told to whoever comes now, UNAVAILABLE (DRAINING).
   absl::Status CheckServing();
   /// Who has been told so: grows for as long as somebody still comes.
   std::uint64_t turned_away() const;
-  /// Ends the flows that have waited for their clients for too long. Gives the time before which
+  /// Ends the machines that have waited for their clients for too long. Gives the time before which
   /// none of those that are here now will have.
   std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
                                                 std::chrono::steady_clock::time_point now);
-  /// Whether all flows have left before the deadline.
+  /// Whether all machines have left before the deadline.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
 
  private:
   struct Entry {
-    std::shared_ptr<StreamFlow> flow;
+    std::shared_ptr<StreamStateMachine> machine;
     Caller caller;
     CallerAccount::Place place;           // While open.
-    std::optional<StreamSummary> stream;  // While open; its counts are asked of the flow.
+    std::optional<StreamSummary> stream;  // While open; its counts are asked of the machine.
     std::string token;                    // Of the stream.
     bool taken_over = false;  // By another entry: the stream is not this one's any more.
 
@@ -110,7 +111,7 @@ class StreamRegistry {
   absl::Status CheckPlace(const Entry* former, const std::string& name) const;
   // Of the caller of `entry`, where `former` has none to pass on.
   static absl::Status TakePlace(Entry& entry, Entry* former);
-  std::vector<std::shared_ptr<StreamFlow>> Flows() const;
+  std::vector<std::shared_ptr<StreamStateMachine>> Machines() const;
   Entry* FindOpen(std::string_view token);
 
   const std::uint32_t max_streams_;
@@ -118,7 +119,7 @@ class StreamRegistry {
 
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
-  std::map<const StreamFlow*, Entry> entries_;
+  std::map<const StreamStateMachine*, Entry> entries_;
   std::uint64_t opened_ = 0;
   bool draining_ = false;
   std::uint64_t turned_away_ = 0;

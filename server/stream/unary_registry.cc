@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 
 namespace partiemc::server {
 namespace {
@@ -25,15 +25,15 @@ absl::Status TooMany(UnaryKind kind, const FairShare& places, const CallerAccoun
 
 }  // namespace
 
-absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryFlow> call, UnaryKind kind) {
+absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind) {
   const std::lock_guard lock(mutex_);
   if (draining_ && kind == UnaryKind::kFrame) return DrainingError();
-  const UnaryFlow* key = call.get();
+  const UnaryStateMachine* key = call.get();
   calls_[key] = {std::move(call), kind};
   return absl::OkStatus();
 }
 
-absl::Status UnaryRegistry::TakePlace(const UnaryFlow& call, const CallerAccount& caller) {
+absl::Status UnaryRegistry::TakePlace(const UnaryStateMachine& call, const CallerAccount& caller) {
   const std::lock_guard lock(mutex_);
   Entry& entry = calls_.at(&call);
   FairShare& places = places_[IndexOf(entry.kind)];
@@ -43,7 +43,7 @@ absl::Status UnaryRegistry::TakePlace(const UnaryFlow& call, const CallerAccount
   return absl::OkStatus();
 }
 
-void UnaryRegistry::GiveBackPlace(const UnaryFlow& call) {
+void UnaryRegistry::GiveBackPlace(const UnaryStateMachine& call) {
   const std::lock_guard lock(mutex_);
   const auto found = calls_.find(&call);
   if (found == calls_.end()) return;  // It was not let in.
@@ -52,7 +52,7 @@ void UnaryRegistry::GiveBackPlace(const UnaryFlow& call) {
   entry.caller = nullptr;
 }
 
-void UnaryRegistry::Leave(const UnaryFlow& call) {
+void UnaryRegistry::Leave(const UnaryStateMachine& call) {
   const std::lock_guard lock(mutex_);
   calls_.erase(&call);
   // With the lock held: whoever waits for the last one may take the registry away after that.
@@ -72,8 +72,8 @@ std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
   return look_again;
 }
 
-std::vector<std::shared_ptr<UnaryFlow>> UnaryRegistry::All() const {
-  std::vector<std::shared_ptr<UnaryFlow>> all;
+std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
+  std::vector<std::shared_ptr<UnaryStateMachine>> all;
   const std::lock_guard lock(mutex_);
   for (const auto& [key, entry] : calls_) all.push_back(entry.call);
   return all;

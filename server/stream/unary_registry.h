@@ -15,7 +15,7 @@
 #include "absl/status/status.h"
 #include "server/compute/fair_share.h"
 #include "server/security/caller.h"
-#include "server/stream/unary_flow.h"
+#include "server/stream/unary_state_machine.h"
 
 namespace partiemc::server {
 
@@ -35,14 +35,14 @@ class UnaryRegistry {
 
   /// A call comes in, without a request yet: those are counted elsewhere (OpeningCalls). Errors,
   /// each with a Violation: UNAVAILABLE (DRAINING), for frames only.
-  absl::Status Enter(std::shared_ptr<UnaryFlow> call, UnaryKind kind);
+  absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind);
   /// Its request has come, and it gets a place; the account lives until it gives that back.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
-  absl::Status TakePlace(const UnaryFlow& call, const CallerAccount& caller);
+  absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller);
   /// It has its last word, and its place is free for others. It may have had none.
-  void GiveBackPlace(const UnaryFlow& call);
+  void GiveBackPlace(const UnaryStateMachine& call);
   /// The connection has taken its last word; it has given its place back.
-  void Leave(const UnaryFlow& call);
+  void Leave(const UnaryStateMachine& call);
 
   /// Of both kinds.
   std::size_t count() const;
@@ -59,16 +59,16 @@ class UnaryRegistry {
 
  private:
   struct Entry {
-    std::shared_ptr<UnaryFlow> call;
+    std::shared_ptr<UnaryStateMachine> call;
     UnaryKind kind;
     const CallerAccount* caller = nullptr;  // Whose place it has; null: none yet.
   };
 
-  std::vector<std::shared_ptr<UnaryFlow>> All() const;
+  std::vector<std::shared_ptr<UnaryStateMachine>> All() const;
 
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
-  std::map<const UnaryFlow*, Entry> calls_;
+  std::map<const UnaryStateMachine*, Entry> calls_;
   std::array<FairShare, 2> places_;  // By kind.
   bool draining_ = false;
 };

@@ -10,15 +10,15 @@
 
 namespace partiemc::server {
 
-absl::Status WatchRegistry::Enter(std::shared_ptr<WatchFlow> watcher) {
+absl::Status WatchRegistry::Enter(std::shared_ptr<WatchStateMachine> watcher) {
   const std::lock_guard lock(mutex_);
   if (draining_) return DrainingError();
-  const WatchFlow* key = watcher.get();
+  const WatchStateMachine* key = watcher.get();
   watchers_[key] = std::move(watcher);
   return absl::OkStatus();
 }
 
-absl::Status WatchRegistry::Open(const WatchFlow& watcher, const Caller& caller) {
+absl::Status WatchRegistry::Open(const WatchStateMachine& watcher, const Caller& caller) {
   const std::lock_guard lock(mutex_);
   if (placed_.size() >= max_watchers_) {
     return ViolationError(
@@ -34,12 +34,12 @@ absl::Status WatchRegistry::Open(const WatchFlow& watcher, const Caller& caller)
   return absl::OkStatus();
 }
 
-void WatchRegistry::Close(const WatchFlow& watcher) {
+void WatchRegistry::Close(const WatchStateMachine& watcher) {
   const std::lock_guard lock(mutex_);
   placed_.erase(&watcher);
 }
 
-void WatchRegistry::Leave(const WatchFlow& watcher) {
+void WatchRegistry::Leave(const WatchStateMachine& watcher) {
   const std::lock_guard lock(mutex_);
   placed_.erase(&watcher);
   watchers_.erase(&watcher);
@@ -68,14 +68,14 @@ std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
   return look_again;
 }
 
-std::vector<std::shared_ptr<WatchFlow>> WatchRegistry::All() const {
-  std::vector<std::shared_ptr<WatchFlow>> all;
+std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
+  std::vector<std::shared_ptr<WatchStateMachine>> all;
   const std::lock_guard lock(mutex_);
   for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   return all;
 }
 
-// Flows are told without the lock: one that drains may leave at once.
+// Machines are told without the lock: one that drains may leave at once.
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
   {
     const std::lock_guard lock(mutex_);

@@ -12,7 +12,7 @@
 
 #include "absl/status/status.h"
 #include "server/security/caller.h"
-#include "server/watch/watch_flow.h"
+#include "server/watch/watch_state_machine.h"
 
 namespace partiemc::server {
 
@@ -25,14 +25,14 @@ class WatchRegistry {
 
   /// A watcher comes in, before it has said what it wants to watch: those are counted elsewhere
   /// (OpeningCalls). Errors, with a Violation: UNAVAILABLE (DRAINING).
-  absl::Status Enter(std::shared_ptr<WatchFlow> watcher);
+  absl::Status Enter(std::shared_ptr<WatchStateMachine> watcher);
   /// It has said so, and gets a place. Errors, each with a Violation: RESOURCE_EXHAUSTED
   /// (TOO_MANY_WATCHERS, CALLER_WATCHERS).
-  absl::Status Open(const WatchFlow& watcher, const Caller& caller = {});
+  absl::Status Open(const WatchStateMachine& watcher, const Caller& caller = {});
   /// Its last word is about to be sent: its place is free.
-  void Close(const WatchFlow& watcher);
+  void Close(const WatchStateMachine& watcher);
   /// Its last word has been sent.
-  void Leave(const WatchFlow& watcher);
+  void Leave(const WatchStateMachine& watcher);
 
   /// Of those that have a place.
   std::size_t count() const;
@@ -50,13 +50,13 @@ class WatchRegistry {
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
 
  private:
-  std::vector<std::shared_ptr<WatchFlow>> All() const;
+  std::vector<std::shared_ptr<WatchStateMachine>> All() const;
 
   const std::uint32_t max_watchers_;
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
-  std::map<const WatchFlow*, std::shared_ptr<WatchFlow>> watchers_;
-  std::map<const WatchFlow*, CallerAccount::Place> placed_;  // Open, not closed.
+  std::map<const WatchStateMachine*, std::shared_ptr<WatchStateMachine>> watchers_;
+  std::map<const WatchStateMachine*, CallerAccount::Place> placed_;  // Open, not closed.
   bool draining_ = false;
 };
 

@@ -129,7 +129,7 @@ Violations CoreIsPlain(const SourceTree& tree) {
   return violations;
 }
 
-Violations TasksHaveOneDoor(const SourceTree& tree) {
+Violations TasksStartInOneFile(const SourceTree& tree) {
   static const std::string kDoor = "core/src/base/parallel.cc";
   static const std::regex kTasks("(oneapi/)?tbb/(?!global_control\\.h).*");
   Violations violations;

@@ -17,7 +17,7 @@ Violations CoreIsPlain(const SourceTree& tree);
 
 /// Outside of the tests only core/src/base/parallel.cc, which is compiled without ThreadSanitizer,
 /// includes what makes tasks of oneTBB, so that the sanitizer is told about every fork and join.
-Violations TasksHaveOneDoor(const SourceTree& tree);
+Violations TasksStartInOneFile(const SourceTree& tree);
 
 /// Every file of core/src and of server lies in one of their rooms, or is one of the few beside
 /// them that put the rooms together. A file includes its own room and rooms above it, by its path.

@@ -9,7 +9,7 @@
 #include "fuzz/single_thread.h"
 #include "partiemc/status.h"
 #include "server/rpc/stream_messages.h"
-#include "server/watch/watch_pump.h"
+#include "server/watch/watch_dispatcher.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::fuzz {
@@ -39,7 +39,7 @@ const server::ServerLimits& Limits() {
 }
 
 // Stands where a call would: nothing is read or written but by the target itself.
-class NoDoor final : public server::StreamDoor {
+class NoTransport final : public server::StreamTransport {
  public:
   void StartRead(std::size_t) override {}
   void StartWrite(Outgoing, std::size_t) override {}
@@ -53,7 +53,7 @@ class NoDoor final : public server::StreamDoor {
 struct Shared {
   server::ComputePool pool{1};
   server::MemoryBudget budget{1 << 30};
-  server::WatchPump pump;
+  server::WatchDispatcher dispatcher;
   server::Worker worker;
 };
 
@@ -61,12 +61,12 @@ class Stream {
  public:
   explicit Stream(Shared& shared)
       : shared_(shared),
-        flow_(std::make_shared<server::StreamFlow>(door_, shared.pool, shared.budget,
-                                                   Limits().frames_in_flight)),
-        messages_(Limits(), registry_, shared.pump, keys_) {
-    RequireOk(registry_.Enter(flow_), "a first call is let in");
+        machine_(std::make_shared<server::StreamStateMachine>(
+            transport_, shared.pool, shared.budget, Limits().frames_in_flight)),
+        messages_(Limits(), registry_, shared.dispatcher, keys_) {
+    RequireOk(registry_.Enter(machine_), "a first call is let in");
   }
-  ~Stream() { registry_.Leave(*flow_); }
+  ~Stream() { registry_.Leave(*machine_); }
 
   void Take(std::string_view bytes) {
     const std::size_t slot = taken_++ % Limits().frames_in_flight;
@@ -83,7 +83,7 @@ class Stream {
 
  private:
   void Open(std::size_t slot) {
-    const auto opened = messages_.Open(slot, *flow_);
+    const auto opened = messages_.Open(slot, *machine_);
     is_open_ = opened.ok();
     if (!is_open_) {
       RequireViolation(opened.status());
@@ -93,7 +93,7 @@ class Stream {
   }
 
   void Answer(std::size_t slot) {
-    const server::Answered answered = messages_.Answer(slot, shared_.worker, flow_->cancelled());
+    const server::Answered answered = messages_.Answer(slot, shared_.worker, machine_->cancelled());
     if (answered.afterwards) answered.afterwards();
     const v1::ReconstructResponse response = Response(Outgoing::kAnswer, slot);
     Require(answered.is_result ? response.has_frame() : response.has_error(), "an answer is told");
@@ -114,9 +114,9 @@ class Stream {
   }
 
   Shared& shared_;
-  NoDoor door_;
+  NoTransport transport_;
   server::StreamRegistry registry_{Limits().max_streams};
-  std::shared_ptr<server::StreamFlow> flow_;
+  std::shared_ptr<server::StreamStateMachine> machine_;
   server::CurrentCheckpointKeys keys_;
   server::StreamMessages messages_;
   bool is_open_ = false;
@@ -128,7 +128,7 @@ class Stream {
 void AttackStreamRequests(Bytes bytes) {
   const SingleThread single_thread;
   static auto* const shared = new Shared;
-  shared->worker.door_buffers.reset();
+  shared->worker.message_buffers.reset();
   Stream stream(*shared);
   Choices choices(bytes);
   std::size_t largest = 0, messages = 0;
@@ -145,7 +145,7 @@ void AttackStreamRequests(Bytes bytes) {
             "a message that comes again takes no further memory");
   }
   const std::size_t with_messages = HeldBytes();
-  shared->worker.door_buffers.reset();
+  shared->worker.message_buffers.reset();
   Require(with_messages <= HeldBytes() + kKeptBytes + kKeptPerByte * largest,
           "a worker keeps no more of messages than they justify");
 }

@@ -1,5 +1,5 @@
 // What is attacked with bytes that somebody else made. Each target is an ordinary function, so that
-// libFuzzer (libfuzzer.cc) and the unit tests (replay_test.cc) go through the same door.
+// libFuzzer (libfuzzer.cc) and the unit tests (replay_test.cc) call the same functions.
 #pragma once
 
 #include <cstdint>

@@ -6,9 +6,9 @@
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/watch/watch_flow.h"
-#include "server/watch/watch_hub.h"
-#include "server/watch/watch_pump.h"
+#include "server/watch/result_broadcaster.h"
+#include "server/watch/watch_dispatcher.h"
+#include "server/watch/watch_state_machine.h"
 
 namespace partiemc::fuzz {
 namespace {
@@ -17,11 +17,14 @@ constexpr std::size_t kMaxWatcherBytes = 4096;
 constexpr std::size_t kMaxSteps = 256;
 
 // A watch without a connection: its writes end when the target says so.
-class Watch final : private server::WatchDoor {
+class Watch final : private server::WatchTransport {
  public:
-  explicit Watch(std::shared_ptr<server::WatchHub> hub) : hub_(std::move(hub)) { flow_->Start(); }
+  explicit Watch(std::shared_ptr<server::ResultBroadcaster> broadcaster)
+      : broadcaster_(std::move(broadcaster)) {
+    machine_->Start();
+  }
   ~Watch() override {
-    flow_->Cancelled();
+    machine_->Cancelled();
     if (writing_) WriteDone(false);
     if (reading_) ReadEnded();
     Require(finished_, "a watch comes to its end");
@@ -41,19 +44,19 @@ class Watch final : private server::WatchDoor {
       if (is_open_ && parsed_.has_credit()) credit_ += request.credit;
     }
     reading_ = false;
-    flow_->ReadDone(request);
+    machine_->ReadDone(request);
   }
   void ReadEnded() {
-    if (std::exchange(reading_, false)) flow_->ReadEnded();
+    if (std::exchange(reading_, false)) machine_->ReadEnded();
   }
   void WriteDone(bool ok) {
-    if (std::exchange(writing_, false)) flow_->WriteDone(ok);
+    if (std::exchange(writing_, false)) machine_->WriteDone(ok);
   }
-  void Cancel() { flow_->Cancelled(); }
-  void Drain() { flow_->Drain(); }
+  void Cancel() { machine_->Cancelled(); }
+  void Drain() { machine_->Drain(); }
   void RequireBounded() const {
     // In mode `latest` two results at most, each within the limit: one is being written.
-    Require(flow_->held_bytes() <= (is_every_ ? 1 : 2) * kMaxWatcherBytes,
+    Require(machine_->held_bytes() <= (is_every_ ? 1 : 2) * kMaxWatcherBytes,
             "a watcher holds no more than it may");
   }
 
@@ -68,7 +71,7 @@ class Watch final : private server::WatchDoor {
     credit_ = parsed_.open().credits();
     is_every_ = parsed_.open().mode() == v1::WATCH_MODE_EVERY;
     return server::WatchTerms{
-        .hub = hub_,
+        .broadcaster = broadcaster_,
         .mode = is_every_ ? server::WatchMode::kEvery : server::WatchMode::kLatest,
         .credit = credit_};
   }
@@ -96,23 +99,24 @@ class Watch final : private server::WatchDoor {
     writing_ = true;
   }
 
-  const std::shared_ptr<server::WatchHub> hub_;
+  const std::shared_ptr<server::ResultBroadcaster> broadcaster_;
   v1::WatchStreamRequest parsed_;
   std::uint64_t credit_ = 0;
   bool is_open_ = false, is_every_ = false, reading_ = false, writing_ = false, finished_ = false;
-  std::shared_ptr<server::WatchFlow> flow_ =
-      std::make_shared<server::WatchFlow>(static_cast<server::WatchDoor&>(*this), kMaxWatcherBytes);
+  std::shared_ptr<server::WatchStateMachine> machine_ = std::make_shared<server::WatchStateMachine>(
+      static_cast<server::WatchTransport&>(*this), kMaxWatcherBytes);
 };
 
 }  // namespace
 
 void AttackWatchRequests(Bytes bytes) {
-  static auto* const pump = new server::WatchPump;
-  const auto hub = std::make_shared<server::WatchHub>(
-      *pump, server::WatchHub::Limits{.tap_bytes = 2 * kMaxWatcherBytes, .kept_bytes = 256});
+  static auto* const dispatcher = new server::WatchDispatcher;
+  const auto broadcaster = std::make_shared<server::ResultBroadcaster>(
+      *dispatcher,
+      server::ResultBroadcaster::Limits{.mailbox_bytes = 2 * kMaxWatcherBytes, .kept_bytes = 256});
   Choices choices(bytes);
   {
-    Watch watch(hub);
+    Watch watch(broadcaster);
     bool over = false;
     for (std::size_t step = 0; step < kMaxSteps && !choices.empty(); ++step) {
       const std::uint8_t what = choices.Take<std::uint8_t>();
@@ -128,8 +132,8 @@ void AttackWatchRequests(Bytes bytes) {
         case 4:
         case 5:
           if (over) break;
-          hub->Publish(std::make_shared<server::WatchFrame>(16 * std::size_t{what}));
-          hub->Announce();
+          broadcaster->Publish(std::make_shared<server::WatchFrame>(16 * std::size_t{what}));
+          broadcaster->Announce();
           break;
         case 6:
           watch.ReadEnded();
@@ -139,14 +143,14 @@ void AttackWatchRequests(Bytes bytes) {
           if (what == 255) watch.Cancel();
           if (what == 247) watch.Drain();
           if (!std::exchange(over, true)) {
-            hub->End(server::WatchEnd::OfStream(absl::OkStatus()));
+            broadcaster->End(server::WatchEnd::OfStream(absl::OkStatus()));
           }
       }
-      pump->Flush();  // So that the same bytes do the same again.
+      dispatcher->Flush();  // So that the same bytes do the same again.
       watch.RequireBounded();
     }
   }
-  pump->Flush();
+  dispatcher->Flush();
 }
 
 }  // namespace partiemc::fuzz

@@ -136,23 +136,23 @@ std::optional<int> Fleet::TerminateAndRestart(std::size_t server, std::chrono::s
   return code;
 }
 
-std::string DoorName(Door door) {
-  switch (door) {
-    case Door::kList:
+std::string RouteName(Route route) {
+  switch (route) {
+    case Route::kList:
       return "List";
-    case Door::kHaproxy:
+    case Route::kHaproxy:
       return "Haproxy";
-    case Door::kNginx:
+    case Route::kNginx:
       return "Nginx";
   }
   return "";
 }
 
-ProxyProcess::ProxyProcess(Door door, const std::vector<std::string>& servers)
+ProxyProcess::ProxyProcess(Route route, const std::vector<std::string>& servers)
     : socket_(folder_.Path("socket")) {
   const std::string folder = folder_.path().string();
   const std::string file = folder_.Path("configuration");
-  const bool is_nginx = door == Door::kNginx;
+  const bool is_nginx = route == Route::kNginx;
   std::ofstream(file) << (is_nginx ? NginxFile(folder, socket_, servers)
                                    : HaproxyFile(socket_, servers));
   std::vector<std::string> arguments =

@@ -40,16 +40,16 @@ class Fleet {
 };
 
 /// What stands between clients and servers.
-enum class Door { kList, kHaproxy, kNginx };
+enum class Route { kList, kHaproxy, kNginx };
 
 /// "List", "Haproxy" or "Nginx".
-std::string DoorName(Door door);
+std::string RouteName(Route route);
 
 /// A proxy as Debian has it, on a Unix socket. Ended when it goes out of scope.
 class ProxyProcess {
  public:
   /// Serves when it returns. A missing program fails the test.
-  ProxyProcess(Door door, const std::vector<std::string>& servers);
+  ProxyProcess(Route route, const std::vector<std::string>& servers);
   ~ProxyProcess();
   ProxyProcess(const ProxyProcess&) = delete;
   ProxyProcess& operator=(const ProxyProcess&) = delete;

@@ -26,10 +26,10 @@ constexpr std::chrono::seconds kGrace(20);
 // From a disturbance to the next answer (tests/PROMISES.md).
 constexpr double kMaxRecoveryMs = 1000;
 
-class FleetTest : public testing::TestWithParam<Door> {
+class FleetTest : public testing::TestWithParam<Route> {
  protected:
   FleetTest() {
-    if (GetParam() != Door::kList) proxy_.emplace(GetParam(), fleet_.addresses());
+    if (GetParam() != Route::kList) proxy_.emplace(GetParam(), fleet_.addresses());
   }
 
   client::StreamOptions OptionsFor(const Workload& workload, std::size_t number) const {
@@ -81,8 +81,8 @@ class FleetTest : public testing::TestWithParam<Door> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Behind, FleetTest,
-                         testing::Values(Door::kList, Door::kHaproxy, Door::kNginx),
-                         [](const auto& test) { return DoorName(test.param); });
+                         testing::Values(Route::kList, Route::kHaproxy, Route::kNginx),
+                         [](const auto& test) { return RouteName(test.param); });
 
 // From each loss that a stream has told back to the disturbance before it and on to its next
 // answer: how long its user was without.
@@ -122,8 +122,8 @@ double LongestPauseMs(const std::vector<History>& histories) {
 // Prints what was seen, and judges how long users were without: 99 of 100 of them at most a second,
 // beside what the machine makes them wait anyway. Of less than a hundred recoveries one may be
 // longer.
-void Judge(Door door, const char* what, std::uint64_t count, const std::vector<double>& recoveries,
-           const std::vector<History>& histories) {
+void Judge(Route route, const char* what, std::uint64_t count,
+           const std::vector<double>& recoveries, const std::vector<History>& histories) {
   std::uint64_t frames = 0;
   for (const History& history : histories) frames += history.answers.size();
   const auto percentile = [&](std::size_t percent) {
@@ -131,7 +131,7 @@ void Judge(Door door, const char* what, std::uint64_t count, const std::vector<d
     return recoveries[std::min(recoveries.size() - 1, recoveries.size() * percent / 100)];
   };
   std::printf("%s: %llu %s, %llu answers, %zu recoveries: p50 %.0f ms, p99 %.0f ms, most %.0f ms\n",
-              DoorName(door).c_str(), static_cast<unsigned long long>(count), what,
+              RouteName(route).c_str(), static_cast<unsigned long long>(count), what,
               static_cast<unsigned long long>(frames), recoveries.size(), percentile(50),
               percentile(99), percentile(100));
   const double pause = LongestPauseMs(histories), bound = kMaxRecoveryMs + pause;

@@ -6,7 +6,7 @@
 namespace partiemc::resume {
 
 struct Options {
-  std::uint64_t kills = 6;         ///< --kills: of servers, for each door.
+  std::uint64_t kills = 6;         ///< --kills: of servers, for each route.
   std::uint64_t terminations = 6;  ///< --terminations: likewise, by SIGTERM.
   std::uint64_t faults = 12;       ///< --faults: of the network.
   std::uint64_t seed = 1;          ///< --seed: of what is random.

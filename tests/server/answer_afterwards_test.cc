@@ -8,7 +8,7 @@
 
 #include "server/compute/memory_budget.h"
 #include "server/moving_blob.h"
-#include "server/scripted_door.h"
+#include "server/scripted_transport.h"
 
 namespace partiemc::server {
 namespace {
@@ -24,37 +24,37 @@ class AnswerAfterwards : public ::testing::Test {
   };
 
   void SetUp() override {
-    door_.afterwards = [this] {
-      const auto& writing = door_.writing();
+    transport_.afterwards = [this] {
+      const auto& writing = transport_.writing();
       moments_.push_back(writing ? Moment{writing->what, writing->sequence} : Moment{});
     };
-    door_.BringRequest({.kind = RequestKind::kOpen, .positions = {}});
+    transport_.BringRequest({.kind = RequestKind::kOpen, .positions = {}});
   }
   void SendFrame(std::uint64_t sequence) {
-    door_.BringRequest(
+    transport_.BringRequest(
         {.kind = RequestKind::kFrame, .sequence = sequence, .positions = MovingBlob(1, sequence)});
   }
 
   SteppedPool pool_;
   MemoryBudget budget_{std::uint64_t{1} << 30};
-  ScriptedDoor door_{pool_, budget_, 4, BlobParameters(), kLimits};
+  ScriptedTransport transport_{pool_, budget_, 4, BlobParameters(), kLimits};
   std::vector<Moment> moments_;
 };
 
 TEST_F(AnswerAfterwards, ComesOnceTheAnswerIsOnItsWay) {
-  door_.EndWrite(true);  // `opened`.
+  transport_.EndWrite(true);  // `opened`.
   for (std::uint64_t k = 1; k <= 3; ++k) {
     SendFrame(k);
     pool_.Step();
     ASSERT_EQ(moments_.size(), k);
     EXPECT_EQ(moments_.back().what, Outgoing::kAnswer);
     EXPECT_EQ(moments_.back().sequence, k);
-    door_.EndWrite(true);
+    transport_.EndWrite(true);
   }
 }
 
 TEST_F(AnswerAfterwards, DoesNotWaitForAClientThatTakesNoAnswers) {
-  ASSERT_EQ(door_.writing()->what, Outgoing::kOpened);  // And stays so.
+  ASSERT_EQ(transport_.writing()->what, Outgoing::kOpened);  // And stays so.
   for (std::uint64_t k = 1; k <= 4; ++k) {
     SendFrame(k);
     pool_.Step();
@@ -64,14 +64,14 @@ TEST_F(AnswerAfterwards, DoesNotWaitForAClientThatTakesNoAnswers) {
 }
 
 TEST_F(AnswerAfterwards, ComesForAFrameWhoseStreamEndsWhileItIsComputed) {
-  door_.EndWrite(true);
+  transport_.EndWrite(true);
   SendFrame(1);
-  door_.meanwhile = [this] {
-    door_.EndReads();
-    door_.flow().Cancelled();
+  transport_.meanwhile = [this] {
+    transport_.EndReads();
+    transport_.machine().Cancelled();
   };
   pool_.Step();
-  EXPECT_TRUE(door_.finished());
+  EXPECT_TRUE(transport_.finished());
   ASSERT_EQ(moments_.size(), 1u);
   EXPECT_EQ(moments_.back().what, std::nullopt);
 }

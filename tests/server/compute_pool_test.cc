@@ -264,7 +264,7 @@ TEST(ComputePool, AJobThatWaitsForACallerWhoHasGoneRunsAfterAWhile) {
 }
 
 // Tells when it is destroyed.
-class Mourned final : public DoorBuffers {
+class Mourned final : public MessageBuffers {
  public:
   explicit Mourned(std::promise<void> gone) : gone_(std::move(gone)) {}
   ~Mourned() override { gone_.set_value(); }
@@ -278,10 +278,10 @@ std::future<void> WorkOnALargeFrame(ComputePool& pool) {
   std::promise<void> gone;
   std::future<void> future = gone.get_future();
   auto buffers =
-      std::make_shared<std::unique_ptr<DoorBuffers>>(std::make_unique<Mourned>(std::move(gone)));
+      std::make_shared<std::unique_ptr<MessageBuffers>>(std::make_unique<Mourned>(std::move(gone)));
   RunAndWait(pool, [buffers](Worker& worker) {
     worker.particles.Used(1'000'000, WarmSize::Clock::now());
-    worker.door_buffers = std::move(*buffers);
+    worker.message_buffers = std::move(*buffers);
   });
   return future;
 }
@@ -331,13 +331,13 @@ std::array<std::future<void>, 2> WorkOnTwoLargeFramesAtOnce(ComputePool& pool) {
   for (std::future<void>& future : gone) {
     std::promise<void> promise;
     future = promise.get_future();
-    auto buffers = std::make_shared<std::unique_ptr<DoorBuffers>>(
+    auto buffers = std::make_shared<std::unique_ptr<MessageBuffers>>(
         std::make_unique<Mourned>(std::move(promise)));
     pool.Submit(
         [begun, buffers](Worker& worker) {
           begun->arrive_and_wait();
           worker.particles.Used(1'000'000, WarmSize::Clock::now());
-          worker.door_buffers = std::move(*buffers);
+          worker.message_buffers = std::move(*buffers);
         },
         [done] { done->count_down(); });
   }

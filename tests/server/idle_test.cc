@@ -1,4 +1,4 @@
-// Streams that keep the server waiting. Times are told to the flow, not waited for, except where
+// Streams that keep the server waiting. Times are told to the machine, not waited for, except where
 // the timer itself is asked.
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "partiemc/status.h"
-#include "server/memory_door.h"
+#include "server/memory_transport.h"
 #include "server/moving_blob.h"
 #include "server/stream/idle_timer.h"
 #include "server/stream/stream_registry.h"
@@ -24,49 +24,49 @@ constexpr IdleLimits kIdle{.opening = minutes(1), .streaming = minutes(10)};
 
 class Idle : public ::testing::Test {
  protected:
-  // Of the flow, as if that much time had passed.
+  // Of the machine, as if that much time had passed.
   steady_clock::time_point EndIfIdle(milliseconds later, const IdleLimits& limits = kIdle) {
-    return door_.flow().EndIfIdle(limits, steady_clock::now() + later);
+    return transport_.machine().EndIfIdle(limits, steady_clock::now() + later);
   }
   void ExpectIdle(const char* value) {
-    EXPECT_EQ(door_.status().code(), absl::StatusCode::kDeadlineExceeded);
-    const auto violation = FindViolation(door_.status());
+    EXPECT_EQ(transport_.status().code(), absl::StatusCode::kDeadlineExceeded);
+    const auto violation = FindViolation(transport_.status());
     ASSERT_TRUE(violation.has_value());
     EXPECT_EQ(violation->reason, kReasonIdle);
     EXPECT_EQ(violation->value, value);
   }
 
   ComputePool pool_{1};
-  MemoryDoor door_{pool_, 2, BlobParameters(), kLimits};
+  MemoryTransport transport_{pool_, 2, BlobParameters(), kLimits};
 };
 
 TEST_F(Idle, ACallThatNeverOpensEnds) {
   const auto look_again = EndIfIdle(milliseconds(0));
   EXPECT_LE(look_again, steady_clock::now() + kIdle.opening);
   EndIfIdle(kIdle.opening);
-  EXPECT_FALSE(door_.Receive().has_value());
+  EXPECT_FALSE(transport_.Receive().has_value());
   ExpectIdle("sends no `open` for 60 s");
 }
 
 TEST_F(Idle, AStreamWithoutAFrameEndsAndOneThatHadOneInTimeDoesNot) {
-  door_.Open();
-  ASSERT_EQ(door_.Receive()->what, Outgoing::kOpened);
+  transport_.Open();
+  ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
   EndIfIdle(minutes(9));
   const auto before_frame = steady_clock::now();
-  door_.Send(1, MovingBlob(1, 0));
-  ASSERT_EQ(door_.Receive()->sequence, 1u);
+  transport_.Send(1, MovingBlob(1, 0));
+  ASSERT_EQ(transport_.Receive()->sequence, 1u);
   EXPECT_GE(EndIfIdle(milliseconds(0)), before_frame + kIdle.streaming);
   EndIfIdle(minutes(10));
-  EXPECT_FALSE(door_.Receive().has_value());
+  EXPECT_FALSE(transport_.Receive().has_value());
   ExpectIdle("sends no frame for 600 s");
 }
 
 TEST_F(Idle, AClientThatTakesNoAnswersIsCut) {
-  door_.Open();
-  for (std::uint64_t i = 1; i <= 6; ++i) door_.Send(i, MovingBlob(1, i));
-  door_.WaitUntilRead(2);
+  transport_.Open();
+  for (std::uint64_t i = 1; i <= 6; ++i) transport_.Send(i, MovingBlob(1, i));
+  transport_.WaitUntilRead(2);
   // Until both are computed, which is waiting for nobody but ourselves.
-  while (door_.flow().counts().frames < 2) std::this_thread::yield();
+  while (transport_.machine().counts().frames < 2) std::this_thread::yield();
   EndIfIdle(minutes(10));
   ExpectIdle("takes no answer for 600 s");
 }
@@ -74,26 +74,26 @@ TEST_F(Idle, AClientThatTakesNoAnswersIsCut) {
 TEST_F(Idle, WaitingForAWorkerDoesNotCount) {
   std::promise<void> go;
   pool_.Submit([future = go.get_future().share()](Worker&) { future.wait(); });
-  door_.Open();
-  ASSERT_EQ(door_.Receive()->what, Outgoing::kOpened);
-  door_.Send(1, MovingBlob(1, 0));
-  door_.Send(2, MovingBlob(1, 1));
-  door_.WaitUntilRead(2);  // So the flow knows of the first one.
+  transport_.Open();
+  ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
+  transport_.Send(1, MovingBlob(1, 0));
+  transport_.Send(2, MovingBlob(1, 1));
+  transport_.WaitUntilRead(2);  // So the machine knows of the first one.
   EndIfIdle(minutes(100));
   go.set_value();
-  EXPECT_EQ(door_.Receive()->sequence, 1u);
-  EXPECT_EQ(door_.Receive()->sequence, 2u);
-  door_.HalfClose();
-  EXPECT_TRUE(door_.status().ok());
+  EXPECT_EQ(transport_.Receive()->sequence, 1u);
+  EXPECT_EQ(transport_.Receive()->sequence, 2u);
+  transport_.HalfClose();
+  EXPECT_TRUE(transport_.status().ok());
 }
 
 TEST_F(Idle, WithoutALimitNothingEnds) {
   EXPECT_EQ(EndIfIdle(minutes(1000), {}), steady_clock::time_point::max());
-  door_.Open();
-  ASSERT_EQ(door_.Receive()->what, Outgoing::kOpened);
+  transport_.Open();
+  ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
   EXPECT_EQ(EndIfIdle(minutes(1000), {}), steady_clock::time_point::max());
-  door_.HalfClose();
-  EXPECT_TRUE(door_.status().ok());
+  transport_.HalfClose();
+  EXPECT_TRUE(transport_.status().ok());
 }
 
 TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
@@ -106,10 +106,10 @@ TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
   const IdleTimer timer(registry, watchers, calls, limits);
   // It sleeps already when they come.
   for (int round = 0; round < 3; ++round) {
-    MemoryDoor door(pool, 2, BlobParameters(), kLimits);
-    ASSERT_TRUE(registry.Enter(door.flow().shared_from_this()).ok());
-    EXPECT_EQ(FindViolation(door.status())->reason, kReasonIdle);
-    registry.Leave(door.flow());
+    MemoryTransport transport(pool, 2, BlobParameters(), kLimits);
+    ASSERT_TRUE(registry.Enter(transport.machine().shared_from_this()).ok());
+    EXPECT_EQ(FindViolation(transport.status())->reason, kReasonIdle);
+    registry.Leave(transport.machine());
   }
 }
 

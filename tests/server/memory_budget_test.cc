@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "server/base/machine_memory.h"
-#include "server/memory_door.h"
+#include "server/memory_transport.h"
 #include "server/moving_blob.h"
 #include "support/temporary_folder.h"
 
@@ -128,23 +128,24 @@ constexpr std::size_t kWindow = 4;
 
 std::uint64_t FrameBytes() { return MovingBlob(1, 0).size() * sizeof(double); }
 
-void SendAll(MemoryDoor& door, std::uint64_t frames) {
-  door.Open();
-  for (std::uint64_t i = 0; i < frames; ++i) door.Send(i + 1, MovingBlob(1, i));
-  door.HalfClose();
+void SendAll(MemoryTransport& transport, std::uint64_t frames) {
+  transport.Open();
+  for (std::uint64_t i = 0; i < frames; ++i) transport.Send(i + 1, MovingBlob(1, i));
+  transport.HalfClose();
 }
 
-std::size_t ReceiveAll(MemoryDoor& door) {
+std::size_t ReceiveAll(MemoryTransport& transport) {
   std::size_t frames = 0;
-  while (const auto answer = door.Receive()) frames += answer->what == Outgoing::kAnswer ? 1 : 0;
+  while (const auto answer = transport.Receive())
+    frames += answer->what == Outgoing::kAnswer ? 1 : 0;
   return frames;
 }
 
 TEST(MemoryOfStreams, WithoutAnyBudgetEveryStreamStillGoesOnFrameByFrame) {
   ComputePool pool(2);
   MemoryBudget budget(0);
-  MemoryDoor one(pool, budget, kWindow, BlobParameters(), kLimits);
-  MemoryDoor two(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryTransport one(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryTransport two(pool, budget, kWindow, BlobParameters(), kLimits);
   SendAll(one, 12);
   SendAll(two, 12);
   std::size_t of_two = 0;
@@ -163,8 +164,8 @@ TEST(MemoryOfStreams, WithoutAnyBudgetEveryStreamStillGoesOnFrameByFrame) {
 TEST(MemoryOfStreams, AStreamThatPinsTheBudgetStopsNobody) {
   ComputePool pool(2);
   MemoryBudget budget(FrameBytes() * 3);
-  MemoryDoor pinned(pool, budget, kWindow, BlobParameters(), kLimits);
-  MemoryDoor other(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryTransport pinned(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryTransport other(pool, budget, kWindow, BlobParameters(), kLimits);
   SendAll(pinned, 12);
   pinned.WaitUntilRead(3);
   SendAll(other, 30);
@@ -182,20 +183,20 @@ TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
   for (int round = 0; round < 20; ++round) {
     MemoryBudget budget(FrameBytes() * (random() % 6));
     auto pool = std::make_unique<ComputePool>(2);
-    std::vector<std::unique_ptr<MemoryDoor>> doors;
+    std::vector<std::unique_ptr<MemoryTransport>> transports;
     std::vector<std::thread> clients;
     for (int i = 0; i < 6; ++i) {
-      doors.push_back(std::make_unique<MemoryDoor>(*pool, budget, 1 + random() % kWindow,
-                                                   BlobParameters(), kLimits));
-      SendAll(*doors.back(), 8);
-      clients.emplace_back([&door = *doors.back(), fate = random() % 4] {
-        if (fate == 0) return door.Cancel();
-        if (fate == 1) return door.flow().Drain();
-        EXPECT_EQ(ReceiveAll(door), 8u);
+      transports.push_back(std::make_unique<MemoryTransport>(*pool, budget, 1 + random() % kWindow,
+                                                             BlobParameters(), kLimits));
+      SendAll(*transports.back(), 8);
+      clients.emplace_back([&transport = *transports.back(), fate = random() % 4] {
+        if (fate == 0) return transport.Cancel();
+        if (fate == 1) return transport.machine().Drain();
+        EXPECT_EQ(ReceiveAll(transport), 8u);
       });
     }
     for (std::thread& client : clients) client.join();
-    doors.clear();
+    transports.clear();
     pool.reset();  // Its threads may be about to tell a stream of memory that it wanted once.
     EXPECT_EQ(budget.held(), 0u) << "round " << round;
   }

@@ -5,14 +5,14 @@
 
 namespace partiemc::server {
 
-MemoryWatcher::MemoryWatcher(std::shared_ptr<WatchHub> hub, WatchMode mode, std::uint64_t credit,
-                             std::size_t max_bytes)
-    : terms_{std::move(hub), mode, credit},
-      flow_(std::make_shared<WatchFlow>(static_cast<WatchDoor&>(*this), max_bytes)),
+MemoryWatcher::MemoryWatcher(std::shared_ptr<ResultBroadcaster> broadcaster, WatchMode mode,
+                             std::uint64_t credit, std::size_t max_bytes)
+    : terms_{std::move(broadcaster), mode, credit},
+      machine_(std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), max_bytes)),
       sent_{{WatchRequest::Kind::kOpen, 0}},
       paid_(credit),
       thread_([this] { Run(); }) {
-  flow_->Start();
+  machine_->Start();
 }
 
 MemoryWatcher::~MemoryWatcher() {
@@ -34,7 +34,7 @@ void MemoryWatcher::Cancel() {
     cut_ = true;
     changed_.notify_all();
   }
-  flow_->Cancelled();
+  machine_->Cancelled();
 }
 
 void MemoryWatcher::StopReading() {
@@ -143,13 +143,13 @@ void MemoryWatcher::Run() {
       const bool ok = !cut_;
       changed_.notify_all();
       lock.unlock();
-      flow_->WriteDone(ok);
+      machine_->WriteDone(ok);
     } else {
       reading_ = false;
       const WatchRequest request = sent_.front();
       sent_.pop_front();
       lock.unlock();
-      flow_->ReadDone(request);
+      machine_->ReadDone(request);
     }
     lock.lock();
   }

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "server/watch/watch_flow.h"
-#include "server/watch/watch_hub.h"
+#include "server/watch/result_broadcaster.h"
+#include "server/watch/watch_state_machine.h"
 
 namespace partiemc::server {
 
@@ -32,11 +32,11 @@ struct SeenFrame {
   friend bool operator==(const SeenFrame&, const SeenFrame&) = default;
 };
 
-class MemoryWatcher final : private WatchDoor {
+class MemoryWatcher final : private WatchTransport {
  public:
   /// Opens at once.
-  MemoryWatcher(std::shared_ptr<WatchHub> hub, WatchMode mode, std::uint64_t credit,
-                std::size_t max_bytes);
+  MemoryWatcher(std::shared_ptr<ResultBroadcaster> broadcaster, WatchMode mode,
+                std::uint64_t credit, std::size_t max_bytes);
   /// Cancels what goes on and waits for the end.
   ~MemoryWatcher() override;
 
@@ -59,7 +59,7 @@ class MemoryWatcher final : private WatchDoor {
   /// Frames that came without credit for them; two writes at once throw.
   std::uint64_t unpaid() const;
 
-  WatchFlow& flow() { return *flow_; }
+  WatchStateMachine& machine() { return *machine_; }
 
  private:
   void StartRead() override;
@@ -74,7 +74,7 @@ class MemoryWatcher final : private WatchDoor {
   void Run();
 
   const WatchTerms terms_;
-  std::shared_ptr<WatchFlow> flow_;
+  std::shared_ptr<WatchStateMachine> machine_;
 
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable changed_;

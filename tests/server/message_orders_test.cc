@@ -10,7 +10,7 @@
 #include <string>
 
 #include "partiemc/status.h"
-#include "server/scripted_door.h"
+#include "server/scripted_transport.h"
 #include "server/stream_model.h"
 #include "support/random.h"
 
@@ -63,28 +63,28 @@ class Order {
         pool_(pool),
         seen_(seen),
         model_(window_, legal_, results),
-        door_(pool, budget, window_, Parameters(legal_), kLimits) {}
+        transport_(pool, budget, window_, Parameters(legal_), kLimits) {}
 
   void Run() {
     ExpectAsPredicted("start");
     const std::size_t steps = random_.Below(kMostSteps);
     for (std::size_t k = 0; k < steps && !testing::Test::HasFailure(); ++k) Step();
     half_closed_ = true;
-    while (!testing::Test::HasFailure() && !door_.finished()) {
-      if (door_.reading()) {
+    while (!testing::Test::HasFailure() && !transport_.finished()) {
+      if (transport_.reading()) {
         EndReads();
-      } else if (door_.writing()) {
-        EndWrite(!door_.cut());
+      } else if (transport_.writing()) {
+        EndWrite(!transport_.cut());
       } else if (model_.computing()) {
         Compute();
       } else {
         FAIL() << "stands still";
       }
     }
-    if (door_.reading()) EndReads();  // What a transport may still do after the end.
-    door_.flow().Cancelled();
-    door_.flow().Drain();
-    door_.flow().TakenOver();
+    if (transport_.reading()) EndReads();  // What a transport may still do after the end.
+    transport_.machine().Cancelled();
+    transport_.machine().Drain();
+    transport_.machine().TakenOver();
     ExpectAsPredicted("the end");
     if (const auto end = model_.finished()) {
       ++seen_["ended " + absl::StatusCodeToString(end->code) + " " + end->reason];
@@ -97,10 +97,10 @@ class Order {
     if (dice < 0.02) {
       SomethingMeanwhile();
       ExpectAsPredicted("an event");
-    } else if (dice < 0.4 && door_.reading()) {
+    } else if (dice < 0.4 && transport_.reading()) {
       half_closed_ || random_.Chance(0.05) ? EndReads() : BringRequest();
-    } else if (dice < (slow_reader_ ? 0.45 : 0.7) && door_.writing()) {
-      EndWrite(!door_.cut() && !random_.Chance(0.01));
+    } else if (dice < (slow_reader_ ? 0.45 : 0.7) && transport_.writing()) {
+      EndWrite(!transport_.cut() && !random_.Chance(0.01));
     } else if (model_.computing()) {
       Compute();
     }
@@ -124,13 +124,13 @@ class Order {
     auto [request, fault] = RandomRequest();
     ++seen_[request.kind == RequestKind::kFrame && fault.empty() ? "frame" : "other request"];
     if (request.kind == RequestKind::kOpen && random_.Chance(0.1)) {
-      door_.meanwhile = [this] { SomethingMeanwhile(); };
+      transport_.meanwhile = [this] { SomethingMeanwhile(); };
     }
     const bool opens = request.kind == RequestKind::kOpen;
     model_.RequestCame(request, fault);
     const bool opening = opens && model_.opening();
-    if (!opening) door_.meanwhile = nullptr;
-    door_.BringRequest(std::move(request));
+    if (!opening) transport_.meanwhile = nullptr;
+    transport_.BringRequest(std::move(request));
     if (opening) model_.OpeningDone();
     ExpectAsPredicted("a request");
   }
@@ -166,19 +166,19 @@ class Order {
   void EndReads() {
     half_closed_ = true;
     model_.ReadsEnded();
-    door_.EndReads();
+    transport_.EndReads();
     ExpectAsPredicted("no more requests");
   }
 
   void EndWrite(bool ok) {
     model_.WriteDone(ok);
-    door_.EndWrite(ok);
+    transport_.EndWrite(ok);
     ExpectAsPredicted(ok ? "a write" : "a failed write");
   }
 
   void Compute() {
     const bool answers = model_.TakeUp();
-    if (answers && random_.Chance(0.03)) door_.meanwhile = [this] { SomethingMeanwhile(); };
+    if (answers && random_.Chance(0.03)) transport_.meanwhile = [this] { SomethingMeanwhile(); };
     pool_.Step();
     model_.Computed(answers);
     ExpectAsPredicted("a frame computed");
@@ -187,44 +187,45 @@ class Order {
   void Cancel() {
     half_closed_ = true;
     model_.Cancelled();
-    door_.flow().Cancelled();
+    transport_.machine().Cancelled();
     ++seen_["cancel"];
   }
   void Drain() {
     model_.Drained();
-    door_.flow().Drain();
+    transport_.machine().Drain();
     ++seen_["drain"];
   }
   void TakeOver() {
     model_.TakenOver();
-    door_.flow().TakenOver();
+    transport_.machine().TakenOver();
     ++seen_["taken over"];
   }
   void WaitTooLong() {
     constexpr IdleLimits kLimit{std::chrono::milliseconds(1), std::chrono::milliseconds(1)};
     model_.WaitedTooLong();
-    door_.flow().EndIfIdle(kLimit, std::chrono::steady_clock::now() + std::chrono::hours(1));
+    transport_.machine().EndIfIdle(kLimit,
+                                   std::chrono::steady_clock::now() + std::chrono::hours(1));
     ++seen_["idle"];
   }
 
   void ExpectAsPredicted(const char* after) {
     SCOPED_TRACE(testing::Message() << "after " << after);
-    EXPECT_EQ(door_.reading(), model_.reading());
-    EXPECT_EQ(door_.writing() == model_.writing(), true)
-        << "sequence " << (door_.writing() ? door_.writing()->sequence : 0) << " and "
+    EXPECT_EQ(transport_.reading(), model_.reading());
+    EXPECT_EQ(transport_.writing() == model_.writing(), true)
+        << "sequence " << (transport_.writing() ? transport_.writing()->sequence : 0) << " and "
         << (model_.writing() ? model_.writing()->sequence : 0);
-    EXPECT_EQ(door_.cut(), model_.cut());
+    EXPECT_EQ(transport_.cut(), model_.cut());
     EXPECT_EQ(End(), model_.finished());
-    const StreamCounts counts = door_.flow().counts();
+    const StreamCounts counts = transport_.machine().counts();
     EXPECT_EQ(counts.frames, model_.results());
     EXPECT_EQ(counts.frame_errors, model_.errors());
     EXPECT_EQ(counts.last_sequence, model_.last_sequence());
   }
 
   std::optional<StreamEnd> End() const {
-    if (!door_.finished()) return std::nullopt;
-    const auto violation = FindViolation(*door_.finished());
-    return StreamEnd{door_.finished()->code(), violation ? violation->reason : ""};
+    if (!transport_.finished()) return std::nullopt;
+    const auto violation = FindViolation(*transport_.finished());
+    return StreamEnd{transport_.finished()->code(), violation ? violation->reason : ""};
   }
 
   support::Random random_;
@@ -233,7 +234,7 @@ class Order {
   SteppedPool& pool_;
   std::map<std::string, int>& seen_;
   StreamModel model_;
-  ScriptedDoor door_;
+  ScriptedTransport transport_;
   bool first_ = true, half_closed_ = false;
 };
 

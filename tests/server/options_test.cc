@@ -18,26 +18,26 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::variant<CommandLine, Leave> Parse(std::vector<const char*> arguments) {
+std::variant<CommandLine, EarlyExit> Parse(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "partiemc-server");
   return ParseCommandLine(static_cast<int>(arguments.size()), arguments.data());
 }
 
 CommandLine Parsed(std::vector<const char*> arguments) {
   const auto parsed = Parse(std::move(arguments));
-  const auto* leave = std::get_if<Leave>(&parsed);
-  EXPECT_EQ(leave, nullptr) << leave->text;
-  return leave == nullptr ? std::get<CommandLine>(parsed) : CommandLine{};
+  const auto* early = std::get_if<EarlyExit>(&parsed);
+  EXPECT_EQ(early, nullptr) << early->text;
+  return early == nullptr ? std::get<CommandLine>(parsed) : CommandLine{};
 }
 
 // The one line with which the arguments are refused.
 std::string Refused(std::vector<const char*> arguments) {
   const auto parsed = Parse(std::move(arguments));
-  const auto* leave = std::get_if<Leave>(&parsed);
-  if (leave == nullptr) return "accepted";
-  EXPECT_EQ(leave->code, 2);
-  EXPECT_EQ(leave->text.find('\n'), leave->text.size() - 1) << leave->text;
-  return leave->text;
+  const auto* early = std::get_if<EarlyExit>(&parsed);
+  if (early == nullptr) return "accepted";
+  EXPECT_EQ(early->code, 2);
+  EXPECT_EQ(early->text.find('\n'), early->text.size() - 1) << early->text;
+  return early->text;
 }
 
 // Set for the length of a test.
@@ -158,9 +158,9 @@ TEST(CommandLineOptions, AMisspeltOptionInTheFileIsRefused) {
 TEST(CommandLineOptions, HelpAndVersionArePrintedAndAreNoError) {
   for (const char* flag : {"--help", "--version"}) {
     const auto parsed = Parse({flag});
-    ASSERT_TRUE(std::holds_alternative<Leave>(parsed));
-    EXPECT_EQ(std::get<Leave>(parsed).code, 0);
-    EXPECT_THAT(std::get<Leave>(parsed).text, HasSubstr("partiemc-server"));
+    ASSERT_TRUE(std::holds_alternative<EarlyExit>(parsed));
+    EXPECT_EQ(std::get<EarlyExit>(parsed).code, 0);
+    EXPECT_THAT(std::get<EarlyExit>(parsed).text, HasSubstr("partiemc-server"));
   }
 }
 

@@ -22,7 +22,8 @@ namespace {
 
 constexpr unsigned kSeed = 20;
 
-// Sessions know no threads, so their tests need none; stream_flow_test has those of the pool.
+// Sessions know no threads, so their tests need none; stream_state_machine_test has those of the
+// pool.
 const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_allowed_parallelism,
                                              1);
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};

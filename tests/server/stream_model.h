@@ -1,5 +1,5 @@
 // What a stream does, told as shortly as PROTOCOL.md tells it and without any of the server's code:
-// the tests hold StreamFlow and Session against it.
+// the tests hold StreamStateMachine and Session against it.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "server/memory_door.h"
+#include "server/memory_transport.h"
 
 namespace partiemc::server {
 

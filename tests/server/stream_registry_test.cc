@@ -15,8 +15,8 @@
 namespace partiemc::server {
 namespace {
 
-// A door that is never opened: the registry needs flows only by their identity.
-class ClosedDoor final : public StreamDoor {
+// A transport that is never opened: the registry needs machines only by their identity.
+class ClosedTransport final : public StreamTransport {
  public:
   void StartRead(std::size_t) override {}
   void StartWrite(Outgoing, std::size_t) override {}
@@ -32,13 +32,14 @@ class Registry : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kMaxStreams = 3;
 
-  std::shared_ptr<StreamFlow> Enter(const Caller& caller = {}) {
-    auto flow = std::make_shared<StreamFlow>(door_, pool_, budget_, 1);
-    EXPECT_TRUE(registry_.Enter(flow, caller).ok());
-    return flow;
+  std::shared_ptr<StreamStateMachine> Enter(const Caller& caller = {}) {
+    auto machine = std::make_shared<StreamStateMachine>(transport_, pool_, budget_, 1);
+    EXPECT_TRUE(registry_.Enter(machine, caller).ok());
+    return machine;
   }
-  absl::StatusOr<StreamSummary> Open(const StreamFlow& flow, const std::string& name) {
-    return registry_.Open(flow, {.name = name, .labels = {}, .parameters = {}}, NewStreamToken());
+  absl::StatusOr<StreamSummary> Open(const StreamStateMachine& machine, const std::string& name) {
+    return registry_.Open(machine, {.name = name, .labels = {}, .parameters = {}},
+                          NewStreamToken());
   }
   static std::string ReasonOf(const absl::Status& status) {
     const auto violation = FindViolation(status);
@@ -47,15 +48,15 @@ class Registry : public ::testing::Test {
 
   ComputePool pool_{1};
   MemoryBudget budget_{1000};
-  ClosedDoor door_;
+  ClosedTransport transport_;
   StreamRegistry registry_{kMaxStreams};
 };
 
 TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
-  std::vector<std::shared_ptr<StreamFlow>> flows;
+  std::vector<std::shared_ptr<StreamStateMachine>> machines;
   for (std::uint32_t i = 0; i < kMaxStreams; ++i) {
-    flows.push_back(Enter());
-    EXPECT_TRUE(Open(*flows.back(), "").ok());
+    machines.push_back(Enter());
+    EXPECT_TRUE(Open(*machines.back(), "").ok());
   }
   const auto late = Enter();
   const auto refused = Open(*late, "late");
@@ -63,7 +64,7 @@ TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
   EXPECT_EQ(refused.status().message(),
             "streams: 3 open; must be at most 3; try again when one has ended, or start the server "
             "with a larger --max-streams");
-  registry_.Close(*flows[0]);
+  registry_.Close(*machines[0]);
   EXPECT_TRUE(Open(*late, "late").ok());
 }
 
@@ -132,7 +133,7 @@ TEST_F(Registry, ATakeoverInheritsNoNameThatItsCallerMayNotUse) {
   ASSERT_TRUE(registry_.Open(*first, {.name = "dam", .labels = {}, .parameters = {}}, token).ok());
   const auto refused = registry_.Open(*second, {.name = "", .labels = {}, .parameters = {}}, token);
   EXPECT_EQ(ReasonOf(refused.status()), kReasonNotPermitted);
-  EXPECT_FALSE(door_.finished.has_value()) << "the first goes on";
+  EXPECT_FALSE(transport_.finished.has_value()) << "the first goes on";
 }
 
 TEST_F(Registry, ANameBelongsToOneOpenStreamAndIsFreeOnceThatIsClosed) {
@@ -152,14 +153,14 @@ TEST_F(Registry, WhoHasTheTokenTakesOverAndNobodyElse) {
   const auto first = Enter(), second = Enter(), stranger = Enter();
   ASSERT_TRUE(registry_.Open(*first, {.name = "tank", .labels = {}, .parameters = {}}, token).ok());
   EXPECT_EQ(ReasonOf(Open(*stranger, "tank").status()), kReasonNameInUse);
-  EXPECT_FALSE(door_.finished.has_value());
+  EXPECT_FALSE(transport_.finished.has_value());
 
   const auto resumed = registry_.Open(*second, {.name = "", .labels = {}, .parameters = {}}, token);
   ASSERT_TRUE(resumed.ok());
   EXPECT_EQ(resumed->description.name, "tank") << "inherited";
-  ASSERT_TRUE(door_.finished.has_value()) << "the call before has ended";
-  EXPECT_EQ(door_.finished->code(), absl::StatusCode::kAborted);
-  EXPECT_EQ(ReasonOf(*door_.finished), kReasonTakenOver);
+  ASSERT_TRUE(transport_.finished.has_value()) << "the call before has ended";
+  EXPECT_EQ(transport_.finished->code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(ReasonOf(*transport_.finished), kReasonTakenOver);
   EXPECT_EQ(registry_.OpenCount(), 1u);
   ASSERT_EQ(registry_.List(0, 10).size(), 1u);
   EXPECT_EQ(registry_.List(0, 10)[0].id, resumed->id);
@@ -180,10 +181,11 @@ TEST_F(Registry, TakingOverNeedsNoFreePlace) {
 }
 
 TEST_F(Registry, TokensOfAnotherFormAreRefusedAndNotRepeated) {
-  const auto flow = Enter();
+  const auto machine = Enter();
   for (const std::string& token : {std::string(), std::string("secret"), std::string(33, 'a'),
                                    std::string(31, 'a') + "G", std::string(31, 'a') + "A"}) {
-    const auto refused = registry_.Open(*flow, {.name = "", .labels = {}, .parameters = {}}, token);
+    const auto refused =
+        registry_.Open(*machine, {.name = "", .labels = {}, .parameters = {}}, token);
     EXPECT_EQ(ReasonOf(refused.status()), kReasonStreamToken);
     EXPECT_EQ(refused.status().message().find("secret"), std::string::npos);
   }
@@ -192,26 +194,26 @@ TEST_F(Registry, TokensOfAnotherFormAreRefusedAndNotRepeated) {
 }
 
 TEST_F(Registry, NamesAreShortAndPlain) {
-  const auto flow = Enter();
+  const auto machine = Enter();
   for (const std::string& name :
        {std::string("a b"), std::string("\n"), std::string("a/b"), std::string(129, 'a')}) {
-    const auto refused = Open(*flow, name);
+    const auto refused = Open(*machine, name);
     EXPECT_EQ(refused.status().code(), absl::StatusCode::kInvalidArgument);
     EXPECT_EQ(ReasonOf(refused.status()), kReasonName);
     EXPECT_EQ(refused.status().message().find('\n'), std::string::npos);
   }
-  EXPECT_TRUE(Open(*flow, std::string(128, 'a')).ok());
+  EXPECT_TRUE(Open(*machine, std::string(128, 'a')).ok());
 }
 
 TEST_F(Registry, LabelsAreFewAndShort) {
-  const auto flow = Enter();
+  const auto machine = Enter();
   StreamDescription many{.name = "", .labels = {}, .parameters = {}};
   for (int i = 0; i < 17; ++i) many.labels[std::to_string(i)] = "";
-  EXPECT_EQ(ReasonOf(registry_.Open(*flow, many, NewStreamToken()).status()), kReasonLabels);
+  EXPECT_EQ(ReasonOf(registry_.Open(*machine, many, NewStreamToken()).status()), kReasonLabels);
   StreamDescription wide{.name = "", .labels = {{"k", std::string(129, 'v')}}, .parameters = {}};
-  EXPECT_EQ(ReasonOf(registry_.Open(*flow, wide, NewStreamToken()).status()), kReasonLabels);
+  EXPECT_EQ(ReasonOf(registry_.Open(*machine, wide, NewStreamToken()).status()), kReasonLabels);
   many.labels.erase("0");
-  EXPECT_TRUE(registry_.Open(*flow, many, NewStreamToken()).ok());
+  EXPECT_TRUE(registry_.Open(*machine, many, NewStreamToken()).ok());
 }
 
 TEST_F(Registry, StreamsWithoutANameGetDifferentOnes) {
@@ -238,19 +240,20 @@ TEST_F(Registry, ListsOpenStreamsInOrderAndPageByPage) {
 }
 
 TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {
-  const auto flow = Enter();
+  const auto machine = Enter();
   registry_.Drain();
   EXPECT_TRUE(registry_.draining());
-  ASSERT_TRUE(door_.finished.has_value());
-  EXPECT_EQ(door_.finished->code(), absl::StatusCode::kUnavailable);
-  EXPECT_EQ(registry_.Enter(std::make_shared<StreamFlow>(door_, pool_, budget_, 1)).code(),
-            absl::StatusCode::kUnavailable);
-  EXPECT_EQ(ReasonOf(Open(*flow, "x").status()), kReasonDraining);
+  ASSERT_TRUE(transport_.finished.has_value());
+  EXPECT_EQ(transport_.finished->code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(
+      registry_.Enter(std::make_shared<StreamStateMachine>(transport_, pool_, budget_, 1)).code(),
+      absl::StatusCode::kUnavailable);
+  EXPECT_EQ(ReasonOf(Open(*machine, "x").status()), kReasonDraining);
 
   const auto now = std::chrono::steady_clock::now();
-  registry_.Close(*flow);
+  registry_.Close(*machine);
   EXPECT_FALSE(registry_.WaitUntilEmpty(now)) << "closed is not gone";
-  std::thread leaver([&] { registry_.Leave(*flow); });
+  std::thread leaver([&] { registry_.Leave(*machine); });
   EXPECT_TRUE(registry_.WaitUntilEmpty(now + std::chrono::seconds(60)));
   leaver.join();
 }

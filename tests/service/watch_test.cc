@@ -117,7 +117,7 @@ TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
   EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
   for (std::uint64_t i = 1; i < 6; ++i) Produce(i);
   watcher.Credit(1);
-  // The pump may still be on its way with the last ones when the credit comes.
+  // The dispatcher may still be on its way with the last ones when the credit comes.
   std::uint64_t dropped = 0;
   std::uint64_t sequence = 0;
   while (sequence < 6) {

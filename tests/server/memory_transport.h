@@ -16,7 +16,7 @@
 
 #include "absl/status/status.h"
 #include "server/stream/session.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 
 namespace partiemc::server {
 
@@ -35,15 +35,15 @@ struct MemoryAnswer {
   friend bool operator==(const MemoryAnswer&, const MemoryAnswer&) = default;
 };
 
-class MemoryDoor final : private StreamDoor {
+class MemoryTransport final : private StreamTransport {
  public:
-  MemoryDoor(ComputePool& pool, std::size_t window, const ReconstructionParameters& parameters,
-             const FrameLimits& limits);
+  MemoryTransport(ComputePool& pool, std::size_t window, const ReconstructionParameters& parameters,
+                  const FrameLimits& limits);
   /// With the others of `budget`. A request counts 16 bytes a particle, an answer nothing.
-  MemoryDoor(ComputePool& pool, MemoryBudget& budget, std::size_t window,
-             const ReconstructionParameters& parameters, const FrameLimits& limits);
+  MemoryTransport(ComputePool& pool, MemoryBudget& budget, std::size_t window,
+                  const ReconstructionParameters& parameters, const FrameLimits& limits);
   /// Cancels what goes on and waits for the end.
-  ~MemoryDoor() override;
+  ~MemoryTransport() override;
 
   // The client's end. Sending never blocks; what the server does not read waits here.
   void Open();
@@ -60,7 +60,7 @@ class MemoryDoor final : private StreamDoor {
   /// Called by the worker before it answers a frame. To be set before the first one is sent.
   std::function<void()> when_answering = [] {};
 
-  StreamFlow& flow() { return *flow_; }
+  StreamStateMachine& machine() { return *machine_; }
   /// The most frames that were inside the server at once: read, and their answer not received.
   std::size_t most_inside() const;
   /// Waits until as many frames have been read.
@@ -79,10 +79,11 @@ class MemoryDoor final : private StreamDoor {
 
   const ReconstructionParameters parameters_;
   const FrameLimits limits_;
-  std::vector<MemoryRequest> requests_;  // By slot; handed over by StreamFlow's rules alone.
-  std::vector<MemoryAnswer> answers_;    // Likewise.
+  std::vector<MemoryRequest>
+      requests_;                       // By slot; handed over by StreamStateMachine's rules alone.
+  std::vector<MemoryAnswer> answers_;  // Likewise.
   std::optional<Session> session_;
-  std::shared_ptr<StreamFlow> flow_;
+  std::shared_ptr<StreamStateMachine> machine_;
 
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable changed_;
@@ -91,7 +92,7 @@ class MemoryDoor final : private StreamDoor {
   std::optional<std::size_t> read_slot_;
   std::optional<MemoryAnswer> being_written_;
   std::optional<MemoryAnswer> to_receive_;
-  bool telling_ = false;  // The flow that a write is done.
+  bool telling_ = false;  // The machine that a write is done.
   std::optional<absl::Status> finished_;
   std::size_t frames_read_ = 0, frames_received_ = 0, most_inside_ = 0;
 

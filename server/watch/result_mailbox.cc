@@ -1,11 +1,11 @@
-#include "server/watch/watch_tap.h"
+#include "server/watch/result_mailbox.h"
 
 #include <algorithm>
 #include <utility>
 
 namespace partiemc::server {
 
-void WatchTap::Put(Published published, bool keep_older) {
+void ResultMailbox::Put(Published published, bool keep_older) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   auto* const post = new Post{std::move(published), nullptr, bytes};
   // Taken back first, so that nobody else is at them while they are linked. Only PutBack can come
@@ -22,7 +22,7 @@ void WatchTap::Put(Published published, bool keep_older) {
   Delete(posts_.exchange(post));
 }
 
-std::vector<Published> WatchTap::Take() {
+std::vector<Published> ResultMailbox::Take() {
   std::vector<Published> taken;
   Post* const newest = posts_.exchange(nullptr);
   for (const Post* post = newest; post != nullptr; post = post->older) {
@@ -33,14 +33,14 @@ std::vector<Published> WatchTap::Take() {
   return taken;
 }
 
-void WatchTap::PutBack(Published published) {
+void ResultMailbox::PutBack(Published published) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   auto* const post = new Post{std::move(published), nullptr, bytes};
   Post* nothing = nullptr;
   if (!posts_.compare_exchange_strong(nothing, post)) delete post;
 }
 
-void WatchTap::Delete(Post* newest) {
+void ResultMailbox::Delete(Post* newest) {
   while (newest != nullptr) delete std::exchange(newest, newest->older);
 }
 

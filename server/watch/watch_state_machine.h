@@ -1,5 +1,5 @@
 // How results flow to one watcher: credits, drops, ends. It knows neither what the messages are nor
-// how they travel; a door (gRPC, or a test's memory) does.
+// how they travel; a transport (gRPC, or a test's memory) does.
 #pragma once
 
 #include <chrono>
@@ -15,13 +15,13 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/watch/watch_tap.h"
+#include "server/watch/result_mailbox.h"
 
 namespace partiemc::server {
 
-class WatchHub;
+class ResultBroadcaster;
 
-/// The reasons for which a watch ends, beside those of StreamFlow (proto/PROTOCOL.md).
+/// The reasons for which a watch ends, beside those of StreamStateMachine (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonFellBehind = "FELL_BEHIND";
 inline constexpr std::string_view kReasonWatchedBytes = "WATCHED_BYTES";
 inline constexpr std::string_view kReasonFinished = "FINISHED";
@@ -42,7 +42,7 @@ struct WatchEnd {
 
 /// What a watcher asked for when it came.
 struct WatchTerms {
-  std::shared_ptr<WatchHub> hub;  ///< Of the stream.
+  std::shared_ptr<ResultBroadcaster> broadcaster;  ///< Of the stream.
   WatchMode mode = WatchMode::kLatest;
   std::uint64_t credit = 1;
 };
@@ -54,32 +54,32 @@ struct WatchRequest {
   std::uint64_t credit = 0;
 };
 
-/// Where a watcher's messages come in and go out. WatchFlow never has more than one read and one
-/// write going on, and never calls the door with a lock held.
-class WatchDoor {
+/// Where a watcher's messages come in and go out. WatchStateMachine never has more than one read
+/// and one write going on, and never calls the transport with a lock held.
+class WatchTransport {
  public:
-  virtual ~WatchDoor() = default;
+  virtual ~WatchTransport() = default;
 
-  /// Begins to read the next request; ends in WatchFlow::ReadDone or ReadEnded.
+  /// Begins to read the next request; ends in WatchStateMachine::ReadDone or ReadEnded.
   virtual void StartRead() = 0;
   /// Looks at the `open` that was just read, and prepares what WriteOpened sends. An error ends the
   /// watch.
   virtual absl::StatusOr<WatchTerms> Open() = 0;
 
-  /// Each begins to write; ends in WatchFlow::WriteDone.
+  /// Each begins to write; ends in WatchStateMachine::WriteDone.
   virtual void WriteOpened() = 0;
   virtual void WriteFrame(const WatchFrame& frame, std::uint64_t dropped) = 0;
   virtual void WriteEnded(const WatchEnd& end, std::uint64_t dropped) = 0;
 
   /// Has reads and writes that go on fail soon, whatever the other side does.
   virtual void Cut() = 0;
-  /// The last call that the door gets; a read may still be going on, nothing else.
+  /// The last call that the transport gets; a read may still be going on, nothing else.
   virtual void Finish(const absl::Status& status) = 0;
 };
 
 /// Frames count from the first that was offered on.
 struct WatchCounts {
-  std::uint64_t frames = 0;         ///< Given to the door.
+  std::uint64_t frames = 0;         ///< Given to the transport.
   std::uint64_t dropped = 0;        ///< Never to be.
   std::size_t most_held_bytes = 0;  ///< At any one time, of those not taken yet.
 };
@@ -95,15 +95,16 @@ struct WatchCounts {
 /// the newest one only; `every` holds all of them, at most `max_bytes`, the one being written
 /// included, and the watch ends when there would be more. Ending because the stream did, what is
 /// held is still written as credit comes. Safe from any thread.
-class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
+class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine> {
  public:
-  /// `door` lives until its Finish returns. Held by shared_ptr only. A frame of more than
+  /// `transport` lives until its Finish returns. Held by shared_ptr only. A frame of more than
   /// `max_bytes` ends the watch.
-  WatchFlow(WatchDoor& door, std::size_t max_bytes) : door_(door), max_bytes_(max_bytes) {}
+  WatchStateMachine(WatchTransport& transport, std::size_t max_bytes)
+      : transport_(transport), max_bytes_(max_bytes) {}
 
   /// Begins with the first read, or, where `admission` is an error, ends with it at once. Called
   /// once. Every end of a watch goes through this state machine, that of a refused one too, so that
-  /// WatchDoor::Finish is called exactly once, whatever the watcher does meanwhile.
+  /// WatchTransport::Finish is called exactly once, whatever the watcher does meanwhile.
   void Start(absl::Status admission = absl::OkStatus());
 
   /// The read that was begun last has brought this request.
@@ -148,7 +149,7 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
     WatchEnd end;
     std::uint64_t dropped = 0;
     std::optional<absl::Status> finish;
-    std::shared_ptr<WatchHub> leave;
+    std::shared_ptr<ResultBroadcaster> leave;
   };
 
   // With the lock held:
@@ -166,7 +167,7 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   void Perform(Actions actions);
   void Open();
 
-  WatchDoor& door_;
+  WatchTransport& transport_;
   const std::size_t max_bytes_;
 
   const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
@@ -174,7 +175,7 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   mutable std::mutex mutex_;  // Guards everything below.
   Phase phase_ = Phase::kOpening;
   WatchEnd end_;  // From kEnding on.
-  std::shared_ptr<WatchHub> hub_;
+  std::shared_ptr<ResultBroadcaster> broadcaster_;
   WatchMode mode_ = WatchMode::kLatest;
   std::uint64_t credit_ = 0;
   bool half_closed_ = false;
@@ -184,7 +185,7 @@ class WatchFlow : public std::enable_shared_from_this<WatchFlow> {
   std::uint64_t offered_ = 0;      // The number of the last frame offered; 0: none yet.
   std::uint64_t next_told_ = 0;    // The number that the next frame has if none is dropped.
   bool reading_ = false, writing_ = false, opening_ = false;
-  // Between the decision and the return of the door's call: the door has to stay.
+  // Between the decision and the return of the transport's call: the transport has to stay.
   bool starting_read_ = false, cutting_ = false;
   bool owes_opened_ = false, owes_ended_ = false;
   WatchCounts counts_;

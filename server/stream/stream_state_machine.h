@@ -1,5 +1,5 @@
 // How the messages of one stream flow: what may be read, computed and written when. It knows
-// neither what the messages are nor how they travel; a door (gRPC, or a test's memory) does.
+// neither what the messages are nor how they travel; a transport (gRPC, or a test's memory) does.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ namespace partiemc::server {
 /// What a request turned out to be.
 enum class RequestKind { kMalformed, kEmpty, kOpen, kFrame };
 
-/// What StreamDoor::StartWrite is to send.
+/// What StreamTransport::StartWrite is to send.
 enum class Outgoing { kOpened, kAnswer, kDraining };
 
 /// What became of a frame.
@@ -32,8 +32,8 @@ struct Answered {
   bool is_result = false;           ///< Or a frame error.
   std::uint64_t last_sequence = 0;  ///< The last number that the stream has used up.
   std::uint64_t bytes = 0;          ///< Of the answer.
-  /// Run by the worker once the answer is on its way, or waits for one before it. The door may be
-  /// gone by then. Empty: nothing is left to do.
+  /// Run by the worker once the answer is on its way, or waits for one before it. The transport may
+  /// be gone by then. Empty: nothing is left to do.
   std::function<void()> afterwards = {};
 };
 
@@ -41,15 +41,16 @@ struct Answered {
 inline constexpr std::uint64_t kQuickOpenBytes = 64 << 10;
 
 /// Where a stream's messages come in and go out. It has `window` slots, each a request and the
-/// answer to it. StreamFlow never has more than one read, one write and one computation going on,
-/// these on different slots, and never calls the door with a lock held.
-class StreamDoor {
+/// answer to it. StreamStateMachine never has more than one read, one write and one computation
+/// going on, these on different slots, and never calls the transport with a lock held.
+class StreamTransport {
  public:
-  virtual ~StreamDoor() = default;
+  virtual ~StreamTransport() = default;
 
-  /// Begins to read the next request into `slot`; ends in StreamFlow::ReadDone or ReadEnded.
+  /// Begins to read the next request into `slot`; ends in StreamStateMachine::ReadDone or
+  /// ReadEnded.
   virtual void StartRead(std::size_t slot) = 0;
-  /// Begins to write; ends in StreamFlow::WriteDone. `slot` counts for kAnswer only.
+  /// Begins to write; ends in StreamStateMachine::WriteDone. `slot` counts for kAnswer only.
   virtual void StartWrite(Outgoing what, std::size_t slot) = 0;
   /// Opens the stream as the request in `slot` asks and prepares Outgoing::kOpened. Quick, but for
   /// a request of more than kQuickOpenBytes, which a worker opens. An error ends the stream.
@@ -59,8 +60,8 @@ class StreamDoor {
   virtual Answered Answer(std::size_t slot, Worker& worker) = 0;
   /// Has the read and the write that are going on fail soon, whatever the client does.
   virtual void Cut() = 0;
-  /// The last call that the door gets; a read may still be going on, nothing else. OK, or why the
-  /// stream ended.
+  /// The last call that the transport gets; a read may still be going on, nothing else. OK, or why
+  /// the stream ended.
   virtual void Finish(const absl::Status& status) = 0;
 };
 
@@ -94,17 +95,17 @@ struct StreamCounts {
 /// another frame is read only when the budget has room for one of the size of the last. A stream of
 /// which nothing is in flight always reads one frame, so that none stands still for the sake of
 /// another.
-class StreamFlow final : public MemoryBudget::Waiter,
-                         public std::enable_shared_from_this<StreamFlow> {
+class StreamStateMachine final : public MemoryBudget::Waiter,
+                                 public std::enable_shared_from_this<StreamStateMachine> {
  public:
-  /// `door` lives until its Finish returns, `pool` and `budget` longer. Held by shared_ptr only.
-  /// `caller` is whose share of pool and budget it takes.
-  StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget, std::size_t window,
-             std::shared_ptr<const CallerAccount> caller = nullptr);
+  /// `transport` lives until its Finish returns, `pool` and `budget` longer. Held by shared_ptr
+  /// only. `caller` is whose share of pool and budget it takes.
+  StreamStateMachine(StreamTransport& transport, ComputePool& pool, MemoryBudget& budget,
+                     std::size_t window, std::shared_ptr<const CallerAccount> caller = nullptr);
 
   /// Begins with the first read, or, where `admission` is an error, ends with it at once. Called
   /// once. Every end of a stream goes through this state machine, that of a refused one too, so
-  /// that StreamDoor::Finish is called exactly once, whatever the client does meanwhile.
+  /// that StreamTransport::Finish is called exactly once, whatever the client does meanwhile.
   void Start(absl::Status admission = absl::OkStatus());
 
   /// The read that was begun last has brought a request of this kind and size.
@@ -165,7 +166,7 @@ class StreamFlow final : public MemoryBudget::Waiter,
   void Compute(std::size_t slot, Worker& worker);
   void Computed();
 
-  StreamDoor& door_;
+  StreamTransport& transport_;
   ComputePool& pool_;
   MemoryBudget& budget_;
   const std::shared_ptr<const CallerAccount> caller_;
@@ -181,7 +182,8 @@ class StreamFlow final : public MemoryBudget::Waiter,
   // Frames so far: written_ <= computed_ <= read_ <= written_ + window_.
   std::uint64_t read_ = 0, computed_ = 0, written_ = 0;
   bool reading_ = false, computing_ = false, writing_ = false, opening_ = false;
-  // Between the decision to read or cut and the return of the door's call: the door has to stay.
+  // Between the decision to read or cut and the return of the transport's call: the transport has
+  // to stay.
   bool starting_read_ = false, cutting_ = false;
   bool owes_cut_ = false;
   bool owes_opened_ = false, owes_notice_ = false;

@@ -1,5 +1,5 @@
 // A transport in which nothing happens by itself: a test decides when a read brings what, when a
-// write has gone out and when a worker takes its next job, and sees what the flow asks for next.
+// write has gone out and when a worker takes its next job, and sees what the machine asks for next.
 // The same script gives the same run, however many threads are behind it.
 #pragma once
 
@@ -11,9 +11,9 @@
 
 #include "absl/status/status.h"
 #include "server/compute/memory_budget.h"
-#include "server/memory_door.h"
+#include "server/memory_transport.h"
 #include "server/stream/session.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 
 namespace partiemc::server {
 
@@ -45,12 +45,12 @@ class SteppedPool {
   ComputePool pool_{1};
 };
 
-class ScriptedDoor final : private StreamDoor {
+class ScriptedTransport final : private StreamTransport {
  public:
-  ScriptedDoor(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
-               const ReconstructionParameters& parameters, const FrameLimits& limits);
+  ScriptedTransport(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
+                    const ReconstructionParameters& parameters, const FrameLimits& limits);
 
-  // What the flow has asked for and not been told the end of.
+  // What the machine has asked for and not been told the end of.
   bool reading() const { return read_slot_.has_value(); }
   const std::optional<MemoryAnswer>& writing() const { return writing_; }
   bool cut() const { return cut_; }
@@ -66,7 +66,7 @@ class ScriptedDoor final : private StreamDoor {
   /// What each answer leaves to do.
   std::function<void()> afterwards;
 
-  StreamFlow& flow() { return *flow_; }
+  StreamStateMachine& machine() { return *machine_; }
 
  private:
   void StartRead(std::size_t slot) override;
@@ -86,7 +86,7 @@ class ScriptedDoor final : private StreamDoor {
   std::optional<MemoryAnswer> writing_;
   bool cut_ = false;
   std::optional<absl::Status> finished_;
-  std::shared_ptr<StreamFlow> flow_;
+  std::shared_ptr<StreamStateMachine> machine_;
 };
 
 /// A session's answer to `request`, as tests in memory compare it.

@@ -1,11 +1,11 @@
-#include "server/stream/unary_flow.h"
+#include "server/stream/unary_state_machine.h"
 
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 
 namespace partiemc::server {
 namespace {
@@ -34,7 +34,7 @@ absl::Status NoRoom(FairShare::Fit fit, std::string field, std::uint64_t bytes,
 
 // Lets something happen to the state and does what follows from it.
 template <typename Event>
-void UnaryFlow::On(Event event) {
+void UnaryStateMachine::On(Event event) {
   Actions actions;
   {
     const std::lock_guard lock(mutex_);
@@ -44,14 +44,14 @@ void UnaryFlow::On(Event event) {
   Perform(std::move(actions));
 }
 
-void UnaryFlow::Start(absl::Status admission) {
+void UnaryStateMachine::Start(absl::Status admission) {
   On([&] {
     owes_read_ = admission.ok() && phase_ == Phase::kReading;
     if (!admission.ok()) End(std::move(admission));
   });
 }
 
-void UnaryFlow::ReadDone(std::uint64_t bytes) {
+void UnaryStateMachine::ReadDone(std::uint64_t bytes) {
   On([&] {
     if (phase_ != Phase::kReading) return;
     if (auto status = TakeBytes("request", bytes); !status.ok()) return End(std::move(status));
@@ -60,14 +60,14 @@ void UnaryFlow::ReadDone(std::uint64_t bytes) {
   });
 }
 
-void UnaryFlow::ReadEnded() {
+void UnaryStateMachine::ReadEnded() {
   On([&] {
     if (phase_ == Phase::kReading) End(NoRequest());
   });
 }
 
 // What the call holds from now on.
-absl::Status UnaryFlow::TakeBytes(std::string field, std::uint64_t bytes) {
+absl::Status UnaryStateMachine::TakeBytes(std::string field, std::uint64_t bytes) {
   if (kind_ == UnaryKind::kInformation) {
     budget_.Take(bytes, caller_.get());
   } else if (const auto fit = budget_.TryTake(bytes, caller_.get()); fit != FairShare::Fit::kYes) {
@@ -77,9 +77,9 @@ absl::Status UnaryFlow::TakeBytes(std::string field, std::uint64_t bytes) {
   return absl::OkStatus();
 }
 
-void UnaryFlow::Answer(Worker* worker) {
+void UnaryStateMachine::Answer(Worker* worker) {
   absl::StatusOr<std::uint64_t> bytes = ClientGone();
-  if (!cancelled_) bytes = door_.Answer(worker);
+  if (!cancelled_) bytes = transport_.Answer(worker);
   // The request is gone, so that its answer may have all that its caller may.
   On([&] { surplus_ += std::exchange(held_bytes_, 0); });
   On([&] {
@@ -93,7 +93,7 @@ void UnaryFlow::Answer(Worker* worker) {
   });
 }
 
-void UnaryFlow::WriteDone(bool ok) {
+void UnaryStateMachine::WriteDone(bool ok) {
   On([&] {
     writing_ = false;
     if (phase_ != Phase::kWriting) return;
@@ -105,17 +105,17 @@ void UnaryFlow::WriteDone(bool ok) {
   });
 }
 
-void UnaryFlow::Cancelled() {
+void UnaryStateMachine::Cancelled() {
   On([&] { Abandon(ClientGone()); });
 }
 
-void UnaryFlow::GiveWay(const absl::Status& status) {
+void UnaryStateMachine::GiveWay(const absl::Status& status) {
   On([&] {
     if (phase_ == Phase::kReading) End(status);
   });
 }
 
-TimePoint UnaryFlow::EndIfIdle(const UnaryLimits& limits, TimePoint now) {
+TimePoint UnaryStateMachine::EndIfIdle(const UnaryLimits& limits, TimePoint now) {
   TimePoint look_again = TimePoint::max();
   On([&] {
     if (phase_ != Phase::kReading && phase_ != Phase::kWriting) return;
@@ -133,20 +133,20 @@ TimePoint UnaryFlow::EndIfIdle(const UnaryLimits& limits, TimePoint now) {
   return look_again;
 }
 
-void UnaryFlow::End(absl::Status status) {
+void UnaryStateMachine::End(absl::Status status) {
   if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kEnding;
   status_ = std::move(status);
 }
 
-void UnaryFlow::Abandon(absl::Status status) {
+void UnaryStateMachine::Abandon(absl::Status status) {
   if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kAbandoned;
   status_ = std::move(status);
   cancelled_ = true;
 }
 
-UnaryFlow::Actions UnaryFlow::Decide() {
+UnaryStateMachine::Actions UnaryStateMachine::Decide() {
   Actions actions;
   if (std::exchange(owes_read_, false)) actions.read = calling_ = true;
   if (std::exchange(owes_answer_, false)) actions.answer = working_ = true;
@@ -164,7 +164,7 @@ UnaryFlow::Actions UnaryFlow::Decide() {
   return actions;
 }
 
-void UnaryFlow::Perform(Actions actions) {
+void UnaryStateMachine::Perform(Actions actions) {
   const auto self = shared_from_this();
   for (;;) {
     if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
@@ -176,11 +176,11 @@ void UnaryFlow::Perform(Actions actions) {
                       caller_.get());
       }
     }
-    if (actions.write) door_.StartWrite();
-    if (actions.cut) door_.Cut();
-    if (actions.finish) door_.Finish(*actions.finish);
+    if (actions.write) transport_.StartWrite();
+    if (actions.cut) transport_.Cut();
+    if (actions.finish) transport_.Finish(*actions.finish);
     if (!actions.read && !actions.cut) return;
-    if (actions.read) door_.StartRead();
+    if (actions.read) transport_.StartRead();
     const std::lock_guard lock(mutex_);
     calling_ = false;
     actions = Decide();

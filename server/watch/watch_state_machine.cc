@@ -1,4 +1,4 @@
-#include "server/watch/watch_flow.h"
+#include "server/watch/watch_state_machine.h"
 
 #include <algorithm>
 #include <utility>
@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/base/call_errors.h"
-#include "server/watch/watch_hub.h"
+#include "server/watch/result_broadcaster.h"
 
 namespace partiemc::server {
 namespace {
@@ -55,7 +55,7 @@ WatchEnd WatchEnd::OfStream(const absl::Status& status) {
 
 // Lets something happen to the state and does what follows from it.
 template <typename Event>
-void WatchFlow::On(Event event) {
+void WatchStateMachine::On(Event event) {
   Actions actions;
   {
     const std::lock_guard lock(mutex_);
@@ -65,13 +65,13 @@ void WatchFlow::On(Event event) {
   Perform(std::move(actions));
 }
 
-void WatchFlow::Start(absl::Status admission) {
+void WatchStateMachine::Start(absl::Status admission) {
   On([&] {
     if (!admission.ok()) Refuse(std::move(admission));
   });
 }
 
-void WatchFlow::ReadDone(const WatchRequest& request) {
+void WatchStateMachine::ReadDone(const WatchRequest& request) {
   bool open = false;
   On([&] {
     reading_ = false;
@@ -81,7 +81,7 @@ void WatchFlow::ReadDone(const WatchRequest& request) {
   if (open) Open();
 }
 
-void WatchFlow::TakeRequest(const WatchRequest& request) {
+void WatchStateMachine::TakeRequest(const WatchRequest& request) {
   using Kind = WatchRequest::Kind;
   if (phase_ == Phase::kOpening) {
     opening_ = request.kind == Kind::kOpen;
@@ -102,9 +102,9 @@ void WatchFlow::TakeRequest(const WatchRequest& request) {
 
 // The watcher joins before it is told that it is in, so that it misses nothing that is published
 // after that. Nothing is written, and nothing ends, until then.
-void WatchFlow::Open() {
-  absl::StatusOr<WatchTerms> terms = door_.Open();
-  std::shared_ptr<WatchHub> hub;
+void WatchStateMachine::Open() {
+  absl::StatusOr<WatchTerms> terms = transport_.Open();
+  std::shared_ptr<ResultBroadcaster> broadcaster;
   {
     const std::lock_guard lock(mutex_);
     if (!terms.ok()) {
@@ -114,14 +114,14 @@ void WatchFlow::Open() {
       owes_opened_ = true;
       mode_ = terms->mode;
       credit_ = terms->credit;
-      hub = hub_ = terms->hub;
+      broadcaster = broadcaster_ = terms->broadcaster;
     }
   }
-  if (hub != nullptr) hub->Join(shared_from_this());
+  if (broadcaster != nullptr) broadcaster->Join(shared_from_this());
   On([&] { opening_ = false; });
 }
 
-void WatchFlow::ReadEnded() {
+void WatchStateMachine::ReadEnded() {
   On([&] {
     reading_ = false;
     half_closed_ = true;
@@ -131,7 +131,7 @@ void WatchFlow::ReadEnded() {
   });
 }
 
-void WatchFlow::WriteDone(bool ok) {
+void WatchStateMachine::WriteDone(bool ok) {
   Published written;  // Its memory is given back without the lock.
   On([&] {
     writing_ = false;
@@ -141,11 +141,11 @@ void WatchFlow::WriteDone(bool ok) {
   });
 }
 
-void WatchFlow::Cancelled() {
+void WatchStateMachine::Cancelled() {
   On([&] { Abandon(WatcherGone()); });
 }
 
-void WatchFlow::Offer(std::span<const Published> frames) {
+void WatchStateMachine::Offer(std::span<const Published> frames) {
   On([&] {
     for (const Published& published : frames) {
       if (phase_ != Phase::kWatching) return;
@@ -154,7 +154,7 @@ void WatchFlow::Offer(std::span<const Published> frames) {
   });
 }
 
-void WatchFlow::Take(const Published& published) {
+void WatchStateMachine::Take(const Published& published) {
   if (offered_ == 0) next_told_ = published.number;
   const std::uint64_t missed = offered_ == 0 ? 0 : published.number - offered_ - 1;
   offered_ = published.number;
@@ -175,7 +175,7 @@ void WatchFlow::Take(const Published& published) {
   counts_.most_held_bytes = std::max(counts_.most_held_bytes, held_bytes_);
 }
 
-void WatchFlow::StreamEnded(const WatchEnd& end) {
+void WatchStateMachine::StreamEnded(const WatchEnd& end) {
   On([&] {
     if (phase_ != Phase::kWatching) return;
     if (end.status.ok()) {
@@ -188,14 +188,14 @@ void WatchFlow::StreamEnded(const WatchEnd& end) {
   });
 }
 
-void WatchFlow::Drain() {
+void WatchStateMachine::Drain() {
   On([&] {
     if (phase_ == Phase::kOpening) Refuse(DrainingError());
     if (phase_ == Phase::kWatching || phase_ == Phase::kEnding) End(EndWith(DrainingError()));
   });
 }
 
-std::chrono::steady_clock::time_point WatchFlow::EndIfSilent(
+std::chrono::steady_clock::time_point WatchStateMachine::EndIfSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
   On([&] {
@@ -209,13 +209,13 @@ std::chrono::steady_clock::time_point WatchFlow::EndIfSilent(
   return look_again;
 }
 
-void WatchFlow::GiveWay(const absl::Status& status) {
+void WatchStateMachine::GiveWay(const absl::Status& status) {
   On([&] {
     if (phase_ == Phase::kOpening && !opening_) Refuse(status);
   });
 }
 
-void WatchFlow::GiveUp(const absl::Status& status) {
+void WatchStateMachine::GiveUp(const absl::Status& status) {
   bool cut = false;
   On([&] {
     if (phase_ != Phase::kWatching && phase_ != Phase::kEnding) return;
@@ -225,37 +225,37 @@ void WatchFlow::GiveUp(const absl::Status& status) {
   if (cut) Cut();
 }
 
-void WatchFlow::Cut() {
+void WatchStateMachine::Cut() {
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::kFinished || cutting_) return;
     cutting_ = true;
   }
-  door_.Cut();
+  transport_.Cut();
   On([&] {
     cutting_ = false;
     Abandon(WatcherGone());
   });
 }
 
-WatchCounts WatchFlow::counts() const {
+WatchCounts WatchStateMachine::counts() const {
   const std::lock_guard lock(mutex_);
   return counts_;
 }
 
-std::size_t WatchFlow::held_bytes() const {
+std::size_t WatchStateMachine::held_bytes() const {
   const std::lock_guard lock(mutex_);
   return held_bytes_;
 }
 
-void WatchFlow::DropPending() {
+void WatchStateMachine::DropPending() {
   counts_.dropped += pending_.size();
   for (const Published& dropped : pending_) held_bytes_ -= dropped.frame->bytes() + kPublishedBytes;
   pending_.clear();
 }
 
 // What is held is given up: there is no time to wait for credit, or no sense in it.
-void WatchFlow::End(WatchEnd end) {
+void WatchStateMachine::End(WatchEnd end) {
   if (phase_ == Phase::kEnding && !owes_ended_) return;  // Another end has been told.
   phase_ = Phase::kEnding;
   end_ = std::move(end);
@@ -264,20 +264,20 @@ void WatchFlow::End(WatchEnd end) {
 }
 
 // Before the watch was open: the status says it all.
-void WatchFlow::Refuse(absl::Status status) {
+void WatchStateMachine::Refuse(absl::Status status) {
   if (phase_ != Phase::kOpening) return;
   phase_ = Phase::kEnding;
   end_ = EndWith(std::move(status));
 }
 
-void WatchFlow::Abandon(absl::Status status) {
+void WatchStateMachine::Abandon(absl::Status status) {
   if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kAbandoned;
   end_.status = std::move(status);
   DropPending();
 }
 
-WatchFlow::Actions WatchFlow::Decide() {
+WatchStateMachine::Actions WatchStateMachine::Decide() {
   Actions actions;
   const bool no_more_credit = half_closed_ && credit_ == 0;
   if (no_more_credit && phase_ == Phase::kWatching && !writing_) {
@@ -295,12 +295,12 @@ WatchFlow::Actions WatchFlow::Decide() {
   if (all_said && !opening_ && !writing_ && !starting_read_ && !cutting_) {
     phase_ = Phase::kFinished;
     actions.finish = end_.status;
-    actions.leave = std::exchange(hub_, nullptr);
+    actions.leave = std::exchange(broadcaster_, nullptr);
   }
   return actions;
 }
 
-void WatchFlow::DecideWrite(Actions& actions) {
+void WatchStateMachine::DecideWrite(Actions& actions) {
   if (owes_opened_) {
     owes_opened_ = false;
     actions.write = Write::kOpened;
@@ -324,26 +324,26 @@ void WatchFlow::DecideWrite(Actions& actions) {
   writing_ = true;
 }
 
-void WatchFlow::Perform(Actions actions) {
+void WatchStateMachine::Perform(Actions actions) {
   const auto self = shared_from_this();
   for (;;) {
     if (actions.write) {
       switch (*actions.write) {
         case Write::kOpened:
-          door_.WriteOpened();
+          transport_.WriteOpened();
           break;
         case Write::kFrame:
-          door_.WriteFrame(*actions.frame.frame, actions.dropped);
+          transport_.WriteFrame(*actions.frame.frame, actions.dropped);
           break;
         case Write::kEnded:
-          door_.WriteEnded(actions.end, actions.dropped);
+          transport_.WriteEnded(actions.end, actions.dropped);
           break;
       }
     }
     if (actions.leave != nullptr) actions.leave->Leave(*this);
-    if (actions.finish) door_.Finish(*actions.finish);
+    if (actions.finish) transport_.Finish(*actions.finish);
     if (!actions.read) return;
-    door_.StartRead();
+    transport_.StartRead();
     const std::lock_guard lock(mutex_);
     starting_read_ = false;
     actions = Decide();

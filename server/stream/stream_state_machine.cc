@@ -1,4 +1,4 @@
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 
 #include <algorithm>
 #include <string>
@@ -30,9 +30,10 @@ absl::Status ClientGone() { return absl::CancelledError("the client went away");
 
 }  // namespace
 
-StreamFlow::StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget,
-                       std::size_t window, std::shared_ptr<const CallerAccount> caller)
-    : door_(door),
+StreamStateMachine::StreamStateMachine(StreamTransport& transport, ComputePool& pool,
+                                       MemoryBudget& budget, std::size_t window,
+                                       std::shared_ptr<const CallerAccount> caller)
+    : transport_(transport),
       pool_(pool),
       budget_(budget),
       caller_(std::move(caller)),
@@ -41,7 +42,7 @@ StreamFlow::StreamFlow(StreamDoor& door, ComputePool& pool, MemoryBudget& budget
 
 // Lets something happen to the state and does what follows from it.
 template <typename Event>
-void StreamFlow::On(Event event) {
+void StreamStateMachine::On(Event event) {
   Actions actions;
   {
     const std::lock_guard lock(mutex_);
@@ -51,13 +52,13 @@ void StreamFlow::On(Event event) {
   Perform(std::move(actions));
 }
 
-void StreamFlow::Start(absl::Status admission) {
+void StreamStateMachine::Start(absl::Status admission) {
   On([&] {
     if (!admission.ok()) End(std::move(admission));
   });
 }
 
-void StreamFlow::ReadDone(RequestKind kind, std::uint64_t bytes) {
+void StreamStateMachine::ReadDone(RequestKind kind, std::uint64_t bytes) {
   bool open = false;
   On([&] {
     reading_ = false;
@@ -72,7 +73,7 @@ void StreamFlow::ReadDone(RequestKind kind, std::uint64_t bytes) {
                caller_.get());
 }
 
-void StreamFlow::TakeRequest(RequestKind kind, std::uint64_t bytes) {
+void StreamStateMachine::TakeRequest(RequestKind kind, std::uint64_t bytes) {
   if (phase_ == Phase::kOpening) {
     opening_ = kind == RequestKind::kOpen;
     if (opening_) return SetSlotBytes(0, bytes);
@@ -94,8 +95,8 @@ void StreamFlow::TakeRequest(RequestKind kind, std::uint64_t bytes) {
   }
 }
 
-void StreamFlow::Open() {
-  absl::Status status = cancelled_ ? ClientGone() : door_.Open(0);
+void StreamStateMachine::Open() {
+  absl::Status status = cancelled_ ? ClientGone() : transport_.Open(0);
   On([&] {
     opening_ = false;
     SetSlotBytes(0, 0);
@@ -108,7 +109,7 @@ void StreamFlow::Open() {
   });
 }
 
-void StreamFlow::ReadEnded() {
+void StreamStateMachine::ReadEnded() {
   On([&] {
     reading_ = false;
     End(phase_ == Phase::kOpening ? ProtocolError("none", "the first must be `open`")
@@ -116,7 +117,7 @@ void StreamFlow::ReadEnded() {
   });
 }
 
-void StreamFlow::WriteDone(bool ok) {
+void StreamStateMachine::WriteDone(bool ok) {
   On([&] {
     writing_ = false;
     if (in_flight_ == Outgoing::kAnswer) SetSlotBytes(written_++, 0);
@@ -125,21 +126,21 @@ void StreamFlow::WriteDone(bool ok) {
   });
 }
 
-void StreamFlow::Cancelled() {
+void StreamStateMachine::Cancelled() {
   On([&] { Abandon(ClientGone()); });
 }
 
-void StreamFlow::Granted(std::uint64_t bytes) {
+void StreamStateMachine::Granted(std::uint64_t bytes) {
   On([&] {
-    // What comes after the flow has gone on without it goes back at once.
+    // What comes after the machine has gone on without it goes back at once.
     (waiting_ ? set_aside_ : surplus_) += bytes;
     waiting_ = false;
   });
 }
 
-void StreamFlow::TakenOver() {
+void StreamStateMachine::TakenOver() {
   On([&] {
-    // Of one that is over there is nothing to take, and no door to cut any more.
+    // Of one that is over there is nothing to take, and no transport to cut any more.
     if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
     Abandon(ViolationError(absl::StatusCode::kAborted, {std::string(kReasonTakenOver), "stream",
                                                         "resumed by its producer in another call",
@@ -148,20 +149,20 @@ void StreamFlow::TakenOver() {
   });
 }
 
-void StreamFlow::GiveWay(const absl::Status& status) {
+void StreamStateMachine::GiveWay(const absl::Status& status) {
   On([&] {
     if (phase_ == Phase::kOpening && !opening_) End(status);
   });
 }
 
-void StreamFlow::Drain() {
+void StreamStateMachine::Drain() {
   On([&] {
     if (phase_ == Phase::kStreaming) owes_notice_ = true;
     End(DrainingError());
   });
 }
 
-TimePoint StreamFlow::EndIfIdle(const IdleLimits& limits, TimePoint now) {
+TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now) {
   TimePoint look_again = TimePoint::max();
   On([&] {
     if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
@@ -187,20 +188,20 @@ TimePoint StreamFlow::EndIfIdle(const IdleLimits& limits, TimePoint now) {
   return look_again;
 }
 
-StreamCounts StreamFlow::counts() const {
+StreamCounts StreamStateMachine::counts() const {
   const std::lock_guard lock(mutex_);
   return counts_;
 }
 
-void StreamFlow::Compute(std::size_t slot, Worker& worker) {
+void StreamStateMachine::Compute(std::size_t slot, Worker& worker) {
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::kAbandoned) return;
   }
-  answered_ = door_.Answer(slot, worker);
+  answered_ = transport_.Answer(slot, worker);
 }
 
-void StreamFlow::Computed() {
+void StreamStateMachine::Computed() {
   // Taken before any other frame can be computed.
   const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
   On([&] {
@@ -214,13 +215,13 @@ void StreamFlow::Computed() {
   if (answered && answered->afterwards) answered->afterwards();
 }
 
-void StreamFlow::End(absl::Status status) {
+void StreamStateMachine::End(absl::Status status) {
   if (phase_ != Phase::kOpening && phase_ != Phase::kStreaming) return;
   phase_ = Phase::kEnding;
   status_ = std::move(status);
 }
 
-void StreamFlow::Abandon(absl::Status status) {
+void StreamStateMachine::Abandon(absl::Status status) {
   if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
   phase_ = Phase::kAbandoned;
   status_ = std::move(status);
@@ -228,7 +229,7 @@ void StreamFlow::Abandon(absl::Status status) {
 }
 
 // Counts what frame number `frame`, from 0, holds now instead of what it held before.
-void StreamFlow::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
+void StreamStateMachine::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
   std::uint64_t& held = slot_bytes_[frame % window_];
   if (bytes > held) {
     budget_.Take(bytes - held, caller_.get());
@@ -238,7 +239,7 @@ void StreamFlow::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
   held = bytes;
 }
 
-StreamFlow::Actions StreamFlow::Decide() {
+StreamStateMachine::Actions StreamStateMachine::Decide() {
   Actions actions;
   if (!opening_ && !reading_ && !starting_read_ && MayRead(actions)) {
     reading_ = starting_read_ = true;
@@ -252,7 +253,7 @@ StreamFlow::Actions StreamFlow::Decide() {
   if (answers && !writing_) DecideWrite(actions);
   const bool all_said = phase_ == Phase::kAbandoned ||
                         (phase_ == Phase::kEnding && written_ == read_ && !owes_notice_);
-  // Once finished there may be no door any more.
+  // Once finished there may be no transport any more.
   if (std::exchange(owes_cut_, false) && phase_ != Phase::kFinished) {
     actions.cut = cutting_ = true;
   }
@@ -265,7 +266,7 @@ StreamFlow::Actions StreamFlow::Decide() {
 }
 
 // Asked only when the next read could begin at once.
-bool StreamFlow::MayRead(Actions& actions) {
+bool StreamStateMachine::MayRead(Actions& actions) {
   if (phase_ == Phase::kOpening) return true;
   if (phase_ != Phase::kStreaming || read_ - written_ >= window_) return false;
   if (read_ == written_) {
@@ -284,7 +285,7 @@ bool StreamFlow::MayRead(Actions& actions) {
 
 // Room is set aside for a read only while the stream has something else in flight: what an idle
 // stream reads next costs nothing until it comes.
-void StreamFlow::DecideMemory(Actions& actions) {
+void StreamStateMachine::DecideMemory(Actions& actions) {
   if (phase_ != Phase::kStreaming && std::exchange(waiting_, false)) actions.stop_waiting = true;
   if (phase_ != Phase::kStreaming || read_ == written_) surplus_ += std::exchange(set_aside_, 0);
   if (phase_ == Phase::kFinished) {
@@ -293,7 +294,7 @@ void StreamFlow::DecideMemory(Actions& actions) {
   actions.give_back = std::exchange(surplus_, 0);
 }
 
-void StreamFlow::DecideWrite(Actions& actions) {
+void StreamStateMachine::DecideWrite(Actions& actions) {
   if (owes_opened_) {
     owes_opened_ = false;
     actions.write = Outgoing::kOpened;
@@ -310,7 +311,7 @@ void StreamFlow::DecideWrite(Actions& actions) {
   in_flight_ = *actions.write;
 }
 
-void StreamFlow::Perform(Actions actions) {
+void StreamStateMachine::Perform(Actions actions) {
   const auto self = shared_from_this();
   for (;;) {
     // Before anything that may end the stream elsewhere: it ends with nothing held.
@@ -320,11 +321,11 @@ void StreamFlow::Perform(Actions actions) {
       pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
                    [self] { self->Computed(); }, &busy_mark_, caller_.get());
     }
-    if (actions.write) door_.StartWrite(*actions.write, actions.write_slot);
-    if (actions.cut) door_.Cut();
-    if (actions.finish) door_.Finish(*actions.finish);
+    if (actions.write) transport_.StartWrite(*actions.write, actions.write_slot);
+    if (actions.cut) transport_.Cut();
+    if (actions.finish) transport_.Finish(*actions.finish);
     if (!actions.read && !actions.cut) return;
-    if (actions.read) door_.StartRead(*actions.read);
+    if (actions.read) transport_.StartRead(*actions.read);
     const std::lock_guard lock(mutex_);
     if (actions.read) starting_read_ = false;
     if (actions.cut) cutting_ = false;

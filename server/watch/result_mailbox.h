@@ -10,7 +10,7 @@
 
 namespace partiemc::server {
 
-/// A result as its door made it for watchers: immutable, one for all of them.
+/// A result as its transport made it for watchers: immutable, one for all of them.
 class WatchFrame {
  public:
   explicit WatchFrame(std::size_t bytes) : bytes_(bytes) {}
@@ -34,13 +34,13 @@ struct Published {
 inline constexpr std::size_t kPublishedBytes = 512;
 
 /// Put and Clear come from one thread at a time, the others from any thread.
-class WatchTap {
+class ResultMailbox {
  public:
   /// Holds at most `max_bytes`, or one frame.
-  explicit WatchTap(std::size_t max_bytes) : max_bytes_(max_bytes) {}
-  ~WatchTap() { Delete(posts_.load()); }
-  WatchTap(const WatchTap&) = delete;
-  WatchTap& operator=(const WatchTap&) = delete;
+  explicit ResultMailbox(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+  ~ResultMailbox() { Delete(posts_.load()); }
+  ResultMailbox(const ResultMailbox&) = delete;
+  ResultMailbox& operator=(const ResultMailbox&) = delete;
 
   /// Wait-free: two exchanges, whatever the other side does. What has not been taken yet stays
   /// before it if `keep_older`, unless that would be too much.

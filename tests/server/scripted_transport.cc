@@ -1,4 +1,4 @@
-#include "server/scripted_door.h"
+#include "server/scripted_transport.h"
 
 #include <stdexcept>
 #include <utility>
@@ -20,53 +20,54 @@ MemoryAnswer AnswerInMemory(const MemoryRequest& request, Session& session, Work
   return answer;
 }
 
-ScriptedDoor::ScriptedDoor(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
-                           const ReconstructionParameters& parameters, const FrameLimits& limits)
+ScriptedTransport::ScriptedTransport(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
+                                     const ReconstructionParameters& parameters,
+                                     const FrameLimits& limits)
     : parameters_(parameters),
       limits_(limits),
       requests_(window),
       answers_(window),
-      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool.pool(), budget,
-                                         window)) {
-  flow_->Start();
+      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this),
+                                                    pool.pool(), budget, window)) {
+  machine_->Start();
 }
 
-void ScriptedDoor::BringRequest(MemoryRequest request) {
+void ScriptedTransport::BringRequest(MemoryRequest request) {
   const RequestKind kind = request.kind;
   const std::uint64_t bytes = request.positions.size() * sizeof(double);
   requests_.at(read_slot_.value()) = std::move(request);
   read_slot_.reset();
-  flow_->ReadDone(kind, bytes);
+  machine_->ReadDone(kind, bytes);
 }
 
-void ScriptedDoor::EndReads() {
+void ScriptedTransport::EndReads() {
   read_slot_.reset();
-  flow_->ReadEnded();
+  machine_->ReadEnded();
 }
 
-void ScriptedDoor::EndWrite(bool ok) {
+void ScriptedTransport::EndWrite(bool ok) {
   writing_.reset();
-  flow_->WriteDone(ok);
+  machine_->WriteDone(ok);
 }
 
-void ScriptedDoor::StartRead(std::size_t slot) {
+void ScriptedTransport::StartRead(std::size_t slot) {
   if (read_slot_ || finished_) throw std::logic_error("two reads at once, or one after the end");
   read_slot_ = slot;
 }
 
-void ScriptedDoor::StartWrite(Outgoing what, std::size_t slot) {
+void ScriptedTransport::StartWrite(Outgoing what, std::size_t slot) {
   if (writing_ || finished_) throw std::logic_error("two writes at once, or one after the end");
   writing_ = what == Outgoing::kAnswer ? answers_.at(slot) : MemoryAnswer{what, 0, {}, {}};
 }
 
-absl::Status ScriptedDoor::Open(std::size_t) {
+absl::Status ScriptedTransport::Open(std::size_t) {
   auto session = Session::Open(parameters_, limits_);
   if (session.ok()) session_ = *std::move(session);
   Meanwhile();
   return session.status();
 }
 
-Answered ScriptedDoor::Answer(std::size_t slot, Worker& worker) {
+Answered ScriptedTransport::Answer(std::size_t slot, Worker& worker) {
   answers_.at(slot) = AnswerInMemory(requests_.at(slot), *session_, worker);
   Meanwhile();
   return {.is_result = answers_[slot].reason.empty(),
@@ -75,17 +76,17 @@ Answered ScriptedDoor::Answer(std::size_t slot, Worker& worker) {
           .afterwards = afterwards};
 }
 
-void ScriptedDoor::Cut() {
+void ScriptedTransport::Cut() {
   if (finished_) throw std::logic_error("cut after the end");
   cut_ = true;
 }
 
-void ScriptedDoor::Finish(const absl::Status& status) {
+void ScriptedTransport::Finish(const absl::Status& status) {
   if (finished_ || writing_) throw std::logic_error("finished twice, or while writing");
   finished_ = status;
 }
 
-void ScriptedDoor::Meanwhile() {
+void ScriptedTransport::Meanwhile() {
   if (const auto happens = std::exchange(meanwhile, nullptr)) happens();
 }
 

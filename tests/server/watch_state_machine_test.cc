@@ -1,6 +1,6 @@
 // Watching over a transport in memory: what passes from a producer to its watchers, in which order,
 // at whose pace. Also under ThreadSanitizer.
-#include "server/watch/watch_flow.h"
+#include "server/watch/watch_state_machine.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@
 
 #include "partiemc/status.h"
 #include "server/memory_watcher.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 #include "server/watch/watch_registry.h"
 
 namespace partiemc::server {
@@ -34,16 +34,18 @@ class WatchTest : public ::testing::Test {
  protected:
   // Frame `number` of the stream.
   void Publish(std::uint64_t number, std::size_t bytes = kFrameBytes) {
-    if (hub_->Publish(std::make_shared<NumberedFrame>(number, bytes))) hub_->Announce();
+    if (broadcaster_->Publish(std::make_shared<NumberedFrame>(number, bytes)))
+      broadcaster_->Announce();
   }
   std::unique_ptr<MemoryWatcher> Join(WatchMode mode, std::uint64_t credit) {
-    return std::make_unique<MemoryWatcher>(hub_, mode, credit, kMaxBytes);
+    return std::make_unique<MemoryWatcher>(broadcaster_, mode, credit, kMaxBytes);
   }
-  void EndStream() { hub_->End(WatchEnd::OfStream(absl::OkStatus())); }
+  void EndStream() { broadcaster_->End(WatchEnd::OfStream(absl::OkStatus())); }
 
-  WatchPump pump_;
-  std::shared_ptr<WatchHub> hub_ = std::make_shared<WatchHub>(
-      pump_, WatchHub::Limits{.tap_bytes = kMaxBytes, .kept_bytes = 2 * kFrameBytes});
+  WatchDispatcher dispatcher_;
+  std::shared_ptr<ResultBroadcaster> broadcaster_ = std::make_shared<ResultBroadcaster>(
+      dispatcher_,
+      ResultBroadcaster::Limits{.mailbox_bytes = kMaxBytes, .kept_bytes = 2 * kFrameBytes});
 };
 
 TEST_F(WatchTest, ALateOneGetsTheNewestFrameAtOnceAndAgainWhenAllHadLeft) {
@@ -59,7 +61,7 @@ TEST_F(WatchTest, AFrameTooLargeToBeKeptForNobodyIsNot) {
   Publish(1);
   Publish(2, 3 * kFrameBytes);
   const auto watcher = Join(WatchMode::kLatest, 1);
-  while (hub_->watcher_count() == 0) std::this_thread::yield();
+  while (broadcaster_->watcher_count() == 0) std::this_thread::yield();
   Publish(3);
   watcher->WaitForFrames(1);
   EXPECT_THAT(watcher->seen(), ElementsAre(SeenFrame{3, 0}));
@@ -68,7 +70,7 @@ TEST_F(WatchTest, AFrameTooLargeToBeKeptForNobodyIsNot) {
 TEST_F(WatchTest, AFrameThatIsLargerThanAWatcherMayHoldEndsTheWatch) {
   for (const WatchMode mode : {WatchMode::kLatest, WatchMode::kEvery}) {
     const auto watcher = Join(mode, 9);
-    while (hub_->watcher_count() == 0) std::this_thread::yield();
+    while (broadcaster_->watcher_count() == 0) std::this_thread::yield();
     Publish(1, kMaxBytes);
     EXPECT_EQ(watcher->status().code(), absl::StatusCode::kResourceExhausted);
     EXPECT_EQ(watcher->end_reason(), kReasonWatchedBytes);
@@ -88,14 +90,14 @@ TEST_F(WatchTest, EveryHoldsAsMuchAsItMayAndEndsWithTheFirstFrameBeyond) {
   EXPECT_EQ(watcher->status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(watcher->end_reason(), kReasonFellBehind);
   EXPECT_EQ(watcher->seen().size(), 3u);
-  EXPECT_EQ(watcher->end_dropped(), watcher->flow().counts().dropped);
+  EXPECT_EQ(watcher->end_dropped(), watcher->machine().counts().dropped);
 }
 
 TEST_F(WatchTest, OneThatTakesNothingHoldsUpNobody) {
   const auto stuck = Join(WatchMode::kLatest, 1000);
   stuck->StopReading();
   const auto reading = Join(WatchMode::kEvery, 1000);
-  while (hub_->watcher_count() < 2) std::this_thread::yield();
+  while (broadcaster_->watcher_count() < 2) std::this_thread::yield();
   for (std::uint64_t k = 1; k <= 100; ++k) {
     Publish(k);
     reading->WaitForFrames(k);
@@ -106,24 +108,25 @@ TEST_F(WatchTest, OneThatTakesNothingHoldsUpNobody) {
   EXPECT_LE(stuck->seen().size(), 1u);
 }
 
-// Nothing but the clock orders the end after the pump has served the hub, so that ThreadSanitizer
-// sees whether both hold its lock.
+// Nothing but the clock orders the end after the dispatcher has served the broadcaster, so that
+// ThreadSanitizer sees whether both hold its lock.
 TEST_F(WatchTest, AStreamEndsWhileItsWatchersAreServed) {
   const auto watcher = Join(WatchMode::kLatest, 1);
-  while (hub_->watcher_count() == 0) std::this_thread::yield();
+  while (broadcaster_->watcher_count() == 0) std::this_thread::yield();
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EndStream();
   EXPECT_TRUE(watcher->status().ok());
 }
 
-TEST(WatchTap, HoldsNoMoreBytesThanItMayAndDropsTheOlderOnes) {
-  WatchTap tap(3 * (kFrameBytes + kPublishedBytes));
+TEST(ResultMailbox, HoldsNoMoreBytesThanItMayAndDropsTheOlderOnes) {
+  ResultMailbox mailbox(3 * (kFrameBytes + kPublishedBytes));
   const auto put = [&](std::uint64_t number) {
-    tap.Put({std::make_shared<NumberedFrame>(number, kFrameBytes), number}, /*keep_older=*/true);
+    mailbox.Put({std::make_shared<NumberedFrame>(number, kFrameBytes), number},
+                /*keep_older=*/true);
   };
   const auto taken = [&] {
     std::vector<std::uint64_t> numbers;
-    for (const Published& published : tap.Take()) numbers.push_back(published.number);
+    for (const Published& published : mailbox.Take()) numbers.push_back(published.number);
     return numbers;
   };
   for (const std::uint64_t number : {1, 2, 3}) put(number);
@@ -136,8 +139,8 @@ TEST_F(WatchTest, ADrainEndsThoseWithoutCreditAndCutsThoseWhoTakeNothing) {
   WatchRegistry registry(2);
   const auto poor = Join(WatchMode::kEvery, 1);
   const auto stuck = Join(WatchMode::kLatest, 9);
-  EXPECT_TRUE(registry.Enter(poor->flow().shared_from_this()).ok());
-  EXPECT_TRUE(registry.Enter(stuck->flow().shared_from_this()).ok());
+  EXPECT_TRUE(registry.Enter(poor->machine().shared_from_this()).ok());
+  EXPECT_TRUE(registry.Enter(stuck->machine().shared_from_this()).ok());
   Publish(1);
   poor->WaitForFrames(1);
   stuck->WaitForFrames(1);
@@ -148,13 +151,14 @@ TEST_F(WatchTest, ADrainEndsThoseWithoutCreditAndCutsThoseWhoTakeNothing) {
   EXPECT_EQ(poor->status().code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(poor->end_reason(), kReasonDraining);
   EXPECT_EQ(stuck->status().code(), absl::StatusCode::kCancelled);
-  EXPECT_EQ(registry.Enter(poor->flow().shared_from_this()).code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(registry.Enter(poor->machine().shared_from_this()).code(),
+            absl::StatusCode::kUnavailable);
 }
 
-// A door whose writes end when the test says so; it keeps what was written.
-class StepDoor final : public WatchDoor {
+// A transport whose writes end when the test says so; it keeps what was written.
+class StepTransport final : public WatchTransport {
  public:
-  explicit StepDoor(WatchTerms terms) : terms_(std::move(terms)) {}
+  explicit StepTransport(WatchTerms terms) : terms_(std::move(terms)) {}
 
   void StartRead() override {}
   absl::StatusOr<WatchTerms> Open() override { return terms_; }
@@ -198,73 +202,75 @@ TEST_F(WatchTest, AsManyMayWatchAsTheServerAndTheirCallerAllow) {
   WatchRegistry registry(2);
   const auto terms = std::make_shared<const CallerTerms>();
   const Caller modest(terms, std::make_shared<CallerAccount>(CallerQuota{.watchers = 1}));
-  std::vector<std::shared_ptr<WatchFlow>> flows;
-  StepDoor door({hub_, WatchMode::kLatest, 1});
+  std::vector<std::shared_ptr<WatchStateMachine>> machines;
+  StepTransport transport({broadcaster_, WatchMode::kLatest, 1});
   for (int i = 0; i < 4; ++i) {
-    flows.push_back(std::make_shared<WatchFlow>(door, kMaxBytes));
-    ASSERT_TRUE(registry.Enter(flows.back()).ok()) << "it has not said yet what it wants";
+    machines.push_back(std::make_shared<WatchStateMachine>(transport, kMaxBytes));
+    ASSERT_TRUE(registry.Enter(machines.back()).ok()) << "it has not said yet what it wants";
   }
   EXPECT_EQ(registry.count(), 0u);
   const auto reason = [](const absl::Status& status) { return FindViolation(status)->reason; };
-  EXPECT_TRUE(registry.Open(*flows[0], modest).ok());
-  EXPECT_EQ(reason(registry.Open(*flows[1], modest)), kReasonCallerWatchers);
-  EXPECT_TRUE(registry.Open(*flows[2]).ok());
-  EXPECT_EQ(reason(registry.Open(*flows[3])), kReasonTooManyWatchers);
+  EXPECT_TRUE(registry.Open(*machines[0], modest).ok());
+  EXPECT_EQ(reason(registry.Open(*machines[1], modest)), kReasonCallerWatchers);
+  EXPECT_TRUE(registry.Open(*machines[2]).ok());
+  EXPECT_EQ(reason(registry.Open(*machines[3])), kReasonTooManyWatchers);
   EXPECT_EQ(registry.count(), 2u);
-  registry.Close(*flows[0]);
-  EXPECT_TRUE(registry.Open(*flows[1], modest).ok());
-  for (const auto& flow : flows) registry.Leave(*flow);
+  registry.Close(*machines[0]);
+  EXPECT_TRUE(registry.Open(*machines[1], modest).ok());
+  for (const auto& machine : machines) registry.Leave(*machine);
   EXPECT_EQ(registry.count(), 0u);
   EXPECT_EQ(modest.account()->held(CallerAccount::Kind::kWatcher), 0u);
 }
 
 TEST_F(WatchTest, ASilentOneGivesWayAndOneThatHasOpenedDoesNot) {
-  StepDoor silent({hub_, WatchMode::kLatest, 1}), open({hub_, WatchMode::kLatest, 1});
-  const auto silent_flow = std::make_shared<WatchFlow>(silent, kMaxBytes);
-  const auto open_flow = std::make_shared<WatchFlow>(open, kMaxBytes);
-  silent_flow->Start();
-  open_flow->Start();
-  open_flow->ReadDone({WatchRequest::Kind::kOpen, 0});
-  silent_flow->GiveWay(absl::ResourceExhaustedError("others come"));
-  open_flow->GiveWay(absl::ResourceExhaustedError("others come"));
+  StepTransport silent({broadcaster_, WatchMode::kLatest, 1}),
+      open({broadcaster_, WatchMode::kLatest, 1});
+  const auto silent_machine = std::make_shared<WatchStateMachine>(silent, kMaxBytes);
+  const auto open_machine = std::make_shared<WatchStateMachine>(open, kMaxBytes);
+  silent_machine->Start();
+  open_machine->Start();
+  open_machine->ReadDone({WatchRequest::Kind::kOpen, 0});
+  silent_machine->GiveWay(absl::ResourceExhaustedError("others come"));
+  open_machine->GiveWay(absl::ResourceExhaustedError("others come"));
   ASSERT_TRUE(silent.status.has_value());
   EXPECT_EQ(silent.status->message(), "others come");
   EXPECT_FALSE(open.status.has_value());
-  open_flow->Cancelled();
-  open_flow->WriteDone(false);
+  open_machine->Cancelled();
+  open_machine->WriteDone(false);
   EXPECT_TRUE(open.status.has_value());
 }
 
 TEST_F(WatchTest, WhereMemoryIsShortAnOpenOneEndsWithoutItsFramesAndOneThatIsWrittenToIsCut) {
-  StepDoor idle({hub_, WatchMode::kEvery, 1}), writing({hub_, WatchMode::kEvery, 1}),
-      silent({hub_, WatchMode::kLatest, 1});
-  std::vector<std::shared_ptr<WatchFlow>> flows;
-  for (StepDoor* const door : {&idle, &writing, &silent}) {
-    flows.push_back(std::make_shared<WatchFlow>(*door, kMaxBytes));
-    flows.back()->Start();
-    if (door != &silent) flows.back()->ReadDone({WatchRequest::Kind::kOpen, 0});
+  StepTransport idle({broadcaster_, WatchMode::kEvery, 1}),
+      writing({broadcaster_, WatchMode::kEvery, 1}), silent({broadcaster_, WatchMode::kLatest, 1});
+  std::vector<std::shared_ptr<WatchStateMachine>> machines;
+  for (StepTransport* const transport : {&idle, &writing, &silent}) {
+    machines.push_back(std::make_shared<WatchStateMachine>(*transport, kMaxBytes));
+    machines.back()->Start();
+    if (transport != &silent) machines.back()->ReadDone({WatchRequest::Kind::kOpen, 0});
   }
-  flows[0]->WriteDone(true);
-  for (const auto& flow : flows) flow->GiveUp(absl::ResourceExhaustedError("no memory"));
+  machines[0]->WriteDone(true);
+  for (const auto& machine : machines) machine->GiveUp(absl::ResourceExhaustedError("no memory"));
   ASSERT_TRUE(idle.status.has_value());
   EXPECT_EQ(idle.status->message(), "no memory");
   EXPECT_TRUE(writing.cut);
   EXPECT_FALSE(writing.status.has_value()) << "the write has not come back";
-  flows[1]->WriteDone(false);
+  machines[1]->WriteDone(false);
   ASSERT_TRUE(writing.status.has_value());
   EXPECT_EQ(writing.status->message(), "no memory");
   EXPECT_FALSE(silent.status.has_value()) << "it is not open";
-  flows[2]->Cancelled();
+  machines[2]->Cancelled();
 }
 
 TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
   using std::chrono::minutes;
   WatchRegistry registry(1);
   const auto now = std::chrono::steady_clock::now();
-  StepDoor silent({hub_, WatchMode::kLatest, 1}), next({hub_, WatchMode::kLatest, 1});
-  const auto flow = std::make_shared<WatchFlow>(silent, kMaxBytes);
-  ASSERT_TRUE(registry.Enter(flow).ok());
-  flow->Start();
+  StepTransport silent({broadcaster_, WatchMode::kLatest, 1}),
+      next({broadcaster_, WatchMode::kLatest, 1});
+  const auto machine = std::make_shared<WatchStateMachine>(silent, kMaxBytes);
+  ASSERT_TRUE(registry.Enter(machine).ok());
+  machine->Start();
   EXPECT_GE(registry.EndSilent(minutes(1), now), now + minutes(1));
   EXPECT_EQ(registry.EndSilent(minutes(0), now + minutes(9)),
             std::chrono::steady_clock::time_point::max());
@@ -274,9 +280,9 @@ TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
   EXPECT_EQ(silent.status->code(), absl::StatusCode::kDeadlineExceeded);
   EXPECT_EQ(FindViolation(*silent.status)->reason, kReasonIdle);
   EXPECT_EQ(FindViolation(*silent.status)->value, "sends no `open` for 60 s");
-  registry.Close(*flow);
+  registry.Close(*machine);
   EXPECT_EQ(registry.count(), 0u);
-  const auto other = std::make_shared<WatchFlow>(next, kMaxBytes);
+  const auto other = std::make_shared<WatchStateMachine>(next, kMaxBytes);
   ASSERT_TRUE(registry.Enter(other).ok());
   other->Start();
   other->ReadDone({WatchRequest::Kind::kOpen, 0});
@@ -284,9 +290,9 @@ TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
             std::chrono::steady_clock::time_point::max());
   EXPECT_FALSE(next.status.has_value());
   other->Cancelled();
-  registry.Leave(*flow);
+  registry.Leave(*machine);
   registry.Leave(*other);
-  hub_->Leave(*other);
+  broadcaster_->Leave(*other);
 }
 
 // What a watcher should get, written down as plainly as possible.
@@ -341,44 +347,44 @@ TEST_F(WatchTest, RandomOrdersGiveWhatAPlainReferenceSays) {
     const WatchMode mode = pick(2) == 0 ? WatchMode::kLatest : WatchMode::kEvery;
     const std::uint64_t credit = 1 + pick(4);
     const unsigned generosity = 1 + pick(6);  // Of credit and of the connection.
-    StepDoor door({hub_, mode, credit});
-    const auto flow = std::make_shared<WatchFlow>(door, kMaxBytes);
-    flow->Start();
-    flow->ReadDone({WatchRequest::Kind::kOpen, 0});
+    StepTransport transport({broadcaster_, mode, credit});
+    const auto machine = std::make_shared<WatchStateMachine>(transport, kMaxBytes);
+    machine->Start();
+    machine->ReadDone({WatchRequest::Kind::kOpen, 0});
     Reference reference{.mode = mode, .credit = credit};
     std::uint64_t number = pick(100);
     const int length = 20 + static_cast<int>(pick(100));
-    for (int step = 0; step < length || !door.status; ++step, ++steps) {
+    for (int step = 0; step < length || !transport.status; ++step, ++steps) {
       const unsigned what = step < length ? pick(8) : 6 + pick(2);
       if (step == length && !reference.stream_ended) {
-        flow->StreamEnded(WatchEnd::OfStream(absl::OkStatus()));
+        machine->StreamEnded(WatchEnd::OfStream(absl::OkStatus()));
         reference.stream_ended = true;
       } else if (what < 3) {
         const Published published{std::make_shared<NumberedFrame>(++number, kFrameBytes), number};
-        flow->Offer({&published, 1});
+        machine->Offer({&published, 1});
         reference.Offer(number);
       } else if (what < 5 || (step < length && pick(generosity) != 0)) {
         continue;
       } else if (what == 6) {
         const std::uint64_t frames = 1 + pick(3);
-        flow->ReadDone({WatchRequest::Kind::kCredit, frames});
+        machine->ReadDone({WatchRequest::Kind::kCredit, frames});
         reference.credit += frames;
-      } else if (door.under_way > 0) {
-        --door.under_way;
+      } else if (transport.under_way > 0) {
+        --transport.under_way;
         reference.WriteDone();
-        flow->WriteDone(true);
+        machine->WriteDone(true);
       }
       reference.Go();
-      ASSERT_LE(door.under_way, 1) << "seed " << seed;
-      ASSERT_EQ(door.written, reference.written) << "seed " << seed << " step " << step;
-      ASSERT_EQ(door.ended.has_value(), reference.end_written) << "seed " << seed;
+      ASSERT_LE(transport.under_way, 1) << "seed " << seed;
+      ASSERT_EQ(transport.written, reference.written) << "seed " << seed << " step " << step;
+      ASSERT_EQ(transport.ended.has_value(), reference.end_written) << "seed " << seed;
     }
-    const WatchCounts counts = flow->counts();
+    const WatchCounts counts = machine->counts();
     ASSERT_EQ(counts.dropped, reference.lost) << "seed " << seed;
-    std::uint64_t told = door.ended->second;
-    for (const SeenFrame& seen : door.written) told += seen.dropped;
+    std::uint64_t told = transport.ended->second;
+    for (const SeenFrame& seen : transport.written) told += seen.dropped;
     ASSERT_EQ(told, counts.dropped) << "seed " << seed;
-    ASSERT_EQ(door.ended->first, reference.fell_behind ? kReasonFellBehind : kReasonFinished);
+    ASSERT_EQ(transport.ended->first, reference.fell_behind ? kReasonFellBehind : kReasonFinished);
     drops += counts.dropped;
     fell_behind += reference.fell_behind ? 1 : 0;
   }
@@ -424,7 +430,7 @@ TEST_F(WatchTest, WatchersComeAndGoAndDawdleWhileTheProducerNeverWaits) {
   const auto stuck = Join(WatchMode::kLatest, 1000);
   stuck->StopReading();
   const auto last = Join(WatchMode::kLatest, kFrames);
-  while (hub_->watcher_count() < 2) std::this_thread::yield();
+  while (broadcaster_->watcher_count() < 2) std::this_thread::yield();
   for (std::uint64_t k = 1; k <= kFrames; ++k) {
     Publish(k);
     if (k % 16 == 0) std::this_thread::yield();
@@ -438,10 +444,10 @@ TEST_F(WatchTest, WatchersComeAndGoAndDawdleWhileTheProducerNeverWaits) {
   ASSERT_FALSE(last->seen().empty());
   EXPECT_EQ(last->seen().back().number, kFrames);  // The last one is never missed.
   const SeenFrame first = last->seen().front();
-  EXPECT_EQ(last->seen().size() + last->flow().counts().dropped,
+  EXPECT_EQ(last->seen().size() + last->machine().counts().dropped,
             kFrames - (first.number - first.dropped) + 1);
 #ifndef PARTIEMC_SANITIZED  // Their allocators wait.
-  EXPECT_EQ(hub_->producer_waits(), 0u);
+  EXPECT_EQ(broadcaster_->producer_waits(), 0u);
 #endif
 }
 

@@ -1,4 +1,4 @@
-#include "server/watch/watch_hub.h"
+#include "server/watch/result_broadcaster.h"
 
 #include <sys/resource.h>
 
@@ -18,61 +18,61 @@ long Sleeps() {
 
 }  // namespace
 
-WatchHub::WatchHub(WatchPump& pump, const Limits& limits)
-    : pump_(pump), limits_(limits), tap_(limits.tap_bytes) {}
+ResultBroadcaster::ResultBroadcaster(WatchDispatcher& dispatcher, const Limits& limits)
+    : dispatcher_(dispatcher), limits_(limits), mailbox_(limits.mailbox_bytes) {}
 
 template <typename Action>
-void WatchHub::CountWaits(Action action) {
+void ResultBroadcaster::CountWaits(Action action) {
   const long sleeps = Sleeps();
   action();
   if (Sleeps() != sleeps) ++producer_waits_;
 }
 
-bool WatchHub::Publish(std::shared_ptr<const WatchFrame> frame) {
+bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame) {
   ++published_;
   if (watcher_count_ == 0) {
     if (frame->bytes() <= limits_.kept_bytes) {
-      tap_.Put({std::move(frame), published_}, /*keep_older=*/false);
+      mailbox_.Put({std::move(frame), published_}, /*keep_older=*/false);
     } else {
-      tap_.Clear();
+      mailbox_.Clear();
     }
-    // Who has joined meanwhile may have found the tap empty.
+    // Who has joined meanwhile may have found the mailbox empty.
     return watcher_count_ != 0;
   }
-  CountWaits([&] { tap_.Put({std::move(frame), published_}, /*keep_older=*/true); });
+  CountWaits([&] { mailbox_.Put({std::move(frame), published_}, /*keep_older=*/true); });
   return true;
 }
 
-void WatchHub::Announce() {
-  CountWaits([&] { pump_.Wake(*this); });
+void ResultBroadcaster::Announce() {
+  CountWaits([&] { dispatcher_.Wake(*this); });
 }
 
-void WatchHub::End(WatchEnd end) {
+void ResultBroadcaster::End(WatchEnd end) {
   {
     const std::lock_guard lock(mutex_);
     if (!end_) end_ = std::move(end);
   }
-  pump_.Wake(*this);
+  dispatcher_.Wake(*this);
 }
 
-void WatchHub::Join(std::shared_ptr<WatchFlow> watcher) {
+void ResultBroadcaster::Join(std::shared_ptr<WatchStateMachine> watcher) {
   {
     const std::lock_guard lock(mutex_);
-    // From here on the tap keeps everything.
+    // From here on the mailbox keeps everything.
     ++watcher_count_;
     TakeNews();
-    watchers_.push_back({.flow = std::move(watcher), .first = newest_});
+    watchers_.push_back({.machine = std::move(watcher), .first = newest_});
   }
-  pump_.Wake(*this);
+  dispatcher_.Wake(*this);
 }
 
-void WatchHub::Leave(const WatchFlow& watcher) {
+void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
   Entry left;  // Given up without the lock, and so are the frames.
   std::vector<Published> news;
   Published newest;
   const std::lock_guard lock(mutex_);
   const auto found = std::ranges::find_if(
-      watchers_, [&](const Entry& entry) { return entry.flow.get() == &watcher; });
+      watchers_, [&](const Entry& entry) { return entry.machine.get() == &watcher; });
   if (found == watchers_.end()) return;
   left = std::move(*found);
   watchers_.erase(found);
@@ -80,19 +80,19 @@ void WatchHub::Leave(const WatchFlow& watcher) {
   news = std::exchange(news_, {});
   newest = std::exchange(newest_, {});
   if (newest.frame != nullptr && newest.frame->bytes() <= limits_.kept_bytes) {
-    tap_.PutBack(std::move(newest));
+    mailbox_.PutBack(std::move(newest));
   }
 }
 
-void WatchHub::TakeNews() {
-  std::vector<Published> news = tap_.Take();
+void ResultBroadcaster::TakeNews() {
+  std::vector<Published> news = mailbox_.Take();
   if (news.empty()) return;
   newest_ = news.back();
   news_.insert(news_.end(), std::make_move_iterator(news.begin()),
                std::make_move_iterator(news.end()));
 }
 
-void WatchHub::Serve() {
+void ResultBroadcaster::Serve() {
   std::vector<Published> news;
   std::vector<Entry> watchers;
   std::optional<WatchEnd> end;
@@ -106,9 +106,9 @@ void WatchHub::Serve() {
     end = end_;
   }
   for (const Entry& entry : watchers) {
-    if (entry.first.frame != nullptr) entry.flow->Offer({&entry.first, 1});
-    entry.flow->Offer(news);
-    if (end) entry.flow->StreamEnded(*end);
+    if (entry.first.frame != nullptr) entry.machine->Offer({&entry.first, 1});
+    entry.machine->Offer(news);
+    if (end) entry.machine->StreamEnded(*end);
   }
 }
 

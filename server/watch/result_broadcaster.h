@@ -9,40 +9,40 @@
 #include <optional>
 #include <vector>
 
-#include "server/watch/watch_flow.h"
-#include "server/watch/watch_pump.h"
-#include "server/watch/watch_tap.h"
+#include "server/watch/result_mailbox.h"
+#include "server/watch/watch_dispatcher.h"
+#include "server/watch/watch_state_machine.h"
 
 namespace partiemc::server {
 
 /// Publish comes from one thread at a time; it and Announce never wait, whatever watchers do.
 /// Everything else comes from any thread. Held by shared_ptr only.
-class WatchHub final : public Pumped {
+class ResultBroadcaster final : public Dispatched {
  public:
   struct Limits {
-    /// Of frames that the pump has not come to yet.
-    std::size_t tap_bytes = std::size_t{16} << 20;
+    /// Of frames that the dispatcher has not come to yet.
+    std::size_t mailbox_bytes = std::size_t{16} << 20;
     /// A frame of at most this size is kept for a watcher that comes later, although nobody
     /// watches.
     std::size_t kept_bytes = std::size_t{1} << 20;
   };
 
-  /// `pump` lives longer.
-  WatchHub(WatchPump& pump, const Limits& limits);
+  /// `dispatcher` lives longer.
+  ResultBroadcaster(WatchDispatcher& dispatcher, const Limits& limits);
 
   /// A result of the stream. Wait-free. True if somebody watches: then Announce is to follow.
   [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame);
-  /// Has watchers served with what was published. From any thread; wakes the pump's, without
+  /// Has watchers served with what was published. From any thread; wakes the dispatcher's, without
   /// waiting for it. Apart from Publish, so that a producer's own answer is on its way before the
-  /// pump writes to watchers: their writes take the same locks of gRPC.
+  /// dispatcher writes to watchers: their writes take the same locks of gRPC.
   void Announce();
   /// The stream has ended. Watchers get what was published, then this.
   void End(WatchEnd end);
 
   /// From the newest frame on, which it gets at once if there is one; of what is published after
   /// this call it misses nothing.
-  void Join(std::shared_ptr<WatchFlow> watcher);
-  void Leave(const WatchFlow& watcher);
+  void Join(std::shared_ptr<WatchStateMachine> watcher);
+  void Leave(const WatchStateMachine& watcher);
 
   std::uint32_t watcher_count() const { return watcher_count_; }
   /// How often the producer's thread had to sleep to publish or to announce, as the system counts
@@ -51,7 +51,7 @@ class WatchHub final : public Pumped {
 
  private:
   struct Entry {
-    std::shared_ptr<WatchFlow> flow;
+    std::shared_ptr<WatchStateMachine> machine;
     Published first = {};  // The newest frame when it joined; until it has been served.
   };
 
@@ -60,16 +60,16 @@ class WatchHub final : public Pumped {
   template <typename Action>
   void CountWaits(Action action);
 
-  WatchPump& pump_;
+  WatchDispatcher& dispatcher_;
   const Limits limits_;
-  WatchTap tap_;
+  ResultMailbox mailbox_;
   std::uint64_t published_ = 0;  // Of the producer's thread.
   std::atomic<std::uint64_t> producer_waits_ = 0;
   std::atomic<std::uint32_t> watcher_count_ = 0;
 
   std::mutex mutex_;  // Guards everything below. Publish never takes it.
   std::vector<Entry> watchers_;
-  std::vector<Published> news_;  // Taken from the tap, not yet offered.
+  std::vector<Published> news_;  // Taken from the mailbox, not yet offered.
   Published newest_;             // While somebody watches.
   std::optional<WatchEnd> end_;
 };

@@ -1,5 +1,5 @@
 // How a call of one request and one answer goes: what is read, computed and written when. It knows
-// neither what the messages are nor how they travel; a door (gRPC, or a test's memory) does.
+// neither what the messages are nor how they travel; a transport (gRPC, or a test's memory) does.
 #pragma once
 
 #include <atomic>
@@ -24,22 +24,22 @@ namespace partiemc::server {
 /// not.
 enum class UnaryKind { kFrame, kInformation };
 
-/// Where a call's request comes in and its answer goes out. UnaryFlow never calls it with a lock
-/// held.
-class UnaryDoor {
+/// Where a call's request comes in and its answer goes out. UnaryStateMachine never calls it with a
+/// lock held.
+class UnaryTransport {
  public:
-  virtual ~UnaryDoor() = default;
+  virtual ~UnaryTransport() = default;
 
-  /// Begins to read the request; ends in UnaryFlow::ReadDone or ReadEnded.
+  /// Begins to read the request; ends in UnaryStateMachine::ReadDone or ReadEnded.
   virtual void StartRead() = 0;
   /// Turns the request into the answer and gives the size of the answer. An error ends the call.
-  /// `worker` is null where the flow has no pool.
+  /// `worker` is null where the machine has no pool.
   virtual absl::StatusOr<std::uint64_t> Answer(Worker* worker) = 0;
-  /// Begins to write the answer; ends in UnaryFlow::WriteDone.
+  /// Begins to write the answer; ends in UnaryStateMachine::WriteDone.
   virtual void StartWrite() = 0;
   /// Has the read and the write that are going on fail soon, whatever the client does.
   virtual void Cut() = 0;
-  /// The last call that the door gets; a read may still be going on, nothing else.
+  /// The last call that the transport gets; a read may still be going on, nothing else.
   virtual void Finish(const absl::Status& status) = 0;
 };
 
@@ -59,15 +59,19 @@ struct UnaryLimits {
 /// Memory: the request counts against the budget of all streams from its reading on, its answer
 /// until the connection has taken it. A frame that the budget has no room for ends the call, as an
 /// answer to it does. Safe from any thread.
-class UnaryFlow final : public std::enable_shared_from_this<UnaryFlow> {
+class UnaryStateMachine final : public std::enable_shared_from_this<UnaryStateMachine> {
  public:
-  /// `door` lives until its Finish returns, the others longer. Without a pool the answer is made by
-  /// the thread that brings the request. Held by shared_ptr only.
-  /// `caller` is whose share of budget and pool it takes.
-  UnaryFlow(UnaryDoor& door, MemoryBudget& budget, ComputePool* pool,
-            std::shared_ptr<const CallerAccount> caller = nullptr,
-            UnaryKind kind = UnaryKind::kFrame)
-      : door_(door), budget_(budget), pool_(pool), caller_(std::move(caller)), kind_(kind) {}
+  /// `transport` lives until its Finish returns, the others longer. Without a pool the answer is
+  /// made by the thread that brings the request. Held by shared_ptr only. `caller` is whose share
+  /// of budget and pool it takes.
+  UnaryStateMachine(UnaryTransport& transport, MemoryBudget& budget, ComputePool* pool,
+                    std::shared_ptr<const CallerAccount> caller = nullptr,
+                    UnaryKind kind = UnaryKind::kFrame)
+      : transport_(transport),
+        budget_(budget),
+        pool_(pool),
+        caller_(std::move(caller)),
+        kind_(kind) {}
 
   /// Begins with the read, or, where `admission` is an error, ends with it at once. Called once.
   void Start(absl::Status admission);
@@ -109,7 +113,7 @@ class UnaryFlow final : public std::enable_shared_from_this<UnaryFlow> {
   void Perform(Actions actions);
   void Answer(Worker* worker);
 
-  UnaryDoor& door_;
+  UnaryTransport& transport_;
   MemoryBudget& budget_;
   ComputePool* const pool_;
   const std::shared_ptr<const CallerAccount> caller_;
@@ -121,7 +125,7 @@ class UnaryFlow final : public std::enable_shared_from_this<UnaryFlow> {
   absl::Status status_;
   bool working_ = false, writing_ = false;
   bool owes_read_ = false, owes_answer_ = false, owes_write_ = false, owes_cut_ = false;
-  // Between the decision and the return of the door's call: the door has to stay.
+  // Between the decision and the return of the transport's call: the transport has to stay.
   bool calling_ = false;
   std::uint64_t held_bytes_ = 0, surplus_ = 0;
   std::chrono::steady_clock::time_point phase_began_ = std::chrono::steady_clock::now();

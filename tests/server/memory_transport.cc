@@ -1,4 +1,4 @@
-#include "server/memory_door.h"
+#include "server/memory_transport.h"
 
 #include <algorithm>
 #include <limits>
@@ -17,59 +17,62 @@ MemoryBudget& UnlimitedBudget() {
 
 }  // namespace
 
-MemoryDoor::MemoryDoor(ComputePool& pool, std::size_t window,
-                       const ReconstructionParameters& parameters, const FrameLimits& limits)
-    : MemoryDoor(pool, UnlimitedBudget(), window, parameters, limits) {}
+MemoryTransport::MemoryTransport(ComputePool& pool, std::size_t window,
+                                 const ReconstructionParameters& parameters,
+                                 const FrameLimits& limits)
+    : MemoryTransport(pool, UnlimitedBudget(), window, parameters, limits) {}
 
-MemoryDoor::MemoryDoor(ComputePool& pool, MemoryBudget& budget, std::size_t window,
-                       const ReconstructionParameters& parameters, const FrameLimits& limits)
+MemoryTransport::MemoryTransport(ComputePool& pool, MemoryBudget& budget, std::size_t window,
+                                 const ReconstructionParameters& parameters,
+                                 const FrameLimits& limits)
     : parameters_(parameters),
       limits_(limits),
       requests_(window),
       answers_(window),
-      flow_(std::make_shared<StreamFlow>(static_cast<StreamDoor&>(*this), pool, budget, window)),
+      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), pool,
+                                                    budget, window)),
       reader_([this] { ReadLoop(); }),
       writer_([this] { WriteLoop(); }) {
-  flow_->Start();
+  machine_->Start();
 }
 
-MemoryDoor::~MemoryDoor() {
+MemoryTransport::~MemoryTransport() {
   Cancel();
   reader_.join();
   writer_.join();
 }
 
-void MemoryDoor::Open() {
+void MemoryTransport::Open() {
   SendRequest({.kind = RequestKind::kOpen, .sequence = 0, .positions = {}});
 }
 
-void MemoryDoor::Send(std::uint64_t sequence, std::vector<double> positions) {
+void MemoryTransport::Send(std::uint64_t sequence, std::vector<double> positions) {
   SendRequest({RequestKind::kFrame, sequence, std::move(positions)});
 }
 
-void MemoryDoor::SendRequest(MemoryRequest request) {
+void MemoryTransport::SendRequest(MemoryRequest request) {
   const std::lock_guard lock(mutex_);
   sent_.push_back(std::move(request));
   changed_.notify_all();
 }
 
-void MemoryDoor::HalfClose() {
+void MemoryTransport::HalfClose() {
   const std::lock_guard lock(mutex_);
   half_closed_ = true;
   changed_.notify_all();
 }
 
-void MemoryDoor::Cancel() {
+void MemoryTransport::Cancel() {
   {
     const std::lock_guard lock(mutex_);
     if (cancelled_ || finished_) return;
     cancelled_ = true;
     changed_.notify_all();
   }
-  flow_->Cancelled();
+  machine_->Cancelled();
 }
 
-std::optional<MemoryAnswer> MemoryDoor::Receive() {
+std::optional<MemoryAnswer> MemoryTransport::Receive() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return to_receive_ || finished_; });
   auto answer = std::exchange(to_receive_, std::nullopt);
@@ -79,30 +82,30 @@ std::optional<MemoryAnswer> MemoryDoor::Receive() {
   return answer;
 }
 
-absl::Status MemoryDoor::status() {
+absl::Status MemoryTransport::status() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return finished_.has_value(); });
   return *finished_;
 }
 
-std::size_t MemoryDoor::most_inside() const {
+std::size_t MemoryTransport::most_inside() const {
   const std::lock_guard lock(mutex_);
   return most_inside_;
 }
 
-void MemoryDoor::WaitUntilRead(std::size_t frames) {
+void MemoryTransport::WaitUntilRead(std::size_t frames) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return frames_read_ >= frames; });
 }
 
-void MemoryDoor::StartRead(std::size_t slot) {
+void MemoryTransport::StartRead(std::size_t slot) {
   const std::lock_guard lock(mutex_);
   if (read_slot_ || finished_) throw std::logic_error("two reads at once, or one after the end");
   read_slot_ = slot;
   changed_.notify_all();
 }
 
-void MemoryDoor::StartWrite(Outgoing what, std::size_t slot) {
+void MemoryTransport::StartWrite(Outgoing what, std::size_t slot) {
   const std::lock_guard lock(mutex_);
   if (being_written_ || finished_)
     throw std::logic_error("two writes at once, or one after the end");
@@ -112,13 +115,13 @@ void MemoryDoor::StartWrite(Outgoing what, std::size_t slot) {
   changed_.notify_all();
 }
 
-absl::Status MemoryDoor::Open(std::size_t) {
+absl::Status MemoryTransport::Open(std::size_t) {
   auto session = Session::Open(parameters_, limits_);
   if (session.ok()) session_ = *std::move(session);
   return session.status();
 }
 
-Answered MemoryDoor::Answer(std::size_t slot, Worker& worker) {
+Answered MemoryTransport::Answer(std::size_t slot, Worker& worker) {
   when_answering();
   const MemoryRequest& request = requests_[slot];
   MemoryAnswer& answer = answers_[slot];
@@ -135,21 +138,21 @@ Answered MemoryDoor::Answer(std::size_t slot, Worker& worker) {
   return {.is_result = status.ok(), .last_sequence = session_->next_sequence() - 1, .bytes = 0};
 }
 
-void MemoryDoor::Cut() {
+void MemoryTransport::Cut() {
   const std::lock_guard lock(mutex_);
   if (finished_) throw std::logic_error("cut after the end");
   cancelled_ = true;
   changed_.notify_all();
 }
 
-void MemoryDoor::Finish(const absl::Status& status) {
+void MemoryTransport::Finish(const absl::Status& status) {
   const std::lock_guard lock(mutex_);
   if (finished_ || being_written_) throw std::logic_error("finished twice, or while writing");
   finished_ = status;
   changed_.notify_all();
 }
 
-void MemoryDoor::ReadLoop() {
+void MemoryTransport::ReadLoop() {
   for (;;) {
     std::optional<RequestKind> kind;
     std::uint64_t bytes = 0;
@@ -171,14 +174,14 @@ void MemoryDoor::ReadLoop() {
       read_slot_.reset();
     }
     if (kind) {
-      flow_->ReadDone(*kind, bytes);
+      machine_->ReadDone(*kind, bytes);
     } else {
-      flow_->ReadEnded();
+      machine_->ReadEnded();
     }
   }
 }
 
-void MemoryDoor::WriteLoop() {
+void MemoryTransport::WriteLoop() {
   for (;;) {
     bool written = false;
     {
@@ -193,7 +196,7 @@ void MemoryDoor::WriteLoop() {
       telling_ = true;
       changed_.notify_all();
     }
-    flow_->WriteDone(written);
+    machine_->WriteDone(written);
     const std::lock_guard lock(mutex_);
     telling_ = false;
     changed_.notify_all();

@@ -1,6 +1,6 @@
-// The flow of messages through a stream, over a transport in memory: order, window, ends, and
+// The machine of messages through a stream, over a transport in memory: order, window, ends, and
 // results that do not depend on who else computes. Also under ThreadSanitizer.
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "partiemc/status.h"
-#include "server/memory_door.h"
+#include "server/memory_transport.h"
 #include "server/moving_blob.h"
 
 namespace partiemc::server {
@@ -44,65 +44,65 @@ class Gate {
   bool is_open_ = false;
 };
 
-std::vector<MemoryAnswer> ReceiveAll(MemoryDoor& door) {
+std::vector<MemoryAnswer> ReceiveAll(MemoryTransport& transport) {
   std::vector<MemoryAnswer> answers;
-  while (auto answer = door.Receive()) answers.push_back(*answer);
+  while (auto answer = transport.Receive()) answers.push_back(*answer);
   return answers;
 }
 
 // The answers of a whole stream of the blob of `seed`, opened and half-closed.
 std::vector<MemoryAnswer> RunStream(ComputePool& pool, unsigned seed, std::uint64_t frames) {
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Open();
-  for (std::uint64_t i = 0; i < frames; ++i) door.Send(i + 1, MovingBlob(seed, i));
-  door.HalfClose();
-  return ReceiveAll(door);
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Open();
+  for (std::uint64_t i = 0; i < frames; ++i) transport.Send(i + 1, MovingBlob(seed, i));
+  transport.HalfClose();
+  return ReceiveAll(transport);
 }
 
-TEST(StreamFlow, OpensAnswersEveryFrameInOrderAndEndsWell) {
+TEST(StreamStateMachine, OpensAnswersEveryFrameInOrderAndEndsWell) {
   ComputePool pool(2);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Open();
-  for (std::uint64_t i = 1; i <= 10; ++i) door.Send(i, MovingBlob(1, i));
-  door.HalfClose();
-  const auto answers = ReceiveAll(door);
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Open();
+  for (std::uint64_t i = 1; i <= 10; ++i) transport.Send(i, MovingBlob(1, i));
+  transport.HalfClose();
+  const auto answers = ReceiveAll(transport);
   ASSERT_EQ(answers.size(), 11u);
   EXPECT_EQ(answers[0].what, Outgoing::kOpened);
   for (std::uint64_t i = 1; i <= 10; ++i) {
     EXPECT_EQ(answers[i].sequence, i);
     EXPECT_EQ(answers[i].reason, "");
   }
-  EXPECT_TRUE(door.status().ok()) << door.status();
-  EXPECT_EQ(door.flow().counts().frames, 10u);
-  EXPECT_EQ(door.flow().counts().last_sequence, 10u);
+  EXPECT_TRUE(transport.status().ok()) << transport.status();
+  EXPECT_EQ(transport.machine().counts().frames, 10u);
+  EXPECT_EQ(transport.machine().counts().last_sequence, 10u);
 }
 
-TEST(StreamFlow, ReadsNoFurtherAheadThanTheWindowWhenTheClientDoesNotReceive) {
+TEST(StreamStateMachine, ReadsNoFurtherAheadThanTheWindowWhenTheClientDoesNotReceive) {
   ComputePool pool(2);
   for (const std::size_t window : {std::size_t{1}, std::size_t{3}, kWindow}) {
-    MemoryDoor door(pool, window, BlobParameters(), kLimits);
-    door.Open();
-    for (std::uint64_t i = 1; i <= 20; ++i) door.Send(i, MovingBlob(1, i));
-    door.HalfClose();
+    MemoryTransport transport(pool, window, BlobParameters(), kLimits);
+    transport.Open();
+    for (std::uint64_t i = 1; i <= 20; ++i) transport.Send(i, MovingBlob(1, i));
+    transport.HalfClose();
     // The transport itself holds `opened`; behind it the window fills, and no more.
-    door.WaitUntilRead(window);
-    EXPECT_EQ(ReceiveAll(door).size(), 21u);
+    transport.WaitUntilRead(window);
+    EXPECT_EQ(ReceiveAll(transport).size(), 21u);
     // The transport holds one answer that is neither inside the server nor received.
-    EXPECT_LE(door.most_inside(), window + 1);
-    EXPECT_GE(door.most_inside(), window);
+    EXPECT_LE(transport.most_inside(), window + 1);
+    EXPECT_GE(transport.most_inside(), window);
   }
 }
 
-TEST(StreamFlow, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeverCome) {
+TEST(StreamStateMachine, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeverCome) {
   ComputePool pool(2);
   const auto undisturbed = RunStream(pool, 5, 20);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Open();
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Open();
   std::vector<std::string> expected;  // By answer; empty for a result.
   std::uint64_t sequence = 0;
   const auto send = [&](std::uint64_t number, std::vector<double> positions,
                         std::string_view reason) {
-    door.Send(number, std::move(positions));
+    transport.Send(number, std::move(positions));
     expected.emplace_back(reason);
   };
   for (std::uint64_t i = 0; i < 20; ++i) {
@@ -116,10 +116,10 @@ TEST(StreamFlow, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeve
     }
     send(++sequence, MovingBlob(5, i), "");
   }
-  door.HalfClose();
+  transport.HalfClose();
   std::vector<std::string> reasons;
   std::vector<MemoryAnswer> results;
-  for (const MemoryAnswer& answer : ReceiveAll(door)) {
+  for (const MemoryAnswer& answer : ReceiveAll(transport)) {
     if (answer.what != Outgoing::kAnswer) continue;
     reasons.push_back(answer.reason);
     if (answer.reason.empty()) results.push_back(answer);
@@ -129,11 +129,11 @@ TEST(StreamFlow, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeve
   for (std::size_t i = 0; i < 20; ++i) {
     EXPECT_EQ(results[i].digests, undisturbed[i + 1].digests) << "frame " << i;
   }
-  EXPECT_EQ(door.flow().counts().frames, 20u);
-  EXPECT_EQ(door.flow().counts().frame_errors, 16u);
+  EXPECT_EQ(transport.machine().counts().frames, 20u);
+  EXPECT_EQ(transport.machine().counts().frame_errors, 16u);
 }
 
-TEST(StreamFlow, ResultsAreTheSameForOneTwoAndSevenThreads) {
+TEST(StreamStateMachine, ResultsAreTheSameForOneTwoAndSevenThreads) {
   // One pool at a time: each limits the whole process to its threads.
   const auto answers_with = [](unsigned threads) {
     ComputePool pool(threads);
@@ -145,7 +145,7 @@ TEST(StreamFlow, ResultsAreTheSameForOneTwoAndSevenThreads) {
   EXPECT_EQ(answers_with(7), expected);
 }
 
-TEST(StreamFlow, ResultsAreTheSameAloneAndWithFiveOtherStreamsRunning) {
+TEST(StreamStateMachine, ResultsAreTheSameAloneAndWithFiveOtherStreamsRunning) {
   ComputePool pool(3);
   const auto expected = RunStream(pool, 7, 10);
   std::vector<std::thread> others;
@@ -156,140 +156,140 @@ TEST(StreamFlow, ResultsAreTheSameAloneAndWithFiveOtherStreamsRunning) {
   for (std::thread& other : others) other.join();
 }
 
-TEST(StreamFlow, AFrameBeforeOpenEndsTheStream) {
+TEST(StreamStateMachine, AFrameBeforeOpenEndsTheStream) {
   ComputePool pool(1);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Send(1, MovingBlob(1, 0));
-  EXPECT_TRUE(ReceiveAll(door).empty());
-  EXPECT_EQ(door.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(door.status().message(), "request: frame; the first must be `open`");
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Send(1, MovingBlob(1, 0));
+  EXPECT_TRUE(ReceiveAll(transport).empty());
+  EXPECT_EQ(transport.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(transport.status().message(), "request: frame; the first must be `open`");
 }
 
-TEST(StreamFlow, AStreamThatNeverOpensEndsWithAWordAboutIt) {
+TEST(StreamStateMachine, AStreamThatNeverOpensEndsWithAWordAboutIt) {
   ComputePool pool(1);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.HalfClose();
-  EXPECT_EQ(door.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(FindViolation(door.status())->reason, kReasonProtocol);
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.HalfClose();
+  EXPECT_EQ(transport.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FindViolation(transport.status())->reason, kReasonProtocol);
 }
 
-TEST(StreamFlow, ParametersThatAreRefusedEndTheStreamWithTheirReason) {
+TEST(StreamStateMachine, ParametersThatAreRefusedEndTheStreamWithTheirReason) {
   ComputePool pool(1);
   ReconstructionParameters parameters;
   parameters.cell_size = -1;
-  MemoryDoor door(pool, kWindow, parameters, kLimits);
-  door.Open();
-  EXPECT_TRUE(ReceiveAll(door).empty());
-  EXPECT_EQ(FindViolation(door.status())->reason, kReasonOutOfRange);
+  MemoryTransport transport(pool, kWindow, parameters, kLimits);
+  transport.Open();
+  EXPECT_TRUE(ReceiveAll(transport).empty());
+  EXPECT_EQ(FindViolation(transport.status())->reason, kReasonOutOfRange);
 }
 
-TEST(StreamFlow, ASecondOpenAndAnEmptyRequestEndTheStreamOnceWhatCameBeforeIsAnswered) {
+TEST(StreamStateMachine, ASecondOpenAndAnEmptyRequestEndTheStreamOnceWhatCameBeforeIsAnswered) {
   ComputePool pool(2);
   for (const RequestKind kind : {RequestKind::kOpen, RequestKind::kEmpty}) {
-    MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-    door.Open();
-    door.Send(1, MovingBlob(1, 0));
-    door.Send(2, MovingBlob(1, 1));
-    door.SendRequest({.kind = kind, .sequence = 0, .positions = {}});
-    door.Send(3, MovingBlob(1, 2));
-    const auto answers = ReceiveAll(door);
+    MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+    transport.Open();
+    transport.Send(1, MovingBlob(1, 0));
+    transport.Send(2, MovingBlob(1, 1));
+    transport.SendRequest({.kind = kind, .sequence = 0, .positions = {}});
+    transport.Send(3, MovingBlob(1, 2));
+    const auto answers = ReceiveAll(transport);
     ASSERT_EQ(answers.size(), 3u);
     EXPECT_EQ(answers[2].sequence, 2u);
-    EXPECT_EQ(door.status().code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_EQ(FindViolation(door.status())->reason, kReasonProtocol);
+    EXPECT_EQ(transport.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(FindViolation(transport.status())->reason, kReasonProtocol);
   }
 }
 
-TEST(StreamFlow, ADrainTellsTheClientAnswersWhatWasReadAndEndsUnavailable) {
+TEST(StreamStateMachine, ADrainTellsTheClientAnswersWhatWasReadAndEndsUnavailable) {
   ComputePool pool(1);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Open();
-  ASSERT_EQ(door.Receive()->what, Outgoing::kOpened);
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Open();
+  ASSERT_EQ(transport.Receive()->what, Outgoing::kOpened);
   Gate gate(pool);
-  for (std::uint64_t i = 1; i <= 10; ++i) door.Send(i, MovingBlob(1, i));
-  door.WaitUntilRead(kWindow);
-  door.flow().Drain();
+  for (std::uint64_t i = 1; i <= 10; ++i) transport.Send(i, MovingBlob(1, i));
+  transport.WaitUntilRead(kWindow);
+  transport.machine().Drain();
   gate.Open();
-  const auto answers = ReceiveAll(door);
-  // A read that had been delivered, but not yet told to the flow, may have been dropped by it.
+  const auto answers = ReceiveAll(transport);
+  // A read that had been delivered, but not yet told to the machine, may have been dropped by it.
   ASSERT_GE(answers.size(), kWindow);
   ASSERT_LE(answers.size(), kWindow + 1);
   EXPECT_EQ(answers[0].what, Outgoing::kDraining);
   for (std::size_t i = 1; i < answers.size(); ++i) EXPECT_EQ(answers[i].sequence, i);
-  EXPECT_EQ(door.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_EQ(FindViolation(door.status())->reason, kReasonDraining);
+  EXPECT_EQ(transport.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(FindViolation(transport.status())->reason, kReasonDraining);
 }
 
-TEST(StreamFlow, ADrainEndsAStreamThatHasNotOpened) {
+TEST(StreamStateMachine, ADrainEndsAStreamThatHasNotOpened) {
   ComputePool pool(1);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.flow().Drain();
-  EXPECT_TRUE(ReceiveAll(door).empty());
-  EXPECT_EQ(door.status().code(), absl::StatusCode::kUnavailable);
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.machine().Drain();
+  EXPECT_TRUE(ReceiveAll(transport).empty());
+  EXPECT_EQ(transport.status().code(), absl::StatusCode::kUnavailable);
 }
 
-// The door throws where it is used after the end, when it may be gone.
-TEST(StreamFlow, WhatComesAfterTheEndReachesNoDoor) {
+// The transport throws where it is used after the end, when it may be gone.
+TEST(StreamStateMachine, WhatComesAfterTheEndReachesNoTransport) {
   ComputePool pool(1);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Open();
-  door.HalfClose();
-  EXPECT_EQ(ReceiveAll(door).size(), 1u);
-  EXPECT_TRUE(door.status().ok());
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Open();
+  transport.HalfClose();
+  EXPECT_EQ(ReceiveAll(transport).size(), 1u);
+  EXPECT_TRUE(transport.status().ok());
   EXPECT_NO_THROW({
-    door.flow().TakenOver();
-    door.flow().Drain();
-    door.flow().Cancelled();
-    door.flow().EndIfIdle({.streaming = std::chrono::milliseconds(1)},
-                          std::chrono::steady_clock::now() + std::chrono::hours(1));
-    door.flow().Granted(0);
+    transport.machine().TakenOver();
+    transport.machine().Drain();
+    transport.machine().Cancelled();
+    transport.machine().EndIfIdle({.streaming = std::chrono::milliseconds(1)},
+                                  std::chrono::steady_clock::now() + std::chrono::hours(1));
+    transport.machine().Granted(0);
   });
 }
 
-TEST(StreamFlow, ACancelledStreamComputesNothingThatWasOnlyQueued) {
+TEST(StreamStateMachine, ACancelledStreamComputesNothingThatWasOnlyQueued) {
   ComputePool pool(1);
   Gate gate(pool);
-  MemoryDoor door(pool, kWindow, BlobParameters(), kLimits);
-  door.Open();
-  for (std::uint64_t i = 1; i <= 10; ++i) door.Send(i, MovingBlob(1, i));
-  door.WaitUntilRead(kWindow);
-  door.Cancel();
+  MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
+  transport.Open();
+  for (std::uint64_t i = 1; i <= 10; ++i) transport.Send(i, MovingBlob(1, i));
+  transport.WaitUntilRead(kWindow);
+  transport.Cancel();
   gate.Open();
-  EXPECT_EQ(door.status().code(), absl::StatusCode::kCancelled);
-  EXPECT_EQ(door.flow().counts().frames, 0u);
+  EXPECT_EQ(transport.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(transport.machine().counts().frames, 0u);
 }
 
-// The door throws where the flow breaks its word: two reads or writes at once, or anything after
-// the end.
-TEST(StreamFlow, MayBeCancelledAndDrainedAtAnyMoment) {
+// The transport throws where the machine breaks its word: two reads or writes at once, or anything
+// after the end.
+TEST(StreamStateMachine, MayBeCancelledAndDrainedAtAnyMoment) {
   constexpr unsigned kSeed = 31;
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   std::mt19937 random(kSeed);
   ComputePool pool(2);
   for (int round = 0; round < 200; ++round) {
-    MemoryDoor door(pool, 1 + random() % 4, BlobParameters(), kLimits);
-    door.Open();
-    for (std::uint64_t i = 1; i <= 4; ++i) door.Send(i, MovingBlob(1, i));
-    if (random() % 2 == 0) door.HalfClose();
+    MemoryTransport transport(pool, 1 + random() % 4, BlobParameters(), kLimits);
+    transport.Open();
+    for (std::uint64_t i = 1; i <= 4; ++i) transport.Send(i, MovingBlob(1, i));
+    if (random() % 2 == 0) transport.HalfClose();
     const bool drain = random() % 2 == 0, cancel = !drain || random() % 2 == 0;
     const auto pause = std::chrono::microseconds(random() % 3000);
     std::thread outside([&] {
       std::this_thread::sleep_for(pause);
-      if (drain) door.flow().Drain();
-      if (cancel) door.Cancel();
+      if (drain) transport.machine().Drain();
+      if (cancel) transport.Cancel();
     });
     std::uint64_t expected = 1;
-    while (const auto answer = door.Receive()) {
+    while (const auto answer = transport.Receive()) {
       if (answer->what != Outgoing::kAnswer) continue;
       EXPECT_EQ(answer->sequence, expected++);
     }
     outside.join();
-    const auto code = door.status().code();
+    const auto code = transport.status().code();
     // Before `open`, a read that ends because nobody is there looks like a half-close.
     EXPECT_TRUE(code == absl::StatusCode::kOk || code == absl::StatusCode::kCancelled ||
                 code == absl::StatusCode::kUnavailable ||
                 (cancel && code == absl::StatusCode::kInvalidArgument))
-        << door.status();
+        << transport.status();
   }
 }
 
@@ -304,31 +304,33 @@ TEST(ComputePool, RunsWhatWasSubmittedBeforeItGoes) {
 
 // A stream of large frames beside twenty of small ones, by the order of turns and not by time: each
 // waits for at most one frame of each other stream, whatever those have waiting.
-TEST(StreamFlow, OneOfLargeFramesDelaysEachSmallFrameByOneOfItsOwn) {
+TEST(StreamStateMachine, OneOfLargeFramesDelaysEachSmallFrameByOneOfItsOwn) {
   constexpr int kStreams = 21;
   ComputePool pool(1);
   Gate gate(pool);
   std::vector<int> turns;  // Of the pool's only thread.
-  std::vector<std::unique_ptr<MemoryDoor>> doors;
+  std::vector<std::unique_ptr<MemoryTransport>> transports;
   std::vector<std::thread> clients;
   for (int i = 0; i < kStreams; ++i) {
-    doors.push_back(std::make_unique<MemoryDoor>(pool, kWindow, BlobParameters(), kLimits));
-    MemoryDoor& door = *doors.back();
-    door.when_answering = [&turns, i] { turns.push_back(i); };
-    door.Open();
+    transports.push_back(
+        std::make_unique<MemoryTransport>(pool, kWindow, BlobParameters(), kLimits));
+    MemoryTransport& transport = *transports.back();
+    transport.when_answering = [&turns, i] { turns.push_back(i); };
+    transport.Open();
     for (std::uint64_t k = 1; k <= 3 * kWindow; ++k) {
       // The first stream's frames are thirty times as large.
       std::vector<double> positions = MovingBlob(1, k);
       if (i > 0) positions.resize(80);
-      door.Send(k, std::move(positions));
+      transport.Send(k, std::move(positions));
     }
-    door.HalfClose();
+    transport.HalfClose();
   }
   // Every stream has its window full when the first turn begins.
-  for (const auto& door : doors) door->WaitUntilRead(kWindow);
+  for (const auto& transport : transports) transport->WaitUntilRead(kWindow);
   gate.Open();
-  for (const auto& door : doors) {
-    clients.emplace_back([&door] { EXPECT_EQ(ReceiveAll(*door).size(), 3 * kWindow + 1); });
+  for (const auto& transport : transports) {
+    clients.emplace_back(
+        [&transport] { EXPECT_EQ(ReceiveAll(*transport).size(), 3 * kWindow + 1); });
   }
   for (std::thread& client : clients) client.join();
   ASSERT_EQ(turns.size(), kStreams * 3 * kWindow);
@@ -345,7 +347,7 @@ TEST(ComputePool, GivesEveryStreamATurnBeforeAnyHasASecond) {
   Gate gate(pool);
   std::vector<int> order;
   std::promise<void> done;
-  // Each stream submits its next frame when the one before is done, as StreamFlow does.
+  // Each stream submits its next frame when the one before is done, as StreamStateMachine does.
   std::function<void(int, int)> submit = [&](int stream, int frames) {
     pool.Submit([&, stream, frames](Worker&) {
       order.push_back(stream);

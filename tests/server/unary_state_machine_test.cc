@@ -1,6 +1,6 @@
 // Calls of one request and one answer: whatever happens in whatever order, they end once, hold
 // memory until the connection has taken the answer, and give it back.
-#include "server/stream/unary_flow.h"
+#include "server/stream/unary_state_machine.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 
 #include "partiemc/status.h"
 #include "server/base/call_errors.h"
-#include "server/stream/stream_flow.h"
+#include "server/stream/stream_state_machine.h"
 #include "server/stream/unary_registry.h"
 
 namespace partiemc::server {
@@ -25,27 +25,27 @@ using std::chrono::steady_clock;
 constexpr std::uint64_t kBudget = 1000;
 constexpr UnaryLimits kLimits{.request = seconds(30), .answer = seconds(120)};
 
-// A call whose other side is the test. What the flow must never do throws.
-class ScriptedCall final : private UnaryDoor {
+// A call whose other side is the test. What the machine must never do throws.
+class ScriptedCall final : private UnaryTransport {
  public:
   ScriptedCall(MemoryBudget& budget, ComputePool* pool, absl::Status admission = {},
                UnaryKind kind = UnaryKind::kFrame)
-      : flow(std::make_shared<UnaryFlow>(static_cast<UnaryDoor&>(*this), budget, pool, nullptr,
-                                         kind)) {
-    flow->Start(std::move(admission));
+      : machine(std::make_shared<UnaryStateMachine>(static_cast<UnaryTransport&>(*this), budget,
+                                                    pool, nullptr, kind)) {
+    machine->Start(std::move(admission));
   }
 
   void Bring(std::uint64_t bytes) {
     reading = false;
-    flow->ReadDone(bytes);
+    machine->ReadDone(bytes);
   }
   void EndRead() {
     reading = false;
-    flow->ReadEnded();
+    machine->ReadEnded();
   }
   void EndWrite(bool ok) {
     writing = false;
-    flow->WriteDone(ok);
+    machine->WriteDone(ok);
   }
   std::string Reason() const {
     const auto violation = FindViolation(finished.value());
@@ -56,7 +56,7 @@ class ScriptedCall final : private UnaryDoor {
   std::function<void()> while_answering = [] {};
   bool reading = false, writing = false, cut = false;
   std::optional<absl::Status> finished;
-  std::shared_ptr<UnaryFlow> flow;
+  std::shared_ptr<UnaryStateMachine> machine;
 
  private:
   void StartRead() override {
@@ -82,7 +82,7 @@ class ScriptedCall final : private UnaryDoor {
   }
 };
 
-TEST(UnaryFlow, HoldsTheRequestThenTheAnswerUntilItIsTaken) {
+TEST(UnaryStateMachine, HoldsTheRequestThenTheAnswerUntilItIsTaken) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
   ASSERT_TRUE(call.reading);
@@ -96,7 +96,7 @@ TEST(UnaryFlow, HoldsTheRequestThenTheAnswerUntilItIsTaken) {
   EXPECT_EQ(budget.held(), 0u);
 }
 
-TEST(UnaryFlow, ARequestThatTheBudgetHasNoRoomForEndsIt) {
+TEST(UnaryStateMachine, ARequestThatTheBudgetHasNoRoomForEndsIt) {
   MemoryBudget budget(kBudget);
   budget.Take(400);
   ScriptedCall call(budget, nullptr);
@@ -105,7 +105,7 @@ TEST(UnaryFlow, ARequestThatTheBudgetHasNoRoomForEndsIt) {
   EXPECT_EQ(budget.held(), 400u);
 }
 
-TEST(UnaryFlow, AnAnswerThatTheBudgetHasNoRoomForEndsIt) {
+TEST(UnaryStateMachine, AnAnswerThatTheBudgetHasNoRoomForEndsIt) {
   MemoryBudget budget(kBudget);
   budget.Take(400);
   ScriptedCall call(budget, nullptr);
@@ -117,7 +117,7 @@ TEST(UnaryFlow, AnAnswerThatTheBudgetHasNoRoomForEndsIt) {
   EXPECT_EQ(budget.held(), 400u);
 }
 
-TEST(UnaryFlow, AnAnswerMayHaveTheRoomOfItsRequest) {
+TEST(UnaryStateMachine, AnAnswerMayHaveTheRoomOfItsRequest) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
   call.answer = kBudget;
@@ -128,7 +128,7 @@ TEST(UnaryFlow, AnAnswerMayHaveTheRoomOfItsRequest) {
   EXPECT_EQ(budget.held(), 0u);
 }
 
-TEST(UnaryFlow, ARequestForInformationNeedsNoRoom) {
+TEST(UnaryStateMachine, ARequestForInformationNeedsNoRoom) {
   MemoryBudget budget(kBudget);
   budget.Take(kBudget);
   ScriptedCall call(budget, nullptr, {}, UnaryKind::kInformation);
@@ -138,17 +138,17 @@ TEST(UnaryFlow, ARequestForInformationNeedsNoRoom) {
   EXPECT_EQ(budget.held(), kBudget);
 }
 
-TEST(UnaryFlow, OneThatIsNotLetInReadsNothingAndEndsOnceAlthoughItIsCancelled) {
+TEST(UnaryStateMachine, OneThatIsNotLetInReadsNothingAndEndsOnceAlthoughItIsCancelled) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr, DrainingError());
   EXPECT_FALSE(call.reading);
   EXPECT_EQ(call.Reason(), kReasonDraining);
-  call.flow->Cancelled();
-  call.flow->GiveWay(DrainingError());
+  call.machine->Cancelled();
+  call.machine->GiveWay(DrainingError());
   EXPECT_EQ(call.Reason(), kReasonDraining);
 }
 
-TEST(UnaryFlow, ACallWithoutARequestIsMalformed) {
+TEST(UnaryStateMachine, ACallWithoutARequestIsMalformed) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
   call.EndRead();
@@ -156,25 +156,25 @@ TEST(UnaryFlow, ACallWithoutARequestIsMalformed) {
   EXPECT_EQ(call.Reason(), kReasonMalformed);
 }
 
-TEST(UnaryFlow, ARequestThatDoesNotComeInTimeEndsItAndIsToldWhy) {
+TEST(UnaryStateMachine, ARequestThatDoesNotComeInTimeEndsItAndIsToldWhy) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
-  const auto due = call.flow->EndIfIdle(kLimits, steady_clock::now());
+  const auto due = call.machine->EndIfIdle(kLimits, steady_clock::now());
   EXPECT_LE(due, steady_clock::now() + kLimits.request);
   EXPECT_FALSE(call.finished);
-  call.flow->EndIfIdle(kLimits, due);
+  call.machine->EndIfIdle(kLimits, due);
   EXPECT_EQ(call.finished.value().code(), absl::StatusCode::kDeadlineExceeded);
   EXPECT_EQ(call.Reason(), kReasonIdle);
 }
 
-TEST(UnaryFlow, AnAnswerThatIsNotTakenInTimeIsCutAndItsMemoryGivenBack) {
+TEST(UnaryStateMachine, AnAnswerThatIsNotTakenInTimeIsCutAndItsMemoryGivenBack) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
   call.Bring(10);
   EXPECT_EQ(budget.held(), 300u);
-  call.flow->EndIfIdle(kLimits, steady_clock::now() + kLimits.request);
+  call.machine->EndIfIdle(kLimits, steady_clock::now() + kLimits.request);
   EXPECT_FALSE(call.cut) << "the time for the answer is its own";
-  call.flow->EndIfIdle(kLimits, steady_clock::now() + kLimits.answer);
+  call.machine->EndIfIdle(kLimits, steady_clock::now() + kLimits.answer);
   EXPECT_TRUE(call.cut);
   EXPECT_FALSE(call.finished) << "the write still goes on";
   call.EndWrite(false);
@@ -182,25 +182,25 @@ TEST(UnaryFlow, AnAnswerThatIsNotTakenInTimeIsCutAndItsMemoryGivenBack) {
   EXPECT_EQ(budget.held(), 0u);
 }
 
-TEST(UnaryFlow, ADrainAnswersWhatHasComeAndRefusesTheRest) {
+TEST(UnaryStateMachine, ADrainAnswersWhatHasComeAndRefusesTheRest) {
   MemoryBudget budget(kBudget);
   ScriptedCall waiting(budget, nullptr), answered(budget, nullptr);
   answered.Bring(10);
-  waiting.flow->GiveWay(DrainingError());
-  answered.flow->GiveWay(DrainingError());
+  waiting.machine->GiveWay(DrainingError());
+  answered.machine->GiveWay(DrainingError());
   EXPECT_EQ(waiting.Reason(), kReasonDraining);
   answered.EndWrite(true);
   EXPECT_TRUE(answered.finished.value().ok());
 }
 
-TEST(UnaryFlow, OneThatIsCancelledWhileItIsWorkedOnEndsWhenTheWorkDoes) {
+TEST(UnaryStateMachine, OneThatIsCancelledWhileItIsWorkedOnEndsWhenTheWorkDoes) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
   call.while_answering = [&] {
-    EXPECT_FALSE(call.flow->cancelled());
-    call.flow->Cancelled();
-    EXPECT_TRUE(call.flow->cancelled());
-    EXPECT_FALSE(call.finished) << "the door is still used";
+    EXPECT_FALSE(call.machine->cancelled());
+    call.machine->Cancelled();
+    EXPECT_TRUE(call.machine->cancelled());
+    EXPECT_FALSE(call.finished) << "the transport is still used";
   };
   call.Bring(10);
   EXPECT_FALSE(call.writing);
@@ -209,7 +209,7 @@ TEST(UnaryFlow, OneThatIsCancelledWhileItIsWorkedOnEndsWhenTheWorkDoes) {
 }
 
 // Everything that may happen to a call, in random orders, some of it while it is worked on.
-TEST(UnaryFlow, InAnyOrderItEndsOnceWithNothingHeld) {
+TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
   constexpr unsigned kSeed = 20261122;
   std::mt19937 random(kSeed);
   for (int order = 0; order < 20'000; ++order) {
@@ -219,8 +219,8 @@ TEST(UnaryFlow, InAnyOrderItEndsOnceWithNothingHeld) {
     if (random() % 4 == 0) call.answer = absl::InternalError("");
     if (random() % 4 == 0) call.answer = random() % 1500;
     const std::vector<std::function<void()>> outside = {
-        [&] { call.flow->Cancelled(); }, [&] { call.flow->GiveWay(DrainingError()); },
-        [&] { call.flow->EndIfIdle(kLimits, steady_clock::now() + seconds(random() % 200)); }};
+        [&] { call.machine->Cancelled(); }, [&] { call.machine->GiveWay(DrainingError()); },
+        [&] { call.machine->EndIfIdle(kLimits, steady_clock::now() + seconds(random() % 200)); }};
     if (random() % 2 == 0) call.while_answering = outside[random() % outside.size()];
     for (int step = 0; step < 6; ++step) {
       switch (random() % 5) {
@@ -237,7 +237,7 @@ TEST(UnaryFlow, InAnyOrderItEndsOnceWithNothingHeld) {
           outside[random() % outside.size()]();
       }
     }
-    call.flow->Cancelled();
+    call.machine->Cancelled();
     if (call.reading) call.EndRead();
     if (call.writing) call.EndWrite(false);
     ASSERT_TRUE(call.finished.has_value());
@@ -245,7 +245,7 @@ TEST(UnaryFlow, InAnyOrderItEndsOnceWithNothingHeld) {
   }
 }
 
-TEST(UnaryFlow, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
+TEST(UnaryStateMachine, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
   MemoryBudget budget(kBudget);
   std::vector<std::unique_ptr<ScriptedCall>> calls;
   {
@@ -253,7 +253,7 @@ TEST(UnaryFlow, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
     for (int i = 0; i < 100; ++i) calls.push_back(std::make_unique<ScriptedCall>(budget, &pool));
     for (const auto& call : calls) {
       call->Bring(1);
-      call->flow->Cancelled();
+      call->machine->Cancelled();
     }
   }  // All work is done.
   for (const auto& call : calls) {
@@ -270,32 +270,33 @@ TEST(UnaryRegistry, EachKindOfCallsHasPlacesOfItsOwn) {
   ScriptedCall first(budget, nullptr), second(budget, nullptr), probe(budget, nullptr);
   ScriptedCall others(budget, nullptr), last(budget, nullptr), never(budget, nullptr);
   for (const auto* call : {&first, &second, &others, &last}) {
-    EXPECT_TRUE(registry.Enter(call->flow, UnaryKind::kFrame).ok()) << "it has no request yet";
+    EXPECT_TRUE(registry.Enter(call->machine, UnaryKind::kFrame).ok()) << "it has no request yet";
   }
-  EXPECT_TRUE(registry.TakePlace(*first.flow, greedy).ok());
-  const absl::Status refused = registry.TakePlace(*second.flow, greedy);
+  EXPECT_TRUE(registry.TakePlace(*first.machine, greedy).ok());
+  const absl::Status refused = registry.TakePlace(*second.machine, greedy);
   EXPECT_EQ(FindViolation(refused)->reason, kReasonTooManyCalls);
-  EXPECT_TRUE(registry.TakePlace(*others.flow, modest).ok()) << "there is always one for others";
-  EXPECT_EQ(FindViolation(registry.TakePlace(*last.flow, late))->reason, kReasonTooManyCalls);
-  EXPECT_TRUE(registry.Enter(probe.flow, UnaryKind::kInformation).ok());
-  EXPECT_TRUE(registry.TakePlace(*probe.flow, greedy).ok());
-  registry.Leave(*never.flow);  // Was never in.
+  EXPECT_TRUE(registry.TakePlace(*others.machine, modest).ok()) << "there is always one for others";
+  EXPECT_EQ(FindViolation(registry.TakePlace(*last.machine, late))->reason, kReasonTooManyCalls);
+  EXPECT_TRUE(registry.Enter(probe.machine, UnaryKind::kInformation).ok());
+  EXPECT_TRUE(registry.TakePlace(*probe.machine, greedy).ok());
+  registry.Leave(*never.machine);  // Was never in.
   EXPECT_EQ(registry.count(), 5u);
-  registry.GiveBackPlace(*first.flow);
-  EXPECT_TRUE(registry.TakePlace(*second.flow, greedy).ok()) << "before the first has left";
-  registry.Leave(*first.flow);
+  registry.GiveBackPlace(*first.machine);
+  EXPECT_TRUE(registry.TakePlace(*second.machine, greedy).ok()) << "before the first has left";
+  registry.Leave(*first.machine);
 }
 
 TEST(UnaryRegistry, ADrainLetsNoFrameInAndEndsCallsWhoseRequestHasNotCome) {
   MemoryBudget budget(kBudget);
   UnaryRegistry registry(2);
   ScriptedCall call(budget, nullptr), late(budget, nullptr);
-  ASSERT_TRUE(registry.Enter(call.flow, UnaryKind::kFrame).ok());
+  ASSERT_TRUE(registry.Enter(call.machine, UnaryKind::kFrame).ok());
   registry.Drain();
   EXPECT_EQ(call.Reason(), kReasonDraining);
-  EXPECT_EQ(FindViolation(registry.Enter(late.flow, UnaryKind::kFrame))->reason, kReasonDraining);
+  EXPECT_EQ(FindViolation(registry.Enter(late.machine, UnaryKind::kFrame))->reason,
+            kReasonDraining);
   EXPECT_FALSE(registry.WaitForFrames(steady_clock::now()));
-  registry.Leave(*call.flow);
+  registry.Leave(*call.machine);
   EXPECT_TRUE(registry.WaitForFrames(steady_clock::now()));
 }
 
@@ -304,7 +305,7 @@ TEST(UnaryRegistry, NoDrainWaitsForACallForInformation) {
   UnaryRegistry registry(2);
   registry.Drain();
   ScriptedCall mute(budget, nullptr, {}, UnaryKind::kInformation);
-  ASSERT_TRUE(registry.Enter(mute.flow, UnaryKind::kInformation).ok());
+  ASSERT_TRUE(registry.Enter(mute.machine, UnaryKind::kInformation).ok());
   EXPECT_TRUE(registry.WaitForFrames(steady_clock::now()));
 }
 
