@@ -31,9 +31,9 @@ ROOMS = {
     "core": ["core_test", "core_threads_test", "core_allocation_test"],
     "server": [
         "session_test", "checkpoint_test", "stream_registry_test", "busy_streams_test",
-        "compute_pool_test", "watch_state_machine_test", "stream_state_machine_test", "memory_budget_test",
-        "idle_test", "message_orders_test", "answer_afterwards_test", "codec_test",
-        "bearer_tokens_test", "tls_identity_test", "options_test", "security_test",
+        "compute_pool_test", "watch_state_machine_test", "stream_state_machine_test",
+        "memory_budget_test", "idle_test", "message_orders_test", "answer_afterwards_test",
+        "codec_test", "bearer_tokens_test", "tls_identity_test", "options_test", "security_test",
         "observed_test", "watch_test", "protocol_test", "streams_test", "overload_test",
         "resume_protocol_test", "error_table_test", "operation_test"],
     "client": [
@@ -44,8 +44,8 @@ ROOMS = {
 # Half of a minute's work in a few tests: run last, where no other test fails.
 SLOW = {"core_test": "Guarantees.*:Roots.*:Bilinear.*:TrackedTurmoil*:TJunctions.*"}
 # Under ThreadSanitizer only what is built for it.
-TSAN_ROOM = ["compute_pool_test", "watch_state_machine_test", "stream_registry_test", "session_test",
-             "stream_state_machine_test", "message_orders_test"]
+TSAN_ROOM = ["compute_pool_test", "watch_state_machine_test", "stream_registry_test",
+             "session_test", "stream_state_machine_test", "message_orders_test"]
 
 
 def fail(message):
