@@ -40,9 +40,9 @@ ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
                                        const CurrentCheckpointKeys& checkpoint_keys)
     : ByteCall(context, std::move(admission)),
       registry_(registry),
-      messages_(limits, registry, dispatcher, checkpoint_keys),
-      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), pool,
-                                                    budget, limits.frames_in_flight,
+      messages_(limits, registry, dispatcher, checkpoint_keys, {peer(), this->caller().name()}),
+      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), messages_,
+                                                    pool, budget, limits.frames_in_flight,
                                                     caller().account())) {
   absl::Status status = this->admission();
   if (status.ok()) status = registry_.Enter(machine_, caller());
@@ -79,24 +79,6 @@ void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
   written_ = what;
   written_slot_ = slot;
   ServerBidiReactor::StartWrite(&messages_.response(what, slot));
-}
-
-absl::Status ReconstructReactor::Open(std::size_t slot) {
-  const auto stream = messages_.Open(slot, *machine_);
-  if (!stream.ok()) return stream.status();
-  const StreamDescription& description = stream->description;
-  LogEvent(spdlog::level::info, "stream opened",
-           {{"id", stream->id},
-            {"name", description.name},
-            {"peer", peer()},
-            {"client", caller().name()},
-            {"placement", std::string(Name(description.parameters.placement))},
-            {"fill", std::string(Name(description.parameters.fill))}});
-  return absl::OkStatus();
-}
-
-Answered ReconstructReactor::Answer(std::size_t slot, Worker& worker) {
-  return messages_.Answer(slot, worker, machine_->cancelled());
 }
 
 void ReconstructReactor::Cut() { CancelCall(); }

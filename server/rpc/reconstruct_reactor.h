@@ -34,8 +34,6 @@ class ReconstructReactor final : public ByteCall, private StreamTransport {
  private:
   void StartRead(std::size_t slot) override;
   void StartWrite(Outgoing what, std::size_t slot) override;
-  absl::Status Open(std::size_t slot) override;
-  Answered Answer(std::size_t slot, Worker& worker) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
   void Left() override;

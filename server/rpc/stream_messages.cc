@@ -9,6 +9,7 @@
 #include "partiemc/status.h"
 #include "server/rpc/watch_reactor.h"
 #include "server/stream/stream_token.h"
+#include "server/telemetry/logging.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {
@@ -120,10 +121,11 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 
 StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,
                                WatchDispatcher& dispatcher,
-                               const CurrentCheckpointKeys& checkpoint_keys)
+                               const CurrentCheckpointKeys& checkpoint_keys, Origin origin)
     : limits_(limits),
       registry_(registry),
       checkpoint_keys_(checkpoint_keys),
+      origin_(std::move(origin)),
       broadcaster_(std::make_shared<ResultBroadcaster>(
           dispatcher, ResultBroadcaster::Limits{.mailbox_bytes = limits.max_watcher_bytes,
                                                 .kept_bytes = limits.KeptResultBytes()})),
@@ -162,8 +164,7 @@ grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
   return answers_[slot];
 }
 
-absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot,
-                                                   const StreamStateMachine& machine) {
+absl::Status StreamMessages::Open(std::size_t slot, const StreamStateMachine& stream_machine) {
   v1::ReconstructRequest request;
   if (auto status = ParseOpen(requests_[slot], limits_.MaxOpenBytes(), request); !status.ok()) {
     return status;
@@ -181,7 +182,7 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot,
     auto status = Resume(open.resume(), limits_, checkpoint_keys_, *session, terms);
     if (!status.ok()) return status;
   }
-  auto stream = registry_.Open(machine,
+  auto stream = registry_.Open(stream_machine,
                                {.name = terms.name,
                                 .labels = {open.labels().begin(), open.labels().end()},
                                 .parameters = session->parameters(),
@@ -202,7 +203,14 @@ absl::StatusOr<StreamSummary> StreamMessages::Open(std::size_t slot,
   EncodeLimits(limits_, *opened.mutable_limits());
   opened.set_next_sequence(session_->next_sequence());
   opened_ = wire::ToBytes(response);
-  return stream;
+  LogEvent(spdlog::level::info, "stream opened",
+           {{"id", stream->id},
+            {"name", terms_.name},
+            {"peer", origin_.peer},
+            {"client", origin_.client},
+            {"placement", std::string(Name(session_->parameters().placement))},
+            {"fill", std::string(Name(session_->parameters().fill))}});
+  return absl::OkStatus();
 }
 
 Answered StreamMessages::Answer(std::size_t slot, Worker& worker,

@@ -41,13 +41,17 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 
 /// Slots hold messages as bytes, and only from their reading or until their writing: what a frame
 /// needs besides belongs to the worker that answers it, so that an idle stream holds next to
-/// nothing. Not thread-safe as a whole: StreamStateMachine's promises to a StreamTransport are what
-/// it relies on.
-class StreamMessages {
+/// nothing. Not thread-safe as a whole: it relies on what StreamStateMachine promises.
+class StreamMessages final : public StreamHandler {
  public:
+  /// For the log.
+  struct Origin {
+    std::string peer, client;
+  };
+
   /// One slot for each of limits.frames_in_flight.
   StreamMessages(const ServerLimits& limits, StreamRegistry& registry, WatchDispatcher& dispatcher,
-                 const CurrentCheckpointKeys& checkpoint_keys);
+                 const CurrentCheckpointKeys& checkpoint_keys, Origin origin);
 
   grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
   RequestKind Kind(std::size_t slot);
@@ -55,9 +59,8 @@ class StreamMessages {
   /// The response has been written: lets go of it.
   void Written(Outgoing what, std::size_t slot) { Response(what, slot).Clear(); }
 
-  /// As StreamTransport::Open and StreamTransport::Answer; gives the stream as it was opened.
-  absl::StatusOr<StreamSummary> Open(std::size_t slot, const StreamStateMachine& machine);
-  Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled);
+  absl::Status Open(std::size_t slot, const StreamStateMachine& stream) override;
+  Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) override;
 
  private:
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
@@ -67,6 +70,7 @@ class StreamMessages {
   const ServerLimits& limits_;
   StreamRegistry& registry_;
   const CurrentCheckpointKeys& checkpoint_keys_;
+  const Origin origin_;
   const std::shared_ptr<ResultBroadcaster> broadcaster_;
   std::vector<grpc::ByteBuffer> requests_;
   std::vector<grpc::ByteBuffer> answers_;

@@ -30,10 +30,11 @@ absl::Status ClientGone() { return absl::CancelledError("the client went away");
 
 }  // namespace
 
-StreamStateMachine::StreamStateMachine(StreamTransport& transport, ComputePool& pool,
-                                       MemoryBudget& budget, std::size_t window,
+StreamStateMachine::StreamStateMachine(StreamTransport& transport, StreamHandler& handler,
+                                       ComputePool& pool, MemoryBudget& budget, std::size_t window,
                                        std::shared_ptr<const CallerAccount> caller)
     : transport_(transport),
+      handler_(handler),
       pool_(pool),
       budget_(budget),
       caller_(std::move(caller)),
@@ -96,7 +97,7 @@ void StreamStateMachine::TakeRequest(RequestKind kind, std::uint64_t bytes) {
 }
 
 void StreamStateMachine::Open() {
-  absl::Status status = cancelled_ ? ClientGone() : transport_.Open(0);
+  absl::Status status = cancelled_ ? ClientGone() : handler_.Open(0, *this);
   On([&] {
     opening_ = false;
     SetSlotBytes(0, 0);
@@ -198,7 +199,7 @@ void StreamStateMachine::Compute(std::size_t slot, Worker& worker) {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::kAbandoned) return;
   }
-  answered_ = transport_.Answer(slot, worker);
+  answered_ = handler_.Answer(slot, worker, cancelled_);
 }
 
 void StreamStateMachine::Computed() {

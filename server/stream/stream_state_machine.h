@@ -1,5 +1,5 @@
-// How the messages of one stream flow: what may be read, computed and written when. It knows
-// neither what the messages are nor how they travel; a transport (gRPC, or a test's memory) does.
+// How the messages of one stream flow: what may be read, computed and written when. What they are a
+// handler knows, how they travel a transport (gRPC, or a test's memory).
 #pragma once
 
 #include <atomic>
@@ -40,9 +40,12 @@ struct Answered {
 /// A larger `open`, which brings a checkpoint, takes a time that no thread of gRPC has.
 inline constexpr std::uint64_t kQuickOpenBytes = 64 << 10;
 
-/// Where a stream's messages come in and go out. It has `window` slots, each a request and the
-/// answer to it. StreamStateMachine never has more than one read, one write and one computation
-/// going on, these on different slots, and never calls the transport with a lock held.
+class StreamStateMachine;
+
+/// Where a stream's messages come in and go out. There are `window` slots, each a request and the
+/// answer to it, which it shares with the handler. StreamStateMachine never has more than one read,
+/// one write and one computation going on, these on different slots, and calls neither of the two
+/// with a lock held.
 class StreamTransport {
  public:
   virtual ~StreamTransport() = default;
@@ -52,17 +55,24 @@ class StreamTransport {
   virtual void StartRead(std::size_t slot) = 0;
   /// Begins to write; ends in StreamStateMachine::WriteDone. `slot` counts for kAnswer only.
   virtual void StartWrite(Outgoing what, std::size_t slot) = 0;
-  /// Opens the stream as the request in `slot` asks and prepares Outgoing::kOpened. Quick, but for
-  /// a request of more than kQuickOpenBytes, which a worker opens. An error ends the stream.
-  virtual absl::Status Open(std::size_t slot) = 0;
-  /// Turns the frame in `slot` into its answer. Called by a worker, one frame of a stream at a time
-  /// and in their order.
-  virtual Answered Answer(std::size_t slot, Worker& worker) = 0;
   /// Has the read and the write that are going on fail soon, whatever the client does.
   virtual void Cut() = 0;
   /// The last call that the transport gets; a read may still be going on, nothing else. OK, or why
   /// the stream ended.
   virtual void Finish(const absl::Status& status) = 0;
+};
+
+/// What the messages of a stream are, and the session behind them.
+class StreamHandler {
+ public:
+  virtual ~StreamHandler() = default;
+
+  /// Opens `stream` as the request in `slot` asks and prepares Outgoing::kOpened. Quick, but for a
+  /// request of more than kQuickOpenBytes, which a worker opens. An error ends the stream.
+  virtual absl::Status Open(std::size_t slot, const StreamStateMachine& stream) = 0;
+  /// Turns the frame in `slot` into its answer, unless `cancelled`. Called by a worker, one frame
+  /// of a stream at a time and in their order.
+  virtual Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) = 0;
 };
 
 /// For how long a client may let a stream wait for it; 0: for ever.
@@ -98,10 +108,11 @@ struct StreamCounts {
 class StreamStateMachine final : public MemoryBudget::Waiter,
                                  public std::enable_shared_from_this<StreamStateMachine> {
  public:
-  /// `transport` lives until its Finish returns, `pool` and `budget` longer. Held by shared_ptr
-  /// only. `caller` is whose share of pool and budget it takes.
-  StreamStateMachine(StreamTransport& transport, ComputePool& pool, MemoryBudget& budget,
-                     std::size_t window, std::shared_ptr<const CallerAccount> caller = nullptr);
+  /// `transport` and `handler` live until the transport's Finish returns, `pool` and `budget`
+  /// longer. Held by shared_ptr only. `caller` is whose share of pool and budget it takes.
+  StreamStateMachine(StreamTransport& transport, StreamHandler& handler, ComputePool& pool,
+                     MemoryBudget& budget, std::size_t window,
+                     std::shared_ptr<const CallerAccount> caller = nullptr);
 
   /// Begins with the first read, or, where `admission` is an error, ends with it at once. Called
   /// once. Every end of a stream goes through this state machine, that of a refused one too, so
@@ -167,6 +178,7 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
   void Computed();
 
   StreamTransport& transport_;
+  StreamHandler& handler_;
   ComputePool& pool_;
   MemoryBudget& budget_;
   const std::shared_ptr<const CallerAccount> caller_;

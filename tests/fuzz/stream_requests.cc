@@ -1,5 +1,7 @@
 // What a producer sends: message after message, of a stream's first call on, into the buffers that
 // the stream and its worker use again.
+#include <spdlog/spdlog.h>
+
 #include <memory>
 #include <string>
 
@@ -43,8 +45,6 @@ class NoTransport final : public server::StreamTransport {
  public:
   void StartRead(std::size_t) override {}
   void StartWrite(Outgoing, std::size_t) override {}
-  absl::Status Open(std::size_t) override { return absl::OkStatus(); }
-  server::Answered Answer(std::size_t, server::Worker&) override { return {}; }
   void Cut() override {}
   void Finish(const absl::Status&) override {}
 };
@@ -61,9 +61,9 @@ class Stream {
  public:
   explicit Stream(Shared& shared)
       : shared_(shared),
+        messages_(Limits(), registry_, shared.dispatcher, keys_, /*origin=*/{}),
         machine_(std::make_shared<server::StreamStateMachine>(
-            transport_, shared.pool, shared.budget, Limits().frames_in_flight)),
-        messages_(Limits(), registry_, shared.dispatcher, keys_) {
+            transport_, messages_, shared.pool, shared.budget, Limits().frames_in_flight)) {
     RequireOk(registry_.Enter(machine_), "a first call is let in");
   }
   ~Stream() { registry_.Leave(*machine_); }
@@ -83,10 +83,10 @@ class Stream {
 
  private:
   void Open(std::size_t slot) {
-    const auto opened = messages_.Open(slot, *machine_);
+    const absl::Status opened = messages_.Open(slot, *machine_);
     is_open_ = opened.ok();
     if (!is_open_) {
-      RequireViolation(opened.status());
+      RequireViolation(opened);
       return;
     }
     Require(Response(Outgoing::kOpened, slot).opened().frames_in_flight() > 0, "a window is told");
@@ -116,9 +116,9 @@ class Stream {
   Shared& shared_;
   NoTransport transport_;
   server::StreamRegistry registry_{Limits().max_streams};
-  std::shared_ptr<server::StreamStateMachine> machine_;
   server::CurrentCheckpointKeys keys_;
   server::StreamMessages messages_;
+  std::shared_ptr<server::StreamStateMachine> machine_;
   bool is_open_ = false;
   std::size_t taken_ = 0;
 };
@@ -128,6 +128,7 @@ class Stream {
 void AttackStreamRequests(Bytes bytes) {
   const SingleThread single_thread;
   static auto* const shared = new Shared;
+  spdlog::set_level(spdlog::level::off);  // A line for each stream that opens.
   shared->worker.message_buffers.reset();
   Stream stream(*shared);
   Choices choices(bytes);

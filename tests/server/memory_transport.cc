@@ -29,7 +29,8 @@ MemoryTransport::MemoryTransport(ComputePool& pool, MemoryBudget& budget, std::s
       limits_(limits),
       requests_(window),
       answers_(window),
-      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), pool,
+      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this),
+                                                    static_cast<StreamHandler&>(*this), pool,
                                                     budget, window)),
       reader_([this] { ReadLoop(); }),
       writer_([this] { WriteLoop(); }) {
@@ -115,13 +116,13 @@ void MemoryTransport::StartWrite(Outgoing what, std::size_t slot) {
   changed_.notify_all();
 }
 
-absl::Status MemoryTransport::Open(std::size_t) {
+absl::Status MemoryTransport::Open(std::size_t, const StreamStateMachine&) {
   auto session = Session::Open(parameters_, limits_);
   if (session.ok()) session_ = *std::move(session);
   return session.status();
 }
 
-Answered MemoryTransport::Answer(std::size_t slot, Worker& worker) {
+Answered MemoryTransport::Answer(std::size_t slot, Worker& worker, const std::atomic<bool>&) {
   when_answering();
   const MemoryRequest& request = requests_[slot];
   MemoryAnswer& answer = answers_[slot];

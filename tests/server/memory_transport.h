@@ -35,7 +35,7 @@ struct MemoryAnswer {
   friend bool operator==(const MemoryAnswer&, const MemoryAnswer&) = default;
 };
 
-class MemoryTransport final : private StreamTransport {
+class MemoryTransport final : private StreamTransport, private StreamHandler {
  public:
   MemoryTransport(ComputePool& pool, std::size_t window, const ReconstructionParameters& parameters,
                   const FrameLimits& limits);
@@ -69,8 +69,8 @@ class MemoryTransport final : private StreamTransport {
  private:
   void StartRead(std::size_t slot) override;
   void StartWrite(Outgoing what, std::size_t slot) override;
-  absl::Status Open(std::size_t slot) override;
-  Answered Answer(std::size_t slot, Worker& worker) override;
+  absl::Status Open(std::size_t slot, const StreamStateMachine& stream) override;
+  Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
 

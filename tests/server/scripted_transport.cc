@@ -28,7 +28,8 @@ ScriptedTransport::ScriptedTransport(SteppedPool& pool, MemoryBudget& budget, st
       requests_(window),
       answers_(window),
       machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this),
-                                                    pool.pool(), budget, window)) {
+                                                    static_cast<StreamHandler&>(*this), pool.pool(),
+                                                    budget, window)) {
   machine_->Start();
 }
 
@@ -60,14 +61,14 @@ void ScriptedTransport::StartWrite(Outgoing what, std::size_t slot) {
   writing_ = what == Outgoing::kAnswer ? answers_.at(slot) : MemoryAnswer{what, 0, {}, {}};
 }
 
-absl::Status ScriptedTransport::Open(std::size_t) {
+absl::Status ScriptedTransport::Open(std::size_t, const StreamStateMachine&) {
   auto session = Session::Open(parameters_, limits_);
   if (session.ok()) session_ = *std::move(session);
   Meanwhile();
   return session.status();
 }
 
-Answered ScriptedTransport::Answer(std::size_t slot, Worker& worker) {
+Answered ScriptedTransport::Answer(std::size_t slot, Worker& worker, const std::atomic<bool>&) {
   answers_.at(slot) = AnswerInMemory(requests_.at(slot), *session_, worker);
   Meanwhile();
   return {.is_result = answers_[slot].reason.empty(),

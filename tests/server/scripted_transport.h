@@ -45,7 +45,7 @@ class SteppedPool {
   ComputePool pool_{1};
 };
 
-class ScriptedTransport final : private StreamTransport {
+class ScriptedTransport final : private StreamTransport, private StreamHandler {
  public:
   ScriptedTransport(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
                     const ReconstructionParameters& parameters, const FrameLimits& limits);
@@ -71,8 +71,8 @@ class ScriptedTransport final : private StreamTransport {
  private:
   void StartRead(std::size_t slot) override;
   void StartWrite(Outgoing what, std::size_t slot) override;
-  absl::Status Open(std::size_t slot) override;
-  Answered Answer(std::size_t slot, Worker& worker) override;
+  absl::Status Open(std::size_t slot, const StreamStateMachine& stream) override;
+  Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
   void Meanwhile();

@@ -16,12 +16,12 @@ namespace partiemc::server {
 namespace {
 
 // A transport that is never opened: the registry needs machines only by their identity.
-class ClosedTransport final : public StreamTransport {
+class ClosedTransport final : public StreamTransport, public StreamHandler {
  public:
   void StartRead(std::size_t) override {}
   void StartWrite(Outgoing, std::size_t) override {}
-  absl::Status Open(std::size_t) override { return absl::OkStatus(); }
-  Answered Answer(std::size_t, Worker&) override { return {}; }
+  absl::Status Open(std::size_t, const StreamStateMachine&) override { return absl::OkStatus(); }
+  Answered Answer(std::size_t, Worker&, const std::atomic<bool>&) override { return {}; }
   void Cut() override {}
   void Finish(const absl::Status& status) override { finished = status; }
 
@@ -33,7 +33,7 @@ class Registry : public ::testing::Test {
   static constexpr std::uint32_t kMaxStreams = 3;
 
   std::shared_ptr<StreamStateMachine> Enter(const Caller& caller = {}) {
-    auto machine = std::make_shared<StreamStateMachine>(transport_, pool_, budget_, 1);
+    auto machine = std::make_shared<StreamStateMachine>(transport_, transport_, pool_, budget_, 1);
     EXPECT_TRUE(registry_.Enter(machine, caller).ok());
     return machine;
   }
@@ -246,7 +246,9 @@ TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {
   ASSERT_TRUE(transport_.finished.has_value());
   EXPECT_EQ(transport_.finished->code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(
-      registry_.Enter(std::make_shared<StreamStateMachine>(transport_, pool_, budget_, 1)).code(),
+      registry_
+          .Enter(std::make_shared<StreamStateMachine>(transport_, transport_, pool_, budget_, 1))
+          .code(),
       absl::StatusCode::kUnavailable);
   EXPECT_EQ(ReasonOf(Open(*machine, "x").status()), kReasonDraining);
 
