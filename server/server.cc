@@ -73,12 +73,18 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 
 // How the process is watched. It may hold what it has begun with, its workers, and the budget, or
 // what was taken of that where it is more: a frame of each stream may be taken beyond it, and what
-// streams hold is no reason to turn away others.
-IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget) {
+// streams hold is no reason to turn away others. Nor are results that watchers have not taken;
+// those of a stream share them.
+IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
+                                    const StreamRegistry& streams, const WatchRegistry& watchers) {
   const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes;
   return {.resident_bytes = ResidentBytes,
           .most_bytes = [outside,
                          &budget] { return outside + std::max(budget.bytes(), budget.held()); },
+          .more_bytes =
+              [most = std::uint64_t{options.limits.max_watcher_bytes}, &streams, &watchers] {
+                return std::min(watchers.held_bytes(), streams.OpenCount() * most);
+              },
           .give_back_freed = GiveBackFreedMemory};
 }
 
@@ -99,7 +105,7 @@ Server::Server(const ServerOptions& options)
       budget_(options.limits.memory_budget),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, WatchedProcess(options, budget_)),
+      intake_guard_(opening_, WatchedProcess(options, budget_, registry_, watchers_)),
       service_(std::make_unique<Service>(options_.limits, authentication_, opening_, registry_,
                                          calls_, budget_, pool_, watchers_, dispatcher_,
                                          checkpoint_keys_)),

@@ -38,6 +38,9 @@ void IntakeGuard::Run() {
   }
 }
 
-bool IntakeGuard::IsTooMuch() const { return process_.resident_bytes() > process_.most_bytes(); }
+bool IntakeGuard::IsTooMuch() const {
+  const std::uint64_t resident = process_.resident_bytes(), most = process_.most_bytes();
+  return resident > most && resident - most > process_.more_bytes();
+}
 
 }  // namespace partiemc::server

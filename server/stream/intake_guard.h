@@ -22,7 +22,8 @@ class IntakeGuard {
   /// What the process is asked for; another for tests.
   struct Process {
     std::function<std::uint64_t()> resident_bytes;
-    std::function<std::uint64_t()> most_bytes;  ///< That it may hold now.
+    /// What it may hold now, and what it may hold beside that; asked for where that is too little.
+    std::function<std::uint64_t()> most_bytes, more_bytes;
     std::function<void()> give_back_freed;
   };
 

@@ -126,7 +126,7 @@ class Guarded : public Calls {
     return condition();
   }
 
-  std::atomic<std::uint64_t> resident_ = 0, freed_ = 0, most_ = kMost;
+  std::atomic<std::uint64_t> resident_ = 0, freed_ = 0, most_ = kMost, more_ = 0;
   std::atomic<int> gave_back_ = 0, looks_ = 0;
   std::optional<IntakeGuard> guard_{
       std::in_place, opening_,
@@ -136,6 +136,7 @@ class Guarded : public Calls {
                                  return resident_.load();
                                },
                            .most_bytes = [this] { return most_.load(); },
+                           .more_bytes = [this] { return more_.load(); },
                            .give_back_freed =
                                [this] {
                                  ++gave_back_;
@@ -162,7 +163,12 @@ TEST_F(Guarded, CallsStayWhereStreamsHaveBeenGrantedMore) {
   const int looked = looks_;
   ASSERT_TRUE(Eventually([&] { return looks_ > looked + 3; }));
   EXPECT_EQ(opening_.count(), 1u);
-  most_ = kMost;  // They have given it back, and somebody else has it.
+  most_ = kMost;
+  more_ = kMost;  // Watchers have as much.
+  const int looked_again = looks_;
+  ASSERT_TRUE(Eventually([&] { return looks_ > looked_again + 3; }));
+  EXPECT_EQ(opening_.count(), 1u);
+  more_ = kMost - 1;  // They have given it back, and somebody else has it.
   EXPECT_TRUE(Eventually([&] { return opening_.count() == 0; }));
 }
 
