@@ -73,8 +73,8 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 
 // How the process is watched. It may hold what it has begun with, its workers, and the budget, or
 // what was taken of that where it is more: a frame of each stream may be taken beyond it, and what
-// streams hold is no reason to turn away others. Nor are results that watchers have not taken;
-// those of a stream share them.
+// streams hold is no reason to turn away others. Nor are results that watchers have not taken,
+// which those of a stream share as a rule.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const StreamRegistry& streams, const WatchRegistry& watchers) {
   const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes;
@@ -83,7 +83,7 @@ IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBu
                          &budget] { return outside + std::max(budget.bytes(), budget.held()); },
           .more_bytes =
               [most = std::uint64_t{options.limits.max_watcher_bytes}, &streams, &watchers] {
-                return std::min(watchers.held_bytes(), streams.OpenCount() * most);
+                return std::min(watchers.held_bytes(), (streams.OpenCount() + 1) * most);
               },
           .give_back_freed = GiveBackFreedMemory};
 }

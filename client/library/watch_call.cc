@@ -175,7 +175,10 @@ std::string WatchCall::reason() {
 bool WatchCall::lost() {
   const std::lock_guard lock(mutex_);
   if (!status_ || cancelled_) return false;
-  if (!status_->ok()) return IsLostConnection(status_->error_code(), reason_);
+  if (!status_->ok()) {
+    // The other one: the server was short of memory.
+    return IsLostConnection(status_->error_code(), reason_) || reason_ == "TOO_MANY_OPENING";
+  }
   return end_.reason.empty() || end_.reason == "TAKEN_OVER" || end_.reason == "PRODUCER_LOST";
 }
 

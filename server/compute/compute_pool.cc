@@ -136,8 +136,10 @@ void ComputePool::PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* str
 }
 
 void ComputePool::MemoryIsShort() {
+  const auto now = WarmSize::Clock::now();
   const std::lock_guard lock(mutex_);
-  memory_is_short_ = true;
+  if (now - memory_was_short_ < kBetweenShortages) return;
+  memory_was_short_ = now;
   task_came_.notify_one();
 }
 
@@ -147,7 +149,8 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   std::size_t workers = working_ + idle_.size();
   std::erase_if(idle_, [&](std::unique_ptr<Worker>& worker) {
     const WarmSize& particles = worker->particles;
-    if (!memory_is_short_ || !worker->memory.counts()) {
+    const bool is_wanted = worker->memory.counts() && worker->made < memory_was_short_;
+    if (!is_wanted) {
       if (!particles.Outlived(now, warm_time_)) return false;
       if (busy_.Count(WarmSize::LeastFor(particles.largest()), now) >= workers) return false;
     }
@@ -155,7 +158,6 @@ ComputePool::Workers ComputePool::TakeOutlived() {
     outlived.push_back(std::move(worker));
     return true;
   });
-  if (working_ == 0) memory_is_short_ = false;  // What works now goes when it is idle.
   return outlived;
 }
 

@@ -29,6 +29,9 @@ inline constexpr std::chrono::seconds kWarmTime(10);
 /// For how long after its last job a caller counts as one who shares the threads.
 inline constexpr std::chrono::seconds kSharingTime(1);
 
+/// Want of memory takes idle workers their buffers this often at most.
+inline constexpr std::chrono::seconds kBetweenShortages(1);
+
 /// Runs jobs, several at once. Callers take turns, and of a caller its streams, of which each has
 /// one job at a time, and the line of all its jobs that are of no stream. So a stream of large
 /// frames delays every other by one of its frames at most, never by its backlog; calls without a
@@ -49,7 +52,8 @@ inline constexpr std::chrono::seconds kSharingTime(1);
 /// there are workers send such frames: how often these meet is luck, and may change by the minute,
 /// but they can at any time. What is free of the process's memory goes back to the system whenever
 /// a worker is dropped, and every `warm_time` while there is work: what requests and answers needed
-/// at some moment, and the gaps that they left, do not add up.
+/// at some moment, and the gaps that they left, do not add up. Where the budget has no room for
+/// somebody, idle workers that hold some of it are dropped at once.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
@@ -118,7 +122,8 @@ class ComputePool {
   Workers idle_;             // The one that was used last is the last.
   std::size_t working_ = 0;  // Workers that are not idle.
   BusyStreams busy_;
-  bool memory_is_short_ = false;  // Somebody wants what idle workers keep warm.
+  // When somebody wanted what idle workers keep warm: those that are older go.
+  WarmSize::Clock::time_point memory_was_short_{};
   WarmSize::Clock::time_point gave_back_ = WarmSize::Clock::now();
   bool stopping_ = false;
 

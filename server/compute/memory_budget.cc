@@ -37,7 +37,7 @@ Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
   const std::lock_guard lock(mutex_);
   const Fit fit = FitsNow({{}, bytes, caller, most});
   if (fit == Fit::kYes) share_.Take(caller, bytes);
-  if (fit != Fit::kYes && tell_shortage_) tell_shortage_();
+  if (fit == Fit::kNoRoom) TellShortage();
   return fit;
 }
 
@@ -45,12 +45,13 @@ bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>
                               const CallerAccount* caller) {
   Claim claim{waiter, bytes, caller, MostOf(caller)};
   const std::lock_guard lock(mutex_);
-  const bool fits = FitsNow(claim) == Fit::kYes;
+  const Fit fit = FitsNow(claim);
+  const bool fits = fit == Fit::kYes;
   if (fits) {
     share_.Take(caller, bytes);
   } else {
     claims_.push_back(std::move(claim));
-    if (tell_shortage_) tell_shortage_();
+    if (fit == Fit::kNoRoom) TellShortage();
   }
   return fits;
 }
@@ -81,7 +82,10 @@ void MemoryBudget::Grant() {
     for (auto claim = claims_.begin(); claim != claims_.end();) {
       auto waiter = claim->waiter.lock();
       const Fit fit = waiter == nullptr ? Fit::kYes : Fits(*claim);
-      if (fit == Fit::kNoRoom) break;
+      if (fit == Fit::kNoRoom) {
+        TellShortage();
+        break;
+      }
       if (fit == Fit::kMoreThanShare) waiting.insert(claim->caller);
       if (waiter != nullptr && waiting.contains(claim->caller)) {
         ++claim;
@@ -95,6 +99,10 @@ void MemoryBudget::Grant() {
     }
   }
   for (const auto& [waiter, bytes] : granted) waiter->Granted(bytes);
+}
+
+void MemoryBudget::TellShortage() const {
+  if (tell_shortage_) tell_shortage_();
 }
 
 void MemoryBudget::OnShortage(std::function<void()> tell) {

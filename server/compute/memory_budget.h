@@ -21,7 +21,7 @@ inline constexpr std::string_view kReasonMemoryBudget = "MEMORY_BUDGET";
 /// who wants more than the share of its caller waits for that, and only others of this caller wait
 /// behind. All else is served in the order in which it came, and nobody takes room past it, so that
 /// a stream of small frames cannot keep one of large frames out. Where `caller` is null, only the
-/// room counts. Safe from any thread; no call blocks.
+/// room counts. Safe from any thread; no call blocks for long.
 class MemoryBudget {
  public:
   class Waiter {
@@ -47,8 +47,8 @@ class MemoryBudget {
   /// To be called without a lock: others may be granted what they wait for.
   void GiveBack(std::uint64_t bytes, const CallerAccount* caller = nullptr);
 
-  /// From now on `tell` is called whenever somebody is refused or has to wait; empty: nobody is
-  /// told. It must not call this.
+  /// From now on `tell` is called whenever somebody is refused or has to wait for want of room, not
+  /// of its caller's share; empty: nobody is told. It must not call this.
   void OnShortage(std::function<void()> tell);
 
   std::uint64_t held() const;
@@ -67,6 +67,7 @@ class MemoryBudget {
     return share_.Fits(claim.caller, claim.bytes, claim.most);
   }
   FairShare::Fit FitsNow(const Claim& claim) const;
+  void TellShortage() const;
   // Without:
   void Grant();
 

@@ -56,7 +56,8 @@ struct Worker {
   Result result;
   State next_state;  ///< Copied to the stream once the frame has been answered.
   std::unique_ptr<MessageBuffers> message_buffers;
-  WarmSize particles;                 ///< Of the frames that it has worked on.
+  WarmSize particles;  ///< Of the frames that it has worked on.
+  const WarmSize::Clock::time_point made = WarmSize::Clock::now();
   FrameObserver* observer = nullptr;  ///< Told of each frame; none: nobody asks.
 
   explicit Worker(FrameObserver* told = nullptr, MemoryBudget* budget = nullptr)

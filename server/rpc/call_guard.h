@@ -13,7 +13,7 @@
 
 namespace partiemc::server {
 
-/// A call that was let in, and its place, which it keeps until it is over.
+/// A call that was let in, and its place, which it keeps until its end is told.
 struct AdmittedCall {
   Caller caller;
   CallerAccount::Place place;

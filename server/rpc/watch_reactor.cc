@@ -143,6 +143,10 @@ void WatchReactor::LogEnd(const absl::Status& status) const {
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;
   const WatchCounts counts = machine_->counts();
+  const auto violation = FindViolation(status);
+  const std::string reason = !end_reason_.empty() ? end_reason_
+                             : violation          ? violation->reason
+                                                  : "LEFT";
   LogEvent(spdlog::level::info, "watch closed",
            {{"stream", opened_.opened().stream_id()},
             {"name", stream_name_},
@@ -150,7 +154,7 @@ void WatchReactor::LogEnd(const absl::Status& status) const {
             {"dropped", counts.dropped},
             {"most_held_bytes", std::uint64_t{counts.most_held_bytes}},
             {"seconds", open.count()},
-            {"reason", end_reason_.empty() ? "LEFT" : end_reason_},
+            {"reason", reason},
             {"status", absl::StatusCodeToString(status.code())}});
 }
 

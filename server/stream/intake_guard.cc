@@ -12,7 +12,7 @@ namespace {
 constexpr std::chrono::milliseconds kPeriod(10);
 
 // Giving back a hundred megabytes takes 15 ms, in which nobody allocates.
-constexpr std::chrono::seconds kBetweenGivingBack(2);
+constexpr std::chrono::milliseconds kBetweenGivingBack(250);
 
 }  // namespace
 
@@ -28,12 +28,17 @@ void IntakeGuard::Run() {
   pthread_setname_np(pthread_self(), "intake");
   auto give_back = std::chrono::steady_clock::time_point::min();
   while (opening_.WaitForOne()) {
-    const auto now = std::chrono::steady_clock::now();
-    if (IsTooMuch() && now >= give_back) {  // Some of it may be free already.
-      process_.give_back_freed();
-      give_back = now + kBetweenGivingBack;
+    if (IsTooMuch()) {
+      const auto now = std::chrono::steady_clock::now();
+      const bool gives_back = now >= give_back;
+      if (gives_back) {  // Some of it may be free already.
+        process_.give_back_freed();
+        give_back = now + kBetweenGivingBack;
+      }
+      if (!gives_back || IsTooMuch()) opening_.GiveWayToAll();
+      // Not before it is sure that this is not free memory alone: watchers are there to stay.
+      if (gives_back && IsTooMuch()) opening_.WatchersGiveWay();
     }
-    if (IsTooMuch()) opening_.GiveWayToAll();
     std::this_thread::sleep_for(kPeriod);
   }
 }

@@ -13,8 +13,8 @@ namespace partiemc::server {
 /// receive, so nobody can count what calls without a request hold, nor what watchers send. This
 /// looks at the memory of the whole process instead, every few milliseconds and only while there
 /// are such calls: as long as it is too much, half of the calls of the caller that has most of them
-/// give way, the oldest first, watchers last. Whose request comes at once is next to never among
-/// them.
+/// give way, the oldest first; whose request comes at once is next to never among them. Watchers
+/// give way only where giving free memory back has not been enough.
 ///
 /// Frames of open streams that are on their way stay, one a stream, whatever their size.
 class IntakeGuard {

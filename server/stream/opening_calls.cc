@@ -25,8 +25,8 @@ absl::Status TooManyWatchers() {
   return ViolationError(
       absl::StatusCode::kResourceExhausted,
       {std::string(kReasonTooManyOpening), "watchers", kMoreThanMemory,
-       "must send each request at once: of the caller with most of them those give way that have "
-       "sent none for longest; try again"});
+       "must be fewer for now: of the caller with most of them those give way that have sent "
+       "nothing for longest; try again"});
 }
 
 }  // namespace
@@ -82,19 +82,18 @@ std::vector<OpeningCalls::GiveWay> OpeningCalls::Lines::RemoveHalf() {
   return gone;
 }
 
-void OpeningCalls::GiveWayToAll() {
+void OpeningCalls::HalfGivesWay(Lines& lines, const absl::Status& status) {
   std::vector<GiveWay> gone;
-  bool opening = false;
   {
     const std::lock_guard lock(mutex_);
-    opening = opening_.count() > 0;
-    Lines& lines = opening ? opening_ : watchers_;
     if (lines.count() > 0) gone = lines.RemoveHalf();
   }
-  for (const GiveWay& give_way : gone) {
-    give_way(opening ? TooManyOpening(kMoreThanMemory) : TooManyWatchers());
-  }
+  for (const GiveWay& give_way : gone) give_way(status);
 }
+
+void OpeningCalls::GiveWayToAll() { HalfGivesWay(opening_, TooManyOpening(kMoreThanMemory)); }
+
+void OpeningCalls::WatchersGiveWay() { HalfGivesWay(watchers_, TooManyWatchers()); }
 
 bool OpeningCalls::WaitForOne() {
   std::unique_lock lock(mutex_);

@@ -31,7 +31,7 @@ inline constexpr std::string_view kReasonTooManyOpening = "TOO_MANY_OPENING";
 class OpeningCalls {
  public:
   /// Ends the call with that status, unless its first request has come meanwhile. It may come when
-  /// the place has gone already, and from any thread that enters another call.
+  /// the place has gone already, and from any thread.
   using GiveWay = std::function<void(const absl::Status&)>;
 
  private:
@@ -92,9 +92,10 @@ class OpeningCalls {
   Place EnterWatcher(const CallerAccount& caller, GiveWay give_way);
 
   /// More has come in with them than the server has memory for: of the caller that has most of them
-  /// the older half gives way, at least one; watchers where nobody else is left, those first that
-  /// have sent nothing for longest. To be called without a lock.
+  /// the older half gives way, at least one. To be called without a lock.
   void GiveWayToAll();
+  /// The same for the watchers.
+  void WatchersGiveWay();
 
   /// Returns true as soon as there is one, false from StopWaiting on. For one thread.
   bool WaitForOne();
@@ -105,6 +106,7 @@ class OpeningCalls {
 
  private:
   Place Take(Lines& lines, const CallerAccount& caller, GiveWay give_way);  // With the lock held.
+  void HalfGivesWay(Lines& lines, const absl::Status& status);              // Without.
 
   const std::size_t places_;
   mutable std::mutex mutex_;  // Guards everything below.

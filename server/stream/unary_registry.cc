@@ -45,6 +45,10 @@ absl::Status UnaryRegistry::TakePlace(const UnaryStateMachine& call, const Calle
 
 void UnaryRegistry::GiveBackPlace(const UnaryStateMachine& call) {
   const std::lock_guard lock(mutex_);
+  FreePlace(call);
+}
+
+void UnaryRegistry::FreePlace(const UnaryStateMachine& call) {
   const auto found = calls_.find(&call);
   if (found == calls_.end()) return;  // It was not let in.
   Entry& entry = found->second;
@@ -54,6 +58,7 @@ void UnaryRegistry::GiveBackPlace(const UnaryStateMachine& call) {
 
 void UnaryRegistry::Leave(const UnaryStateMachine& call) {
   const std::lock_guard lock(mutex_);
+  FreePlace(call);  // A request may come, and take one, while the call ends.
   calls_.erase(&call);
   // With the lock held: whoever waits for the last one may take the registry away after that.
   left_.notify_all();

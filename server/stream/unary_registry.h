@@ -41,7 +41,7 @@ class UnaryRegistry {
   absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller);
   /// It has its last word, and its place is free for others. It may have had none.
   void GiveBackPlace(const UnaryStateMachine& call);
-  /// The connection has taken its last word; it has given its place back.
+  /// The connection has taken its last word.
   void Leave(const UnaryStateMachine& call);
 
   /// Of both kinds.
@@ -65,6 +65,7 @@ class UnaryRegistry {
   };
 
   std::vector<std::shared_ptr<UnaryStateMachine>> All() const;
+  void FreePlace(const UnaryStateMachine& call);  // With the lock held.
 
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;

@@ -33,6 +33,9 @@ RateLimit refusals(kRefusalsPerSecond);
 // Since SetUpLogging. It is never taken away: threads that are left behind at the end of the
 // process may log until the last moment.
 std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
+// Likewise, as spdlog's own goes at the end of main.
+std::shared_ptr<spdlog::logger>& logger =
+    *new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
 
 // Valid JSON, whatever comes: bytes that are no UTF-8 become U+FFFD.
 void AppendEscaped(std::string_view text, std::string& out) {
@@ -155,7 +158,7 @@ void LogEvent(spdlog::level::level_enum level, std::string_view event,
     line += json ? "\":" : "=";
     line += ToText(field, json);
   }
-  spdlog::log(level, fmt::string_view("{}"), line);
+  logger->log(level, fmt::string_view("{}"), line);
 }
 
 void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status) {
@@ -171,12 +174,11 @@ void LogRefusal(std::string_view event, const std::string& peer, const absl::Sta
 void SetUpLogging(const std::string& level, LogFormat format) {
   log_format = format;
   writer = std::make_shared<LogWriter>(LogWriter::Options{.every_second = &TellLosses});
-  auto logger =
+  logger =
       std::make_shared<spdlog::logger>("partiemc-server", std::make_shared<WriterSink>(writer));
   logger->set_formatter(MakeLogFormatter(format));
   logger->set_level(spdlog::level::from_str(level));
-  spdlog::set_default_logger(std::move(logger));
-  // Before spdlog goes, which its thread logs by.
+  spdlog::set_default_logger(logger);
   static const int registered = std::atexit([] {
     FlushLog();
     writer->Stop();

@@ -54,6 +54,8 @@ class Watch final : private server::WatchTransport {
   }
   void Cancel() { machine_->Cancelled(); }
   void Drain() { machine_->Drain(); }
+  void CutOff() { machine_->Cut(); }
+  void GiveUp() { machine_->GiveUp(absl::ResourceExhaustedError("no memory")); }
   void RequireBounded() const {
     // In mode `latest` two results at most, each within the limit: one is being written.
     Require(machine_->held_bytes() <= (is_every_ ? 1 : 2) * kMaxWatcherBytes,
@@ -139,6 +141,8 @@ void AttackWatchRequests(Bytes bytes) {
           watch.ReadEnded();
           break;
         default:
+          if (what == 231) watch.CutOff();
+          if (what == 239) watch.GiveUp();
           if (what < 240) break;
           if (what == 255) watch.Cancel();
           if (what == 247) watch.Drain();

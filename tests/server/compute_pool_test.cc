@@ -308,7 +308,7 @@ TEST(ComputePool, AWorkerThatIsTooLargeForItsFramesIsDroppedAfterAWhile) {
 TEST(ComputePool, WhatIdleWorkersHoldIsGivenBackWhenSomebodyWantsIt) {
   constexpr std::uint64_t kMib = std::uint64_t{1} << 20;
   MemoryBudget budget(100 * kMib);
-  ComputePool pool(2, kLongEnough, nullptr, &budget);
+  ComputePool pool(2, std::chrono::hours(1), nullptr, &budget);
   RunAndWait(pool, [](Worker& worker) {
     worker.particles.Used(1'000'000, WarmSize::Clock::now());
     worker.memory.Reserve(kWorkerBytes + 90 * kMib, 1'000'000);

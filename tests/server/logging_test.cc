@@ -114,7 +114,6 @@ TEST(LogWriter, ThatHasStoppedCountsWhatComesAsDropped) {
   writer.Write(Line(2));
   EXPECT_EQ(writer.dropped(), 1u);
   EXPECT_TRUE(writer.Flush(kPatience)) << "nothing waits";
-  close(pipe.ends[1]);
 }
 
 TEST(RateLimit, LetsSoManyThroughASecondAndCountsTheOthers) {
@@ -198,7 +197,7 @@ TEST(LoggingDeathTest, AThreadMayLogUntilTheProcessIsGone) {
       {
         std::thread([] {
           for (;;) {
-            LossesOfLog();
+            LogEvent(spdlog::level::debug, "still here", {});
             FlushLog(milliseconds(0));
           }
         }).detach();

@@ -198,7 +198,7 @@ TEST_F(Callers, WhoHearsOfAnEndHasThePlaceAgainAtOnce) {
 
 // A watcher may send a request at any time, and nobody sees how large before all of it has come.
 TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
-  options_.limits.memory_budget = 1;
+  options_.limits.memory_budget = std::uint64_t{160} << 20;
   Serve("alice", "mallory");
   Stream stream = BeginStream(kAlice);
   ASSERT_TRUE(stream.Ask(OpenRequest("tank")).has_opened());
@@ -210,6 +210,7 @@ TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
   // The client's memory counts, too, as it is the same process.
   v1::WatchStreamRequest large;
   large.mutable_open()->set_stream_name(std::string(64 << 20, 'x'));
+  ASSERT_EQ(Info(kAlice).load().watchers(), 4u);
   std::atomic<int> gave_way = 0;
   std::vector<std::thread> senders;
   for (Watch& watch : watches) {
