@@ -4,13 +4,16 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout release recordings sanitized threads fuzz core-alone consumer bench)
+readonly all_steps=(layout contract release recordings sanitized threads fuzz core-alone consumer bench)
+
+readonly buf_version=1.50.0
 
 usage() {
   cat <<'USAGE'
 usage: tests/run.sh [--no-install] [STEP...]
 Steps, all of them by default:
   layout      every source file is laid out as .clang-format says
+  contract    the .proto as buf lints it, and that it breaks nobody (where npm can fetch buf)
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
   sanitized   core, sessions and client streams under AddressSanitizer and
@@ -113,6 +116,21 @@ step_layout() {
   mapfile -t files < <(find core proto server client tests -name '*.h' -o -name '*.cc' | sort)
   check "layout: run clang-format-14 -i on the files above" \
     clang-format-14 --dry-run --Werror "${files[@]}"
+}
+
+# buf comes from npm alone, which a machine may not have, or not reach. The contract is compared with
+# what was released by contract_test, too, without either.
+step_contract() {
+  local buf=build/buf/node_modules/.bin/buf
+  if [[ ! -x $buf ]]; then
+    mkdir -p build/buf
+    if ! npm install --prefix build/buf --no-save --ignore-scripts --no-audit --no-fund \
+      --fetch-retries=0 --fetch-timeout=30000 "@bufbuild/buf@$buf_version" >build/buf/log 2>&1; then
+      echo "buf is left out: npm is not here or cannot fetch it (build/buf/log)"
+      return
+    fi
+  fi
+  check "contract" tests/proto/buf.sh "$buf"
 }
 
 step_release() {
