@@ -1,4 +1,4 @@
-#include "cli/server_flags.h"
+#include "client/cli/server_flags.h"
 
 #include <cstdlib>
 
@@ -63,3 +63,4 @@ void AddQueryFlags(CLI::App& app, QueryFlags& flags) {
 }
 
 }  // namespace partiemc::client
+#include "CLI/CLI.hpp"
