@@ -20,7 +20,8 @@ Steps, all of them by default:
               UndefinedBehaviorSanitizer
   threads     core and sessions under ThreadSanitizer, as far as threads meet in them
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
-  core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
+  core-alone  the core without gRPC, Protobuf and VTK, as a shared library: its tests, and a
+              consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
 Builds are kept in build/, so that a second run compiles only what has changed.
@@ -173,7 +174,7 @@ step_fuzz() {
 
 step_core-alone() {
   check "core alone: configure" cmake -S . -B build/core-alone -G Ninja \
-    -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_SERVICE=OFF \
+    -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_SERVICE=OFF -DPARTIEMC_SHARED=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_gRPC=ON -DCMAKE_DISABLE_FIND_PACKAGE_Protobuf=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_VTK=ON -DCMAKE_DISABLE_FIND_PACKAGE_spdlog=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON &&

@@ -14,7 +14,14 @@ if(PARTIEMC_SERVICE)
   # with theirs, as programs without our client library speak the protocol too.
   install(TARGETS partiemc_common partiemc_messages partiemc_proto partiemc_codec partiemc_wire
     partiemc_client EXPORT partiemcClient)
-  install(TARGETS partiemc partiemc-server)
+  set(programs partiemc)
+  if(PARTIEMC_SERVER)
+    list(APPEND programs partiemc-server)
+  endif()
+  if(PARTIEMC_SHARED)
+    set_target_properties(${programs} PROPERTIES INSTALL_RPATH $ORIGIN/../${CMAKE_INSTALL_LIBDIR})
+  endif()
+  install(TARGETS ${programs})
   install(FILES client/recordings/dam_break.pemc client/recordings/README.md
     DESTINATION ${CMAKE_INSTALL_DATADIR}/partiemc/recordings)
   install(DIRECTORY client/include/ TYPE INCLUDE)
