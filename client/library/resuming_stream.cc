@@ -334,7 +334,7 @@ void ResumingStream::Adopt(Lock& lock, StreamConnector::Opened opened, std::size
   next_of_call_ = checkpoint_next_;
   StreamCall& call = *opened.call;
   call.SetWindow(lock, window);
-  // Until it is the stream's call, the sender adds to the ring alone: frames keep their order.
+  // Until it is the stream's call, the sender adds to the buffer alone: frames keep their order.
   for (std::uint64_t k = checkpoint_next_; k < resend_.end(); ++k) call.Queue(lock, resend_.at(k));
   due_since_ = adopted_at_ = Clock::now();
   call_ = std::move(opened.call);

@@ -80,7 +80,7 @@ class ResumingStream final : public Stream {
   bool owes_event_ = false;           // Likewise: a reconnection is to be told.
 
   // Guarded by the monitor:
-  std::unique_ptr<StreamCall> call_;  // Null while the opener looks for another.
+  std::unique_ptr<StreamCall> call_;  // Null while the connector looks for another.
   ResendBuffer resend_{1};
   std::string token_, checkpoint_;
   std::uint64_t checkpoint_next_ = 1;         // The number that the checkpoint expects.

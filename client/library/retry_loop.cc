@@ -17,12 +17,10 @@ RetryLoop::RetryLoop(std::vector<std::string> addresses, const char* call,
       connect_timeout_(connect_timeout) {}
 
 void RetryLoop::Lose(std::string story) {
-  if (loss_) return;
-  const auto now = Clock::now();
-  loss_.emplace(Loss{.backoff = Backoff(policy_, addresses_.size(), std::random_device{}()),
-                     .at = now,
-                     .attempt_at = now,
-                     .story = std::move(story)});
+  if (backoff_) return;
+  backoff_.emplace(policy_, addresses_.size(), std::random_device{}());
+  lost_at_ = attempt_at_ = Clock::now();
+  story_ = std::move(story);
 }
 
 void RetryLoop::TryNext(absl::Status refusal) {
@@ -32,12 +30,12 @@ void RetryLoop::TryNext(absl::Status refusal) {
 
 void RetryLoop::TryAgain(absl::Status refusal) {
   refusal_ = std::move(refusal);
-  loss_->attempt_at = Clock::now() + loss_->backoff.NextPause();
+  attempt_at_ = Clock::now() + backoff_->NextPause();
 }
 
 absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
                                                   std::optional<Clock::time_point> until) {
-  const auto give_up_at = loss_->at + policy_.give_up_after;
+  const auto give_up_at = lost_at_ + policy_.give_up_after;
   for (;;) {
     if (attempts.Cancelled()) return Outcome::kCancelled;
     const auto now = Clock::now();
@@ -61,20 +59,20 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
       }
     } else if (now >= give_up_at) {
       return Outcome::kGaveUp;
-    } else if (now >= loss_->attempt_at) {
+    } else if (now >= attempt_at_) {
       if (auto started = attempts.Start(address()); !started.ok()) return started;
       attempt_until_ = std::min(now + connect_timeout_, give_up_at);
       continue;
     }
     if (until && now >= *until) return Outcome::kNotYet;
-    const auto next = attempt_until_ ? *attempt_until_ : std::min(loss_->attempt_at, give_up_at);
+    const auto next = attempt_until_ ? *attempt_until_ : std::min(attempt_at_, give_up_at);
     attempts.Wait(until ? std::min(next, *until) : next);
   }
 }
 
 std::string RetryLoop::Story() const {
-  return absl::StrCat(loss_->story, ", went on at ", address(), " after ",
-                      Seconds(Clock::now() - loss_->at));
+  return absl::StrCat(story_, ", went on at ", address(), " after ",
+                      Seconds(Clock::now() - lost_at_));
 }
 
 }  // namespace partiemc::client

@@ -56,33 +56,29 @@ class RetryLoop {
   void TryNext(absl::Status refusal);
   void TryAgain(absl::Status refusal);
   /// The next loss is another one.
-  void Recovered() { loss_.reset(); }
+  void Recovered() { backoff_.reset(); }
   /// From Lose to Recovered.
-  bool lost() const { return loss_.has_value(); }
+  bool lost() const { return backoff_.has_value(); }
 
   /// Makes attempts until one has opened a call, nothing later than `until`. Requires lost().
   /// Errors: those of `attempts`.
   absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<Clock::time_point> until);
 
-  /// That of Lose, and where it has gone on, in one line. Requires lost().
+  /// Of the last loss, recovered or not: that of Lose, and where it has gone on, in one line.
   std::string Story() const;
   /// Of the last attempt.
   const absl::Status& refusal() const { return refusal_; }
 
  private:
-  struct Loss {
-    Backoff backoff;
-    Clock::time_point at, attempt_at;
-    std::string story;
-  };
-
   const std::vector<std::string> addresses_;
   const char* const call_;
   const ReconnectPolicy policy_;
   const std::chrono::milliseconds connect_timeout_;
 
   std::size_t address_ = 0;
-  std::optional<Loss> loss_;
+  std::optional<Backoff> backoff_;  // From Lose to Recovered.
+  Clock::time_point lost_at_, attempt_at_;
+  std::string story_;
   std::optional<Clock::time_point> attempt_until_;  // While one is under way.
   absl::Status refusal_;
 };
