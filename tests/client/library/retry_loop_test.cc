@@ -25,7 +25,7 @@ class Scripted final : public Attempts {
     bool retryable = true;
   };
 
-  explicit Scripted(std::deque<Answer> answers) : answers_(std::move(answers)) {}
+  explicit Scripted(std::vector<Answer> answers) : answers_(answers.begin(), answers.end()) {}
 
   bool Cancelled() override { return cancelled; }
   absl::Status Start(const std::string& address) override {
@@ -74,7 +74,7 @@ TEST(RetryLoop, TriesOneAddressAfterTheOtherUntilOneOpens) {
 
 TEST(RetryLoop, TellsItsStoryAlsoOnceItHasRecovered) {
   RetryLoop loop = Loop();
-  Scripted attempts({{.opened = true}});
+  Scripted attempts({Scripted::Answer{.opened = true}});
   loop.Lose("lost a (cut)");
   loop.Lose("lost it again");
   loop.TryNext(absl::UnavailableError("gone"));
@@ -86,7 +86,7 @@ TEST(RetryLoop, TellsItsStoryAlsoOnceItHasRecovered) {
 
 TEST(RetryLoop, TriesTheSameAddressWhereItIsToldTo) {
   RetryLoop loop = Loop();
-  Scripted attempts({{.opened = true}});
+  Scripted attempts({Scripted::Answer{.opened = true}});
   loop.Lose("lost a");
   loop.TryAgain(absl::UnavailableError("gone"));
   ASSERT_TRUE(loop.Run(attempts, {}).ok());
@@ -112,7 +112,7 @@ TEST(RetryLoop, GivesUpInTimeAndKeepsWhatTheLastAttemptSaid) {
 
 TEST(RetryLoop, AnAttemptThatTakesTooLongIsNotAccepted) {
   RetryLoop loop = Loop(milliseconds(60), milliseconds(10));
-  Scripted attempts({{.opened = false}});
+  Scripted attempts({Scripted::Answer{.opened = false}});
   loop.Lose("lost a");
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
   EXPECT_THAT(std::string(loop.refusal().message()), HasSubstr("did not accept the stream"));
@@ -121,7 +121,7 @@ TEST(RetryLoop, AnAttemptThatTakesTooLongIsNotAccepted) {
 
 TEST(RetryLoop, GoesOnWithTheSameAttemptAtTheNextCall) {
   RetryLoop loop = Loop();
-  Scripted attempts({{.opened = false}});
+  Scripted attempts({Scripted::Answer{.opened = false}});
   loop.Lose("lost a");
   const auto soon = [] { return Attempts::Clock::now() + milliseconds(5); };
   EXPECT_EQ(*loop.Run(attempts, soon()), Outcome::kNotYet);
