@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout contract release recordings sanitized threads fuzz core-alone consumer bench)
+readonly all_steps=(layout contract release recordings sanitized threads fuzz includes core-alone consumer bench)
 
 readonly buf_version=1.50.0
 
@@ -20,6 +20,7 @@ Steps, all of them by default:
               UndefinedBehaviorSanitizer
   threads     core and sessions under ThreadSanitizer, as far as threads meet in them
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
+  includes    every source includes what it needs (after sanitized and fuzz, which compile most)
   core-alone  the core without gRPC, Protobuf and VTK, as a shared library: its tests, and a
               consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
@@ -170,6 +171,13 @@ step_fuzz() {
   check "fuzz: configure" cmake --preset asan &&
     check "fuzz: build" cmake --build build/asan -j "$jobs" --target partiemc_fuzz &&
     check "fuzz" tests/fuzz/run.sh --seconds 60
+}
+
+step_includes() {
+  check "includes: configure" cmake --preset asan &&
+    check "includes: headers of messages" cmake --build build/asan -j "$jobs" \
+      --target partiemc_proto partiemc_recording_proto partiemc_health_proto partiemc_rpc_proto &&
+    check "includes" tests/architecture/compile_alone.py build/asan
 }
 
 step_core-alone() {

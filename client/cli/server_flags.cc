@@ -2,6 +2,8 @@
 
 #include <cstdlib>
 
+#include "CLI/CLI.hpp"
+
 namespace partiemc::client {
 
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group) {
@@ -63,4 +65,3 @@ void AddQueryFlags(CLI::App& app, QueryFlags& flags) {
 }
 
 }  // namespace partiemc::client
-#include "CLI/CLI.hpp"
