@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/base/listening.h"
 #include "server/compute/heap.h"
 #include "server/compute/worker_memory.h"
 #include "server/rpc/call_guard.h"

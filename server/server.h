@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "server/base/address.h"
+#include "common/address.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
 #include "server/security/authentication.h"

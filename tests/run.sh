@@ -4,20 +4,25 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout release recordings sanitized threads fuzz core-alone consumer bench)
+readonly all_steps=(layout contract release recordings sanitized threads fuzz includes core-alone consumer bench)
+
+readonly buf_version=1.50.0
 
 usage() {
   cat <<'USAGE'
 usage: tests/run.sh [--no-install] [STEP...]
 Steps, all of them by default:
   layout      every source file is laid out as .clang-format says
+  contract    the .proto as buf lints it, and that it breaks nobody (where npm can fetch buf)
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
   sanitized   core, sessions and client streams under AddressSanitizer and
               UndefinedBehaviorSanitizer
   threads     core and sessions under ThreadSanitizer, as far as threads meet in them
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
-  core-alone  the core without gRPC, Protobuf and VTK: its tests, and a consumer of it installed
+  includes    every source includes what it needs (after sanitized and fuzz, which compile most)
+  core-alone  the core without gRPC, Protobuf and VTK, as a shared library: its tests, and a
+              consumer of it installed
   consumer    everything installed, found and used by tests/consumer (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
 Builds are kept in build/, so that a second run compiles only what has changed.
@@ -115,6 +120,21 @@ step_layout() {
     clang-format-14 --dry-run --Werror "${files[@]}"
 }
 
+# buf comes from npm alone, which a machine may not have, or not reach. The contract is compared with
+# what was released by contract_test, too, without either.
+step_contract() {
+  local buf=build/buf/node_modules/.bin/buf
+  if [[ ! -x $buf ]]; then
+    mkdir -p build/buf
+    if ! npm install --prefix build/buf --no-save --ignore-scripts --no-audit --no-fund \
+      --fetch-retries=0 --fetch-timeout=30000 "@bufbuild/buf@$buf_version" >build/buf/log 2>&1; then
+      echo "buf is left out: npm is not here or cannot fetch it (build/buf/log)"
+      return
+    fi
+  fi
+  check "contract" tests/proto/buf.sh "$buf"
+}
+
 step_release() {
   check "release: configure" cmake --preset release -DPARTIEMC_VTK=ON &&
     check "release: build" cmake --build build/release -j "$jobs" &&
@@ -153,9 +173,16 @@ step_fuzz() {
     check "fuzz" tests/fuzz/run.sh --seconds 60
 }
 
+step_includes() {
+  check "includes: configure" cmake --preset asan &&
+    check "includes: headers of messages" cmake --build build/asan -j "$jobs" \
+      --target partiemc_proto partiemc_recording_proto partiemc_health_proto partiemc_rpc_proto &&
+    check "includes" tests/architecture/compile_alone.py build/asan
+}
+
 step_core-alone() {
   check "core alone: configure" cmake -S . -B build/core-alone -G Ninja \
-    -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_SERVICE=OFF \
+    -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_SERVICE=OFF -DPARTIEMC_SHARED=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_gRPC=ON -DCMAKE_DISABLE_FIND_PACKAGE_Protobuf=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_VTK=ON -DCMAKE_DISABLE_FIND_PACKAGE_spdlog=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON &&

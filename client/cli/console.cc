@@ -1,4 +1,4 @@
-#include "cli/console.h"
+#include "client/cli/console.h"
 
 #include <atomic>
 #include <csignal>

@@ -1,13 +1,22 @@
-// What the command line says, and how it is interrupted.
+// What the command line says, how it is interrupted, and how it ends.
 #pragma once
 
 #include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
-#include "cli/exit_code.h"
 
 namespace partiemc::client {
+
+/// How the program ends, for scripts.
+enum ExitCode : int {
+  kGood = 0,
+  kFailed = 1,        ///< Writing failed, or a check did.
+  kUsage = 2,         ///< A flag is wrong.
+  kInput = 3,         ///< The input cannot be read, or a frame was refused.
+  kServer = 4,        ///< No server, or it ended the stream.
+  kInterrupted = 130  ///< Ctrl-C, as shells number it.
+};
 
 /// Prints "partiemc: MESSAGE" as one line on standard error and returns `code`.
 int Complain(ExitCode code, std::string_view message);

@@ -1,16 +1,17 @@
-#include "cli/convert.h"
+#include "client/cli/convert.h"
 
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
-#include "cli/console.h"
-#include "cli/input_source.h"
-#include "cli/replay_parameters.h"
-#include "output/progress.h"
-#include "output/text.h"
-#include "recording/recording.h"
+#include "CLI/CLI.hpp"
+#include "client/cli/console.h"
+#include "client/cli/input_source.h"
+#include "client/cli/replay_parameters.h"
+#include "client/output/progress.h"
+#include "client/output/text.h"
+#include "client/recording/recording.h"
 
 namespace partiemc::client {
 namespace {

@@ -3,8 +3,11 @@
 
 #include <string>
 
-#include "CLI/CLI.hpp"
 #include "client/input/sequence.h"
+
+namespace CLI {
+class App;
+}
 
 namespace partiemc::client {
 

@@ -1,4 +1,4 @@
-#include "cli/evaluate.h"
+#include "client/cli/evaluate.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -9,14 +9,15 @@
 #include <thread>
 #include <utility>
 
-#include "cli/console.h"
-#include "cli/evaluate_recording.h"
-#include "evaluation/report/report.h"
-#include "evaluation/scenes/scenes.h"
-#include "evaluation/scenes/shapes.h"
-#include "output/atomic_file.h"
-#include "output/progress.h"
-#include "output/text.h"
+#include "CLI/CLI.hpp"
+#include "client/cli/console.h"
+#include "client/cli/evaluate_recording.h"
+#include "client/evaluation/report/report.h"
+#include "client/evaluation/scenes/scenes.h"
+#include "client/evaluation/scenes/shapes.h"
+#include "client/output/atomic_file.h"
+#include "client/output/progress.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

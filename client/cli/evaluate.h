@@ -4,8 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "CLI/CLI.hpp"
 #include "client/input/sequence.h"
+
+namespace CLI {
+class App;
+}
 
 namespace partiemc::client {
 

@@ -1,4 +1,4 @@
-#include "cli/evaluate_recording.h"
+#include "client/cli/evaluate_recording.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -9,9 +9,9 @@
 #include <system_error>
 #include <utility>
 
-#include "cli/input_source.h"
-#include "evaluation/metrics/recorded_truth.h"
-#include "output/text.h"
+#include "client/cli/input_source.h"
+#include "client/evaluation/metrics/recorded_truth.h"
+#include "client/output/text.h"
 #include "partiemc/reconstructor.h"
 
 namespace partiemc::client {

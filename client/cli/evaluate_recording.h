@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "client/evaluation/scenes/sequence.h"
 #include "client/input/sequence.h"
-#include "evaluation/scenes/sequence.h"
 
 namespace partiemc::client {
 

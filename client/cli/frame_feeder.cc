@@ -1,8 +1,8 @@
-#include "cli/frame_feeder.h"
+#include "client/cli/frame_feeder.h"
 
 #include <utility>
 
-#include "cli/console.h"
+#include "client/cli/console.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {

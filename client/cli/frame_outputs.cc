@@ -1,4 +1,4 @@
-#include "cli/frame_outputs.h"
+#include "client/cli/frame_outputs.h"
 
 #include <algorithm>
 #include <utility>

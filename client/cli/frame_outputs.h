@@ -8,10 +8,10 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "output/frame_record.h"
-#include "output/frame_writer.h"
-#include "output/statistics_writer.h"
-#include "output/summary.h"
+#include "client/output/frame_record.h"
+#include "client/output/frame_writer.h"
+#include "client/output/statistics_writer.h"
+#include "client/output/summary.h"
 
 namespace partiemc::client {
 

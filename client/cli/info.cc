@@ -1,12 +1,14 @@
-#include "cli/info.h"
+#include "client/cli/info.h"
 
 #include <cstdio>
 #include <utility>
 #include <vector>
 
+#include "CLI/CLI.hpp"
 #include "absl/strings/str_format.h"
-#include "cli/console.h"
-#include "output/text.h"
+#include "client/cli/console.h"
+#include "client/output/text.h"
+#include "common/json_text.h"
 
 namespace partiemc::client {
 namespace {

@@ -3,9 +3,12 @@
 
 #include <string>
 
-#include "CLI/CLI.hpp"
-#include "cli/server_flags.h"
+#include "client/cli/server_flags.h"
 #include "partiemc/client/server_info.h"
+
+namespace CLI {
+class App;
+}
 
 namespace partiemc::client {
 

@@ -1,10 +1,10 @@
-#include "cli/input_source.h"
+#include "client/cli/input_source.h"
 
 #include <filesystem>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "recording/recording.h"
+#include "client/recording/recording.h"
 
 namespace partiemc::client {
 

@@ -2,13 +2,14 @@
 #include <cstdlib>
 
 #include "CLI/CLI.hpp"
-#include "cli/console.h"
-#include "cli/convert.h"
-#include "cli/evaluate.h"
-#include "cli/info.h"
-#include "cli/replay.h"
-#include "cli/streams.h"
-#include "cli/watch.h"
+#include "client/cli/console.h"
+#include "client/cli/convert.h"
+#include "client/cli/evaluate.h"
+#include "client/cli/info.h"
+#include "client/cli/replay.h"
+#include "client/cli/replay_flags.h"
+#include "client/cli/streams.h"
+#include "client/cli/watch.h"
 
 namespace {
 

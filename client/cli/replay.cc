@@ -1,18 +1,18 @@
-#include "cli/replay.h"
+#include "client/cli/replay.h"
 
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <utility>
 
-#include "cli/console.h"
-#include "cli/frame_feeder.h"
-#include "cli/input_source.h"
-#include "cli/replay_outputs.h"
-#include "cli/replay_parameters.h"
-#include "client/input/text.h"
-#include "output/progress.h"
-#include "output/text.h"
+#include "client/cli/console.h"
+#include "client/cli/frame_feeder.h"
+#include "client/cli/input_source.h"
+#include "client/cli/replay_outputs.h"
+#include "client/cli/replay_parameters.h"
+#include "client/input/base/text.h"
+#include "client/output/progress.h"
+#include "client/output/text.h"
 #include "partiemc/client/local_stream.h"
 #include "partiemc/client/stream.h"
 #include "partiemc/printable.h"
@@ -174,26 +174,6 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
 }
 
 }  // namespace
-
-CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
-  CLI::App* verb = app.add_subcommand(
-      "replay", "Reconstruct a recorded sequence through a server, or in this process");
-  AddReplayFlags(*verb, flags);
-  verb->footer(
-      "Examples:\n"
-      "  partiemc replay dam_break.pemc --local --report dam_break.html\n"
-      "  partiemc replay frames/ --server 127.0.0.1:50051 --spacing 0.0303 "
-      "--output-dir out --format geojson,svg\n"
-      "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
-      "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
-      "--rate 25\n"
-      "  partiemc replay dam_break.pemc --name dam --rate 25   and elsewhere: partiemc watch dam\n"
-      "However it ends, --stats and --report have the frames that came through, and the report "
-      "tells "
-      "why\nit ended early.\n"
-      "Exit codes: 0 good, 1 failed, 2 wrong usage, 3 input, 4 server, 130 interrupted.");
-  return verb;
-}
 
 int Replay(const ReplayFlags& flags) {
   const auto rate = RateOf(flags.rate);

@@ -1,10 +1,11 @@
-#include "cli/replay_flags.h"
+#include "client/cli/replay_flags.h"
 
 #include <string>
 
-#include "cli/console.h"
-#include "output/frame_writer.h"
-#include "output/text.h"
+#include "CLI/CLI.hpp"
+#include "client/cli/console.h"
+#include "client/output/frame_writer.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {
@@ -166,15 +167,31 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
 
 }  // namespace
 
-void AddReplayFlags(CLI::App& app, ReplayFlags& flags) {
-  AddInputFlags(app, flags);
-  AddPlaceFlags(app, flags);
-  AddMethodFlags(app, flags);
-  AddOutputFlags(app, flags);
-  app.parse_complete_callback([&app] {
-    const absl::Status status = CheckCombinations(app);
+CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
+  CLI::App* verb = app.add_subcommand(
+      "replay", "Reconstruct a recorded sequence through a server, or in this process");
+  AddInputFlags(*verb, flags);
+  AddPlaceFlags(*verb, flags);
+  AddMethodFlags(*verb, flags);
+  AddOutputFlags(*verb, flags);
+  verb->parse_complete_callback([verb] {
+    const absl::Status status = CheckCombinations(*verb);
     if (!status.ok()) throw CLI::ValidationError(OneLine(status), CLI::ExitCodes::ValidationError);
   });
+  verb->footer(
+      "Examples:\n"
+      "  partiemc replay dam_break.pemc --local --report dam_break.html\n"
+      "  partiemc replay frames/ --server 127.0.0.1:50051 --spacing 0.0303 "
+      "--output-dir out --format geojson,svg\n"
+      "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
+      "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
+      "--rate 25\n"
+      "  partiemc replay dam_break.pemc --name dam --rate 25   and elsewhere: partiemc watch dam\n"
+      "However it ends, --stats and --report have the frames that came through, and the report "
+      "tells "
+      "why\nit ended early.\n"
+      "Exit codes: 0 good, 1 failed, 2 wrong usage, 3 input, 4 server, 130 interrupted.");
+  return verb;
 }
 
 }  // namespace partiemc::client

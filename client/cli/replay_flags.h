@@ -5,10 +5,13 @@
 #include <optional>
 #include <string>
 
-#include "CLI/CLI.hpp"
-#include "cli/server_flags.h"
+#include "client/cli/server_flags.h"
 #include "client/input/sequence.h"
 #include "partiemc/parameters.h"
+
+namespace CLI {
+class App;
+}
 
 namespace partiemc::client {
 
@@ -49,7 +52,7 @@ struct ReplayFlags {
   std::string report;
 };
 
-/// Adds the flags to the verb `app`; they go to `flags`, which must outlive the parsing.
-void AddReplayFlags(CLI::App& app, ReplayFlags& flags);
+/// Adds the verb to `app`; its flags go to `flags`, which must outlive the parsing.
+CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags);
 
 }  // namespace partiemc::client

@@ -1,8 +1,8 @@
-#include "cli/replay_outputs.h"
+#include "client/cli/replay_outputs.h"
 
 #include <utility>
 
-#include "cli/input_source.h"
+#include "client/cli/input_source.h"
 
 namespace partiemc::client {
 

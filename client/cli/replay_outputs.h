@@ -7,11 +7,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "cli/frame_outputs.h"
-#include "cli/replay.h"
-#include "output/frame_record.h"
-#include "output/report.h"
-#include "output/summary.h"
+#include "client/cli/frame_outputs.h"
+#include "client/cli/replay.h"
+#include "client/output/frame_record.h"
+#include "client/output/report.h"
+#include "client/output/summary.h"
 #include "partiemc/client/frame_stream.h"
 
 namespace partiemc::client {

@@ -1,11 +1,11 @@
-#include "cli/replay_parameters.h"
+#include "client/cli/replay_parameters.h"
 
 #include <charconv>
 #include <cmath>
 #include <string>
 
-#include "cli/console.h"
-#include "output/text.h"
+#include "client/cli/console.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

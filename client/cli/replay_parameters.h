@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "absl/status/statusor.h"
-#include "cli/replay_flags.h"
+#include "client/cli/replay_flags.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc::client {

@@ -1,6 +1,8 @@
-#include "cli/server_flags.h"
+#include "client/cli/server_flags.h"
 
 #include <cstdlib>
+
+#include "CLI/CLI.hpp"
 
 namespace partiemc::client {
 

@@ -4,8 +4,12 @@
 #include <chrono>
 #include <string>
 
-#include "CLI/CLI.hpp"
 #include "partiemc/client/credentials.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace partiemc::client {
 

@@ -1,13 +1,15 @@
-#include "cli/streams.h"
+#include "client/cli/streams.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <vector>
 
+#include "CLI/CLI.hpp"
 #include "absl/strings/str_format.h"
-#include "cli/console.h"
-#include "output/text.h"
+#include "client/cli/console.h"
+#include "client/output/text.h"
+#include "common/json_text.h"
 
 namespace partiemc::client {
 namespace {

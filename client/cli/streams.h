@@ -4,9 +4,12 @@
 #include <span>
 #include <string>
 
-#include "CLI/CLI.hpp"
-#include "cli/server_flags.h"
+#include "client/cli/server_flags.h"
 #include "partiemc/client/stream_list.h"
+
+namespace CLI {
+class App;
+}
 
 namespace partiemc::client {
 

@@ -1,15 +1,16 @@
-#include "cli/watch.h"
+#include "client/cli/watch.h"
 
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <utility>
 
-#include "cli/console.h"
-#include "cli/frame_outputs.h"
-#include "client/input/text.h"
-#include "output/progress.h"
-#include "output/text.h"
+#include "CLI/CLI.hpp"
+#include "client/cli/console.h"
+#include "client/cli/frame_outputs.h"
+#include "client/input/base/text.h"
+#include "client/output/progress.h"
+#include "client/output/text.h"
 #include "partiemc/client/watcher.h"
 
 namespace partiemc::client {

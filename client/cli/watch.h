@@ -4,8 +4,11 @@
 #include <cstdint>
 #include <string>
 
-#include "CLI/CLI.hpp"
-#include "cli/server_flags.h"
+#include "client/cli/server_flags.h"
+
+namespace CLI {
+class App;
+}
 
 namespace partiemc::client {
 

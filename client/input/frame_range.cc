@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "client/input/number_text.h"
-#include "client/input/text.h"
+#include "client/input/base/number_text.h"
+#include "client/input/base/text.h"
 
 namespace partiemc::client::input {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_format.h"
-#include "client/input/text.h"
+#include "client/input/base/text.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client::input {

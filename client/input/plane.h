@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "client/input/particle_rows.h"
+#include "client/input/base/particle_rows.h"
 #include "client/input/sequence.h"
 
 namespace partiemc::client::input {

@@ -5,12 +5,12 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
+#include "client/input/base/text.h"
 #include "client/input/file_list.h"
-#include "client/input/formats.h"
+#include "client/input/formats/formats.h"
+#include "client/input/formats/frame_reader.h"
 #include "client/input/frame_range.h"
-#include "client/input/frame_reader.h"
 #include "client/input/plane.h"
-#include "client/input/text.h"
 #include "client/input/times.h"
 
 namespace partiemc::client {

@@ -7,10 +7,10 @@
 #include <string_view>
 
 #include "absl/strings/ascii.h"
-#include "client/input/byte_source.h"
-#include "client/input/number_text.h"
-#include "client/input/text.h"
-#include "client/input/text_table.h"
+#include "client/input/base/byte_source.h"
+#include "client/input/base/number_text.h"
+#include "client/input/base/text.h"
+#include "client/input/base/text_table.h"
 
 namespace partiemc::client::input {
 namespace {

@@ -1,4 +1,4 @@
-#include "library/answer.h"
+#include "client/library/answer.h"
 
 #include <utility>
 

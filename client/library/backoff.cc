@@ -1,4 +1,4 @@
-#include "library/backoff.h"
+#include "client/library/backoff.h"
 
 #include <algorithm>
 

@@ -1,14 +1,12 @@
-#include "library/channel.h"
+#include "client/library/channel.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cstdint>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "library/credentials.h"
+#include "client/library/credentials.h"
+#include "common/address.h"
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 
@@ -32,22 +30,6 @@ constexpr std::chrono::milliseconds kConnectTimeout(2000);
 // For asking gRPC why there is no connection; it knows the answer already.
 constexpr std::chrono::seconds kReasonTimeout(1);
 
-bool IsPort(std::string_view text) {
-  std::uint16_t port = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  return error == std::errc() && end == text.data() + text.size() && port > 0;
-}
-
-bool IsAddress(std::string_view address) {
-  if (address.starts_with("unix:")) return address.size() > 5;
-  const std::size_t colon = address.rfind(':');
-  if (colon == std::string_view::npos || colon == 0) return false;
-  const std::string_view host = address.substr(0, colon);
-  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
-  const bool plain = host.find_first_of(":/[] \t") == std::string_view::npos;
-  return (bracketed || plain) && IsPort(address.substr(colon + 1));
-}
-
 }  // namespace
 
 std::string Reason(const grpc::Status& status) {
@@ -59,7 +41,8 @@ std::string Reason(const grpc::Status& status) {
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials) {
-  if (!IsAddress(address)) {
+  const auto parsed = ParseAddress(address);
+  if (!parsed.ok() || (parsed->unix_path.empty() && parsed->port == 0)) {
     return ViolationError(absl::StatusCode::kInvalidArgument,
                           {.reason = std::string(kReasonOutOfRange),
                            .field = "address",
@@ -68,7 +51,7 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
   }
   auto channel_credentials = MakeChannelCredentials(credentials);
   if (!channel_credentials.ok()) return channel_credentials.status();
-  auto token_sender = MakeTokenSender(credentials, address);
+  auto token_sender = MakeTokenSender(credentials, *parsed);
   if (!token_sender.ok()) return token_sender.status();
 
   grpc::ChannelArguments arguments;

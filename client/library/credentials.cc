@@ -1,4 +1,4 @@
-#include "library/credentials.h"
+#include "client/library/credentials.h"
 
 #include <algorithm>
 #include <fstream>
@@ -31,15 +31,6 @@ absl::StatusOr<std::string> ReadPem(const std::string& field, const std::string&
     return Wrong(field, path, "must be a PEM file that can be read");
   }
   return pem;
-}
-
-// Reached without a network: what goes there stays on this machine.
-bool IsLocal(std::string_view address) {
-  if (address.starts_with("unix:")) return true;
-  const std::string_view host = address.substr(0, address.rfind(':'));
-  const bool number = std::ranges::all_of(
-      host, [](char c) { return absl::ascii_isdigit(static_cast<unsigned char>(c)) || c == '.'; });
-  return host == "localhost" || host == "[::1]" || (number && host.starts_with("127."));
 }
 
 bool IsToken(const std::string& text) {
@@ -125,13 +116,13 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials
 }
 
 absl::StatusOr<std::unique_ptr<experimental::ClientInterceptorFactoryInterface>> MakeTokenSender(
-    const Credentials& credentials, const std::string& address) {
+    const Credentials& credentials, const Address& address) {
   std::unique_ptr<experimental::ClientInterceptorFactoryInterface> sender;
   if (credentials.token.empty() && credentials.token_file.empty()) return sender;
   if (const auto token = TokenOf(credentials); !token.ok()) return token.status();
-  if (!credentials.tls && !IsLocal(address)) {
+  if (!credentials.tls && !address.IsLocal()) {
     return Wrong(credentials.token.empty() ? "token_file" : "token", "(not shown)",
-                 absl::StrCat("would travel to ", address,
+                 absl::StrCat("would travel to ", address.ToString(),
                               " in the clear; must go over TLS, or within this machine"));
   }
   sender = std::make_unique<TokenSenderFactory>(credentials);

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/address.h"
 #include "partiemc/client/credentials.h"
 
 namespace partiemc::client {
@@ -23,6 +24,6 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials
 /// Errors: INVALID_ARGUMENT where the token cannot be read, is none, or would leave this machine in
 /// the clear. No error has the token in it.
 absl::StatusOr<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>>
-MakeTokenSender(const Credentials& credentials, const std::string& address);
+MakeTokenSender(const Credentials& credentials, const Address& address);
 
 }  // namespace partiemc::client

@@ -1,4 +1,4 @@
-#include "library/frame_request.h"
+#include "client/library/frame_request.h"
 
 #include <algorithm>
 #include <limits>

@@ -4,53 +4,11 @@
 #include <mutex>
 #include <thread>
 #include <utility>
-#include <variant>
-#include <vector>
 
+#include "client/library/owned_frame.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {
-namespace {
-
-// A frame that owns its arrays. Assigning to it uses its memory again.
-class FrameCopy {
- public:
-  void Assign(const Frame& frame, double time, std::uint64_t offer) {
-    frame_ = frame;
-    time_ = time;
-    offer_ = offer;
-    if (const auto* singles = std::get_if<std::span<const float>>(&frame.positions)) {
-      frame_.positions = Copy(*singles, singles_);
-    } else {
-      frame_.positions = Copy(std::get<std::span<const double>>(frame.positions), doubles_);
-    }
-    frame_.volumes = Copy(frame.volumes, volumes_);
-    frame_.ids = Copy(frame.ids, ids_);
-    frame_.velocities = Copy(frame.velocities, velocities_);
-  }
-
-  const Frame& frame() const { return frame_; }
-  double time() const { return time_; }
-  std::uint64_t offer() const { return offer_; }
-
- private:
-  template <typename T>
-  static std::span<const T> Copy(std::span<const T> from, std::vector<T>& to) {
-    to.assign(from.begin(), from.end());
-    return to;
-  }
-
-  std::vector<float> singles_;
-  std::vector<double> doubles_;
-  std::vector<float> volumes_, velocities_;
-  std::vector<std::uint64_t> ids_;
-  Frame frame_;  // Of views into the vectors.
-  double time_ = 0;
-  std::uint64_t offer_ = 0;
-};
-
-}  // namespace
-
 class LatestSender::Sending {
  public:
   Sending(FrameStream& stream, OfferHooks hooks) : stream_(stream), hooks_(std::move(hooks)) {
@@ -72,7 +30,7 @@ class LatestSender::Sending {
     if (!status_.ok()) return status_;
     if (std::exchange(is_waiting_, true)) {
       ++counts_.skipped;
-      hooks_.skipped(waiting_.offer());
+      hooks_.skipped(waiting_.number());
     }
     waiting_.Assign(frame, time, ++offers_);
     changed_.notify_all();
@@ -97,7 +55,7 @@ class LatestSender::Sending {
 
  private:
   void Run() {
-    FrameCopy in_hand;
+    OwnedFrame in_hand;
     std::unique_lock lock(mutex_);
     for (;;) {
       changed_.wait(lock, [this] { return is_waiting_ || finishing_ || !status_.ok(); });
@@ -106,7 +64,7 @@ class LatestSender::Sending {
       is_waiting_ = false;
       ++counts_.sent;
       // Before it is sent: its answer may be there before Send returns.
-      hooks_.sending(in_hand.offer());
+      hooks_.sending(in_hand.number());
       lock.unlock();
       const absl::Status sent = stream_.Send(in_hand.frame(), in_hand.time()).status();
       lock.lock();
@@ -114,7 +72,7 @@ class LatestSender::Sending {
       --counts_.sent;
       if (FindViolation(sent)) {
         ++counts_.refused;
-        hooks_.refused(in_hand.offer(), sent);
+        hooks_.refused(in_hand.number(), sent);
       } else {
         Stop(sent);
       }
@@ -131,7 +89,7 @@ class LatestSender::Sending {
 
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable changed_;
-  FrameCopy waiting_;
+  OwnedFrame waiting_;
   bool is_waiting_ = false, finishing_ = false;
   std::uint64_t offers_ = 0;
   OfferCounts counts_;

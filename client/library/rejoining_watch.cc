@@ -1,24 +1,89 @@
-#include "library/rejoining_watch.h"
+#include "client/library/rejoining_watch.h"
 
 #include <algorithm>
-#include <random>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "library/channel.h"
+#include "client/library/channel.h"
 
 namespace partiemc::client {
+
+// Attempts to find the stream that was lost.
+class RejoiningWatch::Calls final : public Attempts {
+ public:
+  explicit Calls(RejoiningWatch& watch) : watch_(watch) {}
+
+  bool Cancelled() override {
+    const std::lock_guard lock(watch_.mutex_);
+    return watch_.cancelled_;
+  }
+
+  absl::Status Start(const std::string& address) override {
+    const auto channel = MakeChannel(address, watch_.options_.credentials);
+    if (!channel.ok()) return channel.status();
+    watch_.SetCall(std::make_shared<WatchCall>(*channel, address));
+    watch_.call_->Start(watch_.stream_name_, watch_.options_);
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> Check(bool& retryable) override {
+    WatchCall& call = *watch_.call_;
+    const auto opened = news_ ? *std::exchange(news_, {}) : call.WaitUntilOpened(Clock::now());
+    if (!opened.ok()) {
+      const std::string reason = call.reason();
+      // The producer may not have come back yet, the place of the former call not be free.
+      retryable = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS" ||
+                  reason == "TOO_MANY_OPENING" || reason == "CALLER_WATCHERS" ||
+                  reason == "CALLER_CALLS" || call.lost();
+      return opened;
+    }
+    if (!*opened || call.lineage() == watch_.lineage_) return opened;
+    retryable = true;
+    return absl::NotFoundError(
+        absl::StrCat("the server at ", call.address(), " has another stream of this name"));
+  }
+
+  void Drop() override { watch_.SetCall(nullptr); }
+
+  void Wait(Clock::time_point until) override {
+    if (watch_.call_ != nullptr) {
+      news_ = watch_.call_->WaitUntilOpened(until);
+    } else {
+      std::unique_lock lock(watch_.mutex_);
+      watch_.cancel_came_.wait_until(lock, until, [this] { return watch_.cancelled_; });
+    }
+  }
+
+ private:
+  RejoiningWatch& watch_;
+  std::optional<absl::StatusOr<bool>> news_;  // Of a call that was waited for.
+};
+
+absl::StatusOr<std::unique_ptr<Watcher>> Watcher::Open(std::string_view address,
+                                                       std::string_view stream_name,
+                                                       const WatcherOptions& options) {
+  std::vector<std::string> addresses = {std::string(address)};
+  addresses.insert(addresses.end(), options.fallback_addresses.begin(),
+                   options.fallback_addresses.end());
+  auto watch = std::make_unique<RejoiningWatch>(std::move(addresses), stream_name, options);
+  if (auto status = watch->Connect(); !status.ok()) return status;
+  return watch;
+}
+
 RejoiningWatch::RejoiningWatch(std::vector<std::string> addresses, std::string_view stream_name,
                                const WatcherOptions& options)
-    : addresses_(std::move(addresses)), stream_name_(stream_name), options_(options) {}
+    : stream_name_(stream_name),
+      options_(options),
+      retry_(std::move(addresses), "watcher", options.rejoin, options.connect_timeout) {}
 
 // The stream is at one of the servers; what one of them says is worth more than that there is none
 // at an address.
-absl::Status RejoiningWatch::Open() {
-  const auto time = options_.connect_timeout / static_cast<int>(addresses_.size());
+absl::Status RejoiningWatch::Connect() {
+  const std::size_t count = retry_.addresses().size();
+  const auto time = options_.connect_timeout / static_cast<int>(count);
   absl::Status refusal;
-  for (address_ = 0; address_ < addresses_.size(); ++address_) {
-    absl::Status status = OpenAt(time);
+  for (std::size_t k = 0; k < count; ++k, retry_.UseNextAddress()) {
+    absl::Status status = ConnectAt(time);
     if (status.ok()) return status;
     SetCall(nullptr);
     if (refusal.ok() || absl::IsUnavailable(refusal)) refusal = std::move(status);
@@ -26,10 +91,11 @@ absl::Status RejoiningWatch::Open() {
   return refusal;
 }
 
-absl::Status RejoiningWatch::OpenAt(std::chrono::milliseconds connect_timeout) {
+absl::Status RejoiningWatch::ConnectAt(std::chrono::milliseconds connect_timeout) {
   const auto channel = MakeChannel(address(), options_.credentials);
   if (!channel.ok()) return channel.status();
-  if (auto status = Connect(*channel, address(), connect_timeout); !status.ok()) return status;
+  if (auto status = client::Connect(*channel, address(), connect_timeout); !status.ok())
+    return status;
   SetCall(std::make_shared<WatchCall>(*channel, address()));
   call_->Start(stream_name_, options_);
   const auto opened = call_->WaitUntilOpened(Clock::now() + options_.deadline);
@@ -79,16 +145,15 @@ absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
 void RejoiningWatch::Account(WatchedFrame& frame) {
   frame.gap = 0;
   frame.rejoined.clear();
-  if (loss_) {
-    frame.rejoined = absl::StrCat(loss_->story, ", went on at ", address(), " after ",
-                                  Seconds(Clock::now() - loss_->at));
+  if (retry_.lost()) {
+    frame.rejoined = retry_.Story();
     if (last_ == 0) {
       frame.dropped += untold_;
     } else {
       frame.gap = frame.sequence - last_ - 1;
       frame.dropped = 0;
     }
-    loss_.reset();
+    retry_.Recovered();
     untold_ = 0;
   }
   last_ = frame.sequence;
@@ -103,89 +168,39 @@ bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   }
   untold_ = end_.dropped;
   joined_ = false;
-  const auto now = Clock::now();
-  if (!loss_) {
-    loss_.emplace(
-        Loss{.backoff = Backoff(options_.rejoin, addresses_.size(), std::random_device{}()),
-             .at = now,
-             .attempt_at = now,
-             .received = received,
-             .story = absl::StrCat("lost the stream at ", address(), " (", call_->why(), ")")});
-  }
+  if (!retry_.lost()) lost_ = received;
+  retry_.Lose(absl::StrCat("lost the stream at ", address(), " (", call_->why(), ")"));
+  SetCall(nullptr);
   // A producer that is gone from a server that is there may come back to it.
-  if (!end_.reason.empty() && received.ok()) address_ += addresses_.size() - 1;
-  TryNext(received.status());
+  if (!end_.reason.empty() && received.ok()) {
+    retry_.TryAgain(received.status());
+  } else {
+    retry_.TryNext(received.status());
+  }
   return true;
 }
 
-void RejoiningWatch::TryNext(const absl::Status& refusal) {
-  SetCall(nullptr);
-  refusal_ = refusal;
-  address_ = (address_ + 1) % addresses_.size();
-  loss_->attempt_at = Clock::now() + loss_->backoff.NextPause();
-}
-
 absl::StatusOr<Received> RejoiningWatch::Rejoin(std::optional<Clock::time_point> until) {
-  const auto give_up_at = loss_->at + options_.rejoin.give_up_after;
-  for (;;) {
-    if (Cancelled()) return absl::CancelledError("the watch was cancelled");
-    const auto now = Clock::now();
-    if (call_ != nullptr) {
-      const auto next = std::min(loss_->attempt_until, until.value_or(loss_->attempt_until));
-      const auto joined = TryAttempt(next);
-      if (!joined.ok()) return joined.status();
-      if (*joined) return Received::kEvent;
-    } else if (now >= give_up_at) {
-      const absl::Status& lost = loss_->received.status();
-      if (lost.ok()) return loss_->received;
-      return absl::Status(lost.code(), absl::StrCat(lost.message(), "; not found again within ",
-                                                    Seconds(options_.rejoin.give_up_after), ": ",
-                                                    refusal_.message()));
-    } else if (now >= loss_->attempt_at) {
-      if (auto status = StartAttempt(); !status.ok()) return status;
-      loss_->attempt_until = std::min(now + options_.connect_timeout, give_up_at);
-      continue;
-    } else {
-      const auto next = std::min(loss_->attempt_at, give_up_at);
-      std::unique_lock lock(mutex_);
-      cancel_came_.wait_until(lock, until ? std::min(next, *until) : next,
-                              [this] { return cancelled_; });
-    }
-    if (until && Clock::now() >= *until) return Received::kNothingYet;
-  }
-}
-
-// True if it has come to something, false if it has not, or has ended: then another one is due.
-absl::StatusOr<bool> RejoiningWatch::TryAttempt(Clock::time_point until) {
-  const auto opened = call_->WaitUntilOpened(until);
-  if (opened.ok() && *opened) {
-    if (call_->lineage() == lineage_) {
+  Calls calls(*this);
+  const auto outcome = retry_.Run(calls, until);
+  if (!outcome.ok()) return outcome.status();
+  switch (*outcome) {
+    case RetryLoop::Outcome::kOpened:
       stream_ = call_->stream();
       joined_ = true;
-      return true;
-    }
-    TryNext(absl::NotFoundError(
-        absl::StrCat("the server at ", address(), " has another stream of this name")));
-  } else if (!opened.ok()) {
-    const std::string reason = call_->reason();
-    // The producer may not have come back yet, the place of the former call not be free.
-    const bool passes = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS" ||
-                        reason == "TOO_MANY_OPENING" || reason == "CALLER_WATCHERS" ||
-                        reason == "CALLER_CALLS";
-    if (!passes && !call_->lost()) return opened.status();
-    TryNext(opened.status());
-  } else if (Clock::now() >= loss_->attempt_until) {
-    TryNext(NotAccepted(address(), "watcher", options_.connect_timeout));
+      return Received::kEvent;
+    case RetryLoop::Outcome::kNotYet:
+      return Received::kNothingYet;
+    case RetryLoop::Outcome::kCancelled:
+      return absl::CancelledError("the watch was cancelled");
+    case RetryLoop::Outcome::kGaveUp:
+      break;
   }
-  return false;
-}
-
-absl::Status RejoiningWatch::StartAttempt() {
-  const auto channel = MakeChannel(address(), options_.credentials);
-  if (!channel.ok()) return channel.status();
-  SetCall(std::make_shared<WatchCall>(*channel, address()));
-  call_->Start(stream_name_, options_);
-  return absl::OkStatus();
+  const absl::Status& lost = lost_->status();
+  if (lost.ok()) return *lost_;
+  return absl::Status(lost.code(), absl::StrCat(lost.message(), "; not found again within ",
+                                                Seconds(options_.rejoin.give_up_after), ": ",
+                                                retry_.refusal().message()));
 }
 
 void RejoiningWatch::SetCall(std::shared_ptr<WatchCall> call) {
@@ -193,11 +208,6 @@ void RejoiningWatch::SetCall(std::shared_ptr<WatchCall> call) {
   std::swap(call, call_);
   if (cancelled_ && call_ != nullptr) call_->Cancel();
   lock.unlock();  // The former one ends without it.
-}
-
-bool RejoiningWatch::Cancelled() {
-  const std::lock_guard lock(mutex_);
-  return cancelled_;
 }
 
 void RejoiningWatch::Cancel() {

@@ -1,12 +1,12 @@
-#include "library/resuming_stream.h"
+#include "client/library/resuming_stream.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "library/answer.h"
-#include "library/channel.h"
-#include "library/frame_request.h"
+#include "client/library/answer.h"
+#include "client/library/channel.h"
+#include "client/library/frame_request.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {
@@ -34,8 +34,15 @@ bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
 
 }  // namespace
 
+absl::StatusOr<std::unique_ptr<Stream>> Stream::Open(std::string_view address,
+                                                     const StreamOptions& options) {
+  const absl::Status valid = Validate(options.parameters);
+  if (!valid.ok()) return valid;
+  return ResumingStream::Open(address, options);
+}
+
 ResumingStream::ResumingStream(std::vector<std::string> addresses, const StreamOptions& options)
-    : options_(options), opener_(monitor_, std::move(addresses), options) {}
+    : options_(options), connector_(monitor_, std::move(addresses), options) {}
 
 absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string_view address,
                                                                      const StreamOptions& options) {
@@ -55,18 +62,18 @@ absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string
 }
 
 absl::Status ResumingStream::OpenFirst(Lock& lock) {
-  auto opened = opener_.OpenNew(lock);
+  auto opened = connector_.OpenNew(lock);
   if (!opened.ok()) return opened.status();
   auto info = ReadOpened(opened->message);
   if (!info.ok()) {
-    opener_.Drop(lock, std::move(opened->call));
+    connector_.Drop(lock, std::move(opened->call));
     return info.status();
   }
   info_ = *std::move(info);
   survives_ = options_.reconnect.give_up_after.count() > 0 && options_.checkpoint_interval > 0 &&
               !opened->message.stream_token().empty();
   checkpoint_next_ = next_answer_ = std::max<std::uint64_t>(1, opened->message.next_sequence());
-  ring_ = FrameRing(next_answer_);
+  resend_ = ResendBuffer(next_answer_);
   Adopt(lock, *std::move(opened), info_.frames_in_flight);
   return absl::OkStatus();
 }
@@ -75,22 +82,22 @@ absl::StatusOr<std::uint64_t> ResumingStream::Send(const Frame& frame, double ti
   if (auto fits = CheckParticleCount(frame, info_.limits); !fits.ok()) return fits;
   Lock lock(monitor_.mutex);
   if (auto ready = WaitToSend(lock, 0); !ready.ok()) return ready;
-  const std::uint64_t sequence = ring_.end();
+  const std::uint64_t sequence = resend_.end();
   lock.unlock();
   auto request = EncodeFrameRequest(frame, time, sequence, info_.limits);
   if (!request.ok()) return request.status();
   lock.lock();
   if (auto ready = WaitToSend(lock, request->Length()); !ready.ok()) return ready;
   if (all_answered()) due_since_ = Clock::now();
-  ring_.Add(*request);
+  resend_.Add(*request);
   if (call_ != nullptr) call_->Queue(lock, *std::move(request));
   return sequence;
 }
 
 // Whether a frame of that many bytes may be taken now.
 bool ResumingStream::MaySend(std::uint64_t bytes) const {
-  if (ring_.end() - next_answer_ >= info_.frames_in_flight) return false;
-  if (ring_.bytes() + bytes > options_.max_held_bytes && !all_answered()) return false;
+  if (resend_.end() - next_answer_ >= info_.frames_in_flight) return false;
+  if (resend_.bytes() + bytes > options_.max_held_bytes && !all_answered()) return false;
   // One frame at a time waits for being written; what is left of a lost call counts no more.
   return call_ == nullptr || call_->reads_over() || call_->backlog() == 0;
 }
@@ -99,11 +106,11 @@ bool ResumingStream::MaySend(std::uint64_t bytes) const {
 std::optional<absl::Status> ResumingStream::FatalEnd() const {
   if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
   Loss loss = LossOf(*call_, /*resuming=*/false);
-  if (survives_ && loss.mendable) return std::nullopt;
+  if (survives_ && loss.retryable) return std::nullopt;
   if (call_->end().ok() && !all_answered()) {
     return absl::UnavailableError(
         absl::StrCat("the server at ", call_->address(), " ended the stream and left ",
-                     ring_.end() - next_answer_, " frames unanswered: start again"));
+                     resend_.end() - next_answer_, " frames unanswered: start again"));
   }
   return std::move(loss.status);
 }
@@ -121,14 +128,14 @@ absl::Status ResumingStream::WaitToSend(Lock& lock, std::uint64_t bytes) {
     if (Clock::now() >= due) return Fail(lock, TooSlowToSend());
     monitor_.changed.wait_until(lock, due);
   }
-  if (ring_.bytes() + bytes <= options_.max_held_bytes) return absl::OkStatus();
+  if (resend_.bytes() + bytes <= options_.max_held_bytes) return absl::OkStatus();
   return ViolationError(
       absl::StatusCode::kResourceExhausted,
       {.reason = "HELD_BYTES",
        .field = "frame",
        .value = absl::StrCat(bytes, " bytes"),
        .rule = absl::StrCat("must fit into max_held_bytes, ", options_.max_held_bytes, ", beside ",
-                            ring_.bytes(),
+                            resend_.bytes(),
                             " that are held since the last checkpoint; allow more, "
                             "or a smaller checkpoint_interval")});
 }
@@ -178,7 +185,7 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
     if (std::exchange(owes_event_, false)) {
       event.kind = Event::Kind::kReconnected;
       event.sequence = 0;
-      event.message = opener_.Story();
+      event.message = connector_.Story();
       return Received::kEvent;
     }
     if (auto response = call_->Take(lock)) {
@@ -243,9 +250,9 @@ absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response re
     ++next_of_call_;
     if (is_new) {
       ++next_answer_;
-      opener_.Mended();
+      connector_.Recovered();
     }
-    if (!survives_) ring_.DropBelow(next_answer_);
+    if (!survives_) resend_.DropBelow(next_answer_);
   }
   call_->Recycle(lock, std::move(response));
   monitor_.changed.notify_all();
@@ -258,13 +265,13 @@ void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
   if (checkpoint.empty() || next_of_call_ < checkpoint_next_) return;
   checkpoint_ = checkpoint;
   checkpoint_next_ = next_of_call_ + 1;
-  ring_.DropBelow(checkpoint_next_);
+  resend_.DropBelow(checkpoint_next_);
 }
 
 // The call has ended: whether the stream has, too. False where it is to go on.
 absl::StatusOr<bool> ResumingStream::EndCall(Lock& lock) {
   const Loss loss = LossOf(*call_, /*resuming=*/false);
-  if (finished_ && all_answered() && (call_->end().ok() || (survives_ && loss.mendable))) {
+  if (finished_ && all_answered() && (call_->end().ok() || (survives_ && loss.retryable))) {
     return true;
   }
   if (auto end = FatalEnd()) return *std::move(end);
@@ -276,14 +283,14 @@ void ResumingStream::LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, cons
   v1::ResumeStream resume;
   resume.set_checkpoint(checkpoint_);
   resume.set_stream_token(token_);
-  opener_.Lost(loss, std::move(resume));
+  connector_.Lost(loss, std::move(resume));
   monitor_.changed.notify_all();  // What waits for the call's backlog need not any more.
-  opener_.Drop(lock, std::move(call));
+  connector_.Drop(lock, std::move(call));
 }
 
 // False where there is no other call at `until`.
 absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
-  auto opened = opener_.OpenAgain(lock, until);
+  auto opened = connector_.OpenAgain(lock, until);
   if (!opened.ok()) return opened.status();
   if (!*opened) return false;
   const auto info = ReadOpened((*opened)->message);
@@ -298,7 +305,7 @@ absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
 }
 
 // Whether the frames that were taken under the first server's terms are good here.
-absl::Status ResumingStream::CheckReplica(const CallOpener::Opened& opened,
+absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                                           const StreamInfo& info) const {
   const std::string& address = opened.call->address();
   if (opened.message.next_sequence() != checkpoint_next_) {
@@ -322,16 +329,16 @@ absl::Status ResumingStream::CheckReplica(const CallOpener::Opened& opened,
 }
 
 // Sends what is unanswered through a call that has been opened, and makes it the stream's.
-void ResumingStream::Adopt(Lock& lock, CallOpener::Opened opened, std::size_t window) {
+void ResumingStream::Adopt(Lock& lock, StreamConnector::Opened opened, std::size_t window) {
   token_ = opened.message.stream_token();
   next_of_call_ = checkpoint_next_;
   StreamCall& call = *opened.call;
   call.SetWindow(lock, window);
-  // Until it is the stream's call, the sender adds to the ring alone: frames keep their order.
-  for (std::uint64_t k = checkpoint_next_; k < ring_.end(); ++k) call.Queue(lock, ring_.at(k));
+  // Until it is the stream's call, the sender adds to the buffer alone: frames keep their order.
+  for (std::uint64_t k = checkpoint_next_; k < resend_.end(); ++k) call.Queue(lock, resend_.at(k));
   due_since_ = adopted_at_ = Clock::now();
   call_ = std::move(opened.call);
-  if (all_answered()) opener_.Mended();
+  if (all_answered()) connector_.Recovered();
   if (!failure_.ok()) call_->Cancel(lock);
   if (finished_) call_->HalfClose(lock);
   monitor_.changed.notify_all();
@@ -339,7 +346,7 @@ void ResumingStream::Adopt(Lock& lock, CallOpener::Opened opened, std::size_t wi
 
 std::size_t ResumingStream::InFlight() const {
   const Lock lock(monitor_.mutex);
-  return ring_.end() - next_answer_;
+  return resend_.end() - next_answer_;
 }
 
 void ResumingStream::Cancel() {
@@ -350,7 +357,7 @@ void ResumingStream::Cancel() {
 
 absl::Status ResumingStream::Fail(Lock& lock, absl::Status failure) {
   if (failure_.ok()) failure_ = std::move(failure);
-  opener_.Cancel(lock);
+  connector_.Cancel(lock);
   if (call_ != nullptr) call_->Cancel(lock);
   monitor_.changed.notify_all();
   return failure_;

@@ -5,7 +5,7 @@
 // the last one that the caller has got are dropped. So each frame's answer is delivered once, and
 // since results depend on checkpoint and frames alone, with the same bits.
 //
-//   streaming (call_) --lost--> CallOpener --opened--> streaming
+//   streaming (call_) --lost--> StreamConnector --opened--> streaming
 //       |                           +-- refused, or for too long: failed (failure_)
 //       +-- everything is answered: end; what cannot be mended: failed
 //
@@ -20,27 +20,28 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "library/call_opener.h"
-#include "library/frame_ring.h"
-#include "library/loss.h"
-#include "library/stream_call.h"
+#include "client/library/resend_buffer.h"
+#include "client/library/retry_policy.h"
+#include "client/library/stream_call.h"
+#include "client/library/stream_connector.h"
 #include "partiemc/client/stream.h"
 #include "wire/codec.h"
 
 namespace partiemc::client {
 
-class ResumingStream {
+class ResumingStream final : public Stream {
  public:
   /// As Stream::Open.
   static absl::StatusOr<std::unique_ptr<ResumingStream>> Open(std::string_view address,
                                                               const StreamOptions& options);
 
-  const StreamInfo& info() const { return info_; }
-  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time);
-  absl::Status FinishSending();
-  absl::StatusOr<Received> Receive(Event& event, std::optional<std::chrono::milliseconds> wait);
-  std::size_t InFlight() const;
-  void Cancel();
+  const StreamInfo& info() const override { return info_; }
+  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
+  absl::Status FinishSending() override;
+  absl::StatusOr<Received> Receive(Event& event,
+                                   std::optional<std::chrono::milliseconds> wait) override;
+  std::size_t InFlight() const override;
+  void Cancel() override;
 
  private:
   using Clock = StreamCall::Clock;
@@ -53,8 +54,8 @@ class ResumingStream {
   absl::Status OpenFirst(Lock& lock);
   absl::StatusOr<Received> Advance(Lock& lock, Event& event, OptionalTime until);
   absl::StatusOr<bool> GoOn(Lock& lock, OptionalTime until);
-  absl::Status CheckReplica(const CallOpener::Opened& opened, const StreamInfo& info) const;
-  void Adopt(Lock& lock, CallOpener::Opened opened, std::size_t window);
+  absl::Status CheckReplica(const StreamConnector::Opened& opened, const StreamInfo& info) const;
+  void Adopt(Lock& lock, StreamConnector::Opened opened, std::size_t window);
   absl::StatusOr<bool> Deliver(Lock& lock, StreamCall::Response response, Event& event);
   void Remember(const v1::ReconstructResponse& answer);
   absl::StatusOr<bool> EndCall(Lock& lock);
@@ -66,7 +67,7 @@ class ResumingStream {
   bool MaySend(std::uint64_t bytes) const;
   absl::Status TooSlowToSend() const;
   std::optional<absl::Status> FatalEnd() const;
-  bool all_answered() const { return next_answer_ == ring_.end(); }
+  bool all_answered() const { return next_answer_ == resend_.end(); }
 
   const StreamOptions options_;
   // Fixed once open:
@@ -74,13 +75,13 @@ class ResumingStream {
   bool survives_ = false;  // Its calls.
 
   mutable Monitor monitor_;
-  CallOpener opener_;
+  StreamConnector connector_;
   wire::ReconstructedFrame scratch_;  // Of the receiver's thread alone.
   bool owes_event_ = false;           // Likewise: a reconnection is to be told.
 
   // Guarded by the monitor:
-  std::unique_ptr<StreamCall> call_;  // Null while the opener looks for another.
-  FrameRing ring_{1};
+  std::unique_ptr<StreamCall> call_;  // Null while the connector looks for another.
+  ResendBuffer resend_{1};
   std::string token_, checkpoint_;
   std::uint64_t checkpoint_next_ = 1;         // The number that the checkpoint expects.
   std::uint64_t next_answer_ = 1;             // To be delivered.

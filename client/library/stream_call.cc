@@ -1,4 +1,4 @@
-#include "library/stream_call.h"
+#include "client/library/stream_call.h"
 
 #include <utility>
 

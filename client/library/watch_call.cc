@@ -1,12 +1,12 @@
-#include "library/watch_call.h"
+#include "client/library/watch_call.h"
 
 #include <algorithm>
 #include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
-#include "library/channel.h"
-#include "library/loss.h"
+#include "client/library/channel.h"
+#include "client/library/retry_policy.h"
 
 namespace partiemc::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "output/atomic_file.h"
+#include "client/output/atomic_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "absl/strings/escaping.h"
-#include "output/text.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

@@ -1,5 +1,5 @@
-#include "output/formats.h"
-#include "output/text.h"
+#include "client/output/formats.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "output/frame_writer.h"
+#include "client/output/frame_writer.h"
 
 namespace partiemc::client {
 

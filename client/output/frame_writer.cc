@@ -1,4 +1,4 @@
-#include "output/frame_writer.h"
+#include "client/output/frame_writer.h"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
-#include "output/atomic_file.h"
-#include "output/formats.h"
-#include "output/text.h"
+#include "client/output/atomic_file.h"
+#include "client/output/formats.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

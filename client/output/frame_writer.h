@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "output/frame_record.h"
+#include "client/output/frame_record.h"
 
 namespace partiemc::client {
 

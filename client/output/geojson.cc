@@ -1,8 +1,8 @@
 #include <cmath>
 #include <vector>
 
-#include "output/formats.h"
-#include "output/text.h"
+#include "client/output/formats.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

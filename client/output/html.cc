@@ -1,4 +1,4 @@
-#include "output/html.h"
+#include "client/output/html.h"
 
 namespace partiemc::client {
 

@@ -1,4 +1,4 @@
-#include "output/progress.h"
+#include "client/output/progress.h"
 
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_format.h"
-#include "output/text.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

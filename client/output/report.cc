@@ -1,4 +1,4 @@
-#include "output/report.h"
+#include "client/output/report.h"
 
 #include <charconv>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "absl/strings/escaping.h"
-#include "output/html.h"
-#include "output/report_geometry.h"
-#include "output/text.h"
+#include "client/output/html.h"
+#include "client/output/report_geometry.h"
+#include "client/output/text.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {

@@ -8,9 +8,9 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "output/atomic_file.h"
-#include "output/frame_record.h"
-#include "output/summary.h"
+#include "client/output/atomic_file.h"
+#include "client/output/frame_record.h"
+#include "client/output/summary.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc::client {

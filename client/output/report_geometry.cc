@@ -1,4 +1,4 @@
-#include "output/report_geometry.h"
+#include "client/output/report_geometry.h"
 
 #include <algorithm>
 #include <bit>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "output/formats.h"
+#include "client/output/formats.h"
 
 namespace partiemc::client {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-#include "output/frame_record.h"
+#include "client/output/frame_record.h"
 
 namespace partiemc::client {
 

@@ -1,4 +1,4 @@
-#include "output/statistics_writer.h"
+#include "client/output/statistics_writer.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
-#include "output/text.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "output/atomic_file.h"
-#include "output/frame_record.h"
+#include "client/output/atomic_file.h"
+#include "client/output/frame_record.h"
 
 namespace partiemc::client {
 

@@ -1,4 +1,4 @@
-#include "output/summary.h"
+#include "client/output/summary.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "absl/strings/str_format.h"
-#include "output/text.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "output/frame_record.h"
+#include "client/output/frame_record.h"
 
 namespace partiemc::client {
 

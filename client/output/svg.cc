@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "output/formats.h"
-#include "output/text.h"
+#include "client/output/formats.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

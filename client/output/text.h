@@ -8,8 +8,6 @@
 #include <string_view>
 #include <type_traits>
 
-#include "partiemc/printable.h"
-
 namespace partiemc::client {
 
 /// Appends `value` in the shortest form that reads back the same bits in its own type; never
@@ -50,26 +48,6 @@ std::string Concat(const Parts&... parts) {
 /// "1 frame", "2 frames".
 inline std::string Plural(std::uint64_t count, std::string_view noun) {
   return Concat(count, " ", noun, count == 1 ? "" : "s");
-}
-
-/// `text` as a JSON string, quotes and all. Control characters are escaped, so that a terminal does
-/// not obey what is printed; what is no UTF-8 becomes U+FFFD.
-inline std::string JsonString(std::string_view text) {
-  std::string out = "\"";
-  while (!text.empty()) {
-    const std::string_view before = text;
-    const auto character = TakeCharacter(text);
-    if (character == U'"' || character == U'\\') {
-      AppendAll(out, '\\', before.front());
-    } else if (!character) {
-      out += "\\ufffd";
-    } else if (IsControl(*character)) {
-      out += Printable(before.substr(0, before.size() - text.size()));
-    } else {
-      out += before.substr(0, before.size() - text.size());
-    }
-  }
-  return out + '"';
 }
 
 /// The 16 hexadecimal digits of a digest.

@@ -9,8 +9,8 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataWriter.h>
 
-#include "output/formats.h"
-#include "output/text.h"
+#include "client/output/formats.h"
+#include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {

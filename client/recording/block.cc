@@ -1,4 +1,4 @@
-#include "recording/block.h"
+#include "client/recording/block.h"
 
 #include <bit>
 #include <cerrno>

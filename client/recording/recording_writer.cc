@@ -8,12 +8,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "output/atomic_file.h"
+#include "client/output/atomic_file.h"
+#include "client/recording/block.h"
+#include "client/recording/recording.h"
 #include "partiemc/recording/v1/recording.pb.h"
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "recording/block.h"
-#include "recording/recording.h"
 #include "wire/bytes.h"
 
 namespace partiemc::client {

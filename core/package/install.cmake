@@ -10,10 +10,20 @@ install(EXPORT partiemcCore NAMESPACE partiemc:: DESTINATION ${package_dir})
 
 if(PARTIEMC_SERVICE)
   list(APPEND PARTIEMC_COMPONENTS client)
-  # The client library is static: it drags along what it is made of, the codec without a header,
-  # the messages with theirs, as programs without our client library speak the protocol too.
-  install(TARGETS partiemc_messages partiemc_proto partiemc_codec partiemc_wire partiemc_client
-    EXPORT partiemcClient)
+  # The client library drags along what it is made of: codec and common without a header, the messages
+  # with theirs, as programs without our client library speak the protocol too.
+  install(TARGETS partiemc_common partiemc_messages partiemc_proto partiemc_codec partiemc_wire
+    partiemc_client EXPORT partiemcClient)
+  set(programs partiemc)
+  if(PARTIEMC_SERVER)
+    list(APPEND programs partiemc-server)
+  endif()
+  if(PARTIEMC_SHARED)
+    set_target_properties(${programs} PROPERTIES INSTALL_RPATH $ORIGIN/../${CMAKE_INSTALL_LIBDIR})
+  endif()
+  install(TARGETS ${programs})
+  install(FILES client/recordings/dam_break.pemc client/recordings/README.md
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/partiemc/recordings)
   install(DIRECTORY client/include/ TYPE INCLUDE)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/partiemc TYPE INCLUDE
     FILES_MATCHING PATTERN reconstruction.*.h)

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "server/base/address.h"
+#include "common/address.h"
 
 namespace partiemc::server {
 

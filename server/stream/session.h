@@ -10,6 +10,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/stage_clock.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/reconstructor.h"
@@ -18,7 +19,6 @@
 #include "partiemc/state.h"
 #include "server/compute/worker.h"
 #include "server/stream/checkpoint.h"
-#include "server/telemetry/stage_clock.h"
 
 namespace partiemc::server {
 

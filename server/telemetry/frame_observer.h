@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <string_view>
 
-namespace partiemc::server {
+namespace partiemc {
 
 class StageClock;
+
+namespace server {
 
 /// Called by the threads that compute, so quick and safe from any of them.
 class FrameObserver {
@@ -18,4 +20,5 @@ class FrameObserver {
   virtual void FrameRefused(std::string_view reason) = 0;
 };
 
-}  // namespace partiemc::server
+}  // namespace server
+}  // namespace partiemc

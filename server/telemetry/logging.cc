@@ -14,7 +14,7 @@
 #include <mutex>
 #include <utility>
 
-#include "partiemc/printable.h"
+#include "common/json_text.h"
 #include "partiemc/status.h"
 #include "server/base/rate_limit.h"
 #include "server/telemetry/log_writer.h"
@@ -37,30 +37,6 @@ std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
 std::shared_ptr<spdlog::logger>& logger =
     *new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
 
-// Valid JSON, whatever comes: bytes that are no UTF-8 become U+FFFD.
-void AppendEscaped(std::string_view text, std::string& out) {
-  while (!text.empty()) {
-    const std::string_view before = text;
-    const auto character = TakeCharacter(text);
-    if (character == U'"' || character == U'\\') {
-      out += '\\';
-      out += before.front();
-    } else if (!character) {
-      out += "\\ufffd";
-    } else if (IsControl(*character)) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(*character));
-    } else {
-      out += before.substr(0, before.size() - text.size());
-    }
-  }
-}
-
-std::string Quoted(std::string_view text) {
-  std::string quoted = "\"";
-  AppendEscaped(text, quoted);
-  return quoted + "\"";
-}
-
 bool IsPlain(std::string_view text) {
   return !text.empty() && std::ranges::all_of(text, [](char c) {
     return c > 0x20 && c < 0x7f && c != '"' && c != '\\' && c != '=';
@@ -69,7 +45,7 @@ bool IsPlain(std::string_view text) {
 
 std::string ToText(const LogField& field, bool json) {
   if (const auto* text = std::get_if<std::string>(&field.value)) {
-    return json || !IsPlain(*text) ? Quoted(*text) : *text;
+    return json || !IsPlain(*text) ? JsonString(*text) : *text;
   }
   if (const auto* count = std::get_if<std::uint64_t>(&field.value)) return std::to_string(*count);
   return fmt::format("{:.3f}", std::get<double>(field.value));
@@ -94,7 +70,7 @@ class JsonFormatter final : public spdlog::formatter {
                    parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday, parts.tm_hour,
                    parts.tm_min, parts.tm_sec, milliseconds,
                    fmt::string_view(level.data(), level.size()),
-                   fields ? std::string(payload.substr(1)) : Quoted(payload));
+                   fields ? std::string(payload.substr(1)) : JsonString(payload));
   }
 
   std::unique_ptr<spdlog::formatter> clone() const override {
@@ -151,7 +127,7 @@ std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format) {
 void LogEvent(spdlog::level::level_enum level, std::string_view event,
               std::initializer_list<LogField> fields) {
   const bool json = log_format == LogFormat::kJson;
-  std::string line = json ? kFieldsFollow + Quoted(event) : std::string(event);
+  std::string line = json ? kFieldsFollow + JsonString(event) : std::string(event);
   for (const LogField& field : fields) {
     line += json ? ",\"" : " ";
     line += field.name;

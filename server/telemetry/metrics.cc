@@ -3,8 +3,8 @@
 #include <iterator>
 #include <utility>
 
+#include "common/stage_clock.h"
 #include "server/telemetry/process_metrics.h"
-#include "server/telemetry/stage_clock.h"
 
 namespace partiemc::server {
 namespace {

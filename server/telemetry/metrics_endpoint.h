@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
-#include "server/base/address.h"
+#include "common/address.h"
 #include "server/telemetry/metrics.h"
 
 namespace prometheus {

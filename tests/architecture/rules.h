@@ -19,10 +19,13 @@ Violations CoreIsPlain(const SourceTree& tree);
 /// includes what makes tasks of oneTBB, so that the sanitizer is told about every fork and join.
 Violations TasksStartInOneFile(const SourceTree& tree);
 
-/// Every file of core/src and of server lies in one of their rooms, or is one of the few beside
-/// them that put the rooms together. A file includes its own room and rooms above it, by its path.
-/// A room has at most 18 stems.
+/// Every file of core/src, server and client lies in one of their rooms, or is one of the few
+/// beside them that put the rooms together; so do those of client/input and client/evaluation,
+/// which have rooms of their own. A file includes its own room and rooms above it, by its path.
 Violations FilesKeepTheirRooms(const SourceTree& tree);
+
+/// No folder of core, proto, server and client has more than 18 stems.
+Violations NoFolderIsTooFull(const SourceTree& tree);
 
 /// Of the server, the rooms rpc and security, what starts it, and logging.cc, which takes gRPC's
 /// own lines, alone include gRPC and messages.

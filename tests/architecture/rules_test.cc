@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <map>
 #include <string>
 
 namespace partiemc::architecture {
@@ -89,7 +91,9 @@ TEST(Architecture, ASecondStartOfTasksIsSeen) {
 TEST(Architecture, FilesKeepTheirRooms) { EXPECT_THAT(FilesKeepTheirRooms(Project()), IsEmpty()); }
 
 TEST(Architecture, AFileWithoutARoomIsSeen) {
-  for (const std::string path : {"core/src/stray.h", "core/src/attic/stray.h", "server/stray.cc"}) {
+  for (const std::string path :
+       {"core/src/stray.h", "core/src/attic/stray.h", "server/stray.cc", "client/stray.h",
+        "client/attic/stray.h", "client/input/stray.cc", "client/input/attic/stray.cc"}) {
     EXPECT_THAT(FilesKeepTheirRooms(Planted(path, "")), Contains(HasSubstr(path + ": lies in no")));
   }
 }
@@ -102,19 +106,41 @@ TEST(Architecture, AnIncludeOfARoomBelowIsSeen) {
   EXPECT_THAT(FilesKeepTheirRooms(
                   Planted("server/compute/worker.h", "\n#include \"server/stream/session.h\"\n")),
               Contains(HasSubstr("of a room below its own")));
+  for (const auto& [file, include] : std::map<std::string, std::string>{
+           {"client/include/partiemc/client/stream.h", "client/library/channel.h"},
+           {"client/library/channel.h", "client/output/text.h"},
+           {"client/output/svg.cc", "client/input/plane.h"},
+           {"client/recording/block.h", "client/cli/console.h"},
+           {"client/input/base/columns.h", "client/input/formats/frame_reader.h"},
+           {"client/input/formats/xyz.cc", "client/input/plane.h"},
+           {"client/evaluation/scenes/shapes.h", "client/evaluation/metrics/run.h"}}) {
+    EXPECT_THAT(FilesKeepTheirRooms(Planted(file, "\n#include \"" + include + "\"\n")),
+                Contains(HasSubstr(file + ": includes " + include + ", of a room below")));
+  }
 }
 
 TEST(Architecture, AnIncludeWithoutItsRoomIsSeen) {
   const SourceTree tree = Planted("core/src/rings/rings.h", "\n#include \"components.h\"\n");
   EXPECT_THAT(FilesKeepTheirRooms(tree), Contains(HasSubstr("without its room")));
+  EXPECT_THAT(
+      FilesKeepTheirRooms(
+          Planted("client/library/channel.cc", "\n#include \"library/stream_call.h\"\n")),
+      Contains("client/library/channel.cc: includes library/stream_call.h without its room"));
 }
 
-TEST(Architecture, ARoomThatIsTooFullIsSeen) {
-  SourceTree tree = Project();
-  for (char name = 'a'; name <= 'z'; ++name) {
-    tree["core/src/normals/" + std::string(1, name) + ".h"] = "";
+TEST(Architecture, NoFolderIsTooFull) { EXPECT_THAT(NoFolderIsTooFull(Project()), IsEmpty()); }
+
+TEST(Architecture, AFolderThatIsTooFullIsSeen) {
+  for (const std::string folder : {"core/src/normals", "client/input/extra", "proto/extra"}) {
+    SourceTree tree = Project();
+    for (char name = 'a'; name <= 's'; ++name) {
+      tree[folder + "/" + std::string(1, name) + "_.h"] = "";
+      tree[folder + "/" + std::string(1, name) + "_.cc"] = "";
+    }
+    const std::size_t stems = folder == "core/src/normals" ? 20 : 19;
+    EXPECT_THAT(NoFolderIsTooFull(tree),
+                Contains(folder + ": has " + std::to_string(stems) + " stems"));
   }
-  EXPECT_THAT(FilesKeepTheirRooms(tree), Contains("core/src/normals: has 27 stems"));
 }
 
 TEST(Architecture, GrpcStaysInItsRooms) { EXPECT_THAT(GrpcStaysInItsRooms(Project()), IsEmpty()); }

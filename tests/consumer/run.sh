@@ -1,7 +1,7 @@
 #!/bin/bash
 # usage: tests/consumer/run.sh BUILD_DIR COMPONENT...
 # Installs the project as built in BUILD_DIR under a temporary prefix, builds this consumer against
-# it and runs its programs. With `client`, the installed server is started for them.
+# it and runs its programs; then configures one that has PartiEMC as a folder. With `client`, the installed server is started for them.
 set -euo pipefail
 build=$(cd "$1" && pwd)
 shift
@@ -25,6 +25,7 @@ cmake -S "$here" -B "$work/build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   -DCONSUMER_COMPONENTS="$(IFS=';'; echo "${components[*]}")" >/dev/null
 cmake --build "$work/build"
 "$work/build/outline"
+cmake -S "$here/subproject" -B "$work/subproject" -G Ninja >/dev/null
 
 if [[ " ${components[*]} " == *" client "* ]]; then
   address=unix:$work/server.sock

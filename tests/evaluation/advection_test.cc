@@ -1,5 +1,5 @@
 // Contours and points carried along by the particles of a recording, and what they know of it.
-#include "evaluation/metrics/advection.h"
+#include "client/evaluation/metrics/advection.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/metrics/metrics.h"
-#include "evaluation/scenes/random.h"
+#include "client/evaluation/metrics/metrics.h"
+#include "client/evaluation/scenes/random.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // What of the paper reproduces, and the runs that say so.
-#include "evaluation/paper/claims.h"
+#include "client/evaluation/paper/claims.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,11 @@
 #include <cmath>
 #include <set>
 
-#include "evaluation/paper/paper.h"
-#include "evaluation/report/report.h"
-#include "evaluation/report/table.h"
+#include "client/evaluation/paper/paper.h"
+#include "client/evaluation/report/report.h"
+#include "client/evaluation/report/table.h"
+#include "client/output/html.h"
 #include "nlohmann/json.hpp"
-#include "output/html.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // Ratios, intervals and verdicts on numbers made by hand.
-#include "evaluation/metrics/compare.h"
+#include "client/evaluation/metrics/compare.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/metrics/logarithm.h"
+#include "client/evaluation/metrics/logarithm.h"
 
 namespace partiemc::evaluation {
 namespace {

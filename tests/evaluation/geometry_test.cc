@@ -6,12 +6,12 @@
 #include <numbers>
 #include <vector>
 
-#include "evaluation/scenes/erosion.h"
-#include "evaluation/scenes/outline.h"
-#include "evaluation/scenes/random.h"
-#include "evaluation/scenes/segment_index.h"
-#include "evaluation/scenes/shapes.h"
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/erosion.h"
+#include "client/evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/random.h"
+#include "client/evaluation/scenes/segment_index.h"
+#include "client/evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

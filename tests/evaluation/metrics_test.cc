@@ -1,5 +1,5 @@
 // Distances, jitter and defects on curves whose numbers are known.
-#include "evaluation/metrics/metrics.h"
+#include "client/evaluation/metrics/metrics.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "evaluation/scenes/shapes.h"
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // What is known of recordings: moments, walls, and the files that tell.
-#include "evaluation/metrics/recorded_truth.h"
+#include "client/evaluation/metrics/recorded_truth.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/metrics/metrics.h"
-#include "evaluation/scenes/random.h"
-#include "evaluation/scenes/sampling.h"
-#include "evaluation/scenes/shapes.h"
+#include "client/evaluation/metrics/metrics.h"
+#include "client/evaluation/scenes/random.h"
+#include "client/evaluation/scenes/sampling.h"
+#include "client/evaluation/scenes/shapes.h"
 
 namespace partiemc::evaluation {
 namespace {

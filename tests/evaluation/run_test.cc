@@ -1,12 +1,12 @@
 // Methods over sequences, in process.
-#include "evaluation/metrics/run.h"
+#include "client/evaluation/metrics/run.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "evaluation/scenes/random.h"
-#include "evaluation/scenes/scenes.h"
+#include "client/evaluation/scenes/random.h"
+#include "client/evaluation/scenes/scenes.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // The generator: exact truth, true motion, the same bits everywhere.
-#include "evaluation/scenes/scenes.h"
+#include "client/evaluation/scenes/scenes.h"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +13,10 @@
 #include <set>
 #include <string>
 
-#include "evaluation/metrics/metrics.h"
-#include "evaluation/scenes/bodies.h"
-#include "evaluation/scenes/segment_index.h"
-#include "evaluation/scenes/shapes.h"
+#include "client/evaluation/metrics/metrics.h"
+#include "client/evaluation/scenes/bodies.h"
+#include "client/evaluation/scenes/segment_index.h"
+#include "client/evaluation/scenes/shapes.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // All methods over all sequences.
-#include "evaluation/metrics/study.h"
+#include "client/evaluation/metrics/study.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/report/study_tables.h"
+#include "client/evaluation/report/study_tables.h"
 
 namespace partiemc::evaluation {
 namespace {

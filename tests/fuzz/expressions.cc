@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/replay_parameters.h"
-#include "client/input/columns.h"
+#include "client/cli/replay_parameters.h"
+#include "client/input/base/columns.h"
+#include "client/input/base/number_text.h"
 #include "client/input/frame_range.h"
-#include "client/input/number_text.h"
 #include "client/input/sequence.h"
 #include "client/input/times.h"
 #include "fuzz/choices.h"

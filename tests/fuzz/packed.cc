@@ -1,8 +1,8 @@
 // Packed files: whatever packs them, memory is bounded and the end comes.
 #include <vector>
 
-#include "client/input/byte_source.h"
-#include "client/input/unpack.h"
+#include "client/input/base/byte_source.h"
+#include "client/input/base/unpack.h"
 #include "fuzz/choices.h"
 #include "fuzz/memory_file.h"
 #include "fuzz/require.h"

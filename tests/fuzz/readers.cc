@@ -1,7 +1,7 @@
 #include "fuzz/readers.h"
 
 #include "absl/strings/match.h"
-#include "client/input/formats.h"
+#include "client/input/formats/formats.h"
 #include "client/input/plane.h"
 #include "fuzz/choices.h"
 #include "fuzz/memory_file.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "client/input/frame_reader.h"
+#include "client/input/formats/frame_reader.h"
 
 namespace partiemc::fuzz {
 

@@ -1,11 +1,11 @@
 // Recordings: as they are, or fuzzed blocks packed as the writer packs them, so that zstd's
 // checksums keep nothing away from the reader.
-#include "recording/recording.h"
+#include "client/recording/recording.h"
 
+#include "client/recording/block.h"
 #include "fuzz/choices.h"
 #include "fuzz/memory_file.h"
 #include "fuzz/require.h"
-#include "recording/block.h"
 
 namespace partiemc::fuzz {
 namespace {

@@ -4,7 +4,7 @@
 // 7.10): what is left over of a particle's displacement, divided by one less its own leverage. That
 // the way back has to meet its start is the test for occlusions of optical flow (Sundaram, Brox,
 // Keutzer, "Dense Point Trajectories by GPU-accelerated Large Displacement Optical Flow", 2010).
-#include "evaluation/metrics/advection.h"
+#include "client/evaluation/metrics/advection.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/metrics/metrics.h"
+#include "client/evaluation/metrics/metrics.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "evaluation/scenes/outline.h"
-#include "evaluation/scenes/sequence.h"
+#include "client/evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/sequence.h"
 
 namespace partiemc::evaluation {
 

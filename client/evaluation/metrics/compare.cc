@@ -1,4 +1,4 @@
-#include "evaluation/metrics/compare.h"
+#include "client/evaluation/metrics/compare.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <string_view>
 #include <unordered_map>
 
-#include "evaluation/metrics/logarithm.h"
-#include "evaluation/scenes/random.h"
+#include "client/evaluation/metrics/logarithm.h"
+#include "client/evaluation/scenes/random.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/metrics/run.h"
+#include "client/evaluation/metrics/run.h"
 
 namespace partiemc::evaluation {
 

@@ -1,4 +1,4 @@
-#include "evaluation/metrics/logarithm.h"
+#include "client/evaluation/metrics/logarithm.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "evaluation/metrics/metrics.h"
+#include "client/evaluation/metrics/metrics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "evaluation/metrics/advection.h"
-#include "evaluation/scenes/outline.h"
-#include "evaluation/scenes/segment_index.h"
-#include "evaluation/scenes/sequence.h"
+#include "client/evaluation/metrics/advection.h"
+#include "client/evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/segment_index.h"
+#include "client/evaluation/scenes/sequence.h"
 #include "partiemc/result.h"
 
 namespace partiemc::evaluation {

@@ -1,4 +1,4 @@
-#include "evaluation/metrics/recorded_truth.h"
+#include "client/evaluation/metrics/recorded_truth.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "evaluation/scenes/shapes.h"
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

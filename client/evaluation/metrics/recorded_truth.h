@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "absl/status/status.h"
-#include "evaluation/scenes/outline.h"
-#include "evaluation/scenes/sequence.h"
+#include "client/evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/sequence.h"
 
 namespace partiemc::evaluation {
 

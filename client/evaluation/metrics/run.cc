@@ -1,32 +1,16 @@
-#include "evaluation/metrics/run.h"
+#include "client/evaluation/metrics/run.h"
 
-#include <chrono>
 #include <cmath>
 #include <span>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "evaluation/metrics/recorded_truth.h"
+#include "client/evaluation/metrics/recorded_truth.h"
+#include "common/stage_clock.h"
 #include "partiemc/reconstructor.h"
 
 namespace partiemc::evaluation {
 namespace {
-
-class StageClock : public StageObserver {
- public:
-  explicit StageClock(std::array<double, kStageCount>& milliseconds)
-      : milliseconds_(milliseconds) {}
-  void StageBegins(Stage) override { begin_ = std::chrono::steady_clock::now(); }
-  void StageEnds(Stage stage) override {
-    const std::chrono::duration<double, std::milli> spent =
-        std::chrono::steady_clock::now() - begin_;
-    milliseconds_[static_cast<std::size_t>(stage)] += spent.count();
-  }
-
- private:
-  std::array<double, kStageCount>& milliseconds_;
-  std::chrono::steady_clock::time_point begin_;
-};
 
 // Mean of the numbers that are there.
 class Mean {
@@ -172,7 +156,7 @@ absl::StatusOr<std::vector<Result>> Evaluator::Reconstruct(
   std::vector<Result> results(sequence_.frames.size());
   numbers.assign(sequence_.frames.size(), {});
   for (std::size_t t = 0; t < results.size(); ++t) {
-    StageClock clock(numbers[t].stage_ms);
+    StageClock clock;
     const Frame frame = FrameOf(sequence_.frames[t], options.knowledge, ids);
     const absl::Status status =
         reconstructor->Reconstruct(frame, state, workspace, results[t], {.observer = &clock});
@@ -180,6 +164,7 @@ absl::StatusOr<std::vector<Result>> Evaluator::Reconstruct(
       return absl::Status(status.code(), absl::StrCat(sequence_.name, ", frame ", t, ", ",
                                                       method.name, ": ", status.message()));
     }
+    numbers[t].stage_ms = clock.stages_ms();
   }
   return results;
 }

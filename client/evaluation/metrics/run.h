@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "evaluation/metrics/advection.h"
-#include "evaluation/metrics/metrics.h"
-#include "evaluation/scenes/sampling.h"
-#include "evaluation/scenes/sequence.h"
+#include "client/evaluation/metrics/advection.h"
+#include "client/evaluation/metrics/metrics.h"
+#include "client/evaluation/scenes/sampling.h"
+#include "client/evaluation/scenes/sequence.h"
 #include "partiemc/parameters.h"
 #include "partiemc/stage.h"
 

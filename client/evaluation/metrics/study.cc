@@ -1,4 +1,4 @@
-#include "evaluation/metrics/study.h"
+#include "client/evaluation/metrics/study.h"
 
 #include <algorithm>
 #include <atomic>

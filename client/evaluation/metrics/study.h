@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "evaluation/metrics/run.h"
-#include "evaluation/scenes/scenes.h"
-#include "evaluation/scenes/sequence.h"
+#include "client/evaluation/metrics/run.h"
+#include "client/evaluation/scenes/scenes.h"
+#include "client/evaluation/scenes/sequence.h"
 
 namespace partiemc::evaluation {
 

@@ -1,4 +1,4 @@
-#include "evaluation/paper/claims.h"
+#include "client/evaluation/paper/claims.h"
 
 #include <algorithm>
 #include <array>

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/metrics/study.h"
-#include "evaluation/paper/paper.h"
+#include "client/evaluation/metrics/study.h"
+#include "client/evaluation/paper/paper.h"
 
 namespace partiemc::evaluation {
 

@@ -1,10 +1,10 @@
-#include "evaluation/paper/paper.h"
+#include "client/evaluation/paper/paper.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "absl/status/status.h"
-#include "evaluation/paper/paper_parts.h"
+#include "client/evaluation/paper/paper_parts.h"
 #include "partiemc/arena.h"
 
 namespace partiemc::evaluation {

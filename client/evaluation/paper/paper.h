@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "evaluation/metrics/study.h"
+#include "client/evaluation/metrics/study.h"
 
 namespace partiemc::evaluation {
 

@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_format.h"
-#include "evaluation/paper/paper_parts.h"
+#include "client/evaluation/paper/paper_parts.h"
 #include "partiemc/reconstructor.h"
 
 namespace partiemc::evaluation {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_format.h"
-#include "evaluation/paper/paper_parts.h"
+#include "client/evaluation/paper/paper_parts.h"
 #include "partiemc/validate.h"
 
 namespace partiemc::evaluation {

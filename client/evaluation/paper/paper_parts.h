@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "absl/status/status.h"
-#include "evaluation/paper/paper.h"
+#include "client/evaluation/paper/paper.h"
 
 namespace partiemc::evaluation {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "absl/strings/str_format.h"
-#include "evaluation/paper/paper_parts.h"
-#include "evaluation/scenes/random.h"
+#include "client/evaluation/paper/paper_parts.h"
+#include "client/evaluation/scenes/random.h"
 
 namespace partiemc::evaluation {
 namespace {

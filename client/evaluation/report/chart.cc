@@ -4,10 +4,10 @@
 #include <numeric>
 
 #include "absl/strings/str_format.h"
-#include "evaluation/report/picture.h"
-#include "evaluation/report/table.h"
-#include "output/html.h"
-#include "output/text.h"
+#include "client/evaluation/report/picture.h"
+#include "client/evaluation/report/table.h"
+#include "client/output/html.h"
+#include "client/output/text.h"
 
 namespace partiemc::evaluation {
 

@@ -5,11 +5,11 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/report/picture.h"
-#include "evaluation/report/report.h"
-#include "evaluation/report/study_tables.h"
-#include "output/html.h"
-#include "output/text.h"
+#include "client/evaluation/report/picture.h"
+#include "client/evaluation/report/report.h"
+#include "client/evaluation/report/study_tables.h"
+#include "client/output/html.h"
+#include "client/output/text.h"
 
 namespace partiemc::client::page {
 extern const std::string_view

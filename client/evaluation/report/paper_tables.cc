@@ -4,8 +4,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "evaluation/paper/claims.h"
-#include "evaluation/report/study_tables.h"
+#include "client/evaluation/paper/claims.h"
+#include "client/evaluation/report/study_tables.h"
 
 namespace partiemc::evaluation {
 namespace {

@@ -1,13 +1,13 @@
-#include "evaluation/report/picture.h"
+#include "client/evaluation/report/picture.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "absl/strings/str_format.h"
-#include "evaluation/report/table.h"
-#include "output/html.h"
-#include "output/text.h"
+#include "client/evaluation/report/table.h"
+#include "client/output/html.h"
+#include "client/output/text.h"
 
 namespace partiemc::evaluation {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/paper/paper.h"
+#include "client/evaluation/paper/paper.h"
 
 namespace partiemc::evaluation {
 

@@ -1,20 +1,20 @@
-#include "evaluation/report/report.h"
+#include "client/evaluation/report/report.h"
 
 #include <cmath>
 #include <span>
 #include <string_view>
 #include <utility>
 
-#include "evaluation/metrics/compare.h"
-#include "evaluation/report/study_tables.h"
-#include "output/text.h"
+#include "client/evaluation/metrics/compare.h"
+#include "client/evaluation/report/study_tables.h"
+#include "client/output/text.h"
+#include "common/json_text.h"
 
 namespace partiemc::evaluation {
 namespace {
 
 using client::AppendAll;
 using client::Concat;
-using client::JsonString;
 
 std::string JsonNumber(double value) { return std::isfinite(value) ? Concat(value) : "null"; }
 

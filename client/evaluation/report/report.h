@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/metrics/study.h"
-#include "evaluation/paper/claims.h"
-#include "evaluation/paper/paper.h"
+#include "client/evaluation/metrics/study.h"
+#include "client/evaluation/paper/claims.h"
+#include "client/evaluation/paper/paper.h"
 
 namespace partiemc::evaluation {
 

@@ -1,4 +1,4 @@
-#include "evaluation/report/study_tables.h"
+#include "client/evaluation/report/study_tables.h"
 
 #include <algorithm>
 #include <array>

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/metrics/compare.h"
-#include "evaluation/metrics/study.h"
-#include "evaluation/paper/paper.h"
-#include "evaluation/report/table.h"
+#include "client/evaluation/metrics/compare.h"
+#include "client/evaluation/metrics/study.h"
+#include "client/evaluation/paper/paper.h"
+#include "client/evaluation/report/table.h"
 
 namespace partiemc::evaluation {
 

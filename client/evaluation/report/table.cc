@@ -1,11 +1,11 @@
-#include "evaluation/report/table.h"
+#include "client/evaluation/report/table.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "absl/strings/str_format.h"
-#include "output/html.h"
-#include "output/text.h"
+#include "client/output/html.h"
+#include "client/output/text.h"
 
 namespace partiemc::evaluation {
 

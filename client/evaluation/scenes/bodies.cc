@@ -1,11 +1,11 @@
-#include "evaluation/scenes/bodies.h"
+#include "client/evaluation/scenes/bodies.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/shapes.h"
 
 namespace partiemc::evaluation {
 namespace {

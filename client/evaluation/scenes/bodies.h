@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "evaluation/scenes/motion.h"
-#include "evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/motion.h"
+#include "client/evaluation/scenes/outline.h"
 
 namespace partiemc::evaluation {
 

@@ -1,10 +1,10 @@
-#include "evaluation/scenes/erosion.h"
+#include "client/evaluation/scenes/erosion.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "evaluation/scenes/segment_index.h"
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/segment_index.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

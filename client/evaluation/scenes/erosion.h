@@ -1,7 +1,7 @@
 // The second reference: the curve through the outermost particle centres.
 #pragma once
 
-#include "evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/outline.h"
 
 namespace partiemc::evaluation {
 

@@ -1,9 +1,9 @@
-#include "evaluation/scenes/motion.h"
+#include "client/evaluation/scenes/motion.h"
 
 #include <cmath>
 #include <utility>
 
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

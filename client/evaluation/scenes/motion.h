@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "evaluation/scenes/outline.h"
-#include "evaluation/scenes/random.h"
+#include "client/evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/random.h"
 
 namespace partiemc::evaluation {
 

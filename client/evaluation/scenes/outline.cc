@@ -1,4 +1,4 @@
-#include "evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/outline.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "evaluation/scenes/sampling.h"
+#include "client/evaluation/scenes/sampling.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

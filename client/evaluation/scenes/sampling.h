@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/scenes/outline.h"
-#include "evaluation/scenes/random.h"
-#include "evaluation/scenes/segment_index.h"
+#include "client/evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/random.h"
+#include "client/evaluation/scenes/segment_index.h"
 
 namespace partiemc::evaluation {
 

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "evaluation/scenes/scenes.h"
-#include "evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/scenes.h"
+#include "client/evaluation/scenes/shapes.h"
 
 namespace partiemc::evaluation {
 namespace {

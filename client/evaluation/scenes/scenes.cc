@@ -1,4 +1,4 @@
-#include "evaluation/scenes/scenes.h"
+#include "client/evaluation/scenes/scenes.h"
 
 #include <algorithm>
 #include <array>
@@ -8,10 +8,10 @@
 #include <numeric>
 #include <utility>
 
-#include "evaluation/scenes/bodies.h"
-#include "evaluation/scenes/erosion.h"
-#include "evaluation/scenes/shapes.h"
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/bodies.h"
+#include "client/evaluation/scenes/erosion.h"
+#include "client/evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

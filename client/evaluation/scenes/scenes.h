@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/scenes/sampling.h"
-#include "evaluation/scenes/sequence.h"
+#include "client/evaluation/scenes/sampling.h"
+#include "client/evaluation/scenes/sequence.h"
 
 namespace partiemc::evaluation {
 

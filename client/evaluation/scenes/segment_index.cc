@@ -1,4 +1,4 @@
-#include "evaluation/scenes/segment_index.h"
+#include "client/evaluation/scenes/segment_index.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/outline.h"
 
 namespace partiemc::evaluation {
 

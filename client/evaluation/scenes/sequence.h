@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/scenes/motion.h"
-#include "evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/motion.h"
+#include "client/evaluation/scenes/outline.h"
 
 namespace partiemc::evaluation {
 

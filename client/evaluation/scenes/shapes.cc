@@ -1,4 +1,4 @@
-#include "evaluation/scenes/shapes.h"
+#include "client/evaluation/scenes/shapes.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 namespace partiemc::evaluation {
 namespace {

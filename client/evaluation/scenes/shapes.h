@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "evaluation/scenes/outline.h"
+#include "client/evaluation/scenes/outline.h"
 
 namespace partiemc::evaluation {
 

@@ -1,4 +1,4 @@
-#include "evaluation/scenes/trigonometry.h"
+#include "client/evaluation/scenes/trigonometry.h"
 
 #include <cmath>
 

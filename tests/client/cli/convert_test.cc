@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "client/cli/program.h"
-#include "recording/recording.h"
+#include "client/recording/recording.h"
 
 namespace partiemc::client {
 namespace {

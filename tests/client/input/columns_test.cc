@@ -1,4 +1,4 @@
-#include "client/input/columns.h"
+#include "client/input/base/columns.h"
 
 #include "client/input/fixtures.h"
 

@@ -1,4 +1,4 @@
-#include "client/input/number_text.h"
+#include "client/input/base/number_text.h"
 
 #include <clocale>
 #include <cmath>

@@ -7,9 +7,9 @@
 #include <thread>
 #include <vector>
 
+#include "client/library/backoff.h"
 #include "client/library/fake_server.h"
-#include "library/backoff.h"
-#include "library/frame_ring.h"
+#include "client/library/resend_buffer.h"
 #include "partiemc/client/stream.h"
 
 namespace partiemc::client {
@@ -399,25 +399,25 @@ TEST(Backoff, ClientsDoNotComeBackAsOne) {
   EXPECT_NE(one.NextPause(), other.NextPause());
 }
 
-TEST(FrameRing, HoldsFramesByTheirNumbersAndCountsTheirBytes) {
+TEST(ResendBuffer, HoldsFramesByTheirNumbersAndCountsTheirBytes) {
   const auto request = [](const std::string& text) {
     const grpc::Slice slice(text);
     return grpc::ByteBuffer(&slice, 1);
   };
-  FrameRing ring(5);
-  ring.Add(request("12"));
-  ring.Add(request("1234"));
-  ring.Add(request("1"));
-  EXPECT_EQ(ring.begin(), 5u);
-  EXPECT_EQ(ring.end(), 8u);
-  EXPECT_EQ(ring.bytes(), 7u);
-  EXPECT_EQ(ring.at(6).Length(), 4u);
-  ring.DropBelow(7);
-  EXPECT_EQ(ring.begin(), 7u);
-  EXPECT_EQ(ring.bytes(), 1u);
-  ring.DropBelow(100);
-  EXPECT_EQ(ring.begin(), 8u) << "what was never there cannot go";
-  EXPECT_EQ(ring.bytes(), 0u);
+  ResendBuffer buffer(5);
+  buffer.Add(request("12"));
+  buffer.Add(request("1234"));
+  buffer.Add(request("1"));
+  EXPECT_EQ(buffer.begin(), 5u);
+  EXPECT_EQ(buffer.end(), 8u);
+  EXPECT_EQ(buffer.bytes(), 7u);
+  EXPECT_EQ(buffer.at(6).Length(), 4u);
+  buffer.DropBelow(7);
+  EXPECT_EQ(buffer.begin(), 7u);
+  EXPECT_EQ(buffer.bytes(), 1u);
+  buffer.DropBelow(100);
+  EXPECT_EQ(buffer.begin(), 8u) << "what was never there cannot go";
+  EXPECT_EQ(buffer.bytes(), 0u);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "output/atomic_file.h"
+#include "client/output/atomic_file.h"
 
 #include <fcntl.h>
 #include <sys/resource.h>

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "output/frame_record.h"
+#include "client/output/frame_record.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::client {

@@ -1,4 +1,4 @@
-#include "output/frame_writer.h"
+#include "client/output/frame_writer.h"
 
 #include <bit>
 #include <charconv>
@@ -9,10 +9,10 @@
 #include <sstream>
 
 #include "client/output/fixtures.h"
+#include "client/output/text.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
-#include "output/text.h"
 
 namespace partiemc::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "output/progress.h"
+#include "client/output/progress.h"
 
 #include <algorithm>
 #include <vector>

@@ -1,13 +1,13 @@
-#include "output/report.h"
+#include "client/output/report.h"
 
 #include <bit>
 
 #include "absl/strings/escaping.h"
 #include "client/output/fixtures.h"
+#include "client/output/report_geometry.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
-#include "output/report_geometry.h"
 
 namespace partiemc::client {
 namespace {

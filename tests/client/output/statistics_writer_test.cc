@@ -1,4 +1,4 @@
-#include "output/statistics_writer.h"
+#include "client/output/statistics_writer.h"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "output/summary.h"
+#include "client/output/summary.h"
 
 #include <sstream>
 

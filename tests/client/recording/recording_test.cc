@@ -1,4 +1,4 @@
-#include "recording/recording.h"
+#include "client/recording/recording.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "recording/block.h"
+#include "client/recording/block.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::client {

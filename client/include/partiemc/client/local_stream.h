@@ -17,28 +17,14 @@ struct LocalStreamOptions {
   std::size_t frames_in_flight = 2;
 };
 
-class LocalStream final : public FrameStream {
+/// Send waits without a deadline: the work is done by this process itself.
+class LocalStream : public FrameStream {
  public:
   /// Errors: INVALID_ARGUMENT, see Validate(ReconstructionParameters).
   static absl::StatusOr<std::unique_ptr<LocalStream>> Open(const LocalStreamOptions& options);
 
   /// Waits for the frame in work, drops the others. No call may be under way.
-  ~LocalStream() override;
-
-  const StreamInfo& info() const override;
-  /// Waits without a deadline: the work is done by this process itself.
-  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
-  absl::Status FinishSending() override;
-  absl::StatusOr<Received> Receive(
-      Event& event, std::optional<std::chrono::milliseconds> wait = std::nullopt) override;
-  std::size_t InFlight() const override;
-  void Cancel() override;
-
- private:
-  class Worker;
-  explicit LocalStream(std::unique_ptr<Worker> worker);
-
-  std::unique_ptr<Worker> worker_;
+  ~LocalStream() override = default;
 };
 
 }  // namespace partiemc::client

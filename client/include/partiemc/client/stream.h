@@ -78,8 +78,6 @@ struct StreamOptions {
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
 
-class ResumingStream;
-
 /// Frames are never dropped: Send waits while the server's window is full. A frame larger than the
 /// server's limits is refused before anything is sent. Reading runs in the background, so that a
 /// sender and a receiver never wait for each other beyond the window.
@@ -87,7 +85,7 @@ class ResumingStream;
 /// A stream survives its connection and its server: Receive connects again, to the next address
 /// first, and goes on from the last checkpoint. Every frame is still answered once, in order, with
 /// the bits that it would have had. Send does not fail meanwhile; it waits for the window.
-class Stream final : public FrameStream {
+class Stream : public FrameStream {
  public:
   /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
   /// Errors: INVALID_ARGUMENT (address, credentials, parameters, name or labels), UNAVAILABLE (no
@@ -97,20 +95,7 @@ class Stream final : public FrameStream {
                                                       const StreamOptions& options);
 
   /// Cancels the stream unless its end has been received. No call may be under way.
-  ~Stream() override;
-
-  const StreamInfo& info() const override;
-  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
-  absl::Status FinishSending() override;
-  absl::StatusOr<Received> Receive(
-      Event& event, std::optional<std::chrono::milliseconds> wait = std::nullopt) override;
-  std::size_t InFlight() const override;
-  void Cancel() override;
-
- private:
-  explicit Stream(std::unique_ptr<ResumingStream> stream);
-
-  std::unique_ptr<ResumingStream> stream_;
+  ~Stream() override = default;
 };
 
 }  // namespace partiemc::client

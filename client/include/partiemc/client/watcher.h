@@ -77,8 +77,6 @@ struct WatchEnd {
   std::uint64_t dropped = 0;  ///< Frames that did not come since the last one.
 };
 
-class RejoiningWatch;
-
 /// One thread receives; Cancel may come from any thread. Reading runs in the background, credit is
 /// given as frames are received.
 class Watcher {
@@ -92,11 +90,9 @@ class Watcher {
                                                        const WatcherOptions& options);
 
   /// Leaves unless the end has been received. No call may be under way.
-  ~Watcher();
-  Watcher(const Watcher&) = delete;
-  Watcher& operator=(const Watcher&) = delete;
+  virtual ~Watcher() = default;
 
-  const WatchedStream& stream() const;
+  virtual const WatchedStream& stream() const = 0;
 
   /// Waits for the next frame, at most `wait` where it is given. kEnd: the watch has ended, as
   /// end() tells.
@@ -105,19 +101,14 @@ class Watcher {
   /// UNAVAILABLE (the server drains, or the connection was lost, and the stream was not found
   /// again), DATA_LOSS when a message makes no
   /// sense, CANCELLED after Cancel; each has ended the watch.
-  absl::StatusOr<Received> Receive(WatchedFrame& frame,
-                                   std::optional<std::chrono::milliseconds> wait = std::nullopt);
+  virtual absl::StatusOr<Received> Receive(
+      WatchedFrame& frame, std::optional<std::chrono::milliseconds> wait = std::nullopt) = 0;
 
   /// Once the watch has ended; what the server said of it, if it did.
-  const WatchEnd& end() const;
+  virtual const WatchEnd& end() const = 0;
 
   /// Leaves at once: calls under way and later ones return CANCELLED.
-  void Cancel();
-
- private:
-  explicit Watcher(std::unique_ptr<RejoiningWatch> watch);
-
-  std::unique_ptr<RejoiningWatch> watch_;
+  virtual void Cancel() = 0;
 };
 
 }  // namespace partiemc::client

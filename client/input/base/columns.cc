@@ -1,0 +1,285 @@
+#include "client/input/base/columns.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_join.h"
+#include "client/input/base/number_text.h"
+#include "client/input/base/text.h"
+
+namespace partiemc::client::input {
+namespace {
+
+using Names = std::vector<std::string>;
+using Axes = std::array<std::optional<std::size_t>, 3>;
+
+// "Pos.x [m]" -> "posx": what is left of a name when people's habits are taken away.
+std::string Canonical(std::string_view name) {
+  const std::size_t unit = name.find_first_of("[(");
+  if (unit != std::string_view::npos && unit > 0) name = name.substr(0, unit);
+  std::string canonical;
+  for (const char c : name) {
+    if (std::string_view(" _.:-\"'").find(c) == std::string_view::npos) {
+      canonical.push_back(absl::ascii_tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  return canonical;
+}
+
+// Spellings of one axis of a vector: each of `stems` with the axis before or behind it.
+std::vector<std::string> Spellings(std::initializer_list<std::string_view> stems,
+                                   std::size_t axis) {
+  const std::string letter(1, "xyz"[axis]);
+  std::vector<std::string> spellings;
+  for (const std::string_view stem : stems) {
+    for (const std::string& part : {letter, Concat(axis)}) {
+      spellings.push_back(Concat(stem, part));
+    }
+    spellings.push_back(Concat(letter, stem));
+  }
+  return spellings;
+}
+
+std::optional<std::size_t> FindFirst(const Names& canonical,
+                                     const std::vector<std::string>& spellings) {
+  for (const std::string& spelling : spellings) {
+    const auto found = std::find(canonical.begin(), canonical.end(), spelling);
+    if (found != canonical.end()) return static_cast<std::size_t>(found - canonical.begin());
+  }
+  return std::nullopt;
+}
+
+std::ptrdiff_t CountFound(const Axes& axes) {
+  return std::count_if(axes.begin(), axes.end(), [](const auto& axis) { return axis.has_value(); });
+}
+
+// Families of position columns in the order of preference.
+enum class Family { kPlain, kVector, kUnwrapped, kScaled, kScaledUnwrapped };
+
+constexpr Family kFamilies[] = {Family::kPlain, Family::kVector, Family::kUnwrapped,
+                                Family::kScaled, Family::kScaledUnwrapped};
+
+std::vector<std::string> PositionSpellings(Family family, std::size_t axis) {
+  const std::string letter(1, "xyz"[axis]);
+  switch (family) {
+    case Family::kPlain:
+      return {letter};
+    case Family::kVector:
+      return Spellings({"pos", "position", "positions", "point", "points", "coord", "coords",
+                        "coordinate", "coordinates", "xy", "xyz"},
+                       axis);
+    case Family::kUnwrapped:
+      return {letter + "u"};
+    case Family::kScaled:
+      return {letter + "s"};
+    case Family::kScaledUnwrapped:
+      return {letter + "su"};
+  }
+  return {};
+}
+
+Axes FindFamily(const Names& canonical, Family family) {
+  Axes axes;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    axes[axis] = FindFirst(canonical, PositionSpellings(family, axis));
+  }
+  return axes;
+}
+
+bool IsScaled(Family family) {
+  return family == Family::kScaled || family == Family::kScaledUnwrapped;
+}
+
+Axes FindVelocities(const Names& canonical) {
+  Axes axes;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    axes[axis] = FindFirst(canonical, Spellings({"v", "vel", "velocity", "velocities"}, axis));
+  }
+  // PySPH's own names, only together: a single "u" or "v" is anything.
+  const auto u = FindFirst(canonical, {"u"});
+  const auto v = FindFirst(canonical, {"v"});
+  if (CountFound(axes) == 0 && u && v) axes = {u, v, FindFirst(canonical, {"w"})};
+  return axes;
+}
+
+std::string List(const Names& names) {
+  constexpr std::size_t kShown = 12;
+  const Names shown(names.begin(), names.begin() + std::min(names.size(), kShown));
+  return Concat(absl::StrJoin(shown, ","), names.size() > kShown ? ",..." : "");
+}
+
+// A column that the caller names: as written, in another case or spelling, or by its number from 1.
+std::optional<std::size_t> FindAsked(const Names& names, const Names& canonical,
+                                     const std::string& asked) {
+  if (const auto exact = FindFirst(names, {asked})) return exact;
+  if (const auto number = ParseCount(asked); number && *number >= 1 && *number <= names.size()) {
+    return static_cast<std::size_t>(*number - 1);
+  }
+  return FindFirst(canonical, {Canonical(asked)});
+}
+
+// Positions in the columns that the caller lists. Where the names tell axes in rising order (x and
+// z), these are the axes, so that velocities of the same axes fit; else the first is x.
+absl::Status PlanAskedPositions(const Names& names, const Names& canonical,
+                                const ColumnRequest& request, ColumnPlan& plan) {
+  const Names& asked = request.columns;
+  if (asked.size() != 2 && asked.size() != 3) {
+    return absl::FailedPreconditionError(
+        Concat("--columns lists ", asked.size(),
+               " columns; the file names its columns, so list the two or three that hold the "
+               "positions"));
+  }
+  std::vector<std::size_t> found;
+  for (const std::string& column : asked) {
+    const auto index = FindAsked(names, canonical, column);
+    if (!index) {
+      return absl::FailedPreconditionError(
+          Concat("there is no column '", column, "' for --columns; the columns are ", List(names)));
+    }
+    found.push_back(*index);
+  }
+  for (const Family family : kFamilies) {
+    const Axes axes = FindFamily(canonical, family);
+    Axes chosen;
+    std::size_t next = 0;
+    for (std::size_t axis = 0; axis < 3 && next < found.size(); ++axis) {
+      if (axes[axis] == found[next]) chosen[axis] = found[next++];
+    }
+    if (next == found.size()) {
+      plan.positions = chosen;
+      plan.scaled = IsScaled(family);
+      return absl::OkStatus();
+    }
+  }
+  for (std::size_t axis = 0; axis < found.size(); ++axis) plan.positions[axis] = found[axis];
+  plan.velocities = {};
+  return absl::OkStatus();
+}
+
+absl::Status PlanRecognisedPositions(const Names& names, const Names& canonical, ColumnPlan& plan) {
+  for (const Family family : kFamilies) {
+    const Axes axes = FindFamily(canonical, family);
+    if (CountFound(axes) < 2) continue;
+    plan.positions = axes;
+    plan.scaled = IsScaled(family);
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(Concat("no position columns (x,y and the like) among ",
+                                              List(names), "; name them with --columns"));
+}
+
+absl::Status PlanConditions(const Names& names, const Names& canonical,
+                            const ColumnRequest& request, ColumnPlan& plan) {
+  for (const Condition& condition : request.conditions) {
+    const auto column = FindAsked(names, canonical, condition.column);
+    if (!column) {
+      return absl::FailedPreconditionError(Concat("there is no column '", condition.column,
+                                                  "' to select by; the columns are ", List(names)));
+    }
+    plan.conditions.push_back(*column);
+  }
+  return absl::OkStatus();
+}
+
+Names AllCanonical(const Names& names) {
+  Names canonical;
+  for (const std::string& name : names) canonical.push_back(Canonical(name));
+  return canonical;
+}
+
+bool AllNumbers(const Names& columns) {
+  return std::all_of(columns.begin(), columns.end(),
+                     [](const std::string& column) { return ParseCount(column).has_value(); });
+}
+
+}  // namespace
+
+bool Condition::Holds(std::string_view cell) const {
+  if (cell == text) return true;
+  if (!number) return false;
+  const auto value = ParseNumber(cell);
+  return value && *value == *number;
+}
+
+absl::StatusOr<ColumnRequest> ParseColumnRequest(const std::vector<std::string>& select,
+                                                 std::string_view columns) {
+  ColumnRequest request;
+  for (const std::string& expression : select) {
+    const std::string_view whole = expression;
+    const std::size_t equals = std::min(whole.find('='), whole.size());
+    const std::string_view column = Strip(whole.substr(0, equals));
+    const std::string_view value = Strip(whole.substr(std::min(equals + 1, whole.size())));
+    if (column.empty() || value.empty()) {
+      return absl::InvalidArgumentError(
+          Concat("--select: '", expression, "'; must be COLUMN=VALUE, for example type=1"));
+    }
+    request.conditions.push_back({std::string(column), std::string(value), ParseNumber(value)});
+  }
+  if (columns.empty()) return request;
+  for (const std::string_view column : Split(columns, ',')) {
+    if (column.empty()) {
+      return absl::InvalidArgumentError(
+          Concat("--columns: '", columns,
+                 "'; must be names or numbers separated by commas, for example "
+                 "x,y or 2,3"));
+    }
+    request.columns.emplace_back(column);
+  }
+  return request;
+}
+
+absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequest& request) {
+  const Names canonical = AllCanonical(names);
+  ColumnPlan plan;
+  plan.column_count = names.size();
+  plan.velocities = FindVelocities(canonical);
+  plan.id = FindFirst(canonical, {"id", "ids", "idp", "particleid", "particleids", "originalid",
+                                  "pid", "gid", "tag"});
+  plan.volume = FindFirst(canonical, {"volume", "volumes", "vol", "area", "areas", "particlevolume",
+                                      "particlearea", "volumetricmeasure"});
+  const absl::Status positions = request.columns.empty()
+                                     ? PlanRecognisedPositions(names, canonical, plan)
+                                     : PlanAskedPositions(names, canonical, request, plan);
+  if (!positions.ok()) return positions;
+  if (absl::Status status = PlanConditions(names, canonical, request, plan); !status.ok()) {
+    return status;
+  }
+  return plan;
+}
+
+absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnRequest& request) {
+  Names names;
+  ColumnRequest by_name = request;
+  if (request.columns.empty()) {
+    if (count != 2 && count != 3) {
+      return absl::FailedPreconditionError(Concat(
+          "has ", count, count == 1 ? " column" : " columns",
+          " and no names; tell which are the "
+          "positions with --columns, by number (2,3) or by naming the columns in their order "
+          "(id,x,y)"));
+    }
+    names = {"x", "y", "z"};
+    names.resize(count);
+  } else if (AllNumbers(request.columns)) {
+    for (std::size_t column = 1; column <= count; ++column) names.push_back(Concat(column));
+  } else {
+    if (request.columns.size() > count) {
+      return absl::FailedPreconditionError(
+          Concat("--columns names ", request.columns.size(), " columns, the file has ", count));
+    }
+    names = request.columns;
+    names.resize(count, "-");
+    by_name.columns.clear();
+  }
+  return PlanNamedColumns(names, by_name);
+}
+
+bool NamesHoldPositions(const Names& names) {
+  const Names canonical = AllCanonical(names);
+  return std::any_of(std::begin(kFamilies), std::end(kFamilies),
+                     [&](Family family) { return CountFound(FindFamily(canonical, family)) >= 2; });
+}
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,58 @@
+#include "client/input/base/number_text.h"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <system_error>
+
+namespace partiemc::client::input {
+namespace {
+
+// std::from_chars leaves both ends of the range to the caller. `text` is a well-formed number.
+double OutOfRange(std::string_view text) {
+  const bool negative = text.front() == '-';
+  const std::size_t exponent = text.find_first_of("eE");
+  const bool small = exponent == std::string_view::npos
+                         ? text.find_first_of("123456789") > std::min(text.find('.'), text.size())
+                         : text.substr(exponent + 1, 1) == "-";
+  const double magnitude = small ? 0.0 : std::numeric_limits<double>::infinity();
+  return negative ? -magnitude : magnitude;
+}
+
+}  // namespace
+
+std::optional<double> ParseNumber(std::string_view text) {
+  if (!text.empty() && text.front() == '+') {
+    text.remove_prefix(1);
+    if (!text.empty() && text.front() == '-') return std::nullopt;
+  }
+  double number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  if (stop != end || text.empty()) return std::nullopt;
+  if (error == std::errc::result_out_of_range) return OutOfRange(text);
+  if (error != std::errc()) return std::nullopt;
+  return number;
+}
+
+std::optional<std::uint64_t> ParseCount(std::string_view text) {
+  std::uint64_t count = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, count);
+  if (stop != end || error != std::errc() || text.empty()) return std::nullopt;
+  return count;
+}
+
+std::optional<std::uint64_t> ParseId(std::string_view text) {
+  if (const auto count = ParseCount(text)) return count;
+  const auto number = ParseNumber(text);
+  return number ? IdOfNumber(*number) : std::nullopt;
+}
+
+std::optional<std::uint64_t> IdOfNumber(double number) {
+  constexpr double kWholeBelow = 9007199254740992.0;  // 2^53: above, neighbours are not 1 apart.
+  if (!(number >= 0 && number < kWholeBelow) || std::trunc(number) != number) return std::nullopt;
+  return static_cast<std::uint64_t>(number);
+}
+
+}  // namespace partiemc::client::input

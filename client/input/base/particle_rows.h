@@ -1,0 +1,75 @@
+// Particles as a format yields them: every axis that the input has, before the plane is known.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/input/base/columns.h"
+
+namespace partiemc::client::input {
+
+struct ParticleRows {
+  std::array<std::vector<double>, 3> positions;  ///< By axis; axes not in the plan stay empty.
+  std::array<std::vector<float>, 3> velocities;
+  std::vector<std::uint64_t> ids;
+  std::vector<double> volumes;
+  std::array<bool, 3> has_position = {};
+  std::array<bool, 3> has_velocity = {};
+  bool has_ids = false;  ///< Falls to false at the first id that is no id.
+  bool has_volumes = false;
+  bool float32 = false;
+  std::optional<double> time;
+  std::string source;
+  std::size_t count = 0;
+
+  /// Empties the arrays, keeps their memory, and notes which of them `plan` will fill.
+  void Begin(const ColumnPlan& plan);
+};
+
+/// Adds one row of a text table if the conditions hold. Requires rows.Begin(plan) before.
+/// Errors, without a place: kDataLoss if cells are missing or are no numbers.
+absl::Status AppendTextRow(std::span<const std::string_view> cells, const ColumnPlan& plan,
+                           const ColumnRequest& request, ParticleRows& rows);
+
+/// What an element of a binary array is.
+enum class ElementType {
+  kFloat32,
+  kFloat64,
+  kInt8,
+  kInt16,
+  kInt32,
+  kInt64,
+  kUInt8,
+  kUInt16,
+  kUInt32,
+  kUInt64
+};
+
+std::size_t ElementBytes(ElementType type);
+
+/// A column of a binary table: a view, elements `stride` bytes apart.
+struct ArrayColumn {
+  ElementType type = ElementType::kFloat64;
+  bool swapped = false;  ///< Byte order other than this machine's.
+  const char* data = nullptr;
+  std::size_t stride = 0;
+
+  double Number(std::size_t row) const;
+  std::optional<std::uint64_t> Id(std::size_t row) const;
+};
+
+/// Adds `row_count` rows of a binary table, those for which the conditions hold. Every column that
+/// the plan names must be there with `row_count` elements. Requires rows.Begin(plan) before.
+/// Errors: kFailedPrecondition if a condition compares with text.
+absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t row_count,
+                             const ColumnPlan& plan, const ColumnRequest& request,
+                             ParticleRows& rows);
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,23 @@
+// gzip, zstd and raw deflate as byte sources.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
+
+namespace partiemc::client::input {
+
+enum class Packing { kNone, kGzip, kZstd, kDeflate };
+
+/// How a file is packed, by its first four bytes. kDeflate has no mark and is never recognised.
+Packing RecognisePacking(std::string_view first_bytes);
+
+/// `packed` unpacked. Several gzip members or zstd frames follow each other as one; an end in the
+/// middle of one is kDataLoss. `name` is for messages.
+absl::StatusOr<std::unique_ptr<ByteSource>> Unpack(Packing packing, const std::string& name,
+                                                   std::unique_ptr<ByteSource> packed);
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,41 @@
+// Zip files as numpy.savez writes them: entries stored or deflated, below 4 GiB.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
+
+namespace partiemc::client::input {
+
+struct ZipEntry {
+  std::string name;
+  std::uint64_t offset = 0;  ///< Of the local header.
+  std::uint64_t packed_bytes = 0;
+  std::uint64_t bytes = 0;
+  std::uint32_t crc = 0;
+  std::uint16_t method = 0;  ///< 0 stored, 8 deflated; others cannot be opened.
+};
+
+/// The directory of an archive. Not trusted: every offset and size is checked against the file.
+class ZipArchive {
+ public:
+  /// kDataLoss if the file is no zip archive, is truncated or has over 65,535 entries.
+  static absl::StatusOr<ZipArchive> Open(const std::string& path);
+
+  const std::vector<ZipEntry>& entries() const { return entries_; }
+
+  /// The bytes of an entry. At the end the checksum is verified: kDataLoss if it is another.
+  /// kUnimplemented for other methods and encrypted entries.
+  absl::StatusOr<std::unique_ptr<ByteSource>> OpenEntry(const ZipEntry& entry) const;
+
+ private:
+  std::string path_;
+  std::uint64_t file_bytes_ = 0;
+  std::vector<ZipEntry> entries_;
+};
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,36 @@
+// The frames of a stream that may have to be sent again: those after its last checkpoint.
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+
+namespace partiemc::client {
+
+/// Holds requests by their sequence numbers, without a gap. A request's bytes are shared with gRPC,
+/// not copied. Not thread-safe.
+class ResendBuffer {
+ public:
+  /// `first` is the number of the first frame.
+  explicit ResendBuffer(std::uint64_t first) : first_(first) {}
+
+  /// Adds frame end().
+  void Add(grpc::ByteBuffer request);
+  /// Drops the frames below `sequence`.
+  void DropBelow(std::uint64_t sequence);
+
+  /// Requires: begin() <= sequence < end().
+  const grpc::ByteBuffer& at(std::uint64_t sequence) const { return requests_[sequence - first_]; }
+  std::uint64_t begin() const { return first_; }
+  std::uint64_t end() const { return first_ + requests_.size(); }
+  std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  std::uint64_t first_;
+  std::uint64_t bytes_ = 0;
+  std::deque<grpc::ByteBuffer> requests_;
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,78 @@
+#include "client/library/retry_loop.h"
+
+#include <algorithm>
+#include <random>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/library/channel.h"
+
+namespace partiemc::client {
+
+RetryLoop::RetryLoop(std::vector<std::string> addresses, const char* call,
+                     const ReconnectPolicy& policy, std::chrono::milliseconds connect_timeout)
+    : addresses_(std::move(addresses)),
+      call_(call),
+      policy_(policy),
+      connect_timeout_(connect_timeout) {}
+
+void RetryLoop::Lose(std::string story) {
+  if (backoff_) return;
+  backoff_.emplace(policy_, addresses_.size(), std::random_device{}());
+  lost_at_ = attempt_at_ = Clock::now();
+  story_ = std::move(story);
+}
+
+void RetryLoop::TryNext(absl::Status refusal) {
+  UseNextAddress();
+  TryAgain(std::move(refusal));
+}
+
+void RetryLoop::TryAgain(absl::Status refusal) {
+  refusal_ = std::move(refusal);
+  attempt_at_ = Clock::now() + backoff_->NextPause();
+}
+
+absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
+                                                  std::optional<Clock::time_point> until) {
+  const auto give_up_at = lost_at_ + policy_.give_up_after;
+  for (;;) {
+    if (attempts.Cancelled()) return Outcome::kCancelled;
+    const auto now = Clock::now();
+    if (attempt_until_) {
+      bool retryable = false;
+      auto opened = attempts.Check(retryable);
+      if (!opened.ok() || *opened) {
+        attempt_until_.reset();
+        if (opened.ok()) return Outcome::kOpened;
+        attempts.Drop();
+        if (!retryable) return opened.status();
+        TryNext(opened.status());
+        continue;
+      }
+      if (now >= *attempt_until_) {
+        attempts.Drop();
+        // One that was cut short by the end says nothing: what there was before it is told.
+        if (*attempt_until_ < give_up_at) TryNext(NotAccepted(address(), call_, connect_timeout_));
+        attempt_until_.reset();
+        continue;
+      }
+    } else if (now >= give_up_at) {
+      return Outcome::kGaveUp;
+    } else if (now >= attempt_at_) {
+      if (auto started = attempts.Start(address()); !started.ok()) return started;
+      attempt_until_ = std::min(now + connect_timeout_, give_up_at);
+      continue;
+    }
+    if (until && now >= *until) return Outcome::kNotYet;
+    const auto next = attempt_until_ ? *attempt_until_ : std::min(attempt_at_, give_up_at);
+    attempts.Wait(until ? std::min(next, *until) : next);
+  }
+}
+
+std::string RetryLoop::Story() const {
+  return absl::StrCat(story_, ", went on at ", address(), " after ",
+                      Seconds(Clock::now() - lost_at_));
+}
+
+}  // namespace partiemc::client

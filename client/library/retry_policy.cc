@@ -1,0 +1,49 @@
+#include "client/library/retry_policy.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "absl/strings/str_cat.h"
+#include "client/library/channel.h"
+
+namespace partiemc::client {
+namespace {
+
+// Reasons of proto/PROTOCOL.md. A name or a place may be held by what is left of the stream's own
+// former call, and a server of another version or with other keys may have a better one beside it.
+constexpr std::string_view kDraining = "DRAINING";
+constexpr std::array<std::string_view, 7> kRetryableWhileResuming = {
+    "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",    "CALLER_STREAMS",
+    "CALLER_CALLS", "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE"};
+
+}  // namespace
+
+bool IsLostConnection(grpc::StatusCode code, std::string_view reason) {
+  if (!reason.empty()) return reason == kDraining;
+  switch (code) {
+    case grpc::StatusCode::OK:
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::INTERNAL:
+    case grpc::StatusCode::UNKNOWN:
+    case grpc::StatusCode::CANCELLED:
+      return true;
+    default:
+      return false;
+  }
+}
+
+Loss LossOf(const StreamCall& call, bool resuming) {
+  Loss loss{
+      .status = FromGrpc(call.end(), call.address()),
+      .why = Reason(call.end()),
+      .retryable = IsLostConnection(call.end().error_code(), call.reason()) ||
+                   (resuming && std::ranges::count(kRetryableWhileResuming, call.reason()) > 0)};
+  if (loss.status.ok()) {
+    loss.status = absl::UnavailableError(
+        absl::StrCat("the server at ", call.address(), " ended the stream: start again"));
+  }
+  return loss;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,176 @@
+#include "client/library/stream_connector.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/library/channel.h"
+#include "wire/codec.h"
+
+namespace partiemc::client {
+namespace {
+
+// How long one of several addresses may take to be reached before the next is tried, and how long
+// to rest between two rounds, when a stream is opened.
+constexpr std::chrono::milliseconds kShortConnect(250);
+constexpr std::chrono::milliseconds kRest(20);
+
+v1::OpenStream OpenMessage(const StreamOptions& options) {
+  v1::OpenStream open;
+  open.set_stream_name(options.name);
+  wire::EncodeParameters(options.parameters, *open.mutable_parameters());
+  wire::EncodeOutputs({.mesh = options.outputs.mesh,
+                       .normals = options.outputs.normals,
+                       .relative_float32 = options.outputs.relative_float32,
+                       .echo_particles = options.outputs.echo_particles},
+                      *open.mutable_outputs());
+  open.mutable_labels()->insert(options.labels.begin(), options.labels.end());
+  if (options.reconnect.give_up_after.count() > 0) {
+    open.set_checkpoint_interval(options.checkpoint_interval);
+  }
+  return open;
+}
+
+absl::Status NotOpened(const std::string& address) {
+  return absl::DataLossError(absl::StrCat(
+      "the server at ", address, " did not begin with StreamOpened: it breaks the protocol"));
+}
+
+}  // namespace
+
+// Attempts to open the stream. The monitor's lock is let go while it waits.
+class StreamConnector::Calls final : public Attempts {
+ public:
+  Calls(StreamConnector& connector, Lock& lock) : connector_(connector), lock_(lock) {}
+
+  bool Cancelled() override { return connector_.cancelled_; }
+
+  absl::Status Start(const std::string& address) override {
+    lock_.unlock();
+    auto channel = MakeChannel(address, connector_.options_.credentials);
+    lock_.lock();
+    if (!channel.ok()) return channel.status();
+    connector_.Start(lock_, *std::move(channel));
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> Check(bool& retryable) override {
+    StreamCall& call = *connector_.attempt_;
+    retryable = false;
+    if (const auto response = call.Take(lock_)) {
+      if (!response->has_opened()) return NotOpened(call.address());
+      message_ = response->opened();
+      return true;
+    }
+    if (!call.done()) return false;
+    Loss loss = LossOf(call, connector_.resuming_);
+    retryable = loss.retryable;
+    return std::move(loss.status);
+  }
+
+  void Drop() override { StreamConnector::Drop(lock_, std::move(connector_.attempt_)); }
+
+  void Wait(Clock::time_point until) override {
+    connector_.monitor_.changed.wait_until(lock_, until);
+  }
+
+  // Once one is open.
+  Opened TakeOpened() { return {std::move(connector_.attempt_), std::move(message_)}; }
+
+ private:
+  StreamConnector& connector_;
+  Lock& lock_;
+  v1::StreamOpened message_;
+};
+
+StreamConnector::StreamConnector(Monitor& monitor, std::vector<std::string> addresses,
+                                 const StreamOptions& options)
+    : monitor_(monitor),
+      options_(options),
+      retry_(std::move(addresses), "stream", options.reconnect, options.connect_timeout) {}
+
+absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNew(Lock& lock) {
+  const auto give_up_at = Clock::now() + options_.connect_timeout;
+  for (;; retry_.UseNextAddress()) {
+    bool retryable = true;
+    auto opened = OpenNewAt(lock, give_up_at, retryable);
+    if (opened.ok() || !retryable || Clock::now() >= give_up_at) return opened;
+    monitor_.changed.wait_for(lock, kRest, [] { return false; });
+  }
+}
+
+absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(Lock& lock,
+                                                                   Clock::time_point give_up_at,
+                                                                   bool& retryable) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(give_up_at - Clock::now());
+  lock.unlock();
+  auto channel = MakeChannel(address(), options_.credentials);
+  absl::Status reached = channel.status();
+  if (channel.ok()) {
+    reached = Connect(*channel, address(),
+                      retry_.addresses().size() == 1 ? left : std::min(left, kShortConnect));
+  }
+  lock.lock();
+  if (!reached.ok()) return reached;
+  Start(lock, *std::move(channel));
+  monitor_.changed.wait_for(lock, options_.deadline,
+                            [this] { return attempt_->ready() > 0 || attempt_->done(); });
+  Calls calls(*this, lock);
+  const auto opened = calls.Check(retryable);
+  if (opened.ok() && *opened) return calls.TakeOpened();
+  calls.Drop();
+  if (!opened.ok()) return opened.status();
+  return NotAccepted(address(), "stream", options_.deadline);
+}
+
+void StreamConnector::Lost(const Loss& loss, v1::ResumeStream resume) {
+  resume_ = std::move(resume);
+  resuming_ = true;
+  retry_.Lose(absl::StrCat("lost ", address(), " (", loss.why, ")"));
+  retry_.TryNext(loss.status);
+}
+
+absl::StatusOr<std::optional<StreamConnector::Opened>> StreamConnector::OpenAgain(
+    Lock& lock, std::optional<Clock::time_point> until) {
+  Calls calls(*this, lock);
+  const auto outcome = retry_.Run(calls, until);
+  if (!outcome.ok()) return outcome.status();
+  switch (*outcome) {
+    case RetryLoop::Outcome::kOpened:
+      return calls.TakeOpened();
+    case RetryLoop::Outcome::kNotYet:
+      return std::nullopt;
+    case RetryLoop::Outcome::kCancelled:
+      return absl::CancelledError("the stream was cancelled");
+    case RetryLoop::Outcome::kGaveUp:
+      break;
+  }
+  return absl::UnavailableError(absl::StrCat("the stream could not go on within ",
+                                             Seconds(options_.reconnect.give_up_after), ": ",
+                                             retry_.refusal().message()));
+}
+
+void StreamConnector::Start(Lock& lock, std::shared_ptr<grpc::Channel> channel) {
+  v1::OpenStream open = OpenMessage(options_);
+  if (resuming_) *open.mutable_resume() = resume_;
+  lock.unlock();
+  auto call = std::make_unique<StreamCall>(monitor_, std::move(channel), address());
+  call->Start(open);
+  lock.lock();
+  attempt_ = std::move(call);
+}
+
+// Without the lock: gRPC's threads need it to end a call.
+void StreamConnector::Drop(Lock& lock, std::unique_ptr<StreamCall> call) {
+  lock.unlock();
+  call.reset();
+  lock.lock();
+}
+
+void StreamConnector::Cancel(Lock& lock) {
+  cancelled_ = true;
+  if (attempt_ != nullptr) attempt_->Cancel(lock);
+}
+
+}  // namespace partiemc::client
