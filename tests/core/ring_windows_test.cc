@@ -48,12 +48,12 @@ class RandomRing {
   }
   const std::vector<LatticePoint>& normals() const { return normals_; }
 
-  UnrolledRing Unrolled(UnrolledRings& rings) const {
+  PeriodicRing Copied(PeriodicRings& rings) const {
     // More than a turn in either direction.
     const int margin = count() + 20;
     rings.sizes() = {{static_cast<std::uint32_t>(count()), static_cast<std::uint32_t>(margin)}};
     rings.Allocate();
-    const UnrolledRing ring = rings[0];
+    const PeriodicRing ring = rings[0];
     for (int k = 0; k < count(); ++k) {
       ring.x[k] = RingUnits(points_[k].x);
       ring.y[k] = RingUnits(points_[k].y);
@@ -141,8 +141,8 @@ TEST(RingWindows, GoByTheLengthsOfStepsForAnyInstructionSet) {
     support::Random random(static_cast<std::uint64_t>(count));
     const RandomRing source(random, count);
     support::ForEachInstructionSet([&] {
-      UnrolledRings rings;
-      const UnrolledRing ring = source.Unrolled(rings);
+      PeriodicRings rings;
+      const PeriodicRing ring = source.Copied(rings);
       MeasureArc(ring);
       for (std::ptrdiff_t k = 0; k + 1 < ring.count + ring.margin; ++k) {
         const auto step = [&](std::ptrdiff_t from) {
@@ -166,8 +166,8 @@ TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
     support::Random random(seed);
     const RandomRing expected(random, 16 + static_cast<int>(seed) * 2);
     const double reach = expected.Length() * random.Uniform(0.02, 0.5);
-    UnrolledRings rings;
-    const UnrolledRing ring = expected.Unrolled(rings);
+    PeriodicRings rings;
+    const PeriodicRing ring = expected.Copied(rings);
     MeanCurvature(ring, 0, ring.count, reach);
     for (int k = 0; k < ring.count; ++k) {
       const double curvature = expected.Curvature(k, reach);
@@ -191,8 +191,8 @@ TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
 TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
   support::Random random(3);
   const RandomRing source(random, 40);
-  UnrolledRings rings;
-  const UnrolledRing ring = source.Unrolled(rings);
+  PeriodicRings rings;
+  const PeriodicRing ring = source.Copied(rings);
   std::fill(ring.weight - ring.margin, ring.weight + ring.count + ring.margin, 0.0f);
   MeanNormals(ring, 0, ring.count, source.Length() / 4, true);
   for (int k = 0; k < ring.count; ++k) {
@@ -215,12 +215,12 @@ TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
     const auto count = static_cast<std::ptrdiff_t>(points.size());
     // What lies beyond the margins looks near and spoils every sum.
     const auto results_with = [&](std::uint32_t more) {
-      UnrolledRingSize size = SizeForWindows(points, kReach);
+      PeriodicRingSize size = SizeForWindows(points, kReach);
       size.margin += static_cast<std::uint32_t>(kWindowPadding) + more;
       const std::ptrdiff_t room = 3 * count;
       std::vector<std::int32_t> units(3 * room, 0);
       std::vector<float> floats(7 * room, std::numeric_limits<float>::quiet_NaN());
-      const UnrolledRing ring = UnrolledRing::In(
+      const PeriodicRing ring = PeriodicRing::In(
           size, [&](int array) { return units.data() + array * room + count; },
           [&](int array) { return floats.data() + array * room + count; });
       for (std::ptrdiff_t k = 0; k < count; ++k) {
@@ -257,8 +257,8 @@ TEST(RingWindows, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
   std::vector<std::vector<float>> results;
   support::ForEachInstructionSet([&] {
     for (const int stretch : {1, 5, 16, 50, 103}) {
-      UnrolledRings rings;
-      const UnrolledRing ring = source.Unrolled(rings);
+      PeriodicRings rings;
+      const PeriodicRing ring = source.Copied(rings);
       std::vector<float> result;
       const auto in_stretches = [&](auto step) {
         for (std::ptrdiff_t begin = 0; begin < ring.count; begin += stretch) {

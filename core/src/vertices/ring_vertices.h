@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "crossings/crossings.h"
-#include "vertices/unrolled_rings.h"
+#include "vertices/periodic_ring.h"
 
 namespace partiemc {
 
@@ -24,7 +24,7 @@ struct RingVertices {
   std::vector<LatticePoint> root;
   std::vector<VertexNormal> normal;
   std::vector<std::uint8_t> is_kept;  ///< 0 for vertices that thinning dropped.
-  UnrolledRings unrolled;             ///< Scratch of the steps.
+  PeriodicRings periodic_rings;       ///< Scratch of the steps.
 
   void Resize(std::size_t count) {
     point.resize(count);

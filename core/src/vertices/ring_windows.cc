@@ -49,7 +49,7 @@ HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
 // is in the window of one of its vertices; j is the neighbour of the first vertex, w the weights of
 // the neighbours, 0 beyond a window. Then finish(block).
 template <typename Start, typename Add, typename Finish>
-HWY_INLINE void ForEachWindow(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {
   const Lanes d;
   const Vector one = hn::Set(d, 1.0f);
@@ -104,7 +104,7 @@ HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
 }
 
 // LengthInUnits of the step after each vertex, in place of its arc.
-void MeasureSteps(const UnrolledRing& ring) {
+void MeasureSteps(const PeriodicRing& ring) {
   const Lanes d;
   const Units d_units;
   // May go on into the margin.
@@ -119,7 +119,7 @@ void MeasureSteps(const UnrolledRing& ring) {
 }
 
 template <bool kByAngle>
-void SumNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
+void SumNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
   Vector own_x, own_y, sum_x, sum_y;
   ForEachWindow(
@@ -146,7 +146,7 @@ void SumNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t e
       });
 }
 
-void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
+void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle) {
   if (by_angle) {
     SumNormals<true>(ring, begin, end, reach);
@@ -155,7 +155,7 @@ void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t 
   }
 }
 
-void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach) {
   const Lanes d;
   hn::Vec<Units> x, y;
@@ -188,7 +188,7 @@ void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_
       });
 }
 
-void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
+void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
   hn::Vec<Units> x, y;
   Vector normal_x, normal_y, base, sum, weight;
@@ -234,7 +234,7 @@ HWY_EXPORT(MeanNormals);
 HWY_EXPORT(MeanCurvature);
 HWY_EXPORT(MeanShift);
 
-void MeasureArc(const UnrolledRing& ring) {
+void MeasureArc(const PeriodicRing& ring) {
   HWY_DYNAMIC_DISPATCH(MeasureSteps)(ring);
   std::uint32_t length = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
@@ -258,17 +258,17 @@ void MeasureArc(const UnrolledRing& ring) {
   ring.Repeat(ring.weight, 0, ring.count);
 }
 
-void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
+void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle) {
   HWY_DYNAMIC_DISPATCH(MeanNormals)(ring, begin, end, reach, by_angle);
 }
 
-void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach) {
   HWY_DYNAMIC_DISPATCH(MeanCurvature)(ring, begin, end, reach);
 }
 
-void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
+void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   HWY_DYNAMIC_DISPATCH(MeanShift)(ring, begin, end, reach);
 }
 

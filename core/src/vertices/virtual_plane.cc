@@ -112,7 +112,7 @@ void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) 
 }
 
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
-UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
+PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
   const auto length_after = [&](std::size_t k) {
@@ -122,14 +122,14 @@ UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   double length = 0;
   for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
   if (length < min_length) return {};
-  UnrolledRings::Size size =
+  PeriodicRings::Size size =
       SizeForWindows(std::span(v.point).subspan(first, count), min_length / 2);
   size.margin += kWindowPadding;
   return size;
 }
 
 // Copies what the steps need, and measures the ring.
-void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) {
+void CopyRing(const RingVertices& v, std::size_t first, const PeriodicRing& ring) {
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     ring.x[k] = RingUnits(v.point[first + k].x);
     ring.y[k] = RingUnits(v.point[first + k].y);
@@ -143,7 +143,7 @@ void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) 
 
 // Calls body(begin, end) for stretches of a ring, in parallel where it is long.
 template <typename Body>
-void ForEachStretch(const UnrolledRing& ring, Body body) {
+void ForEachStretch(const PeriodicRing& ring, Body body) {
   constexpr std::ptrdiff_t kStretch = 512;
   if (ring.count <= kStretch) {
     body(0, ring.count);
@@ -156,7 +156,7 @@ void ForEachStretch(const UnrolledRing& ring, Body body) {
 }
 
 // Step 2: normals averaged along the ring, first by distance, then also by angle.
-void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
+void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   const VirtualPlaneConstants& c = input.parameters.constants;
   for (const bool by_angle : {false, true}) {
     const double reach = (by_angle ? c.bilateral_reach : c.normal_reach) * input.scale.spacing;
@@ -171,7 +171,7 @@ void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
 }
 
 // Mean of a ring's values by length.
-double MeanOf(const UnrolledRing& ring, const float* values) {
+double MeanOf(const PeriodicRing& ring, const float* values) {
   double sum = 0, weight = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     sum += double{ring.weight[k]} * values[k];
@@ -183,7 +183,7 @@ double MeanOf(const UnrolledRing& ring, const float* values) {
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
 // along the ring counts: their mean depends on how the particles are arranged, not on the shape.
 // The more the particles that support a ring's planes scatter, the less they are believed.
-void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRing& ring,
+void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.parameters.steps;
@@ -242,7 +242,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
 // Step 3, its end: every vertex to the weighted mean of what its neighbours' planes say, along its
 // normal. A circle stays as it is: of two points of it, the mean normal is perpendicular to their
 // chord.
-void SmoothPositions(const VertexInput& input, std::size_t first, const UnrolledRing& ring,
+void SmoothPositions(const VertexInput& input, std::size_t first, const PeriodicRing& ring,
                      RingVertices& v) {
   const double reach = input.parameters.constants.smoothing_reach * input.scale.spacing;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -261,9 +261,9 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Unrolled
 }
 
 // Steps 2 and 3 of a ring.
-void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, RingVertices& v) {
+void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, RingVertices& v) {
   const std::size_t first_segment = input.topology.offsets[r];
-  Unroll(v, 2 * first_segment, ring);
+  CopyRing(v, 2 * first_segment, ring);
   if (input.parameters.steps.normals) SmoothNormals(input, ring);
   ShiftPlanes(input, first_segment, ring, v);
   SmoothPositions(input, 2 * first_segment, ring, v);
@@ -291,14 +291,14 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size());
-  UnrolledRings& unrolled = vertices.unrolled;
-  unrolled.sizes().assign(topology.RingCount(), {});
+  PeriodicRings& periodic = vertices.periodic_rings;
+  periodic.sizes().assign(topology.RingCount(), {});
   // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     FindRingRoots(input, ring, vertices);
-    const UnrolledRings::Size size = SizeOf(input, ring, vertices);
+    const PeriodicRings::Size size = SizeOf(input, ring, vertices);
     if (size.count > 0 && !ShortRing::Holds(size)) {
-      unrolled.sizes()[ring] = size;
+      periodic.sizes()[ring] = size;
       return;
     }
     if (size.count > 0) {
@@ -307,10 +307,10 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
     }
     Thin(input, ring, vertices);
   });
-  unrolled.Allocate();
+  periodic.Allocate();
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    if (unrolled.sizes()[ring].count == 0) return;
-    RefineRing(input, ring, unrolled[ring], vertices);
+    if (periodic.sizes()[ring].count == 0) return;
+    RefineRing(input, ring, periodic[ring], vertices);
     Thin(input, ring, vertices);
   });
 }
