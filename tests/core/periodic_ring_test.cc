@@ -44,7 +44,7 @@ std::vector<LatticePoint> CrowdedSquare(support::Random& random, double reach) {
   return ring;
 }
 
-// As windows judge it (ring_windows.cc).
+// As windows judge it (ring_filters.cc).
 bool IsNear(std::int64_t units, double reach) {
   const double reach_units = reach * kRingUnitsPerCell;
   const auto distance = static_cast<float>(units);

@@ -33,7 +33,7 @@ inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
                                    static_cast<std::uint32_t>(from));
 }
 
-/// Length of a step, rounded down; MeasureArc (ring_windows.h) adds up such lengths.
+/// Length of a step, rounded down; MeasureArc (ring_filters.h) adds up such lengths.
 inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
   const auto x = static_cast<float>(step_x);
   const auto y = static_cast<float>(step_y);

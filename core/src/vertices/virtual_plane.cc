@@ -11,7 +11,7 @@
 #include "sampler/point_groups.h"
 #include "vertices/placement.h"
 #include "vertices/plane_estimates.h"
-#include "vertices/ring_windows.h"
+#include "vertices/ring_filters.h"
 
 namespace partiemc {
 namespace {

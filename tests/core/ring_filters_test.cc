@@ -1,5 +1,5 @@
 // Window sums along rings, against walks along the ring that know of neither vectors nor margins.
-#include "vertices/ring_windows.h"
+#include "vertices/ring_filters.h"
 
 #include <gtest/gtest.h>
 
@@ -78,7 +78,7 @@ class RandomRing {
     return ring;
   }
 
-  // What the three functions of ring_windows.h say, vertex by vertex.
+  // What the three functions of ring_filters.h say, vertex by vertex.
   LatticePoint MeanNormal(int k, double reach, bool by_angle) const {
     LatticePoint sum;
     ForEachNear(k, reach, [&](int j, double w) {
@@ -136,7 +136,7 @@ class RandomRing {
   std::vector<double> bases_, steps_;
 };
 
-TEST(RingWindows, GoByTheLengthsOfStepsForAnyInstructionSet) {
+TEST(RingFilters, GoByTheLengthsOfStepsForAnyInstructionSet) {
   for (const int count : {24, 31, 100}) {
     support::Random random(static_cast<std::uint64_t>(count));
     const RandomRing source(random, count);
@@ -161,7 +161,7 @@ TEST(RingWindows, GoByTheLengthsOfStepsForAnyInstructionSet) {
   }
 }
 
-TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
+TEST(RingFilters, AgreeWithAWalkAlongTheRing) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     support::Random random(seed);
     const RandomRing expected(random, 16 + static_cast<int>(seed) * 2);
@@ -188,7 +188,7 @@ TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
   }
 }
 
-TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
+TEST(RingFilters, KeepTheOwnNormalWhereTheMeanVanishes) {
   support::Random random(3);
   const RandomRing source(random, 40);
   PeriodicRings rings;
@@ -202,7 +202,7 @@ TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
 }
 
 // A polygon whose windows hold many more vertices in one place than at the ends of the ring.
-TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
+TEST(RingFilters, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
   constexpr int kSides = 60, kCrowd = 80;
   constexpr double kReach = 10.5;
   for (const int crowded : {15, kSides - 14}) {
@@ -250,7 +250,7 @@ TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
   }
 }
 
-TEST(RingWindows, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
+TEST(RingFilters, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
   support::Random random(5);
   const RandomRing source(random, 103);
   const double reach = source.Length() / 7;

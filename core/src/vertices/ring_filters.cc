@@ -1,4 +1,4 @@
-#include "vertices/ring_windows.h"
+#include "vertices/ring_filters.h"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "vertices/ring_windows.cc"
+#define HWY_TARGET_INCLUDE "vertices/ring_filters.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
