@@ -5,10 +5,10 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "vertices/area.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
 #include "vertices/virtual_plane.h"
+#include "vertices/volume_correction.h"
 
 namespace partiemc {
 namespace {
@@ -161,7 +161,7 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     }
   });
   rings.outer_of = topology.outer_of;
-  MatchArea(input, placed.offset_points, area_offset, rings);
+  CorrectVolume(input, placed.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   RepairRings(placed.roots, placed.repair, rings);

@@ -54,13 +54,14 @@ struct VertexInput {
 ///   farthest-particle  section 3.5: the particle farthest along the normal, one cell around;
 ///   virtual-plane      one vertex per cell and crossed edge, moved to the plane that its
 ///                      surroundings support (virtual_plane.h), matched to the particles' area
-///                      (area.h) and repaired (repair.h).
+///                      (volume_correction.h) and repaired (repair.h).
 /// marching-squares and qef keep every vertex in its cell or on its edge, so that rings are simple
 /// by construction (core/METHOD.md, "Why rings are simple"); virtual-plane may leave the cells and
 /// is simple by its repair. farthest-particle drops consecutive equal vertices, and rings of which
 /// fewer than three points remain.
-/// `area_offset`: of `virtual-plane`, that of the last frame, then of this one (area.h).
-/// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
+/// `area_offset`: of `virtual-plane`, that of the last frame, then of this one
+/// (volume_correction.h). Deterministic, in parallel over segments. Cost: linear in segments and
+/// the particles near them.
 void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
                    PlacedVertices& placed, Rings& rings);
 

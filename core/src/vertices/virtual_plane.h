@@ -8,7 +8,7 @@
 namespace partiemc {
 
 /// Steps 1 to 5: roots, normals, planes, smoothing, thinning. Requires: the point field indexed
-/// with neighbours. Leaves area and repair to area.h and repair.h.
+/// with neighbours. Leaves the rest to volume_correction.h and repair.h.
 /// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
 /// samples and a window of about twenty vertices per vertex.
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);

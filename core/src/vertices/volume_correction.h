@@ -18,7 +18,7 @@ namespace partiemc {
 /// frame before (nothing at first: then this frame's alone) and becomes this frame's.
 /// Cost: linear in the points. Leaves the rings' measures undefined.
 /// `scratch` is a warm buffer.
-void MatchArea(const VertexInput& input, std::vector<double>& scratch,
-               std::optional<double>& offset, Rings& rings);
+void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
+                   std::optional<double>& offset, Rings& rings);
 
 }  // namespace partiemc

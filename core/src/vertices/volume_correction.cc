@@ -1,4 +1,4 @@
-#include "vertices/area.h"
+#include "vertices/volume_correction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
 }
 
 // The offset that a frame alone would ask for, in spacings. Nothing without large components.
-std::optional<double> WishOf(const VertexInput& input, double spacing, Rings& rings) {
+std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.parameters.constants;
   rings.measures.resize(rings.RingCount());
   ParallelFor(rings.RingCount(), [&](std::size_t ring) {
@@ -44,14 +44,14 @@ std::optional<double> WishOf(const VertexInput& input, double spacing, Rings& ri
 
 }  // namespace
 
-void MatchArea(const VertexInput& input, std::vector<double>& scratch,
-               std::optional<double>& offset, Rings& rings) {
+void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
+                   std::optional<double>& offset, Rings& rings) {
   const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
   if (!is_known || !input.parameters.steps.area) return;
   const double spacing = input.scale.spacing * input.scale.cell_size;
-  if (const std::optional<double> wish = WishOf(input, spacing, rings)) {
+  if (const std::optional<double> target = TargetOf(input, spacing, rings)) {
     const double change = input.parameters.constants.area_change;
-    offset = offset ? std::clamp(*wish, *offset - change, *offset + change) : *wish;
+    offset = offset ? std::clamp(*target, *offset - change, *offset + change) : *target;
   }
   if (!offset) return;
   scratch.resize(rings.points.size());
