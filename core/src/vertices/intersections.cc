@@ -3,7 +3,7 @@
 // leaves hardly any pairs of neighbours, by comparisons of coordinates alone.
 //
 // A short ring whose box touches no other ring's is searched by itself, each run against all of the
-// later ones. Other runs are found in hash grids, one per size of runs: a run lies in the grid
+// later ones. Other runs are found in a hierarchical grid: a run lies in the grid
 // whose cells are just larger than its box, in the cell of its lower left corner, and so in one
 // cell of one grid only, however long it is. It is compared with runs of its own grid and of
 // coarser ones, of which few cells can hold runs that reach it.
@@ -16,7 +16,7 @@
 
 #include "base/parallel.h"
 #include "base/predicates.h"
-#include "vertices/hash_grids.h"
+#include "vertices/hierarchical_grid.h"
 
 namespace partiemc {
 namespace {
@@ -70,8 +70,8 @@ class PairSearch {
   void MeasureRuns();
   void Measure(Run& run) const;
   void FindLoneRuns(std::span<const std::uint32_t> ring_offsets);
-  HashGrids MakeGrids() const;
-  void FillGrids(const HashGrids& grids);
+  HierarchicalGrid MakeGrid() const;
+  void FillGrid(const HierarchicalGrid& grid);
 
   bool Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) const;
   template <typename Visit>
@@ -81,8 +81,8 @@ class PairSearch {
   template <typename Visit>
   void ForEachPairInRing(std::uint32_t run, Visit visit) const;
   template <typename Visit>
-  void ForEachPair(const HashGrids& grids, std::uint32_t run, Visit visit) const;
-  bool FindPairs(const HashGrids& grids);
+  void ForEachPair(const HierarchicalGrid& grid, std::uint32_t run, Visit visit) const;
+  bool FindPairs(const HierarchicalGrid& grid);
 
   std::span<const double> points_;
   TouchingPairsBuffers& buffers_;
@@ -175,7 +175,7 @@ void PairSearch::FindLoneRuns(std::span<const std::uint32_t> ring_offsets) {
   }
 }
 
-HashGrids PairSearch::MakeGrids() const {
+HierarchicalGrid PairSearch::MakeGrid() const {
   Box bounds;
   double extents = 0;
   std::size_t count = 0;
@@ -186,11 +186,11 @@ HashGrids PairSearch::MakeGrids() const {
     bounds.Add({run.right, run.top});
     extents += Extent(run);
   }
-  return HashGrids(bounds, extents / static_cast<double>(std::max(count, std::size_t{1})));
+  return HierarchicalGrid(bounds, extents / static_cast<double>(std::max(count, std::size_t{1})));
 }
 
 /// Puts every run into its cell.
-void PairSearch::FillGrids(const HashGrids& grids) {
+void PairSearch::FillGrid(const HierarchicalGrid& grid) {
   std::vector<Run>& runs = buffers_.runs;
   std::vector<std::uint32_t>& slots = buffers_.slots;
   const auto count = static_cast<std::size_t>(
@@ -200,10 +200,11 @@ void PairSearch::FillGrids(const HashGrids& grids) {
   for (std::size_t k = 0; k < runs.size(); ++k) {
     Run& run = runs[k];
     if (run.is_alone) continue;
-    const int level = grids.LevelFor(Extent(run));
+    const int level = grid.LevelFor(Extent(run));
     used_levels_ |= 1u << level;
     run.level = static_cast<std::uint8_t>(level);
-    run.cell = HashGrids::Key(level, grids.Column(run.left, level), grids.Row(run.bottom, level));
+    run.cell =
+        HierarchicalGrid::Key(level, grid.Column(run.left, level), grid.Row(run.bottom, level));
     std::uint32_t& slot = slots[SlotOf(run.cell, slots.size())];
     run.next_in_slot = slot;
     slot = static_cast<std::uint32_t>(k);
@@ -262,7 +263,7 @@ void PairSearch::ForEachPairInRing(std::uint32_t index, Visit visit) const {
 /// may touch has its lower left corner no farther to the right and above than its box, and less
 /// than a cell to the left and below.
 template <typename Visit>
-void PairSearch::ForEachPair(const HashGrids& grids, std::uint32_t index, Visit visit) const {
+void PairSearch::ForEachPair(const HierarchicalGrid& grid, std::uint32_t index, Visit visit) const {
   const std::span<const Run> runs = buffers_.runs;
   const std::span<const std::uint32_t> slots = buffers_.slots;
   const Run& run = runs[index];
@@ -273,15 +274,15 @@ void PairSearch::ForEachPair(const HashGrids& grids, std::uint32_t index, Visit 
   }
   for (int level = run.level; used_levels_ >> level != 0; ++level) {
     if ((used_levels_ >> level & 1u) == 0) continue;
-    const std::int64_t first_column = std::max<std::int64_t>(grids.Column(run.left, level) - 1, 0);
-    const std::int64_t last_column = grids.Column(run.right, level);
-    const std::int64_t first_row = std::max<std::int64_t>(grids.Row(run.bottom, level) - 1, 0);
-    const std::int64_t last_row = grids.Row(run.top, level);
+    const std::int64_t first_column = std::max<std::int64_t>(grid.Column(run.left, level) - 1, 0);
+    const std::int64_t last_column = grid.Column(run.right, level);
+    const std::int64_t first_row = std::max<std::int64_t>(grid.Row(run.bottom, level) - 1, 0);
+    const std::int64_t last_row = grid.Row(run.top, level);
     // Of two runs of one level, the earlier one finds the pairs.
     const bool finds_all = run.level < level;
     for (std::int64_t row = first_row; row <= last_row; ++row) {
       for (std::int64_t column = first_column; column <= last_column; ++column) {
-        const std::uint64_t cell = HashGrids::Key(level, column, row);
+        const std::uint64_t cell = HierarchicalGrid::Key(level, column, row);
         for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNone;
              other = runs[other].next_in_slot) {
           if (runs[other].cell != cell || (!finds_all && other <= index)) continue;
@@ -293,14 +294,14 @@ void PairSearch::ForEachPair(const HashGrids& grids, std::uint32_t index, Visit 
 }
 
 /// Finds out which runs find pairs; returns whether any does.
-bool PairSearch::FindPairs(const HashGrids& grids) {
+bool PairSearch::FindPairs(const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
   ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t index) {
     Run& run = buffers_.runs[index];
     // Where all that it could meet is as it was, it still finds none.
     if (run.is_settled && run.is_alone && !run.finds_pair) return;
     bool finds_pair = false;
-    ForEachPair(grids, index, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
+    ForEachPair(grid, index, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
     run.finds_pair = finds_pair;
     if (finds_pair) has_pair.store(true, std::memory_order_relaxed);
   });
@@ -311,16 +312,16 @@ std::size_t PairSearch::Count(std::span<const std::uint32_t> ring_offsets) {
   buffers_.pairs.clear();
   if (buffers_.runs.empty()) return 0;
   FindLoneRuns(ring_offsets);
-  const HashGrids grids = MakeGrids();
-  FillGrids(grids);
+  const HierarchicalGrid grid = MakeGrid();
+  FillGrid(grid);
   // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
   // of threads.
-  if (!FindPairs(grids)) return 0;
+  if (!FindPairs(grid)) return 0;
   std::size_t count = 0;
   const std::size_t max_pairs = points_.size() / 2;
   for (std::uint32_t run = 0; run < buffers_.runs.size(); ++run) {
     if (!buffers_.runs[run].finds_pair) continue;
-    ForEachPair(grids, run, [&](std::uint32_t i, std::uint32_t j) {
+    ForEachPair(grid, run, [&](std::uint32_t i, std::uint32_t j) {
       ++count;
       if (buffers_.pairs.size() < max_pairs) buffers_.pairs.emplace_back(i, j);
       buffers_.example_first = std::min(i, j);

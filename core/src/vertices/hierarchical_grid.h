@@ -1,4 +1,5 @@
-// Grids of all sizes in one hash table: a box lies in one cell of the grid of its size.
+// Grids of all sizes in one hash table (a hierarchical grid): a box lies in one cell of the grid of
+// its size.
 #pragma once
 
 #include <algorithm>
@@ -28,9 +29,9 @@ double Extent(const AnyBox& box) {
 }
 
 /// Level k has square cells of side `finest` * 2^k.
-class HashGrids {
+class HierarchicalGrid {
  public:
-  HashGrids(const Box& bounds, double mean_extent)
+  HierarchicalGrid(const Box& bounds, double mean_extent)
       : origin_{bounds.left, bounds.bottom},
         // Cells of twice the mean extent hold almost all boxes of like things in one grid and
         // still make few candidates; the second bound keeps
