@@ -9,7 +9,7 @@
 #include "base/point.h"
 #include "base/predicates.h"
 #include "mesh/monotone_pieces.h"
-#include "mesh/sweep_corners.h"
+#include "mesh/sweep_events.h"
 
 namespace partiemc {
 namespace {
@@ -24,7 +24,7 @@ struct Edge {
   int SideOf(const Point& point) const { return Orientation(lower, upper, point); }
 };
 
-MonotonePieces::Vertex VertexOf(const Corner& corner) { return {corner.point, corner.index}; }
+MonotonePieces::Vertex VertexOf(const SweepEvent& event) { return {event.point, event.index}; }
 
 /// An edge that begins at the point in hand and rises from it.
 struct RisingEdge {
@@ -62,23 +62,23 @@ class Triangulator::Sweep {
     return {points_[2 * std::size_t{index}], points_[2 * std::size_t{index} + 1]};
   }
 
-  bool Visit(std::span<const Corner> corners);
-  std::optional<std::size_t> SplitEdges(std::span<const Corner> corners);
+  bool Visit(std::span<const SweepEvent> events);
+  std::optional<std::size_t> SplitEdges(std::span<const SweepEvent> events);
   bool RisingEdgesAlternate(const Point& point) const;
-  bool Surround(const Corner& vertex, std::size_t ending_edges, Surroundings& found);
-  void Advance(const Corner& vertex, const Surroundings& around);
-  IntervalOrder::Cursor Start(const Corner& vertex, std::span<const RisingEdge> edges,
+  bool Surround(const SweepEvent& vertex, std::size_t ending_edges, Surroundings& found);
+  void Advance(const SweepEvent& vertex, const Surroundings& around);
+  IntervalOrder::Cursor Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
                               IntervalOrder::Cursor cursor);
 
-  std::uint32_t SplitInterval(std::uint32_t id, const Corner& vertex);
-  void AddToLeftChain(Interval& interval, const Corner& vertex);
-  void AddToRightChain(Interval& interval, const Corner& vertex);
-  void Close(std::uint32_t id, const Corner& vertex);
+  std::uint32_t SplitInterval(std::uint32_t id, const SweepEvent& vertex);
+  void AddToLeftChain(Interval& interval, const SweepEvent& vertex);
+  void AddToRightChain(Interval& interval, const SweepEvent& vertex);
+  void Close(std::uint32_t id, const SweepEvent& vertex);
 
   std::uint32_t NewInterval();
 
   std::span<const double> points_;
-  SweepCorners corners_;
+  SweepEvents events_;
   std::vector<RisingEdge> rising_;
   std::vector<Interval> intervals_;
   std::vector<std::uint32_t> unused_intervals_;
@@ -97,11 +97,11 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
   pieces_.Clear(triangles);
   order_.Clear();
 
-  if (!corners_.Collect(points, loop_points, loop_offsets)) return false;
-  const std::span<const Corner> corners = corners_.corners();
-  for (auto begin = corners.begin(); begin != corners.end();) {
-    const auto end = std::find_if(begin + 1, corners.end(), [&](const Corner& corner) {
-      return corner.point != begin->point;
+  if (!events_.Collect(points, loop_points, loop_offsets)) return false;
+  const std::span<const SweepEvent> events = events_.events();
+  for (auto begin = events.begin(); begin != events.end();) {
+    const auto end = std::find_if(begin + 1, events.end(), [&](const SweepEvent& event) {
+      return event.point != begin->point;
     });
     if (!Visit(std::span(begin, end))) {
       triangles.resize(size_before);
@@ -117,9 +117,9 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
 /// the sweep line finds every crossing: the first one exchanges two neighbours, nothing can be
 /// inserted between these any more, and the one that ends first ends on the wrong side of the
 /// other.
-bool Triangulator::Sweep::Visit(std::span<const Corner> corners) {
-  const Corner& vertex = corners.front();
-  const std::optional<std::size_t> ending_edges = SplitEdges(corners);
+bool Triangulator::Sweep::Visit(std::span<const SweepEvent> events) {
+  const SweepEvent& vertex = events.front();
+  const std::optional<std::size_t> ending_edges = SplitEdges(events);
   if (!ending_edges.has_value() || !RisingEdgesAlternate(vertex.point)) return false;
   Surroundings around;
   if (!Surround(vertex, *ending_edges, around)) return false;
@@ -139,12 +139,12 @@ bool Triangulator::Sweep::Visit(std::span<const Corner> corners) {
 
 /// Collects the edges that rise from a point, from left to right; returns the number of those that
 /// end in it. Nothing if an edge has no length.
-std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const Corner> corners) {
-  const Point point = corners.front().point;
+std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const SweepEvent> events) {
+  const Point point = events.front().point;
   rising_.clear();
-  for (const Corner& corner : corners) {
-    const Point previous = PointAt(corner.previous);
-    const Point next = PointAt(corner.next);
+  for (const SweepEvent& event : events) {
+    const Point previous = PointAt(event.previous);
+    const Point next = PointAt(event.next);
     if (previous == point || next == point) return std::nullopt;
     // The region lies to the left of the loop: an edge that the loop goes down is a left one.
     if (SweepsBefore(point, previous)) rising_.push_back({previous, true});
@@ -155,7 +155,7 @@ std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const Corne
       return Orientation(point, a.upper, b.upper) < 0;
     });
   }
-  return 2 * corners.size() - rising_.size();
+  return 2 * events.size() - rising_.size();
 }
 
 bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
@@ -168,7 +168,7 @@ bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
 
 /// Finds the intervals around a point and closes those that end in it. False if an edge runs
 /// through the point, or if the edges found to end here are not all that should.
-bool Triangulator::Sweep::Surround(const Corner& vertex, std::size_t ending_edges,
+bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_edges,
                                    Surroundings& found) {
   const Point& point = vertex.point;
   found.cursor =
@@ -213,7 +213,7 @@ bool Triangulator::Sweep::Surround(const Corner& vertex, std::size_t ending_edge
 ///   \ | /    \  /       /  \        \ /
 ///    \|/      \/ split   \/ merge    | several rising edges: the outer ones go on with the
 ///     *       *           *          * intervals around, each pair between starts a new one
-void Triangulator::Sweep::Advance(const Corner& vertex, const Surroundings& around) {
+void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& around) {
   IntervalOrder::Cursor cursor = around.cursor;
   std::span<const RisingEdge> starting = rising_;
   if (around.left != kNone && !starting.empty()) starting = starting.subspan(1);
@@ -247,7 +247,7 @@ void Triangulator::Sweep::Advance(const Corner& vertex, const Surroundings& arou
 }
 
 /// Starts an interval between every two of `edges`; returns the cursor behind them.
-IntervalOrder::Cursor Triangulator::Sweep::Start(const Corner& vertex,
+IntervalOrder::Cursor Triangulator::Sweep::Start(const SweepEvent& vertex,
                                                  std::span<const RisingEdge> edges,
                                                  IntervalOrder::Cursor cursor) {
   for (std::size_t i = 0; i + 1 < edges.size(); i += 2) {
@@ -263,7 +263,7 @@ IntervalOrder::Cursor Triangulator::Sweep::Start(const Corner& vertex,
 
 /// A vertex inside an interval: a diagonal from it to the last vertex of the interval below cuts
 /// the piece in two. Returns the new interval, which goes to the right of interval `id`.
-std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const Corner& vertex) {
+std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const SweepEvent& vertex) {
   const std::uint32_t right_id = NewInterval();
   Interval& left = intervals_[id];
   Interval& right = intervals_[right_id];
@@ -285,7 +285,7 @@ std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const Corner&
   return right_id;
 }
 
-void Triangulator::Sweep::AddToLeftChain(Interval& interval, const Corner& vertex) {
+void Triangulator::Sweep::AddToLeftChain(Interval& interval, const SweepEvent& vertex) {
   if (interval.IsMerged()) {
     pieces_.Finish(interval.left_piece, VertexOf(vertex));
     interval.left_piece = interval.right_piece;
@@ -294,12 +294,12 @@ void Triangulator::Sweep::AddToLeftChain(Interval& interval, const Corner& verte
   pieces_.AddToLeftChain(interval.left_piece, VertexOf(vertex));
 }
 
-void Triangulator::Sweep::AddToRightChain(Interval& interval, const Corner& vertex) {
+void Triangulator::Sweep::AddToRightChain(Interval& interval, const SweepEvent& vertex) {
   if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
   pieces_.AddToRightChain(interval.left_piece, VertexOf(vertex));
 }
 
-void Triangulator::Sweep::Close(std::uint32_t id, const Corner& vertex) {
+void Triangulator::Sweep::Close(std::uint32_t id, const SweepEvent& vertex) {
   Interval& interval = intervals_[id];
   if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
   pieces_.Finish(interval.left_piece, VertexOf(vertex));
