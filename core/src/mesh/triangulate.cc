@@ -5,9 +5,9 @@
 #include <optional>
 #include <utility>
 
-#include "base/interval_order.h"
 #include "base/point.h"
 #include "base/predicates.h"
+#include "base/sweep_status.h"
 #include "mesh/monotone_pieces.h"
 #include "mesh/sweep_events.h"
 
@@ -45,9 +45,9 @@ struct Interval {
 
 /// Which intervals a point touches from the inside, after those that end in it were closed.
 struct Surroundings {
-  std::uint32_t left = kNone;    // Has the region directly to the left of the point.
-  std::uint32_t right = kNone;   // The same to the right. Equal to `left`: the point is inside.
-  IntervalOrder::Cursor cursor;  // At `right`, if there is one; where new intervals go, if not.
+  std::uint32_t left = kNone;   // Has the region directly to the left of the point.
+  std::uint32_t right = kNone;  // The same to the right. Equal to `left`: the point is inside.
+  SweepStatus::Cursor cursor;   // At `right`, if there is one; where new intervals go, if not.
 };
 
 }  // namespace
@@ -67,8 +67,8 @@ class Triangulator::Sweep {
   bool RisingEdgesAlternate(const Point& point) const;
   bool Surround(const SweepEvent& vertex, std::size_t ending_edges, Surroundings& found);
   void Advance(const SweepEvent& vertex, const Surroundings& around);
-  IntervalOrder::Cursor Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
-                              IntervalOrder::Cursor cursor);
+  SweepStatus::Cursor Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
+                            SweepStatus::Cursor cursor);
 
   std::uint32_t SplitInterval(std::uint32_t id, const SweepEvent& vertex);
   void AddToLeftChain(Interval& interval, const SweepEvent& vertex);
@@ -83,7 +83,7 @@ class Triangulator::Sweep {
   std::vector<Interval> intervals_;
   std::vector<std::uint32_t> unused_intervals_;
   MonotonePieces pieces_;
-  IntervalOrder order_;
+  SweepStatus status_;
 };
 
 bool Triangulator::Sweep::Run(std::span<const double> points,
@@ -95,7 +95,7 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
   intervals_.clear();
   unused_intervals_.clear();
   pieces_.Clear(triangles);
-  order_.Clear();
+  status_.Clear();
 
   if (!events_.Collect(points, loop_points, loop_offsets)) return false;
   const std::span<const SweepEvent> events = events_.events();
@@ -171,11 +171,11 @@ bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
 bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_edges,
                                    Surroundings& found) {
   const Point& point = vertex.point;
-  found.cursor =
-      order_.FindFirstNot([&](std::uint32_t id) { return intervals_[id].right.SideOf(point) < 0; });
+  found.cursor = status_.FindFirstNot(
+      [&](std::uint32_t id) { return intervals_[id].right.SideOf(point) < 0; });
   std::size_t ended = 0;
-  if (!order_.IsEnd(found.cursor)) {
-    const std::uint32_t id = order_.At(found.cursor);
+  if (!status_.IsEnd(found.cursor)) {
+    const std::uint32_t id = status_.At(found.cursor);
     const Interval& interval = intervals_[id];
     if (interval.left.SideOf(point) < 0) {
       found.left = id;
@@ -185,11 +185,11 @@ bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_
       }
       if (interval.right.upper != point) return false;
       ++ended;
-      found.cursor = order_.Next(found.cursor);
+      found.cursor = status_.Next(found.cursor);
     }
   }
-  while (!order_.IsEnd(found.cursor)) {
-    const std::uint32_t id = order_.At(found.cursor);
+  while (!status_.IsEnd(found.cursor)) {
+    const std::uint32_t id = status_.At(found.cursor);
     const Interval& interval = intervals_[id];
     const int left_side = interval.left.SideOf(point);
     if (left_side > 0) break;
@@ -203,7 +203,7 @@ bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_
     if (right_side < 0 || interval.right.upper != point) return false;
     ++ended;
     Close(id, vertex);
-    found.cursor = order_.Erase(found.cursor);
+    found.cursor = status_.Erase(found.cursor);
   }
   return ended == ending_edges;
 }
@@ -214,15 +214,15 @@ bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_
 ///    \|/      \/ split   \/ merge    | several rising edges: the outer ones go on with the
 ///     *       *           *          * intervals around, each pair between starts a new one
 void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& around) {
-  IntervalOrder::Cursor cursor = around.cursor;
+  SweepStatus::Cursor cursor = around.cursor;
   std::span<const RisingEdge> starting = rising_;
   if (around.left != kNone && !starting.empty()) starting = starting.subspan(1);
   if (around.right != kNone && !starting.empty()) starting = starting.first(starting.size() - 1);
 
   if (around.left != kNone && around.left == around.right) {
     const std::uint32_t upper = SplitInterval(around.left, vertex);
-    cursor = Start(vertex, starting, order_.Next(cursor));
-    order_.Insert(cursor, upper);
+    cursor = Start(vertex, starting, status_.Next(cursor));
+    status_.Insert(cursor, upper);
     return;
   }
   if (around.left != kNone) AddToRightChain(intervals_[around.left], vertex);
@@ -234,7 +234,7 @@ void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& 
     merged.right = other.right;
     merged.right_piece = other.left_piece;
     unused_intervals_.push_back(around.right);
-    order_.Erase(cursor);
+    status_.Erase(cursor);
     return;
   }
   if (around.left != kNone) {
@@ -247,16 +247,16 @@ void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& 
 }
 
 /// Starts an interval between every two of `edges`; returns the cursor behind them.
-IntervalOrder::Cursor Triangulator::Sweep::Start(const SweepEvent& vertex,
-                                                 std::span<const RisingEdge> edges,
-                                                 IntervalOrder::Cursor cursor) {
+SweepStatus::Cursor Triangulator::Sweep::Start(const SweepEvent& vertex,
+                                               std::span<const RisingEdge> edges,
+                                               SweepStatus::Cursor cursor) {
   for (std::size_t i = 0; i + 1 < edges.size(); i += 2) {
     const std::uint32_t id = NewInterval();
     Interval& interval = intervals_[id];
     interval.left = {vertex.point, edges[i].upper};
     interval.right = {vertex.point, edges[i + 1].upper};
     interval.left_piece = pieces_.Start(VertexOf(vertex));
-    cursor = order_.Insert(cursor, id);
+    cursor = status_.Insert(cursor, id);
   }
   return cursor;
 }

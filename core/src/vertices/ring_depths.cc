@@ -55,9 +55,9 @@ bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
 
 void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
                        std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
-  const IntervalOrder::Cursor right =
-      order_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
-  const std::int32_t depth = order_.IsEnd(right) ? 0 : chains_[order_.At(right)].depth;
+  const SweepStatus::Cursor right =
+      status_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
+  const std::int32_t depth = status_.IsEnd(right) ? 0 : chains_[status_.At(right)].depth;
   if (turn.is_lowest) depths[turn.ring] = depth;
   const std::uint32_t ring = rings[turn.ring];
   Chain on{turn.index, offsets[ring], offsets[ring + 1], true, depth};
@@ -75,16 +75,16 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
     chains_[id] = chain;
     return id;
   };
-  const IntervalOrder::Cursor behind = order_.Insert(right, add(on_is_right ? back : on));
-  order_.Insert(behind, add(on_is_right ? on : back));
+  const SweepStatus::Cursor behind = status_.Insert(right, add(on_is_right ? back : on));
+  status_.Insert(behind, add(on_is_right ? on : back));
 }
 
 void RingDepths::End(const Turn& turn) {
-  IntervalOrder::Cursor cursor =
-      order_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
-  for (int side = 0; side < 2 && !order_.IsEnd(cursor); ++side) {
-    unused_.push_back(order_.At(cursor));
-    cursor = order_.Erase(cursor);
+  SweepStatus::Cursor cursor =
+      status_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
+  for (int side = 0; side < 2 && !status_.IsEnd(cursor); ++side) {
+    unused_.push_back(status_.At(cursor));
+    cursor = status_.Erase(cursor);
   }
 }
 
@@ -94,7 +94,7 @@ void RingDepths::Find(std::span<const double> points, std::span<const std::uint3
   depths.assign(rings.size(), 0);
   chains_.clear();
   unused_.clear();
-  order_.Clear();
+  status_.Clear();
   CollectTurns(offsets, rings);
   for (const Turn& turn : turns_) {
     ThrowIfCancelled();

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "base/interval_order.h"
 #include "base/point.h"
+#include "base/sweep_status.h"
 
 namespace partiemc {
 
@@ -59,7 +59,7 @@ class RingDepths {
   std::vector<Turn> turns_;
   std::vector<Chain> chains_;
   std::vector<std::uint32_t> unused_;
-  IntervalOrder order_;  // Of chains.
+  SweepStatus status_;  // Of chains.
 };
 
 }  // namespace partiemc
