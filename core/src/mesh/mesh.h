@@ -6,9 +6,10 @@
 
 #include "absl/status/status.h"
 #include "crossings/crossings.h"
-#include "mesh/interior.h"
 #include "mesh/loop_groups.h"
 #include "mesh/node_vertices.h"
+#include "mesh/rectangles.h"
+#include "mesh/staircase.h"
 #include "normals/normals.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
