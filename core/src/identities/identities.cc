@@ -3,20 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <tuple>
 
 namespace partiemc {
 namespace {
-
-// Where each ring of the topology is in the result: placing vertices may have dropped it.
-void FindKeptRings(const RingTopology& topology, const PlacedVertices& placed,
-                   std::vector<std::uint32_t>& result_ring) {
-  result_ring.assign(topology.RingCount(), kNoRing);
-  std::uint32_t kept = 0;
-  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    if (placed.point_of_segment[topology.offsets[ring]] != kNoPoint) result_ring[ring] = kept++;
-  }
-}
 
 // The number of a ring, given to it now if it has none.
 std::uint32_t NumberOf(std::uint32_t ring, const RingTopology& topology, IdentityScratch& s) {
@@ -49,7 +40,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
       ring = from.ring;  // A void between two islands is next to no hole's ring.
       if (topology.outer_of[ring] == kNoRing) return;
     }
-    if (s.result_ring[ring] == kNoRing) return;
+    if (input.placed.kept_as[ring] == kNoRing) return;
     runs.push_back({edge.row, from.column + 1, edge.column, NumberOf(ring, topology, s)});
   });
 }
@@ -64,10 +55,10 @@ void NumberOuterRings(const IdentityInput& input, IdentityScratch& s) {
     s.outer.push_back(outer == kNoRing ? kNoRing : s.number[outer]);
     s.particle_count.push_back(topology.particle_count[ring]);
   }
-  s.ring_of_component.assign(input.traced.components.size(), kNoRing);
+  s.ring_of_component.assign(input.topology.components.size(), kNoRing);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
     if (topology.outer_of[ring] != kNoRing) continue;
-    s.ring_of_component[input.traced.component_of_ring[ring]] = s.number[ring];
+    s.ring_of_component[input.topology.component_of_ring[ring]] = s.number[ring];
   }
 }
 
@@ -92,7 +83,8 @@ void GiveIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory
 }
 
 // Identities and parents into the result.
-void Tell(const RingHistory& previous, IdentityScratch& s, Rings& rings) {
+void Tell(const RingHistory& previous, std::span<const std::uint32_t> kept_as, IdentityScratch& s,
+          Rings& rings) {
   std::sort(s.relations.begin(), s.relations.end(),
             [](const RingRelation& x, const RingRelation& y) {
               return std::tie(x.now, x.before) < std::tie(y.now, y.before);
@@ -101,10 +93,10 @@ void Tell(const RingHistory& previous, IdentityScratch& s, Rings& rings) {
   first_relation.assign(s.topology_ring.size() + 1, 0);
   for (const RingRelation& pair : s.relations) ++first_relation[pair.now + 1];
   std::partial_sum(first_relation.begin(), first_relation.end(), first_relation.begin());
-  for (std::size_t ring = 0; ring < s.result_ring.size(); ++ring) {
-    if (s.result_ring[ring] == kNoRing) continue;
+  for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {
+    if (kept_as[ring] == kNoRing) continue;
     const std::uint32_t number = s.number[ring];
-    rings.measures[s.result_ring[ring]].identity = s.identity[number];
+    rings.measures[kept_as[ring]].identity = s.identity[number];
     for (std::uint32_t k = first_relation[number]; k < first_relation[number + 1]; ++k) {
       rings.parents.push_back(previous.rings[s.relations[k].before].identity);
     }
@@ -144,14 +136,13 @@ void Remember(const IdentityInput& input, IdentityScratch& s, RingHistory& next)
 
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                    IdentityScratch& scratch, RingHistory& next, Rings& rings) {
-  FindKeptRings(input.topology, input.placed, scratch.result_ring);
   CollectRuns(input, scratch, next.runs);
   NumberOuterRings(input, scratch);
   FollowParticles({.frame = input.frame,
                    .plane = input.plane,
                    .bins = input.bins,
                    .crossings = input.crossings,
-                   .components = input.traced.components,
+                   .components = input.topology.components,
                    .ring_of_component = scratch.ring_of_component,
                    .particle_count = scratch.particle_count},
                   previous, scratch.tracks);
@@ -165,7 +156,7 @@ void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                .cell_size = input.cell_size},
               scratch.relation_scratch, scratch.relations);
   GiveIdentities(previous, scratch, next);
-  Tell(previous, scratch, rings);
+  Tell(previous, input.placed.kept_as, scratch, rings);
   Remember(input, scratch, next);
 }
 

@@ -1,5 +1,4 @@
-// Which ring of the last frame a ring continues: the end of stage 6, when it is known which rings
-// there are.
+// Stage 7 of 8: rings of two frames -> identities and parents (core/IDENTITIES.md).
 #pragma once
 
 #include <cstdint>
@@ -22,7 +21,6 @@ namespace partiemc {
 /// Warm buffers of ContinueRings.
 struct IdentityScratch {
   CrossedRows rows;
-  std::vector<std::uint32_t> result_ring;    // By ring of the topology; kNoRing: it was dropped.
   std::vector<std::uint32_t> number;         // By ring of the topology, in the order of their runs.
   std::vector<std::uint32_t> topology_ring;  // By number.
   std::vector<std::uint32_t> outer;          // By number: that of a hole's outer ring, or kNoRing.
@@ -44,7 +42,6 @@ struct IdentityInput {
   Plane plane;
   const ParticleBins& bins;
   const Crossings& crossings;
-  const RingScratch& traced;
   const RingTopology& topology;
   const PlacedVertices& placed;
   double cell_size;

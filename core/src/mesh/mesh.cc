@@ -8,6 +8,7 @@
 #include "base/bits.h"
 #include "base/parallel.h"
 #include "base/predicates.h"
+#include "frame/placement_traits.h"
 #include "mesh/touched_cells.h"
 
 namespace partiemc {
@@ -22,13 +23,14 @@ constexpr std::uint32_t kLongShare = 4;
 // not known yet when loops are triangulated, the corners of the staircases stand in for them.
 class MeshBuilder {
  public:
-  MeshBuilder(const MeshInput& input, MeshScratch& scratch, Mesh& mesh)
-      : input_(input), scratch_(scratch), mesh_(mesh) {}
+  MeshBuilder(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
+              std::vector<std::uint32_t>& tangled)
+      : input_(input), scratch_(scratch), mesh_(mesh), tangled_(tangled) {}
 
   void Build(FrameStatistics& statistics);
 
  private:
-  bool MovesVertices() const { return input_.parameters.placement == Placement::kFarthestParticle; }
+  bool MovesVertices() const { return TraitsOf(input_.parameters.placement).takes_particles; }
   bool HasBand() const {
     return input_.parameters.fill != Fill::kNone && input_.parameters.fill != Fill::kPolygon;
   }
@@ -56,13 +58,14 @@ class MeshBuilder {
   const MeshInput& input_;
   MeshScratch& scratch_;
   Mesh& mesh_;
+  std::vector<std::uint32_t>& tangled_;
   std::size_t ring_points_ = 0;  // Points of the connectivity that belong to rings.
   std::uint64_t interior_cells_ = 0;
 };
 
 void MeshBuilder::FindInterior() {
   scratch_.interior = input_.crossings.interior;
-  if (input_.parameters.placement != Placement::kVirtualPlane) return;
+  if (!TraitsOf(input_.parameters.placement).refines) return;
   ExcludeTouchedCells(input_.directory, input_.rings.points, input_.rings.offsets,
                       input_.placed.roots, input_.scale.cell_size, scratch_.interior);
 }
@@ -181,8 +184,8 @@ void MeshBuilder::AddRingLoops() {
 }
 
 std::uint32_t MeshBuilder::OuterRingAt(const TilePlace& inside_node) const {
-  const RingScratch& scratch = input_.ring_scratch;
-  return scratch.outer_ring[scratch.components.At(input_.crossings, inside_node)];
+  const RingTopology& rings = input_.topology;
+  return rings.outer_ring[rings.components.At(input_.crossings, inside_node)];
 }
 
 void MeshBuilder::AddStaircaseLoops(bool reversed) {
@@ -203,7 +206,7 @@ void MeshBuilder::AddStaircaseLoops(bool reversed) {
 }
 
 void MeshBuilder::TriangulateLoops(TriangleClass triangle_class) {
-  scratch_.loops.Triangulate(mesh_.points, mesh_.triangles, scratch_.tangled);
+  scratch_.loops.Triangulate(mesh_.points, mesh_.triangles, tangled_);
   mesh_.classes.resize(mesh_.triangles.size() / 3, triangle_class);
 }
 
@@ -313,9 +316,7 @@ std::uint64_t MeshBuilder::ExpectedBandTriangles() const {
 }
 
 std::uint64_t MeshBuilder::CountFolded() const {
-  const auto point = [this](std::uint32_t index) {
-    return Point{mesh_.points[2 * index], mesh_.points[2 * index + 1]};
-  };
+  const auto point = [this](std::uint32_t index) { return PointAt(mesh_.points, index); };
   std::uint64_t count = 0;
   for (std::size_t k = 0; k < mesh_.triangles.size(); k += 3) {
     count += Orientation(point(mesh_.triangles[k]), point(mesh_.triangles[k + 1]),
@@ -326,7 +327,7 @@ std::uint64_t MeshBuilder::CountFolded() const {
 
 void MeshBuilder::Build(FrameStatistics& statistics) {
   mesh_.Clear();
-  scratch_.tangled.clear();
+  tangled_.clear();
   FindInterior();
   if (input_.parameters.fill == Fill::kNone) {
     TraceStaircases(input_.directory, scratch_.interior, scratch_.staircases);
@@ -334,7 +335,7 @@ void MeshBuilder::Build(FrameStatistics& statistics) {
   } else {
     CollectRingPoints();
     TriangulateAll();
-    if (!scratch_.tangled.empty()) return;
+    if (!tangled_.empty()) return;
     if (MovesVertices()) MoveVertices();
   }
   const auto band_triangles =
@@ -349,8 +350,8 @@ void MeshBuilder::Build(FrameStatistics& statistics) {
 }  // namespace
 
 void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
-               FrameStatistics& statistics) {
-  MeshBuilder(input, scratch, mesh).Build(statistics);
+               FrameStatistics& statistics, std::vector<std::uint32_t>& tangled) {
+  MeshBuilder(input, scratch, mesh, tangled).Build(statistics);
 }
 
 }  // namespace partiemc

@@ -63,7 +63,7 @@ bool SweepEvents::List(std::span<const double> points, std::span<const std::uint
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t index = loop_points[i];
       if (index >= points.size() / 2) return false;
-      const Point point{points[2 * std::size_t{index}], points[2 * std::size_t{index} + 1]};
+      const Point point = PointAt(points, index);
       if (!InPredicateDomain(point.x) || !InPredicateDomain(point.y)) return false;
       events_.push_back({point, index, loop_points[i == begin ? end - 1 : i - 1],
                          loop_points[i + 1 == end ? begin : i + 1]});

@@ -58,10 +58,6 @@ class Triangulator::Sweep {
            std::span<const std::uint32_t> loop_offsets, std::vector<std::uint32_t>& triangles);
 
  private:
-  Point PointAt(std::uint32_t index) const {
-    return {points_[2 * std::size_t{index}], points_[2 * std::size_t{index} + 1]};
-  }
-
   bool Visit(std::span<const SweepEvent> events);
   std::optional<std::size_t> SplitEdges(std::span<const SweepEvent> events);
   bool RisingEdgesAlternate(const Point& point) const;
@@ -143,8 +139,8 @@ std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const Sweep
   const Point point = events.front().point;
   rising_.clear();
   for (const SweepEvent& event : events) {
-    const Point previous = PointAt(event.previous);
-    const Point next = PointAt(event.next);
+    const Point previous = PointAt(points_, event.previous);
+    const Point next = PointAt(points_, event.next);
     if (previous == point || next == point) return std::nullopt;
     // The region lies to the left of the loop: an edge that the loop goes down is a left one.
     if (SweepsBefore(point, previous)) rising_.push_back({previous, true});

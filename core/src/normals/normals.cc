@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "frame/placement_traits.h"
 #include "sampler/point_groups.h"
 
 namespace partiemc {
@@ -195,7 +196,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       }
     }
   };
-  const bool at_entries = parameters.placement == Placement::kVirtualPlane;
+  const PlacementTraits& traits = TraitsOf(parameters.placement);
   const auto estimate = [&](std::size_t first, std::size_t last) {
     // Cells lie anywhere in memory: all are looked up before anything waits for one of them.
     std::array<std::uint32_t, kSegmentsAtOnce + kSegmentsOfGroup> cells;
@@ -211,13 +212,13 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
       begins_group[k - first] = BeginsGroup(k - *(end - 1));
     }
-    if (parameters.placement == Placement::kFarthestParticle) {
+    if (traits.takes_particles) {
       for (std::size_t k = first; k < last; ++k) SampleAtMean(bins.tiles, field, planes[k]);
     } else {
       auto groups = CollectPoints<LatticePoint>(sample);
       for (std::size_t k = first; k < last; ++k) {
         if (begins_group[k - first]) groups.Part();
-        AddPoints(bins.tiles, k, at_entries, planes[k], groups);
+        AddPoints(bins.tiles, k, traits.refines, planes[k], groups);
       }
       groups.Finish();
     }

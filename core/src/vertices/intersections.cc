@@ -59,9 +59,8 @@ class PairSearch {
   std::size_t Count(std::span<const std::uint32_t> ring_offsets);
 
  private:
-  Point PointAt(std::size_t k) const { return {points_[2 * k], points_[2 * k + 1]}; }
   Segment SegmentAt(const Run& run, std::uint32_t i) const {
-    return {PointAt(i), PointAt(i + 1 == run.ring_end ? run.ring_begin : i + 1)};
+    return {PointAt(points_, i), PointAt(points_, i + 1 == run.ring_end ? run.ring_begin : i + 1)};
   }
   static std::uint32_t Previous(const Run& run, std::uint32_t i) {
     return (i == run.ring_begin ? run.ring_end : i) - 1;
@@ -129,7 +128,7 @@ void PairSearch::MeasureRuns() {
 
 void PairSearch::Measure(Run& run) const {
   Box box;
-  box.Add(PointAt(run.first));
+  box.Add(PointAt(points_, run.first));
   unsigned directions = kRightward | kLeftward | kUpward | kDownward;
   for (std::uint32_t i = run.first; i < run.last; ++i) {
     const auto [a, b] = SegmentAt(run, i);

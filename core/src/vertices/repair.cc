@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/cancellation.h"
-#include "base/parallel.h"
 #include "base/predicates.h"
 #include "vertices/measure.h"
 
@@ -19,10 +18,6 @@ constexpr int kMostRounds = 24;
 
 // Rings of a round that lie on the wrong side of others. Hardly any frame has one.
 constexpr std::size_t kMostMisplaced = 100;
-
-Point PointAt(const Rings& rings, std::size_t k) {
-  return {rings.points[2 * k], rings.points[2 * k + 1]};
-}
 
 // Marks both ends of a segment and the points before and after it.
 void MarkSegment(const Rings& rings, std::uint32_t segment, std::vector<std::uint8_t>& is_marked) {
@@ -42,26 +37,19 @@ void MarkRing(const Rings& rings, std::size_t ring, std::vector<std::uint8_t>& i
 Box BoxOf(const Rings& rings, std::size_t ring) {
   Box box;
   for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
-    box.Add(PointAt(rings, k));
+    box.Add(PointAt(rings.points, k));
   }
   return box;
 }
 
 // The point with the smallest x, of those the one with the smallest y.
 Point LeftmostOf(const Rings& rings, std::size_t ring) {
-  Point leftmost = PointAt(rings, rings.offsets[ring]);
+  Point leftmost = PointAt(rings.points, rings.offsets[ring]);
   for (std::uint32_t k = rings.offsets[ring] + 1; k < rings.offsets[ring + 1]; ++k) {
-    const Point point = PointAt(rings, k);
+    const Point point = PointAt(rings.points, k);
     if (point.x < leftmost.x || (point.x == leftmost.x && point.y < leftmost.y)) leftmost = point;
   }
   return leftmost;
-}
-
-void MeasureRings(Rings& rings) {
-  rings.measures.resize(rings.RingCount());
-  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
-    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
-  });
 }
 
 // Lists the rings that are turned inside out or lie on the wrong side of others. Requires: rings
@@ -118,18 +106,18 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
 }
 
 // Names the outer rings of all that have a marked point.
-void NameTangledRings(const Rings& rings, RepairScratch& scratch) {
+void NameTangledRings(const Rings& rings, const RepairScratch& scratch,
+                      std::vector<std::uint32_t>& tangled) {
   for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
     const auto points =
         std::span(scratch.is_marked)
             .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
     if (std::ranges::none_of(points, [](std::uint8_t marked) { return marked != 0; })) continue;
     const std::uint32_t outer = rings.outer_of[ring];
-    scratch.tangled.push_back(outer == kNoRing ? ring : outer);
+    tangled.push_back(outer == kNoRing ? ring : outer);
   }
-  std::ranges::sort(scratch.tangled);
-  scratch.tangled.erase(std::unique(scratch.tangled.begin(), scratch.tangled.end()),
-                        scratch.tangled.end());
+  std::ranges::sort(tangled);
+  tangled.erase(std::unique(tangled.begin(), tangled.end()), tangled.end());
 }
 
 // Moves the marked points; returns whether any was not at its root yet.
@@ -146,8 +134,9 @@ bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratc
 
 }  // namespace
 
-void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings) {
-  scratch.tangled.clear();
+void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings,
+                 std::vector<std::uint32_t>& tangled) {
+  tangled.clear();
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
     // Only what the round before has marked may have moved.
@@ -171,10 +160,10 @@ void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
     }
     if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
     // What is marked is at its roots already, so it is something else that is out of its place.
-    NameTangledRings(rings, scratch);
+    NameTangledRings(rings, scratch, tangled);
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
     if (!Retreat(roots, true, scratch, rings)) break;
-    scratch.tangled.clear();
+    tangled.clear();
   }
   MeasureRings(rings);
 }

@@ -20,7 +20,6 @@ struct RepairScratch {
   std::vector<std::uint32_t> misplaced;  // Rings.
   std::vector<Point> leftmost;           // By these.
   RingDepths ring_depths;
-  std::vector<std::uint32_t> tangled;  // Outer rings that nothing helps.
 };
 
 /// Moves points of `rings` back towards their roots until the rings are simple, do not touch and
@@ -37,12 +36,13 @@ struct RepairScratch {
 /// a cell to that of the next, lies in these two cells and leaves the first by an inner point of
 /// their common edge, which no other piece crosses. A cell has one path, or two in a saddle, each
 /// in its own half. All of it holds by more than 2^-13 cells, and world coordinates are rounded by
-/// at most 2^-22 (core/METHOD.md, "Why rings are simple"). Should that be wrong, `scratch.tangled`
+/// at most 2^-22 (core/METHOD.md, "Why rings are simple"). Should that be wrong, `tangled`
 /// names the outer rings of all that still cross or are misplaced, ascending, with every point at
 /// its root; else it is empty.
 ///
 /// Measures the rings (measure.h) as they are in the end.
 /// Cost: for each round near-linear in the points, and n log n in the places where rings turn.
-void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings);
+void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings,
+                 std::vector<std::uint32_t>& tangled);
 
 }  // namespace partiemc

@@ -15,10 +15,10 @@ void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets,
     const std::uint32_t first = offsets[rings[ring]], last = offsets[rings[ring] + 1];
     const std::size_t before = turns_.size();
     std::size_t lowest = before;
-    Point point = PointAt(last - 1);
-    bool rises = last - first > 1 && SweepsBefore(PointAt(last - 2), point);
+    Point point = PointAt(points_, last - 1);
+    bool rises = last - first > 1 && SweepsBefore(PointAt(points_, last - 2), point);
     for (std::uint32_t next = first; next < last; ++next) {
-      const Point to = PointAt(next);
+      const Point to = PointAt(points_, next);
       const bool goes_on_rising = SweepsBefore(point, to);
       if (goes_on_rising != rises) {
         const std::uint32_t index = (next == first ? last : next) - 1;
@@ -46,11 +46,11 @@ std::uint32_t RingDepths::Above(const Chain& chain) {
 bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
   Chain& c = chains_[chain];
   std::uint32_t above = Above(c);
-  while (SweepsBefore(PointAt(above), point)) {
+  while (SweepsBefore(PointAt(points_, above), point)) {
     c.at = above;
     above = Above(c);
   }
-  return Orientation(PointAt(c.at), PointAt(above), point) < 0;
+  return Orientation(PointAt(points_, c.at), PointAt(points_, above), point) < 0;
 }
 
 void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
@@ -63,7 +63,8 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
   Chain on{turn.index, offsets[ring], offsets[ring + 1], true, depth};
   Chain back{turn.index, offsets[ring], offsets[ring + 1], false, depth};
   // A ring that runs upwards on the right winds counter-clockwise around what lies between.
-  const bool on_is_right = Orientation(turn.point, PointAt(Above(on)), PointAt(Above(back))) > 0;
+  const bool on_is_right =
+      Orientation(turn.point, PointAt(points_, Above(on)), PointAt(points_, Above(back))) > 0;
   (on_is_right ? on : back).depth += on_is_right ? 1 : -1;
   const auto add = [&](const Chain& chain) {
     if (unused_.empty()) {

@@ -45,9 +45,6 @@ class RingDepths {
     std::int32_t depth;         // Of what lies directly left of it.
   };
 
-  Point PointAt(std::uint32_t k) const {
-    return {points_[2 * std::size_t{k}], points_[2 * std::size_t{k} + 1]};
-  }
   static std::uint32_t Above(const Chain& chain);
   void CollectTurns(std::span<const std::uint32_t> offsets, std::span<const std::uint32_t> rings);
   bool RunsLeftOf(std::uint32_t chain, const Point& point);

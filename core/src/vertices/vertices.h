@@ -1,4 +1,4 @@
-// Stage 6 of 7: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
+// Stage 6 of 8: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
 #pragma once
 
 #include <cstdint>
@@ -19,18 +19,24 @@ namespace partiemc {
 /// Marks a segment whose ring was dropped in PlacedVertices::point_of_segment.
 inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 
-/// Warm buffers of PlaceVertices, and how its points belong to segments.
+/// How the points of Rings belong to the rings of RingTopology and their segments.
 struct PlacedVertices {
-  std::vector<double> points;  ///< One or two per segment, in world units, before duplicates go.
-  /// Per segment of RingTopology: index in Rings::points of the vertex of its cell (of its entry
-  /// crossing for `marching-squares`), or kNoPoint.
+  /// Per segment: index in Rings::points of the vertex of its cell (of its entry crossing for
+  /// `marching-squares`), or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
-  std::vector<std::uint32_t>
-      kept_as;  ///< Per ring of RingTopology: its index in Rings, or kNoRing.
-  /// `virtual-plane` only: the vertices on their way, and where each point of the rings may retreat
-  /// to, interleaved, in world units.
-  RingVertices vertices;
+  std::vector<std::uint32_t> kept_as;  ///< Per ring: its index in Rings, or kNoRing.
+  /// `virtual-plane` only: where each point of the rings may retreat to, interleaved, in world
+  /// units.
   std::vector<double> roots;
+  std::vector<std::uint32_t>
+      tangled;  ///< Outer rings that repair could not make simple (repair.h).
+  std::uint64_t self_intersections = 0;  ///< Of placements that do not promise to have none.
+};
+
+/// Warm buffers of PlaceVertices.
+struct VertexScratch {
+  std::vector<double> points;  ///< One or two per segment, in world units, before duplicates go.
+  RingVertices vertices;       ///< Of `virtual-plane`, on their way.
   std::vector<double> offset_points;
   RepairScratch repair;
 };
@@ -63,6 +69,6 @@ struct VertexInput {
 /// (volume_correction.h). Deterministic, in parallel over segments. Cost: linear in segments and
 /// the particles near them.
 void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
-                   PlacedVertices& placed, Rings& rings);
+                   VertexScratch& scratch, PlacedVertices& placed, Rings& rings);
 
 }  // namespace partiemc

@@ -33,6 +33,19 @@ VertexNormal UnitOf(const LatticePoint& v) {
   return {static_cast<float>(v.x * inverse), static_cast<float>(v.y * inverse)};
 }
 
+// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
+// `max_step` cells; `point` itself where the gradient is weak.
+LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
+  const double square = gradient.x * gradient.x + gradient.y * gradient.y;
+  if (square < kWeakGradientSquare) return point;
+  double step = -value / square;
+  // Its length is that of the gradient times as much.
+  if (step * step * square > max_step * max_step) {
+    step = std::copysign(max_step / std::sqrt(square), step);
+  }
+  return {point.x + step * gradient.x, point.y + step * gradient.y};
+}
+
 // A point beyond the sides of a tile, in cells relative to it.
 FieldPoint LocateBeyond(const VertexInput& input, std::uint32_t tile, double x, double y) {
   const int i = static_cast<int>(std::floor(x));
@@ -287,6 +300,11 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 }
 
 }  // namespace
+
+LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step) {
+  if (plane.is_weak) return plane.point;
+  return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, max_step);
+}
 
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;

@@ -7,6 +7,10 @@
 
 namespace partiemc {
 
+/// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
+/// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
+LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
+
 /// Steps 1 to 5: roots, normals, planes, smoothing, thinning. Requires: the point field indexed
 /// with neighbours. Leaves the rest to volume_correction.h and repair.h.
 /// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
