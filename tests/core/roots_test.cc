@@ -13,6 +13,7 @@
 #include "support/stages.h"
 #include "vertices/placement.h"
 #include "vertices/repair.h"
+#include "vertices/virtual_plane.h"
 
 namespace partiemc {
 namespace {
