@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <numbers>
-#include <numeric>
 #include <vector>
 
 #include "base/predicates.h"
@@ -18,15 +17,10 @@ namespace {
 using testing::Random;
 using testing::Region;
 
-// Depths of the named rings; of all if none is.
-std::vector<std::int32_t> Depths(const Region& region, std::vector<std::uint32_t> rings = {}) {
-  if (rings.empty()) {
-    rings.resize(region.LoopCount());
-    std::iota(rings.begin(), rings.end(), 0u);
-  }
+std::vector<std::int32_t> Depths(const Region& region) {
   RingDepths ring_depths;
   std::vector<std::int32_t> depths;
-  ring_depths.Find(region.points, region.loop_offsets, rings, depths);
+  ring_depths.Find(region.points, region.loop_offsets, depths);
   return depths;
 }
 
@@ -84,12 +78,6 @@ TEST(RingDepths, OuterRingsInsideEachOtherAddUp) {
             (std::vector<std::int32_t>{2, 1, 0}));
 }
 
-TEST(RingDepths, RingsThatAreNotNamedAreNotThere) {
-  const Region region = RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)});
-  EXPECT_EQ(Depths(region, {0, 2}), (std::vector<std::int32_t>{1, 0}));
-  EXPECT_EQ(Depths(region, {2, 0}), (std::vector<std::int32_t>{0, 1}));
-}
-
 TEST(RingDepths, ARingIsLookedForWhereItIsLowestNotWhereItTurnsFirst) {
   // Its other low turns lie above a square that stands between its legs.
   const std::vector<Point> legs{{0, 4}, {0, -1}, {1, 3}, {3, 3}, {4, 0}, {4, 4}};
@@ -131,10 +119,8 @@ TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
     const std::vector<std::int32_t> expected = DepthsOneByOne(region);
     nested +=
         static_cast<int>(std::ranges::count_if(expected, [](int depth) { return depth != 0; }));
-    std::vector<std::uint32_t> rings(region.LoopCount());
-    std::iota(rings.begin(), rings.end(), 0u);
     std::vector<std::int32_t> depths;
-    warm.Find(region.points, region.loop_offsets, rings, depths);
+    warm.Find(region.points, region.loop_offsets, depths);
     ASSERT_EQ(depths, expected) << "seed " << seed;
   }
   EXPECT_GT(nested, 300);

@@ -2,11 +2,10 @@
 // say, does not meet itself, nor the run after it if that goes to the right, too: on contours this
 // leaves hardly any pairs of neighbours, by comparisons of coordinates alone.
 //
-// A short ring whose box touches no other ring's is searched by itself, each run against all of the
-// later ones. Other runs are found in a hierarchical grid: a run lies in the grid
-// whose cells are just larger than its box, in the cell of its lower left corner, and so in one
-// cell of one grid only, however long it is. It is compared with runs of its own grid and of
-// coarser ones, of which few cells can hold runs that reach it.
+// Runs that are near each other are found in a hierarchical grid: a run lies in the grid whose
+// cells are just larger than its box, in the cell of its lower left corner, and so in one cell of
+// one grid only, however long it is. It is compared with runs of its own grid and of coarser ones,
+// of which few cells can hold runs that reach it.
 #include "vertices/intersections.h"
 
 #include <algorithm>
@@ -25,10 +24,6 @@ using Run = TouchingPairsBuffers::Run;
 
 // Segments of a run. Longer ones have larger boxes, of which more overlap.
 constexpr std::uint32_t kRunLength = 8;
-
-// Runs of a short ring. Comparing a run with all others of so many costs less than to find those
-// near it.
-constexpr std::uint32_t kShortRingRuns = 64;
 
 // Directions that all segments of a run may have.
 constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
@@ -54,9 +49,8 @@ class PairSearch {
       : points_(points), buffers_(buffers) {}
 
   void CollectRuns(std::span<const std::uint32_t> ring_offsets);
-  void SettleRuns(std::span<const std::uint8_t> is_moved);
-  /// Requires: runs were collected, and settled if this is not the first search for them.
-  std::size_t Count(std::span<const std::uint32_t> ring_offsets);
+  /// Requires: runs were collected.
+  std::size_t Count();
 
  private:
   Segment SegmentAt(const Run& run, std::uint32_t i) const {
@@ -66,9 +60,7 @@ class PairSearch {
     return (i == run.ring_begin ? run.ring_end : i) - 1;
   }
 
-  void MeasureRuns();
   void Measure(Run& run) const;
-  void FindLoneRuns(std::span<const std::uint32_t> ring_offsets);
   HierarchicalGrid MakeGrid() const;
   void FillGrid(const HierarchicalGrid& grid);
 
@@ -77,8 +69,6 @@ class PairSearch {
   void ForEachPairWithin(const Run& run, Visit visit) const;
   template <typename Visit>
   void ForEachPairBetween(const Run& first, const Run& second, Visit visit) const;
-  template <typename Visit>
-  void ForEachPairInRing(std::uint32_t run, Visit visit) const;
   template <typename Visit>
   void ForEachPair(const HierarchicalGrid& grid, std::uint32_t run, Visit visit) const;
   bool FindPairs(const HierarchicalGrid& grid);
@@ -101,29 +91,7 @@ void PairSearch::CollectRuns(std::span<const std::uint32_t> ring_offsets) {
                       .ring_end = end});
     }
   }
-  MeasureRuns();
-}
-
-/// Finds out which rings are as they were, and measures the runs of the others.
-void PairSearch::SettleRuns(std::span<const std::uint8_t> is_moved) {
-  std::uint32_t ring = kNone;  // Where it begins.
-  bool is_settled = false;
-  for (Run& run : buffers_.runs) {
-    if (run.ring_begin != ring) {
-      ring = run.ring_begin;
-      const auto points = is_moved.subspan(ring, run.ring_end - ring);
-      is_settled = std::ranges::all_of(points, [](std::uint8_t moved) { return moved == 0; });
-    }
-    run.is_settled = is_settled;
-  }
-  MeasureRuns();
-}
-
-void PairSearch::MeasureRuns() {
-  ParallelFor(buffers_.runs.size(), [&](std::size_t k) {
-    Run& run = buffers_.runs[k];
-    if (!run.is_settled) Measure(run);
-  });
+  ParallelFor(runs.size(), [&](std::size_t k) { Measure(runs[k]); });
 }
 
 void PairSearch::Measure(Run& run) const {
@@ -136,74 +104,34 @@ void PairSearch::Measure(Run& run) const {
     directions &= (a.x < b.x ? kRightward : 0u) | (a.x > b.x ? kLeftward : 0u) |
                   (a.y < b.y ? kUpward : 0u) | (a.y > b.y ? kDownward : 0u);
   }
-  run.left = box.left;
-  run.bottom = box.bottom;
-  run.right = box.right;
-  run.top = box.top;
+  run.box = box;
   run.directions = static_cast<std::uint8_t>(directions);
-}
-
-/// Runs from the one that begins at segment `first` to the end of its ring.
-std::uint32_t RunsUpTo(std::uint32_t ring_end, std::uint32_t first) {
-  return (ring_end - first + kRunLength - 1) / kRunLength;
-}
-
-void PairSearch::FindLoneRuns(std::span<const std::uint32_t> ring_offsets) {
-  std::vector<Run>& runs = buffers_.runs;
-  std::vector<Box>& boxes = buffers_.ring_boxes;
-  boxes.clear();
-  std::size_t next = 0;
-  for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
-    Box& box = boxes.emplace_back();
-    for (; next < runs.size() && runs[next].first < ring_offsets[ring + 1]; ++next) {
-      box.Add({runs[next].left, runs[next].bottom});
-      box.Add({runs[next].right, runs[next].top});
-    }
-  }
-  FindBoxesApart(boxes, buffers_.boxes_apart, buffers_.is_apart);
-  next = 0;
-  for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
-    const std::uint32_t count = RunsUpTo(ring_offsets[ring + 1], ring_offsets[ring]);
-    const bool is_alone = buffers_.is_apart[ring] != 0 && count <= kShortRingRuns;
-    for (const std::size_t end = next + count; next < end; ++next) {
-      Run& run = runs[next];
-      // Which run of a pair finds it depends on whether they are alone.
-      run.is_settled = run.is_settled && run.is_alone;
-      run.is_alone = is_alone;
-    }
-  }
 }
 
 HierarchicalGrid PairSearch::MakeGrid() const {
   Box bounds;
   double extents = 0;
-  std::size_t count = 0;
   for (const Run& run : buffers_.runs) {
-    if (run.is_alone) continue;
-    ++count;
-    bounds.Add({run.left, run.bottom});
-    bounds.Add({run.right, run.top});
-    extents += Extent(run);
+    bounds.Add({run.box.left, run.box.bottom});
+    bounds.Add({run.box.right, run.box.top});
+    extents += run.box.Extent();
   }
-  return HierarchicalGrid(bounds, extents / static_cast<double>(std::max(count, std::size_t{1})));
+  return HierarchicalGrid(bounds, extents / static_cast<double>(buffers_.runs.size()));
 }
 
 /// Puts every run into its cell.
 void PairSearch::FillGrid(const HierarchicalGrid& grid) {
   std::vector<Run>& runs = buffers_.runs;
   std::vector<std::uint32_t>& slots = buffers_.slots;
-  const auto count = static_cast<std::size_t>(
-      std::ranges::count_if(runs, [](const Run& run) { return !run.is_alone; }));
-  slots.assign(std::max(std::bit_ceil(2 * count), kBlockSlots), kNone);
+  slots.assign(std::bit_ceil(2 * runs.size()), kNone);
   used_levels_ = 0;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     Run& run = runs[k];
-    if (run.is_alone) continue;
-    const int level = grid.LevelFor(Extent(run));
+    const int level = grid.LevelFor(run.box.Extent());
     used_levels_ |= 1u << level;
     run.level = static_cast<std::uint8_t>(level);
-    run.cell =
-        HierarchicalGrid::Key(level, grid.Column(run.left, level), grid.Row(run.bottom, level));
+    run.cell = HierarchicalGrid::Key(level, grid.Column(run.box.left, level),
+                                     grid.Row(run.box.bottom, level));
     std::uint32_t& slot = slots[SlotOf(run.cell, slots.size())];
     run.next_in_slot = slot;
     slot = static_cast<std::uint32_t>(k);
@@ -232,7 +160,7 @@ void PairSearch::ForEachPairWithin(const Run& run, Visit visit) const {
 
 template <typename Visit>
 void PairSearch::ForEachPairBetween(const Run& first, const Run& second, Visit visit) const {
-  if (!BoxesTouch(first, second)) return;
+  if (!BoxesTouch(first.box, second.box)) return;
   const bool follows = Previous(second, second.first) == first.last - 1 ||
                        Previous(first, first.first) == second.last - 1;
   if (follows && (first.directions & second.directions) != 0) return;
@@ -241,20 +169,10 @@ void PairSearch::ForEachPairBetween(const Run& first, const Run& second, Visit v
     Box box;
     box.Add(segment.a);
     box.Add(segment.b);
-    if (!BoxesTouch(box, second)) continue;
+    if (!BoxesTouch(box, second.box)) continue;
     for (std::uint32_t j = second.first; j < second.last; ++j) {
       if (Touches(first, i, second, j)) visit(i, j);
     }
-  }
-}
-
-template <typename Visit>
-void PairSearch::ForEachPairInRing(std::uint32_t index, Visit visit) const {
-  const std::span<const Run> runs = buffers_.runs;
-  const Run& run = runs[index];
-  const std::uint32_t end = index + RunsUpTo(run.ring_end, run.first);
-  for (std::uint32_t other = index + 1; other < end; ++other) {
-    ForEachPairBetween(run, runs[other], visit);
   }
 }
 
@@ -267,16 +185,13 @@ void PairSearch::ForEachPair(const HierarchicalGrid& grid, std::uint32_t index, 
   const std::span<const std::uint32_t> slots = buffers_.slots;
   const Run& run = runs[index];
   ForEachPairWithin(run, visit);
-  if (run.is_alone) {
-    ForEachPairInRing(index, visit);
-    return;
-  }
   for (int level = run.level; used_levels_ >> level != 0; ++level) {
     if ((used_levels_ >> level & 1u) == 0) continue;
-    const std::int64_t first_column = std::max<std::int64_t>(grid.Column(run.left, level) - 1, 0);
-    const std::int64_t last_column = grid.Column(run.right, level);
-    const std::int64_t first_row = std::max<std::int64_t>(grid.Row(run.bottom, level) - 1, 0);
-    const std::int64_t last_row = grid.Row(run.top, level);
+    const std::int64_t first_column =
+        std::max<std::int64_t>(grid.Column(run.box.left, level) - 1, 0);
+    const std::int64_t last_column = grid.Column(run.box.right, level);
+    const std::int64_t first_row = std::max<std::int64_t>(grid.Row(run.box.bottom, level) - 1, 0);
+    const std::int64_t last_row = grid.Row(run.box.top, level);
     // Of two runs of one level, the earlier one finds the pairs.
     const bool finds_all = run.level < level;
     for (std::int64_t row = first_row; row <= last_row; ++row) {
@@ -297,20 +212,16 @@ bool PairSearch::FindPairs(const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
   ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t index) {
     Run& run = buffers_.runs[index];
-    // Where all that it could meet is as it was, it still finds none.
-    if (run.is_settled && run.is_alone && !run.finds_pair) return;
-    bool finds_pair = false;
-    ForEachPair(grid, index, [&](std::uint32_t, std::uint32_t) { finds_pair = true; });
-    run.finds_pair = finds_pair;
-    if (finds_pair) has_pair.store(true, std::memory_order_relaxed);
+    run.finds_pair = false;
+    ForEachPair(grid, index, [&](std::uint32_t, std::uint32_t) { run.finds_pair = true; });
+    if (run.finds_pair) has_pair.store(true, std::memory_order_relaxed);
   });
   return has_pair;
 }
 
-std::size_t PairSearch::Count(std::span<const std::uint32_t> ring_offsets) {
+std::size_t PairSearch::Count() {
   buffers_.pairs.clear();
   if (buffers_.runs.empty()) return 0;
-  FindLoneRuns(ring_offsets);
   const HierarchicalGrid grid = MakeGrid();
   FillGrid(grid);
   // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
@@ -337,16 +248,7 @@ std::size_t CountTouchingPairs(std::span<const double> points,
                                TouchingPairsBuffers& buffers) {
   PairSearch search(points, buffers);
   search.CollectRuns(ring_offsets);
-  return search.Count(ring_offsets);
-}
-
-std::size_t CountTouchingPairsAgain(std::span<const double> points,
-                                    std::span<const std::uint32_t> ring_offsets,
-                                    std::span<const std::uint8_t> is_moved,
-                                    TouchingPairsBuffers& buffers) {
-  PairSearch search(points, buffers);
-  search.SettleRuns(is_moved);
-  return search.Count(ring_offsets);
+  return search.Count();
 }
 
 }  // namespace partiemc

@@ -53,26 +53,16 @@ Point LeftmostOf(const Rings& rings, std::size_t ring) {
 }
 
 // Lists the rings that are turned inside out or lie on the wrong side of others. Requires: rings
-// were measured, and searched for pairs. Of rings that do not cross, one is in its place if and
-// only if the others wind around it as often as around the region outside of an outer ring (0), or
-// around the fluid that a hole lies in (1). What touches no other ring's box has none around it,
-// and is around none.
+// were measured, and do not cross. Then one is in its place if and only if the others wind around
+// it as often as around the region outside of an outer ring (0), or around the fluid that a hole
+// lies in (1).
 void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   scratch.misplaced.clear();
-  scratch.together.clear();
+  scratch.ring_depths.Find(rings.points, rings.offsets, scratch.depths);
   for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
-    if (scratch.pairs.is_apart[ring] == 0 || rings.outer_of[ring] != kNoRing) {
-      scratch.together.push_back(ring);
-    } else if (rings.measures[ring].area < 0) {
-      scratch.misplaced.push_back(ring);
-    }
-  }
-  scratch.ring_depths.Find(rings.points, rings.offsets, scratch.together, scratch.depths);
-  for (std::size_t k = 0; k < scratch.together.size(); ++k) {
-    const std::uint32_t ring = scratch.together[k];
     const bool is_hole = rings.outer_of[ring] != kNoRing;
     const bool is_turned = (rings.measures[ring].area < 0) != is_hole;
-    if (is_turned || scratch.depths[k] != (is_hole ? 1 : 0)) scratch.misplaced.push_back(ring);
+    if (is_turned || scratch.depths[ring] != (is_hole ? 1 : 0)) scratch.misplaced.push_back(ring);
   }
 }
 
@@ -89,7 +79,7 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
     scratch.leftmost.push_back(LeftmostOf(rings, ring));
   }
   if (scratch.misplaced.empty()) return;
-  for (const std::uint32_t other : scratch.together) {
+  for (std::uint32_t other = 0; other < rings.RingCount(); ++other) {
     const Box box = BoxOf(rings, other);
     for (std::size_t k = 0; k < scratch.misplaced.size(); ++k) {
       const Point& point = scratch.leftmost[k];
@@ -139,11 +129,7 @@ void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
   tangled.clear();
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
-    // Only what the round before has marked may have moved.
-    const std::size_t touching =
-        round == 0 ? CountTouchingPairs(rings.points, rings.offsets, scratch.pairs)
-                   : CountTouchingPairsAgain(rings.points, rings.offsets, scratch.is_marked,
-                                             scratch.pairs);
+    const std::size_t touching = CountTouchingPairs(rings.points, rings.offsets, scratch.pairs);
     scratch.is_marked.assign(rings.PointCount(), 0);
     bool all_the_way = round >= kGentleRounds;
     if (touching > 0) {

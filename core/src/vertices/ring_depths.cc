@@ -8,11 +8,10 @@
 
 namespace partiemc {
 
-void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets,
-                              std::span<const std::uint32_t> rings) {
+void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets) {
   turns_.clear();
-  for (std::uint32_t ring = 0; ring < rings.size(); ++ring) {
-    const std::uint32_t first = offsets[rings[ring]], last = offsets[rings[ring] + 1];
+  for (std::uint32_t ring = 0; ring + 1 < offsets.size(); ++ring) {
+    const std::uint32_t first = offsets[ring], last = offsets[ring + 1];
     const std::size_t before = turns_.size();
     std::size_t lowest = before;
     Point point = PointAt(points_, last - 1);
@@ -54,14 +53,14 @@ bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
 }
 
 void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
-                       std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
+                       std::vector<std::int32_t>& depths) {
   const SweepStatus::Cursor right =
       status_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
   const std::int32_t depth = status_.IsEnd(right) ? 0 : chains_[status_.At(right)].depth;
   if (turn.is_lowest) depths[turn.ring] = depth;
-  const std::uint32_t ring = rings[turn.ring];
-  Chain on{turn.index, offsets[ring], offsets[ring + 1], true, depth};
-  Chain back{turn.index, offsets[ring], offsets[ring + 1], false, depth};
+  const std::uint32_t first = offsets[turn.ring], last = offsets[turn.ring + 1];
+  Chain on{turn.index, first, last, true, depth};
+  Chain back{turn.index, first, last, false, depth};
   // A ring that runs upwards on the right winds counter-clockwise around what lies between.
   const bool on_is_right =
       Orientation(turn.point, PointAt(points_, Above(on)), PointAt(points_, Above(back))) > 0;
@@ -90,17 +89,17 @@ void RingDepths::End(const Turn& turn) {
 }
 
 void RingDepths::Find(std::span<const double> points, std::span<const std::uint32_t> offsets,
-                      std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
+                      std::vector<std::int32_t>& depths) {
   points_ = points;
-  depths.assign(rings.size(), 0);
+  depths.assign(offsets.size() - 1, 0);
   chains_.clear();
   unused_.clear();
   status_.Clear();
-  CollectTurns(offsets, rings);
+  CollectTurns(offsets);
   for (const Turn& turn : turns_) {
     ThrowIfCancelled();
     if (turn.is_low) {
-      Begin(turn, offsets, rings, depths);
+      Begin(turn, offsets, depths);
     } else {
       End(turn);
     }

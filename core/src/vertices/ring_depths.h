@@ -18,22 +18,22 @@ namespace partiemc {
 /// use to the next. Not safe to share between threads.
 class RingDepths {
  public:
-  /// `depths[k]`: how often the other rings of `rings` wind around ring rings[k], +1 for each that
-  /// runs counter-clockwise around it, -1 for each that runs clockwise. Ring r has the points
-  /// [offsets[r], offsets[r + 1]) of the interleaved `points`, and is closed by a segment from the
+  /// `depths[k]`: how often the other rings wind around ring k, +1 for each that runs
+  /// counter-clockwise around it, -1 for each that runs clockwise. Ring k has the points
+  /// [offsets[k], offsets[k + 1]) of the interleaved `points`, and is closed by a segment from the
   /// last to the first.
-  /// Requires: CountTouchingPairs of these rings is 0; none is named twice; coordinates in the
-  /// domain of predicates.h. Exact. Cost: linear in the points, and n log n in the places where
-  /// rings turn from falling to rising or back, of which a round ring has two.
+  /// Requires: CountTouchingPairs of the rings is 0; coordinates in the domain of predicates.h.
+  /// Exact. Cost: linear in the points, and n log n in the places where rings turn from falling to
+  /// rising or back, of which a round ring has two.
   void Find(std::span<const double> points, std::span<const std::uint32_t> offsets,
-            std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths);
+            std::vector<std::int32_t>& depths);
 
  private:
   // Where a ring turns from falling to rising, or back.
   struct Turn {
     Point point;
     std::uint32_t index;  // Of the point.
-    std::uint32_t ring;   // In `rings`.
+    std::uint32_t ring;
     bool is_low;
     bool is_lowest;  // Of its ring.
   };
@@ -46,10 +46,10 @@ class RingDepths {
   };
 
   static std::uint32_t Above(const Chain& chain);
-  void CollectTurns(std::span<const std::uint32_t> offsets, std::span<const std::uint32_t> rings);
+  void CollectTurns(std::span<const std::uint32_t> offsets);
   bool RunsLeftOf(std::uint32_t chain, const Point& point);
   void Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
-             std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths);
+             std::vector<std::int32_t>& depths);
   void End(const Turn& turn);
 
   std::span<const double> points_;
