@@ -14,13 +14,9 @@
 namespace partiemc {
 namespace {
 
-// A ring that has more than one in so many of all segments is long: a few threads would wait for
-// its sweep. To begin with it early costs next to nothing where they would not.
-constexpr std::uint32_t kLongShare = 4;
-
 // Builds one mesh. Points of the connectivity: the points of the rings (for `farthest-particle`:
-// the middles of all segments), then the nodes of the lattice that triangles name. Where these are
-// not known yet when loops are triangulated, the corners of the staircases stand in for them.
+// the middles of all segments), then the nodes of the lattice that triangles name. While loops are
+// triangulated, the corners of the staircases stand in for these.
 class MeshBuilder {
  public:
   MeshBuilder(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
@@ -48,7 +44,6 @@ class MeshBuilder {
   std::uint32_t OuterRingAt(const TilePlace& inside_node) const;
   void TriangulateLoops(TriangleClass triangle_class);
   void TriangulateByLoops();
-  bool OneSweepIsLong() const;
   void TriangulateAll();
   void MoveVertices();
   std::uint64_t CountInteriorCells() const;
@@ -223,38 +218,16 @@ void MeshBuilder::TriangulateByLoops() {
   TriangulateLoops(TriangleClass::kInterior);
 }
 
-// Whether one ring is so long that others wait for the sweep of its component, and there is a
-// thread that may fill rectangles meanwhile.
-bool MeshBuilder::OneSweepIsLong() const {
-  if (!HasBand() || ThreadCount() == 1) return false;
-  const std::vector<std::uint32_t>& offsets = input_.topology.offsets;
-  std::uint32_t longest = 0;
-  for (std::size_t ring = 0; ring + 1 < offsets.size(); ++ring) {
-    longest = std::max(longest, offsets[ring + 1] - offsets[ring]);
-  }
-  return longest > offsets.back() / kLongShare;
-}
-
-// Finds the shapes of the interior and triangulates everything, in whichever order is faster: both
-// make the same triangles.
+// Finds the shapes of the interior and triangulates everything. The rectangles have a thread of
+// their own where there are several: one long ring is swept by one.
 void MeshBuilder::TriangulateAll() {
-  const auto trace = [this] {
+  const auto sweep = [this] {
     TraceStaircases(input_.directory, scratch_.interior, scratch_.staircases);
-  };
-  if (OneSweepIsLong()) {
-    const auto sweep = [&] {
-      trace();
-      AppendCorners();
-      TriangulateByLoops();
-    };
-    ParallelInvoke(sweep, [this] { FillRectangles(); });
-    PutNodesInPlace();
-  } else {
-    ParallelInvoke(trace, [this] { FillRectangles(); });
-    NumberCorners();
-    AppendNodes();
+    AppendCorners();
     TriangulateByLoops();
-  }
+  };
+  ParallelInvoke(sweep, [this] { FillRectangles(); });
+  PutNodesInPlace();
   mesh_.triangles.insert(mesh_.triangles.end(), scratch_.triangles.begin(),
                          scratch_.triangles.end());
   mesh_.classes.resize(mesh_.triangles.size() / 3, TriangleClass::kInterior);
