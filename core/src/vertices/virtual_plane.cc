@@ -311,24 +311,13 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   vertices.Resize(2 * topology.segments.size());
   PeriodicRings& periodic = vertices.periodic_rings;
   periodic.sizes().assign(topology.RingCount(), {});
-  // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     FindRingRoots(input, ring, vertices);
-    const PeriodicRings::Size size = SizeOf(input, ring, vertices);
-    if (size.count > 0 && !ShortRing::Holds(size)) {
-      periodic.sizes()[ring] = size;
-      return;
-    }
-    if (size.count > 0) {
-      ShortRing memory;
-      RefineRing(input, ring, memory.Of(size), vertices);
-    }
-    Thin(input, ring, vertices);
+    periodic.sizes()[ring] = SizeOf(input, ring, vertices);
   });
   periodic.Allocate();
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    if (periodic.sizes()[ring].count == 0) return;
-    RefineRing(input, ring, periodic[ring], vertices);
+    if (periodic.sizes()[ring].count > 0) RefineRing(input, ring, periodic[ring], vertices);
     Thin(input, ring, vertices);
   });
 }
