@@ -103,17 +103,9 @@ void SetTileLimits(const SampleInput& input, RingSamples& s) {
   });
 }
 
-// Whether no tile's limit keeps a sample of the last frame from being chosen: as a rule in frames
-// of large bodies, to which one look-up less for each particle is due.
-bool LimitsCover(std::span<const ParticleSample> samples, const RingSamples& s) {
-  if (samples.empty()) return true;
-  return std::all_of(s.tile_limit.begin(), s.tile_limit.end(), [&](std::uint64_t limit) {
-    return limit == 0 || limit >= samples.back().hash;
-  });
-}
-
-// The particles that may be samples or, as `is_known` says, have been.
-void ChooseParticles(const SampleInput& input, const auto& is_known, RingSamples& s) {
+// The particles that may be samples or have been.
+void ChooseParticles(const SampleInput& input, const KnownHashes& known,
+                     const HashIndex<ParticleSample>& index, RingSamples& s) {
   const std::span<const BinStretch> stretches = input.bins.scratch.stretches;
   if (s.stretches.size() < stretches.size()) s.stretches.resize(stretches.size());
   ParallelFor(stretches.size(), [&](std::size_t k) {
@@ -126,7 +118,7 @@ void ChooseParticles(const SampleInput& input, const auto& is_known, RingSamples
     const std::uint32_t* const home = input.bins.scratch.home.data();
     for (std::size_t particle = stretch.first; particle < stretch.last; ++particle) {
       const std::uint64_t hash = HashOf(input.ids[particle]);
-      if (hash <= limit[home[particle]] || is_known(hash)) {
+      if (hash <= limit[home[particle]] || (known.MayHave(hash) && index.Find(hash) != nullptr)) {
         chosen.push_back(static_cast<std::uint32_t>(particle));
       }
     }
@@ -208,15 +200,7 @@ void SampleRings(const SampleInput& input, std::span<const ParticleSample> previ
   for (const std::uint64_t count : input.particle_count) s.ring_limit.push_back(LimitOf(count));
   SetTileLimits(input, s);
   const HashIndex<ParticleSample> index(previous, s.bucket);
-  if (LimitsCover(previous, s)) {
-    ChooseParticles(
-        input, [](std::uint64_t) { return false; }, s);
-  } else {
-    const KnownHashes known(previous, s.known);
-    ChooseParticles(
-        input,
-        [&](std::uint64_t hash) { return known.MayHave(hash) && index.Find(hash) != nullptr; }, s);
-  }
+  ChooseParticles(input, KnownHashes(previous, s.known), index, s);
   s.found.clear();
   ForEachChosen(input, s, [&](const ParticleSample& now) {
     // Only what is below the limit: a ring must not seem to be full by others.
