@@ -17,11 +17,16 @@ namespace {
 using testing::Random;
 using testing::Region;
 
-std::vector<std::int32_t> Depths(const Region& region) {
-  RingDepths ring_depths;
+std::vector<std::int32_t> DepthsOf(const Region& region, RingDepths& nesting) {
+  nesting.Find(region.points, region.loop_offsets);
   std::vector<std::int32_t> depths;
-  ring_depths.Find(region.points, region.loop_offsets, depths);
+  for (std::size_t k = 0; k < region.LoopCount(); ++k) depths.push_back(nesting.DepthOf(k));
   return depths;
+}
+
+std::vector<std::int32_t> Depths(const Region& region) {
+  RingDepths nesting;
+  return DepthsOf(region, nesting);
 }
 
 // How often a ring winds around a point, by all of its segments.
@@ -49,6 +54,19 @@ std::vector<std::int32_t> DepthsOneByOne(const Region& region) {
     depths.push_back(depth);
   }
   return depths;
+}
+
+// Of the rings around a ring the one that lies in all others of them.
+std::uint32_t AroundOneByOne(const Region& region, std::size_t ring) {
+  const auto is_in = [&](std::size_t inner, std::size_t outer) {
+    return WindingNumber(region, outer, region.PointAt(region.loop_offsets[inner])) != 0;
+  };
+  std::uint32_t around = kNoRing;
+  for (std::uint32_t other = 0; other < region.LoopCount(); ++other) {
+    if (other == ring || !is_in(ring, other)) continue;
+    if (around == kNoRing || is_in(other, around)) around = other;
+  }
+  return around;
 }
 
 std::vector<Point> Square(double x, double y, double half, bool is_hole = false) {
@@ -119,9 +137,10 @@ TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
     const std::vector<std::int32_t> expected = DepthsOneByOne(region);
     nested +=
         static_cast<int>(std::ranges::count_if(expected, [](int depth) { return depth != 0; }));
-    std::vector<std::int32_t> depths;
-    warm.Find(region.points, region.loop_offsets, depths);
-    ASSERT_EQ(depths, expected) << "seed " << seed;
+    ASSERT_EQ(DepthsOf(region, warm), expected) << "seed " << seed;
+    for (std::size_t ring = 0; ring < region.LoopCount(); ++ring) {
+      ASSERT_EQ(warm.AroundOf(ring), AroundOneByOne(region, ring)) << "seed " << seed;
+    }
   }
   EXPECT_GT(nested, 300);
 }

@@ -3,16 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "bins/bins.h"
-#include "crossings/crossings.h"
 #include "identities/ring_samples.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
-#include "rings/components.h"
 
 namespace partiemc {
 
@@ -26,11 +22,7 @@ struct RingTracks {
 struct TrackInput {
   const Frame& frame;
   Plane plane;
-  const ParticleBins& bins;
-  const Crossings& crossings;
-  const Components& components;
-  std::span<const std::uint32_t> ring_of_component;  ///< Number of its outer ring, or kNoRing.
-  std::span<const std::uint64_t> particle_count;     ///< By number, as CountParticles counts.
+  SampleInput particles;  ///< With the ids of the frame.
 };
 
 /// Follows the particles of a checked frame: samples as SampleRings takes them, velocities as means

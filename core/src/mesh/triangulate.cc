@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/bits.h"
 #include "base/point.h"
 #include "base/predicates.h"
 #include "base/sweep_status.h"
@@ -13,8 +14,6 @@
 
 namespace partiemc {
 namespace {
-
-constexpr std::uint32_t kNone = 0xffffffff;
 
 /// An edge on the sweep line, directed upward whatever the direction of its loop.
 struct Edge {
@@ -45,9 +44,9 @@ struct Interval {
 
 /// Which intervals a point touches from the inside, after those that end in it were closed.
 struct Surroundings {
-  std::uint32_t left = kNone;   // Has the region directly to the left of the point.
-  std::uint32_t right = kNone;  // The same to the right. Equal to `left`: the point is inside.
-  SweepStatus::Cursor cursor;   // At `right`, if there is one; where new intervals go, if not.
+  std::uint32_t left = kNoIndex;   // Has the region directly to the left of the point.
+  std::uint32_t right = kNoIndex;  // The same to the right. Equal to `left`: the point is inside.
+  SweepStatus::Cursor cursor;      // At `right`, if there is one; where new intervals go, if not.
 };
 
 }  // namespace
@@ -121,8 +120,8 @@ bool Triangulator::Sweep::Visit(std::span<const SweepEvent> events) {
   if (!Surround(vertex, *ending_edges, around)) return false;
 
   // What the region is directly to the left and right of the point must agree below and above it.
-  const bool inside_on_left = around.left != kNone;
-  const bool inside_on_right = around.right != kNone;
+  const bool inside_on_left = around.left != kNoIndex;
+  const bool inside_on_right = around.right != kNoIndex;
   if (rising_.empty()) {
     if (inside_on_left != inside_on_right) return false;
   } else if (rising_.front().is_left == inside_on_left ||
@@ -212,19 +211,19 @@ bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_
 void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& around) {
   SweepStatus::Cursor cursor = around.cursor;
   std::span<const RisingEdge> starting = rising_;
-  if (around.left != kNone && !starting.empty()) starting = starting.subspan(1);
-  if (around.right != kNone && !starting.empty()) starting = starting.first(starting.size() - 1);
+  if (around.left != kNoIndex && !starting.empty()) starting = starting.subspan(1);
+  if (around.right != kNoIndex && !starting.empty()) starting = starting.first(starting.size() - 1);
 
-  if (around.left != kNone && around.left == around.right) {
+  if (around.left != kNoIndex && around.left == around.right) {
     const std::uint32_t upper = SplitInterval(around.left, vertex);
     cursor = Start(vertex, starting, status_.Next(cursor));
     status_.Insert(cursor, upper);
     return;
   }
-  if (around.left != kNone) AddToRightChain(intervals_[around.left], vertex);
-  if (around.right != kNone) AddToLeftChain(intervals_[around.right], vertex);
+  if (around.left != kNoIndex) AddToRightChain(intervals_[around.left], vertex);
+  if (around.right != kNoIndex) AddToLeftChain(intervals_[around.right], vertex);
   if (rising_.empty()) {
-    if (around.left == kNone) return;
+    if (around.left == kNoIndex) return;
     Interval& merged = intervals_[around.left];
     const Interval& other = intervals_[around.right];
     merged.right = other.right;
@@ -233,10 +232,10 @@ void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& 
     status_.Erase(cursor);
     return;
   }
-  if (around.left != kNone) {
+  if (around.left != kNoIndex) {
     intervals_[around.left].right = {vertex.point, rising_.front().upper};
   }
-  if (around.right != kNone) {
+  if (around.right != kNoIndex) {
     intervals_[around.right].left = {vertex.point, rising_.back().upper};
   }
   Start(vertex, starting, cursor);

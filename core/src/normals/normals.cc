@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "base/bits.h"
 #include "base/parallel.h"
 #include "frame/placement_traits.h"
 #include "sampler/point_groups.h"
@@ -23,14 +24,12 @@ CellNormal PlaceOf(const TileDirectory& directory, const ActiveCell& cell) {
   return {(tile.x << kTileShift) + cell.i, (tile.y << kTileShift) + cell.j, 0, 0};
 }
 
-constexpr std::uint32_t kNone = 0xffffffff;
-
 // Finds the normals that the cells of `order` had in the frame before: both are in one order.
 // Writes the cells' places to `next`.
 void MatchPrevious(std::span<const CellNormal> previous, std::span<const std::uint32_t> order,
                    const TileDirectory& directory, const Crossings& crossings,
                    NormalScratch& scratch, std::vector<CellNormal>& next) {
-  scratch.previous.assign(crossings.cells.size(), kNone);
+  scratch.previous.assign(crossings.cells.size(), kNoIndex);
   next.resize(order.size());
   std::uint32_t before = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -171,7 +170,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   // The normal that a cell had in the frame before, or nullptr.
   const auto previous_of = [&](std::uint32_t cell) {
     const std::uint32_t index = scratch.previous[cell];
-    return index == kNone ? nullptr : &previous[index];
+    return index == kNoIndex ? nullptr : &previous[index];
   };
   planes.resize(rings.segments.size());
   scratch.normal.assign(crossings.cells.size(), {0, 0});

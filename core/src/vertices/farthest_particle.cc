@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/bits.h"
 #include "vertices/placement.h"
 
 namespace partiemc {
@@ -15,8 +16,7 @@ WorldPosition FarthestParticleVertex(const VertexInput& input, const CellPlane& 
   const int j = static_cast<int>(std::floor(y));
   const TilePlace place = Normalise(input.bins.tiles, cell.tile, i, j);
 
-  constexpr std::uint32_t kNone = 0xffffffff;
-  std::uint32_t farthest = kNone;
+  std::uint32_t farthest = kNoIndex;
   double farthest_distance = 0;
   if (place.tile != kNoTile) {
     const double px = place.i + (x - i);
@@ -28,7 +28,7 @@ WorldPosition FarthestParticleVertex(const VertexInput& input, const CellPlane& 
                               const double dy = qy - py;
                               const double distance = dx * plane.normal_x + dy * plane.normal_y;
                               if (distance < 0 || dx * dx + dy * dy > radius * radius) return;
-                              if (farthest == kNone || distance > farthest_distance) {
+                              if (farthest == kNoIndex || distance > farthest_distance) {
                                 farthest = input.field.SourceOf(entry);
                                 farthest_distance = distance;
                               }
@@ -36,7 +36,7 @@ WorldPosition FarthestParticleVertex(const VertexInput& input, const CellPlane& 
   }
   WorldPosition vertex{(plane.entry.x + plane.exit.x) / 2 * scale.cell_size,
                        (plane.entry.y + plane.exit.y) / 2 * scale.cell_size};
-  if (farthest != kNone) vertex = PositionOf(input.frame, input.parameters.plane, farthest);
+  if (farthest != kNoIndex) vertex = PositionOf(input.frame, input.parameters.plane, farthest);
   const double offset = input.parameters.surface_offset * scale.spacing * scale.cell_size;
   return {vertex.x + offset * plane.normal_x, vertex.y + offset * plane.normal_y};
 }

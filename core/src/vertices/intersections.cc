@@ -13,6 +13,7 @@
 #include <bit>
 #include <limits>
 
+#include "base/bits.h"
 #include "base/parallel.h"
 #include "base/predicates.h"
 #include "vertices/hierarchical_grid.h"
@@ -27,8 +28,6 @@ constexpr std::uint32_t kRunLength = 8;
 
 // Directions that all segments of a run may have.
 constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
-
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 struct Segment {
   Point a, b;
@@ -123,7 +122,7 @@ HierarchicalGrid PairSearch::MakeGrid() const {
 void PairSearch::FillGrid(const HierarchicalGrid& grid) {
   std::vector<Run>& runs = buffers_.runs;
   std::vector<std::uint32_t>& slots = buffers_.slots;
-  slots.assign(std::bit_ceil(2 * runs.size()), kNone);
+  slots.assign(std::bit_ceil(2 * runs.size()), kNoIndex);
   used_levels_ = 0;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     Run& run = runs[k];
@@ -197,7 +196,7 @@ void PairSearch::ForEachPair(const HierarchicalGrid& grid, std::uint32_t index, 
     for (std::int64_t row = first_row; row <= last_row; ++row) {
       for (std::int64_t column = first_column; column <= last_column; ++column) {
         const std::uint64_t cell = HierarchicalGrid::Key(level, column, row);
-        for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNone;
+        for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNoIndex;
              other = runs[other].next_in_slot) {
           if (runs[other].cell != cell || (!finds_all && other <= index)) continue;
           ForEachPairBetween(run, runs[other], visit);
@@ -234,8 +233,6 @@ std::size_t PairSearch::Count() {
     ForEachPair(grid, run, [&](std::uint32_t i, std::uint32_t j) {
       ++count;
       if (buffers_.pairs.size() < max_pairs) buffers_.pairs.emplace_back(i, j);
-      buffers_.example_first = std::min(i, j);
-      buffers_.example_second = std::max(i, j);
     });
   }
   return count;

@@ -31,10 +31,6 @@ struct TouchingPairsBuffers {
   /// Pairs that were counted, each segment named by the point that it begins at. At most as many as
   /// there are segments; a frame with more of them has lost the later ones.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-
-  /// One of them, each segment named by the point that it begins at. Only to be read
-  /// when the count was not zero.
-  std::uint32_t example_first = 0, example_second = 0;
 };
 
 /// The number of pairs of segments that have a point in common, over all segments of all rings.

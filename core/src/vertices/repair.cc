@@ -58,11 +58,12 @@ Point LeftmostOf(const Rings& rings, std::size_t ring) {
 // lies in (1).
 void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   scratch.misplaced.clear();
-  scratch.ring_depths.Find(rings.points, rings.offsets, scratch.depths);
+  scratch.ring_depths.Find(rings.points, rings.offsets);
   for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
     const bool is_hole = rings.outer_of[ring] != kNoRing;
     const bool is_turned = (rings.measures[ring].area < 0) != is_hole;
-    if (is_turned || scratch.depths[ring] != (is_hole ? 1 : 0)) scratch.misplaced.push_back(ring);
+    if (is_turned || scratch.ring_depths.DepthOf(ring) != (is_hole ? 1 : 0))
+      scratch.misplaced.push_back(ring);
   }
 }
 

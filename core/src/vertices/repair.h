@@ -15,7 +15,6 @@ namespace partiemc {
 struct RepairScratch {
   TouchingPairsBuffers pairs;
   std::vector<std::uint8_t> is_marked;   // Per point.
-  std::vector<std::int32_t> depths;      // By ring.
   std::vector<std::uint32_t> misplaced;  // Rings.
   std::vector<Point> leftmost;           // By these.
   RingDepths ring_depths;

@@ -52,18 +52,25 @@ bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
   return Orientation(PointAt(points_, c.at), PointAt(points_, above), point) < 0;
 }
 
-void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
-                       std::vector<std::int32_t>& depths) {
+void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets) {
   const SweepStatus::Cursor right =
       status_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
   const std::int32_t depth = status_.IsEnd(right) ? 0 : chains_[status_.At(right)].depth;
-  if (turn.is_lowest) depths[turn.ring] = depth;
   const std::uint32_t first = offsets[turn.ring], last = offsets[turn.ring + 1];
-  Chain on{turn.index, first, last, true, depth};
-  Chain back{turn.index, first, last, false, depth};
+  Chain on{turn.ring, turn.index, first, last, true, depth};
+  Chain back{turn.ring, turn.index, first, last, false, depth};
   // A ring that runs upwards on the right winds counter-clockwise around what lies between.
   const bool on_is_right =
       Orientation(turn.point, PointAt(points_, Above(on)), PointAt(points_, Above(back))) > 0;
+  if (turn.is_lowest) {
+    Ring& ring = rings_[turn.ring];
+    ring = {depth, kNoRing, on_is_right};
+    if (!status_.IsEnd(right)) {
+      const Chain& beside = chains_[status_.At(right)];
+      const Ring& other = rings_[beside.ring];  // Was met before, as its chain goes on already.
+      ring.around = beside.goes_on == other.is_counter_clockwise ? beside.ring : other.around;
+    }
+  }
   (on_is_right ? on : back).depth += on_is_right ? 1 : -1;
   const auto add = [&](const Chain& chain) {
     if (unused_.empty()) {
@@ -88,10 +95,9 @@ void RingDepths::End(const Turn& turn) {
   }
 }
 
-void RingDepths::Find(std::span<const double> points, std::span<const std::uint32_t> offsets,
-                      std::vector<std::int32_t>& depths) {
+void RingDepths::Find(std::span<const double> points, std::span<const std::uint32_t> offsets) {
   points_ = points;
-  depths.assign(offsets.size() - 1, 0);
+  rings_.assign(offsets.empty() ? 0 : offsets.size() - 1, {});
   chains_.clear();
   unused_.clear();
   status_.Clear();
@@ -99,7 +105,7 @@ void RingDepths::Find(std::span<const double> points, std::span<const std::uint3
   for (const Turn& turn : turns_) {
     ThrowIfCancelled();
     if (turn.is_low) {
-      Begin(turn, offsets, depths);
+      Begin(turn, offsets);
     } else {
       End(turn);
     }

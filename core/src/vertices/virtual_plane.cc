@@ -10,7 +10,7 @@
 #include "base/prefetch.h"
 #include "sampler/point_groups.h"
 #include "vertices/placement.h"
-#include "vertices/plane_estimates.h"
+#include "vertices/plane_support.h"
 #include "vertices/ring_filters.h"
 
 namespace partiemc {
@@ -193,6 +193,32 @@ double MeanOf(const PeriodicRing& ring, const float* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
+// What the particles near a plane say of it; 0 where there are none.
+struct PlaneEstimate {
+  // How far outside of the plane the boundary is, in cells: by the mean distance of the particles
+  // that support it, plus half a spacing. At most the support's height either way.
+  double offset = 0;
+  double variance = 0;  // Of those distances, in squared spacings.
+};
+
+PlaneEstimate EstimateOf(const SupportSums& sums, const SupportShape& support) {
+  if (!(sums.weight > 0)) return {};
+  const double mean = sums.distance / sums.weight;
+  const double variance = std::max(0.0, sums.square / sums.weight - mean * mean);
+  return {std::clamp(mean + support.spacing / 2, -support.height, support.height),
+          variance / (support.spacing * support.spacing)};
+}
+
+void FindSupports(const PointField& field, const SupportShape& support,
+                  std::span<const PointGroup<BentPlane>> groups, std::span<QuerySupports> sums) {
+  std::array<SupportQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].planes = std::span(groups[q].points).first(groups[q].count);
+    field.FindNear(groups[q].tile, queries[q].planes, support.radius, queries[q].near);
+  }
+  SumSupports(std::span(queries).first(groups.size()), support, sums);
+}
+
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
 // along the ring counts: their mean depends on how the particles are arranged, not on the shape.
 // The more the particles that support a ring's planes scatter, the less they are believed.
@@ -201,21 +227,25 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.parameters.steps;
   const VirtualPlaneConstants& c = input.parameters.constants;
-  const PlaneEstimator estimator(input.field, input.scale, c);
+  const SupportShape support{// Particles are listed within the kernel radius.
+                             .radius = std::min(c.support_radius * h, input.scale.kernel_radius),
+                             .height = c.support_height * h,
+                             .spacing = h,
+                             .depth = c.support_depth};
   // What the kernel takes off a bend grows with the square of its radius R: R^2 kappa / 18.
   const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
   float* scatter = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, c.curvature_reach * h);
-    auto planes = CollectPoints<BentPlane>([&](std::span<const PlaneEstimator::Planes> groups) {
-      std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates;
-      estimator.Estimate(groups, estimates);
+    auto planes = CollectPoints<BentPlane>([&](std::span<const PointGroup<BentPlane>> groups) {
+      std::array<QuerySupports, kQueriesAtOnce> sums;
+      FindSupports(input.field, support, groups, sums);
       for (std::size_t q = 0; q < groups.size(); ++q) {
         for (std::size_t of = 0; of < groups[q].count; ++of) {
           const std::size_t i = groups[q].vertices[of];
-          const auto [offset, spread] = estimates[q][of];
+          const auto [offset, variance] = EstimateOf(sums[q][of], support);
           ring.shift[i] = static_cast<float>(offset) - ring.base[i];
-          scatter[i] = static_cast<float>(spread);
+          scatter[i] = static_cast<float>(variance);
         }
       }
     });
