@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "base/prefetch.h"
 #include "sampler/point_groups.h"
 #include "vertices/placement.h"
 #include "vertices/plane_support.h"
@@ -15,9 +14,6 @@
 
 namespace partiemc {
 namespace {
-
-// Segments between one and that whose memory is asked for.
-constexpr std::size_t kAskedAhead = 24;
 
 double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
 
@@ -46,37 +42,19 @@ LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient,
   return {point.x + step * gradient.x, point.y + step * gradient.y};
 }
 
-// A point beyond the sides of a tile, in cells relative to it.
-FieldPoint LocateBeyond(const VertexInput& input, std::uint32_t tile, double x, double y) {
+// Where a point in or next to a cell is: in most cases in the cell's own tile, which is indexed as
+// it has an active cell.
+FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const LatticePoint& point) {
+  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
+  const double x = point.x - origin.x + cell.i;
+  const double y = point.y - origin.y + cell.j;
+  if (x >= 0 && y >= 0 && x < kTileSize && y < kTileSize) return {cell.tile, x, y};
   const int i = static_cast<int>(std::floor(x));
   const int j = static_cast<int>(std::floor(y));
-  const TilePlace place = Normalise(input.bins.tiles, tile, i, j);
+  const TilePlace place = Normalise(input.bins.tiles, cell.tile, i, j);
   const bool usable = place.tile != kNoTile && input.field.IsIndexed(place.tile);
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
-
-// Tells where points in or next to the cell of a segment are: in most cases in the tile of that.
-class SegmentLocator {
- public:
-  SegmentLocator(const VertexInput& input, std::size_t segment)
-      : input_(input),
-        cell_(input.planes[segment].cell),
-        origin_(CellOrigin(input.bins.tiles, cell_)) {}
-
-  FieldPoint Locate(const LatticePoint& point) const {
-    const double x = point.x - origin_.x + cell_.i;
-    const double y = point.y - origin_.y + cell_.j;
-    if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
-      return LocateBeyond(input_, cell_.tile, x, y);
-    }
-    return {cell_.tile, x, y};  // Indexed, as it has an active cell.
-  }
-
- private:
-  const VertexInput& input_;
-  const ActiveCell& cell_;
-  LatticePoint origin_;
-};
 
 // Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
 // that of a distance stays the same: unless a step is long, normals are those of the points that it
@@ -96,7 +74,7 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
     const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
     if (Dot(step, step) > constants.long_step * constants.long_step) {
-      const FieldPoint at = SegmentLocator(input, segment).Locate(v.point[i]);
+      const FieldPoint at = Locate(input, plane.cell, v.point[i]);
       const FieldSample sample =
           at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
       gradient = {sample.gradient_x, sample.gradient_y};
@@ -114,12 +92,7 @@ void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) 
   const std::size_t begin = input.topology.offsets[ring];
   const std::size_t count = input.topology.offsets[ring + 1] - begin;
   const auto find = [&](std::size_t first, std::size_t last) {
-    for (std::size_t k = begin + first; k < begin + last; ++k) {
-      if (const std::size_t later = k + kAskedAhead; later < input.planes.size()) {
-        PrefetchLines(std::span(input.planes).subspan(later, 1));
-      }
-      FindRoots(input, k, v);
-    }
+    for (std::size_t k = begin + first; k < begin + last; ++k) FindRoots(input, k, v);
   };
   count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
 }
@@ -252,7 +225,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
     // Each segment has two vertices.
     for (std::ptrdiff_t k = begin; k < end; k += 2) {
       if (BeginsGroup(k / 2)) planes.Part();
-      const SegmentLocator locator(input, first_segment + k / 2);
+      const ActiveCell& cell = input.planes[first_segment + k / 2].cell;
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
         // Nothing bends within less than a spacing.
         const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
@@ -260,7 +233,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
         ring.shift[i] = -ring.base[i];  // What is kept where nothing tells where a plane belongs.
         scatter[i] = 0;
         if (!steps.support) continue;
-        const FieldPoint at = locator.Locate(v.point[2 * first_segment + i]);
+        const FieldPoint at = Locate(input, cell, v.point[2 * first_segment + i]);
         if (at.tile == kNoTile) continue;
         planes.Add(i, at.tile,
                    {.x = at.x,
