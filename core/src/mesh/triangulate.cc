@@ -1,90 +1,19 @@
 #include "mesh/triangulate.h"
 
 #include <algorithm>
-#include <cstddef>
-#include <optional>
 #include <utility>
-
-#include "base/bits.h"
-#include "base/point.h"
-#include "base/predicates.h"
-#include "base/sweep_status.h"
-#include "mesh/monotone_pieces.h"
-#include "mesh/sweep_events.h"
 
 namespace partiemc {
 namespace {
 
-/// An edge on the sweep line, directed upward whatever the direction of its loop.
-struct Edge {
-  Point lower, upper;
-
-  /// +1 where `point` lies left of the edge, 0 on its line, -1 right of it.
-  int SideOf(const Point& point) const { return Orientation(lower, upper, point); }
-};
-
 MonotonePieces::Vertex VertexOf(const SweepEvent& event) { return {event.point, event.index}; }
-
-/// An edge that begins at the point in hand and rises from it.
-struct RisingEdge {
-  Point upper;
-  bool is_left;  // Bounds an interval of the region on its left; otherwise on its right.
-};
-
-/// A maximal part of the sweep line inside the region. Above a merge point, where two intervals
-/// have become one, it holds two pieces until a diagonal from the merge point to the next vertex of
-/// the interval shows which of them ends there: `left_piece` has the merge point as the end of its
-/// right chain, `right_piece` as the end of its left one. Otherwise there is `left_piece` only.
-struct Interval {
-  Edge left, right;
-  MonotonePieces::Piece left_piece, right_piece;
-
-  bool IsMerged() const { return !right_piece.IsEmpty(); }
-};
-
-/// Which intervals a point touches from the inside, after those that end in it were closed.
-struct Surroundings {
-  std::uint32_t left = kNoIndex;   // Has the region directly to the left of the point.
-  std::uint32_t right = kNoIndex;  // The same to the right. Equal to `left`: the point is inside.
-  SweepStatus::Cursor cursor;      // At `right`, if there is one; where new intervals go, if not.
-};
 
 }  // namespace
 
-class Triangulator::Sweep {
- public:
-  bool Run(std::span<const double> points, std::span<const std::uint32_t> loop_points,
-           std::span<const std::uint32_t> loop_offsets, std::vector<std::uint32_t>& triangles);
-
- private:
-  bool Visit(std::span<const SweepEvent> events);
-  std::optional<std::size_t> SplitEdges(std::span<const SweepEvent> events);
-  bool RisingEdgesAlternate(const Point& point) const;
-  bool Surround(const SweepEvent& vertex, std::size_t ending_edges, Surroundings& found);
-  void Advance(const SweepEvent& vertex, const Surroundings& around);
-  SweepStatus::Cursor Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
-                            SweepStatus::Cursor cursor);
-
-  std::uint32_t SplitInterval(std::uint32_t id, const SweepEvent& vertex);
-  void AddToLeftChain(Interval& interval, const SweepEvent& vertex);
-  void AddToRightChain(Interval& interval, const SweepEvent& vertex);
-  void Close(std::uint32_t id, const SweepEvent& vertex);
-
-  std::uint32_t NewInterval();
-
-  std::span<const double> points_;
-  SweepEvents events_;
-  std::vector<RisingEdge> rising_;
-  std::vector<Interval> intervals_;
-  std::vector<std::uint32_t> unused_intervals_;
-  MonotonePieces pieces_;
-  SweepStatus status_;
-};
-
-bool Triangulator::Sweep::Run(std::span<const double> points,
-                              std::span<const std::uint32_t> loop_points,
-                              std::span<const std::uint32_t> loop_offsets,
-                              std::vector<std::uint32_t>& triangles) {
+bool Triangulator::Triangulate(std::span<const double> points,
+                               std::span<const std::uint32_t> loop_points,
+                               std::span<const std::uint32_t> loop_offsets,
+                               std::vector<std::uint32_t>& triangles) {
   points_ = points;
   const std::size_t size_before = triangles.size();
   intervals_.clear();
@@ -112,7 +41,7 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
 /// the sweep line finds every crossing: the first one exchanges two neighbours, nothing can be
 /// inserted between these any more, and the one that ends first ends on the wrong side of the
 /// other.
-bool Triangulator::Sweep::Visit(std::span<const SweepEvent> events) {
+bool Triangulator::Visit(std::span<const SweepEvent> events) {
   const SweepEvent& vertex = events.front();
   const std::optional<std::size_t> ending_edges = SplitEdges(events);
   if (!ending_edges.has_value() || !RisingEdgesAlternate(vertex.point)) return false;
@@ -134,7 +63,7 @@ bool Triangulator::Sweep::Visit(std::span<const SweepEvent> events) {
 
 /// Collects the edges that rise from a point, from left to right; returns the number of those that
 /// end in it. Nothing if an edge has no length.
-std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const SweepEvent> events) {
+std::optional<std::size_t> Triangulator::SplitEdges(std::span<const SweepEvent> events) {
   const Point point = events.front().point;
   rising_.clear();
   for (const SweepEvent& event : events) {
@@ -153,7 +82,7 @@ std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const Sweep
   return 2 * events.size() - rising_.size();
 }
 
-bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
+bool Triangulator::RisingEdgesAlternate(const Point& point) const {
   for (std::size_t i = 1; i < rising_.size(); ++i) {
     if (rising_[i - 1].is_left == rising_[i].is_left) return false;
     if (Orientation(point, rising_[i - 1].upper, rising_[i].upper) == 0) return false;
@@ -163,8 +92,8 @@ bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
 
 /// Finds the intervals around a point and closes those that end in it. False if an edge runs
 /// through the point, or if the edges found to end here are not all that should.
-bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_edges,
-                                   Surroundings& found) {
+bool Triangulator::Surround(const SweepEvent& vertex, std::size_t ending_edges,
+                            Surroundings& found) {
   const Point& point = vertex.point;
   found.cursor = status_.FindFirstNot(
       [&](std::uint32_t id) { return intervals_[id].right.SideOf(point) < 0; });
@@ -208,7 +137,7 @@ bool Triangulator::Sweep::Surround(const SweepEvent& vertex, std::size_t ending_
 ///   \ | /    \  /       /  \        \ /
 ///    \|/      \/ split   \/ merge    | several rising edges: the outer ones go on with the
 ///     *       *           *          * intervals around, each pair between starts a new one
-void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& around) {
+void Triangulator::Advance(const SweepEvent& vertex, const Surroundings& around) {
   SweepStatus::Cursor cursor = around.cursor;
   std::span<const RisingEdge> starting = rising_;
   if (around.left != kNoIndex && !starting.empty()) starting = starting.subspan(1);
@@ -242,9 +171,8 @@ void Triangulator::Sweep::Advance(const SweepEvent& vertex, const Surroundings& 
 }
 
 /// Starts an interval between every two of `edges`; returns the cursor behind them.
-SweepStatus::Cursor Triangulator::Sweep::Start(const SweepEvent& vertex,
-                                               std::span<const RisingEdge> edges,
-                                               SweepStatus::Cursor cursor) {
+SweepStatus::Cursor Triangulator::Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
+                                        SweepStatus::Cursor cursor) {
   for (std::size_t i = 0; i + 1 < edges.size(); i += 2) {
     const std::uint32_t id = NewInterval();
     Interval& interval = intervals_[id];
@@ -258,7 +186,7 @@ SweepStatus::Cursor Triangulator::Sweep::Start(const SweepEvent& vertex,
 
 /// A vertex inside an interval: a diagonal from it to the last vertex of the interval below cuts
 /// the piece in two. Returns the new interval, which goes to the right of interval `id`.
-std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const SweepEvent& vertex) {
+std::uint32_t Triangulator::SplitInterval(std::uint32_t id, const SweepEvent& vertex) {
   const std::uint32_t right_id = NewInterval();
   Interval& left = intervals_[id];
   Interval& right = intervals_[right_id];
@@ -280,7 +208,7 @@ std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const SweepEv
   return right_id;
 }
 
-void Triangulator::Sweep::AddToLeftChain(Interval& interval, const SweepEvent& vertex) {
+void Triangulator::AddToLeftChain(Interval& interval, const SweepEvent& vertex) {
   if (interval.IsMerged()) {
     pieces_.Finish(interval.left_piece, VertexOf(vertex));
     interval.left_piece = interval.right_piece;
@@ -289,19 +217,19 @@ void Triangulator::Sweep::AddToLeftChain(Interval& interval, const SweepEvent& v
   pieces_.AddToLeftChain(interval.left_piece, VertexOf(vertex));
 }
 
-void Triangulator::Sweep::AddToRightChain(Interval& interval, const SweepEvent& vertex) {
+void Triangulator::AddToRightChain(Interval& interval, const SweepEvent& vertex) {
   if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
   pieces_.AddToRightChain(interval.left_piece, VertexOf(vertex));
 }
 
-void Triangulator::Sweep::Close(std::uint32_t id, const SweepEvent& vertex) {
+void Triangulator::Close(std::uint32_t id, const SweepEvent& vertex) {
   Interval& interval = intervals_[id];
   if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
   pieces_.Finish(interval.left_piece, VertexOf(vertex));
   unused_intervals_.push_back(id);
 }
 
-std::uint32_t Triangulator::Sweep::NewInterval() {
+std::uint32_t Triangulator::NewInterval() {
   if (unused_intervals_.empty()) {
     intervals_.emplace_back();
     return static_cast<std::uint32_t>(intervals_.size() - 1);
@@ -310,18 +238,6 @@ std::uint32_t Triangulator::Sweep::NewInterval() {
   unused_intervals_.pop_back();
   intervals_[id] = {};
   return id;
-}
-
-Triangulator::Triangulator() : sweep_(std::make_unique<Sweep>()) {}
-Triangulator::~Triangulator() = default;
-Triangulator::Triangulator(Triangulator&&) noexcept = default;
-Triangulator& Triangulator::operator=(Triangulator&&) noexcept = default;
-
-bool Triangulator::Triangulate(std::span<const double> points,
-                               std::span<const std::uint32_t> loop_points,
-                               std::span<const std::uint32_t> loop_offsets,
-                               std::vector<std::uint32_t>& triangles) {
-  return sweep_->Run(points, loop_points, loop_offsets, triangles);
 }
 
 }  // namespace partiemc

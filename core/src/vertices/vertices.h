@@ -11,8 +11,8 @@
 #include "partiemc/result.h"
 #include "rings/rings.h"
 #include "sampler/point_field.h"
+#include "vertices/periodic_ring.h"
 #include "vertices/repair.h"
-#include "vertices/ring_vertices.h"
 
 namespace partiemc {
 
@@ -31,6 +31,30 @@ struct PlacedVertices {
   std::vector<std::uint32_t>
       tangled;  ///< Outer rings that repair could not make simple (repair.h).
   std::uint64_t self_intersections = 0;  ///< Of placements that do not promise to have none.
+};
+
+/// Unit, outward.
+struct VertexNormal {
+  float x = 0, y = 0;
+};
+
+/// Two vertices per segment of the topology, ring after ring: the crossing of its entry edge, then
+/// the vertex of its cell. Lengths in cells, positions in lattice coordinates of the world. Segment
+/// k has vertices 2 k and 2 k + 1.
+struct RingVertices {
+  std::vector<LatticePoint> point;
+  /// Where a vertex may always retreat to: with all vertices there, rings are simple.
+  std::vector<LatticePoint> root;
+  std::vector<VertexNormal> normal;
+  std::vector<std::uint8_t> is_kept;  ///< 0 for vertices that thinning dropped.
+  PeriodicRings periodic_rings;       ///< Scratch of the steps.
+
+  void Resize(std::size_t count) {
+    point.resize(count);
+    root.resize(count);
+    normal.resize(count);
+    is_kept.resize(count);
+  }
 };
 
 /// Warm buffers of PlaceVertices.

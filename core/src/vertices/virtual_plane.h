@@ -2,7 +2,6 @@
 // support (core/METHOD.md, "The default placement").
 #pragma once
 
-#include "vertices/ring_vertices.h"
 #include "vertices/vertices.h"
 
 namespace partiemc {
