@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "base/bits.h"
 #include "base/cancellation.h"
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
@@ -72,10 +71,7 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   FrameSize size{.particles = frame.ParticleCount(),
                  .tiles = b.bins.tiles.size(),
                  .segments = b.topology.segments.size()};
-  if (parameters.fill != Fill::kGrid) return size;
-  for (const BitRows& rows : b.crossings.interior) {
-    for (const std::uint32_t row : rows) size.grid_cells += CountBits(row);
-  }
+  if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
   return size;
 }
 

@@ -2,6 +2,8 @@
 
 #include <bit>
 
+#include "base/bits.h"
+
 namespace partiemc {
 namespace {
 
@@ -70,6 +72,14 @@ std::array<TilePlace, 4> CornersOf(const TileDirectory& directory, const CellRec
   const TilePlace& corner = rectangle.corner;
   const TilePlace right = moved(corner, rectangle.width, 0);
   return {corner, right, moved(right, 0, rectangle.height), moved(corner, 0, rectangle.height)};
+}
+
+std::uint64_t CountCells(std::span<const BitRows> cells) {
+  std::uint64_t count = 0;
+  for (const BitRows& rows : cells) {
+    for (const std::uint32_t row : rows) count += CountBits(row);
+  }
+  return count;
 }
 
 void MergeCells(const TileDirectory& directory, std::span<const BitRows> interior,

@@ -21,6 +21,9 @@ struct CellRectangle {
 /// so that there are tiles all along its sides.
 std::array<TilePlace, 4> CornersOf(const TileDirectory& directory, const CellRectangle& rectangle);
 
+/// The number of cells in rows of bits.
+std::uint64_t CountCells(std::span<const BitRows> cells);
+
 /// Warm buffers of MergeCells.
 struct MergeScratch {
   std::vector<BitRows> free;

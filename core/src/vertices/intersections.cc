@@ -41,44 +41,37 @@ bool FoldsBack(const Segment& first, const Segment& second) {
          Orientation(first.a, corner, second.b) == 0;
 }
 
-/// All of the work on one input.
-class PairSearch {
- public:
-  PairSearch(std::span<const double> points, TouchingPairsBuffers& buffers)
-      : points_(points), buffers_(buffers) {}
+// All of the work on one input.
+struct Search {
+  std::span<const double> points;
+  TouchingPairsBuffers& buffers;
+  std::uint32_t used_levels = 0;
 
-  void CollectRuns(std::span<const std::uint32_t> ring_offsets);
-  /// Requires: runs were collected.
-  std::size_t Count();
-
- private:
   Segment SegmentAt(const Run& run, std::uint32_t i) const {
-    return {PointAt(points_, i), PointAt(points_, i + 1 == run.ring_end ? run.ring_begin : i + 1)};
+    return {PointAt(points, i), PointAt(points, i + 1 == run.ring_end ? run.ring_begin : i + 1)};
   }
-  static std::uint32_t Previous(const Run& run, std::uint32_t i) {
-    return (i == run.ring_begin ? run.ring_end : i) - 1;
-  }
-
-  void Measure(Run& run) const;
-  HierarchicalGrid MakeGrid() const;
-  void FillGrid(const HierarchicalGrid& grid);
-
-  bool Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) const;
-  template <typename Visit>
-  void ForEachPairWithin(const Run& run, Visit visit) const;
-  template <typename Visit>
-  void ForEachPairBetween(const Run& first, const Run& second, Visit visit) const;
-  template <typename Visit>
-  void ForEachPair(const HierarchicalGrid& grid, std::uint32_t run, Visit visit) const;
-  bool FindPairs(const HierarchicalGrid& grid);
-
-  std::span<const double> points_;
-  TouchingPairsBuffers& buffers_;
-  std::uint32_t used_levels_ = 0;
 };
 
-void PairSearch::CollectRuns(std::span<const std::uint32_t> ring_offsets) {
-  std::vector<Run>& runs = buffers_.runs;
+std::uint32_t Previous(const Run& run, std::uint32_t i) {
+  return (i == run.ring_begin ? run.ring_end : i) - 1;
+}
+
+void Measure(const Search& s, Run& run) {
+  Box box;
+  box.Add(PointAt(s.points, run.first));
+  unsigned directions = kRightward | kLeftward | kUpward | kDownward;
+  for (std::uint32_t i = run.first; i < run.last; ++i) {
+    const auto [a, b] = s.SegmentAt(run, i);
+    box.Add(b);
+    directions &= (a.x < b.x ? kRightward : 0u) | (a.x > b.x ? kLeftward : 0u) |
+                  (a.y < b.y ? kUpward : 0u) | (a.y > b.y ? kDownward : 0u);
+  }
+  run.box = box;
+  run.directions = static_cast<std::uint8_t>(directions);
+}
+
+void CollectRuns(Search& s, std::span<const std::uint32_t> ring_offsets) {
+  std::vector<Run>& runs = s.buffers.runs;
   runs.clear();
   for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
     const std::uint32_t begin = ring_offsets[ring];
@@ -90,44 +83,30 @@ void PairSearch::CollectRuns(std::span<const std::uint32_t> ring_offsets) {
                       .ring_end = end});
     }
   }
-  ParallelFor(runs.size(), [&](std::size_t k) { Measure(runs[k]); });
+  ParallelFor(runs.size(), [&](std::size_t k) { Measure(s, runs[k]); });
 }
 
-void PairSearch::Measure(Run& run) const {
-  Box box;
-  box.Add(PointAt(points_, run.first));
-  unsigned directions = kRightward | kLeftward | kUpward | kDownward;
-  for (std::uint32_t i = run.first; i < run.last; ++i) {
-    const auto [a, b] = SegmentAt(run, i);
-    box.Add(b);
-    directions &= (a.x < b.x ? kRightward : 0u) | (a.x > b.x ? kLeftward : 0u) |
-                  (a.y < b.y ? kUpward : 0u) | (a.y > b.y ? kDownward : 0u);
-  }
-  run.box = box;
-  run.directions = static_cast<std::uint8_t>(directions);
-}
-
-HierarchicalGrid PairSearch::MakeGrid() const {
+HierarchicalGrid MakeGrid(const Search& s) {
   Box bounds;
   double extents = 0;
-  for (const Run& run : buffers_.runs) {
+  for (const Run& run : s.buffers.runs) {
     bounds.Add({run.box.left, run.box.bottom});
     bounds.Add({run.box.right, run.box.top});
     extents += run.box.Extent();
   }
-  return HierarchicalGrid(bounds, extents / static_cast<double>(buffers_.runs.size()));
+  return HierarchicalGrid(bounds, extents / static_cast<double>(s.buffers.runs.size()));
 }
 
 /// Puts every run into its cell.
-void PairSearch::FillGrid(const HierarchicalGrid& grid) {
-  std::vector<Run>& runs = buffers_.runs;
-  std::vector<std::uint32_t>& slots = buffers_.slots;
+void FillGrid(Search& s, const HierarchicalGrid& grid) {
+  std::vector<Run>& runs = s.buffers.runs;
+  std::vector<std::uint32_t>& slots = s.buffers.slots;
   slots.assign(std::bit_ceil(2 * runs.size()), kNoIndex);
-  used_levels_ = 0;
+  s.used_levels = 0;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     Run& run = runs[k];
     const int level = grid.LevelFor(run.box.Extent());
-    used_levels_ |= 1u << level;
+    s.used_levels |= 1u << level;
     run.level = static_cast<std::uint8_t>(level);
     run.cell = HierarchicalGrid::Key(level, grid.Column(run.box.left, level),
                                      grid.Row(run.box.bottom, level));
@@ -138,9 +117,9 @@ void PairSearch::FillGrid(const HierarchicalGrid& grid) {
 }
 
 /// Whether a pair of segments counts, see the header.
-bool PairSearch::Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) const {
-  const Segment a = SegmentAt(of_i, i);
-  const Segment b = SegmentAt(of_j, j);
+bool Touches(const Search& s, const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) {
+  const Segment a = s.SegmentAt(of_i, i);
+  const Segment b = s.SegmentAt(of_j, j);
   const bool a_follows = Previous(of_i, i) == j;
   const bool b_follows = Previous(of_j, j) == i;
   if (!a_follows && !b_follows) return SegmentsTouch(a.a, a.b, b.a, b.b);
@@ -148,29 +127,29 @@ bool PairSearch::Touches(const Run& of_i, std::uint32_t i, const Run& of_j, std:
 }
 
 template <typename Visit>
-void PairSearch::ForEachPairWithin(const Run& run, Visit visit) const {
+void ForEachPairWithin(const Search& s, const Run& run, Visit visit) {
   if (run.directions != 0) return;
   for (std::uint32_t i = run.first; i < run.last; ++i) {
     for (std::uint32_t j = i + 1; j < run.last; ++j) {
-      if (Touches(run, i, run, j)) visit(i, j);
+      if (Touches(s, run, i, run, j)) visit(i, j);
     }
   }
 }
 
 template <typename Visit>
-void PairSearch::ForEachPairBetween(const Run& first, const Run& second, Visit visit) const {
+void ForEachPairBetween(const Search& s, const Run& first, const Run& second, Visit visit) {
   if (!BoxesTouch(first.box, second.box)) return;
   const bool follows = Previous(second, second.first) == first.last - 1 ||
                        Previous(first, first.first) == second.last - 1;
   if (follows && (first.directions & second.directions) != 0) return;
   for (std::uint32_t i = first.first; i < first.last; ++i) {
-    const Segment segment = SegmentAt(first, i);
+    const Segment segment = s.SegmentAt(first, i);
     Box box;
     box.Add(segment.a);
     box.Add(segment.b);
     if (!BoxesTouch(box, second.box)) continue;
     for (std::uint32_t j = second.first; j < second.last; ++j) {
-      if (Touches(first, i, second, j)) visit(i, j);
+      if (Touches(s, first, i, second, j)) visit(i, j);
     }
   }
 }
@@ -179,13 +158,13 @@ void PairSearch::ForEachPairBetween(const Run& first, const Run& second, Visit v
 /// may touch has its lower left corner no farther to the right and above than its box, and less
 /// than a cell to the left and below.
 template <typename Visit>
-void PairSearch::ForEachPair(const HierarchicalGrid& grid, std::uint32_t index, Visit visit) const {
-  const std::span<const Run> runs = buffers_.runs;
-  const std::span<const std::uint32_t> slots = buffers_.slots;
+void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t index, Visit visit) {
+  const std::span<const Run> runs = s.buffers.runs;
+  const std::span<const std::uint32_t> slots = s.buffers.slots;
   const Run& run = runs[index];
-  ForEachPairWithin(run, visit);
-  for (int level = run.level; used_levels_ >> level != 0; ++level) {
-    if ((used_levels_ >> level & 1u) == 0) continue;
+  ForEachPairWithin(s, run, visit);
+  for (int level = run.level; s.used_levels >> level != 0; ++level) {
+    if ((s.used_levels >> level & 1u) == 0) continue;
     const std::int64_t first_column =
         std::max<std::int64_t>(grid.Column(run.box.left, level) - 1, 0);
     const std::int64_t last_column = grid.Column(run.box.right, level);
@@ -199,7 +178,7 @@ void PairSearch::ForEachPair(const HierarchicalGrid& grid, std::uint32_t index, 
         for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNoIndex;
              other = runs[other].next_in_slot) {
           if (runs[other].cell != cell || (!finds_all && other <= index)) continue;
-          ForEachPairBetween(run, runs[other], visit);
+          ForEachPairBetween(s, run, runs[other], visit);
         }
       }
     }
@@ -207,35 +186,15 @@ void PairSearch::ForEachPair(const HierarchicalGrid& grid, std::uint32_t index, 
 }
 
 /// Finds out which runs find pairs; returns whether any does.
-bool PairSearch::FindPairs(const HierarchicalGrid& grid) {
+bool FindPairs(Search& s, const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
-  ParallelFor(static_cast<std::uint32_t>(buffers_.runs.size()), [&](std::uint32_t index) {
-    Run& run = buffers_.runs[index];
+  ParallelFor(static_cast<std::uint32_t>(s.buffers.runs.size()), [&](std::uint32_t index) {
+    Run& run = s.buffers.runs[index];
     run.finds_pair = false;
-    ForEachPair(grid, index, [&](std::uint32_t, std::uint32_t) { run.finds_pair = true; });
+    ForEachPair(s, grid, index, [&](std::uint32_t, std::uint32_t) { run.finds_pair = true; });
     if (run.finds_pair) has_pair.store(true, std::memory_order_relaxed);
   });
   return has_pair;
-}
-
-std::size_t PairSearch::Count() {
-  buffers_.pairs.clear();
-  if (buffers_.runs.empty()) return 0;
-  const HierarchicalGrid grid = MakeGrid();
-  FillGrid(grid);
-  // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
-  // of threads.
-  if (!FindPairs(grid)) return 0;
-  std::size_t count = 0;
-  const std::size_t max_pairs = points_.size() / 2;
-  for (std::uint32_t run = 0; run < buffers_.runs.size(); ++run) {
-    if (!buffers_.runs[run].finds_pair) continue;
-    ForEachPair(grid, run, [&](std::uint32_t i, std::uint32_t j) {
-      ++count;
-      if (buffers_.pairs.size() < max_pairs) buffers_.pairs.emplace_back(i, j);
-    });
-  }
-  return count;
 }
 
 }  // namespace
@@ -243,9 +202,25 @@ std::size_t PairSearch::Count() {
 std::size_t CountTouchingPairs(std::span<const double> points,
                                std::span<const std::uint32_t> ring_offsets,
                                TouchingPairsBuffers& buffers) {
-  PairSearch search(points, buffers);
-  search.CollectRuns(ring_offsets);
-  return search.Count();
+  Search s{points, buffers};
+  CollectRuns(s, ring_offsets);
+  buffers.pairs.clear();
+  if (buffers.runs.empty()) return 0;
+  const HierarchicalGrid grid = MakeGrid(s);
+  FillGrid(s, grid);
+  // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
+  // of threads.
+  if (!FindPairs(s, grid)) return 0;
+  std::size_t count = 0;
+  const std::size_t max_pairs = points.size() / 2;
+  for (std::uint32_t run = 0; run < buffers.runs.size(); ++run) {
+    if (!buffers.runs[run].finds_pair) continue;
+    ForEachPair(s, grid, run, [&](std::uint32_t i, std::uint32_t j) {
+      ++count;
+      if (buffers.pairs.size() < max_pairs) buffers.pairs.emplace_back(i, j);
+    });
+  }
+  return count;
 }
 
 }  // namespace partiemc

@@ -1,3 +1,5 @@
+#include "vertices/volume_correction.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 #include <vector>
 
 #include "support/random.h"
-#include "vertices/volume_correction.h"
 
 namespace partiemc {
 namespace {
