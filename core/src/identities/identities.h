@@ -48,21 +48,9 @@ struct IdentityInput {
 };
 
 /// Gives every ring its identity and its parents, and writes to `next` what the next frame needs.
-///
-/// A ring stands for nodes: an outer ring for the inside nodes of its component, a hole for the
-/// nodes of its void on rows where they are next to the hole's ring. Rings of two frames, both
-/// outer or both holes, are related where they share nodes, after they have moved as their
-/// particles tell, or where ids show that particles went from one to the other (RelateRings), and
-///   - at least a quarter of the nodes of the smaller of the two, or
-///   - neither is related to any other by that rule.
-/// Parents are the related rings of the frame before. An identity goes to the related ring that
-/// shares most, pairs being taken in the order of the nodes that they share (equal numbers: the
-/// older identity, then the lower and the more left ring). Other rings get new identities, in the
-/// order of their lowest rows.
-///
-/// So a ring that keeps some of its place keeps its identity, and one that leaves it does where its
-/// particles have ids or right velocities; one that is missing from a frame is new. Depends on
-/// nothing but rings and particles as sets: not on their order or on threads.
+/// core/IDENTITIES.md has the rules; pairs that share equally many nodes go by the older identity,
+/// then by the lower and the more left ring, and new identities by the lowest rows of their rings.
+/// Depends on rings and particles as sets: not on their order or on threads.
 /// Cost: linear in segments, rows of tiles and runs; n log n in rings and their relations; with ids
 /// or velocities, that of FollowParticles.
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,

@@ -12,7 +12,7 @@
 namespace partiemc {
 
 /// Buffers of CountTouchingPairs, kept warm from call to call; they carry nothing from one to the
-/// next. Memory: about 20 bytes per segment, whatever the input.
+/// next. Memory: about 10 bytes per segment, whatever the input.
 struct TouchingPairsBuffers {
   /// Successive segments of a ring, each named by the point that it begins at.
   struct Run {

@@ -11,9 +11,8 @@ namespace {
 
 constexpr int kGentleRounds = 4;
 
-// Each round costs as much as all of the points, and frames may be made that need one for every few
-// of them: after so many everything goes back at once. Of 59,276 frames of noise, clusters and
-// bodies through each other, one needed nine.
+// Frames may be made that need a round for every few of their points: after so many everything goes
+// back at once. Ordinary frames need none, frames made to hurt up to nine.
 constexpr int kMostRounds = 24;
 
 // Rings of a round that lie on the wrong side of others. Hardly any frame has one.

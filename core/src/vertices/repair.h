@@ -30,13 +30,9 @@ struct RepairScratch {
 /// whole, with those around it. Ordinary frames need no round. After the twenty-fourth, everything
 /// goes back.
 ///
-/// Ends, and in such rings: rings through the roots are so. Each of their pieces, from the root of
-/// a cell to that of the next, lies in these two cells and leaves the first by an inner point of
-/// their common edge, which no other piece crosses. A cell has one path, or two in a saddle, each
-/// in its own half. All of it holds by more than 2^-13 cells, and world coordinates are rounded by
-/// at most 2^-22 (core/METHOD.md, "Why rings are simple"). Should that be wrong, `tangled`
-/// names the outer rings of all that still cross or are misplaced, ascending, with every point at
-/// its root; else it is empty.
+/// Ends, and in such rings: rings through the roots are so (core/METHOD.md, "Why rings are
+/// simple"). Should that be wrong, `tangled` names the outer rings of all that still cross or are
+/// misplaced, ascending, with every point at its root; else it is empty.
 ///
 /// Measures the rings (measure.h) as they are in the end.
 /// Cost: for each round near-linear in the points, and n log n in the places where rings turn.

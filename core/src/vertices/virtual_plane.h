@@ -10,8 +10,7 @@ namespace partiemc {
 /// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
 LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
-/// Steps 1 to 5: roots, normals, planes, smoothing, thinning. Requires: the point field indexed
-/// with neighbours. Leaves the rest to volume_correction.h and repair.h.
+/// Steps 1 to 3: roots, normals, planes. Leaves the rest to volume_correction.h and repair.h.
 /// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
 /// samples and a window of about twenty vertices per vertex.
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);
