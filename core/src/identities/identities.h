@@ -23,11 +23,9 @@ struct IdentityScratch {
   CrossedRows rows;
   std::vector<std::uint32_t> number;         // By ring of the topology, in the order of their runs.
   std::vector<std::uint32_t> topology_ring;  // By number.
-  std::vector<std::uint32_t> outer;          // By number: that of a hole's outer ring, or kNoRing.
   std::vector<std::uint32_t> ring_of_component;  // Number of its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;     // By number.
-  std::vector<std::uint64_t> identity;           // By number.
-  std::vector<std::uint8_t> is_hole;             // By number.
+  std::vector<KnownRing> rings;                  // By number; their outer rings by number, too.
   RingTracks tracks;
   RelationScratch relation_scratch;
   std::vector<RingRelation> relations;
