@@ -140,7 +140,6 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   rings.points.resize(2 * std::size_t{count});
   rings.normals.resize(2 * std::size_t{count});
   placed.roots.resize(2 * std::size_t{count});
-  placed.point_of_segment.resize(topology.segments.size());
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
@@ -156,56 +155,60 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     }
   });
   rings.outer_of = topology.outer_of;
-  placed.kept_as.resize(topology.RingCount());
   std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
   CorrectVolume(input, scratch.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   RepairRings(placed.roots, scratch.repair, rings, placed.tangled);
+}
+
+// The rings of the other placements, segment by segment.
+void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices& placed,
+                Rings& rings) {
+  const RingTopology& topology = input.topology;
+  const PlacementTraits& traits = TraitsOf(input.parameters.placement);
+  const int per_segment = traits.on_edges + traits.in_cells;
+  scratch.points.resize(2 * per_segment * topology.segments.size());
+  ParallelFor(topology.segments.size(), [&](std::size_t k) {
+    PlaceSegment(input, k, scratch.points.data() + 2 * per_segment * k);
+  });
+  SnapToAxes(input.scale.cell_size, scratch.points);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    rings.measures[ring].particle_count = topology.particle_count[ring];
+    placed.kept_as[ring] = kNoRing;
+    if (!AppendRing(input, ring, per_segment, scratch.points, placed, rings)) continue;
+    placed.kept_as[ring] = static_cast<std::uint32_t>(rings.RingCount());
+    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
+    rings.outer_of.push_back(topology.outer_of[ring]);
   }
+  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
+  for (std::uint32_t& outer : rings.outer_of) {
+    if (outer != kNoRing) outer = placed.kept_as[outer];
+  }
+  MeasureRings(rings);
+  // The others do not cross: Validate checks that claim, the hot path trusts it.
+  if (!traits.takes_particles) return;
+  placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }
 
 }  // namespace
 
 void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
                    VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
+  const RingTopology& topology = input.topology;
   rings.Clear();
   placed.tangled.clear();
   placed.self_intersections = 0;
-  const PlacementTraits& traits = TraitsOf(input.parameters.placement);
-  if (traits.refines) {
-    PlaceRefinedRings(input, area_offset, scratch, placed, rings);
-    return;
-  }
-  const RingTopology& topology = input.topology;
-  const int per_segment = traits.on_edges + traits.in_cells;
-  scratch.points.resize(2 * per_segment * topology.segments.size());
   placed.point_of_segment.resize(topology.segments.size());
-  ParallelFor(topology.segments.size(), [&](std::size_t k) {
-    PlaceSegment(input, k, scratch.points.data() + 2 * per_segment * k);
-  });
-  SnapToAxes(input.scale.cell_size, scratch.points);
-
-  std::vector<std::uint32_t>& kept_as = placed.kept_as;
-  kept_as.assign(topology.RingCount(), kNoRing);
+  placed.kept_as.resize(topology.RingCount());
+  if (TraitsOf(input.parameters.placement).refines) {
+    PlaceRefinedRings(input, area_offset, scratch, placed, rings);
+  } else {
+    PlaceRings(input, scratch, placed, rings);
+  }
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    if (!AppendRing(input, ring, per_segment, scratch.points, placed, rings)) continue;
-    kept_as[ring] = static_cast<std::uint32_t>(rings.measures.size());
-    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
-    rings.outer_of.push_back(topology.outer_of[ring]);
-    const std::size_t start = rings.offsets[rings.offsets.size() - 2];
-    rings.measures.push_back(MeasureRing(std::span(rings.points).subspan(2 * start)));
-    rings.measures.back().particle_count = topology.particle_count[ring];
+    const std::uint32_t kept_as = placed.kept_as[ring];
+    if (kept_as != kNoRing) rings.measures[kept_as].particle_count = topology.particle_count[ring];
   }
-  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
-  for (std::uint32_t& outer : rings.outer_of) {
-    if (outer != kNoRing) outer = kept_as[outer];
-  }
-  // The others do not cross: Validate checks that claim, the hot path trusts it.
-  if (!traits.takes_particles) return;
-  placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }
 
 }  // namespace partiemc

@@ -17,11 +17,6 @@ namespace {
 
 double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
 
-double Distance(const LatticePoint& a, const LatticePoint& b) {
-  const LatticePoint chord{b.x - a.x, b.y - a.y};
-  return std::sqrt(Dot(chord, chord));
-}
-
 VertexNormal UnitOf(const LatticePoint& v) {
   const double square = Dot(v, v);
   if (square < kWeakGradientSquare * kWeakGradientSquare) return {1, 0};
@@ -32,7 +27,7 @@ VertexNormal UnitOf(const LatticePoint& v) {
 // `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
 // `max_step` cells; `point` itself where the gradient is weak.
 LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
-  const double square = gradient.x * gradient.x + gradient.y * gradient.y;
+  const double square = Dot(gradient, gradient);
   if (square < kWeakGradientSquare) return point;
   double step = -value / square;
   // Its length is that of the gradient times as much.
@@ -87,22 +82,15 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
 }
 
-// Step 1 of a ring.
-void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
-  const std::size_t begin = input.topology.offsets[ring];
-  const std::size_t count = input.topology.offsets[ring + 1] - begin;
-  const auto find = [&](std::size_t first, std::size_t last) {
-    for (std::size_t k = begin + first; k < begin + last; ++k) FindRoots(input, k, v);
-  };
-  count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
-}
-
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
 PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
   const auto length_after = [&](std::size_t k) {
-    return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
+    const LatticePoint& a = v.point[first + k];
+    const LatticePoint& b = v.point[first + (k + 1 == count ? 0 : k + 1)];
+    const LatticePoint chord{b.x - a.x, b.y - a.y};
+    return std::sqrt(Dot(chord, chord));
   };
   const double min_length = input.parameters.constants.ShortestRing() * input.scale.spacing;
   double length = 0;
@@ -166,15 +154,10 @@ double MeanOf(const PeriodicRing& ring, const float* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
-// What the particles near a plane say of it; 0 where there are none.
-struct PlaneEstimate {
-  // How far outside of the plane the boundary is, in cells: by the mean distance of the particles
-  // that support it, plus half a spacing. At most the support's height either way.
-  double offset = 0;
-  double variance = 0;  // Of those distances, in squared spacings.
-};
-
-PlaneEstimate EstimateOf(const SupportSums& sums, const SupportShape& support) {
+// How far outside of a plane the boundary is, in cells: by the mean distance of the particles that
+// support it, plus half a spacing, at most the support's height either way. Then the variance of
+// these distances, in squared spacings. Both 0 where nothing supports the plane.
+std::pair<double, double> EstimateOf(const SupportSums& sums, const SupportShape& support) {
   if (!(sums.weight > 0)) return {};
   const double mean = sums.distance / sums.weight;
   const double variance = std::max(0.0, sums.square / sums.weight - mean * mean);
@@ -314,10 +297,12 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   vertices.Resize(2 * topology.segments.size());
   PeriodicRings& periodic = vertices.periodic_rings;
   periodic.sizes().assign(topology.RingCount(), {});
-  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    FindRingRoots(input, ring, vertices);
-    periodic.sizes()[ring] = SizeOf(input, ring, vertices);
-  });
+  ParallelForRanges(topology.segments.size(), kSegmentsAtOnce,
+                    [&](std::size_t first, std::size_t last) {
+                      for (std::size_t k = first; k < last; ++k) FindRoots(input, k, vertices);
+                    });
+  ParallelFor(topology.RingCount(),
+              [&](std::size_t ring) { periodic.sizes()[ring] = SizeOf(input, ring, vertices); });
   periodic.Allocate();
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     if (periodic.sizes()[ring].count > 0) RefineRing(input, ring, periodic[ring], vertices);
