@@ -87,16 +87,13 @@ void Tell(const RingHistory& previous, std::span<const std::uint32_t> kept_as, I
             [](const RingRelation& x, const RingRelation& y) {
               return std::tie(x.now, x.before) < std::tie(y.now, y.before);
             });
-  std::vector<std::uint32_t>& first_relation = s.rank;
-  first_relation.assign(s.topology_ring.size() + 1, 0);
-  for (const RingRelation& pair : s.relations) ++first_relation[pair.now + 1];
-  std::partial_sum(first_relation.begin(), first_relation.end(), first_relation.begin());
   for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {
     if (kept_as[ring] == kNoRing) continue;
     const std::uint32_t number = s.number[ring];
     rings.measures[kept_as[ring]].identity = s.rings[number].identity;
-    for (std::uint32_t k = first_relation[number]; k < first_relation[number + 1]; ++k) {
-      rings.parents.push_back(previous.rings[s.relations[k].before].identity);
+    for (const RingRelation& relation :
+         std::ranges::equal_range(s.relations, number, {}, &RingRelation::now)) {
+      rings.parents.push_back(previous.rings[relation.before].identity);
     }
     rings.parent_offsets.push_back(static_cast<std::uint32_t>(rings.parents.size()));
   }

@@ -1,9 +1,6 @@
 #include "identities/ring_samples.h"
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <limits>
 #include <tuple>
@@ -125,42 +122,21 @@ void ChooseParticles(const SampleInput& input, const KnownHashes& known,
   });
 }
 
-// Particles that are looked up together, so that their memory, which is anywhere, comes at once.
-constexpr std::size_t kBlock = 32;
-
 // Calls visit(sample) for each chosen particle that is in a ring.
 template <typename Visit>
 void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) {
-  struct Place {
-    std::uint32_t tile;
-    float x, y;
-    std::uint64_t id;
-  };
-  std::array<Place, kBlock> places;
   const BinScratch& scratch = input.bins.scratch;
   for (std::size_t k = 0; k < scratch.stretches.size(); ++k) {
-    const std::vector<std::uint32_t>& tiles = scratch.stretches[k].tiles;
-    std::span<const std::uint32_t> rest = s.stretches[k].chosen;
-    while (!rest.empty()) {
-      const auto block = rest.first(std::min(kBlock, rest.size()));
-      rest = rest.subspan(block.size());
-      for (std::size_t p = 0; p < block.size(); ++p) {
-        const std::size_t particle = block[p];
-        const std::uint32_t tile = tiles[scratch.home[particle]];
-        places[p] = {tile, scratch.positions[2 * particle], scratch.positions[2 * particle + 1],
-                     input.ids[particle]};
-        hwy::Prefetch(&input.crossings.tiles[tile].inside[static_cast<int>(places[p].y)]);
-        hwy::Prefetch(&input.bins.tiles[tile]);
-        input.components.Prefetch(tile, static_cast<int>(places[p].y));
-      }
-      for (const Place& place : std::span(places).first(block.size())) {
-        const std::uint32_t component = input.components.ComponentOf(
-            input.bins.tiles, input.crossings, place.tile, place.x, place.y);
-        if (component == kNoComponent) continue;
-        const std::uint32_t ring = input.ring_of_component[component];
-        if (ring == kNoRing) continue;
-        visit(SampleAt(input.bins.tiles[place.tile], place.x, place.y, place.id, ring));
-      }
+    for (const std::uint32_t particle : s.stretches[k].chosen) {
+      const std::uint32_t tile = scratch.stretches[k].tiles[scratch.home[particle]];
+      const float x = scratch.positions[2 * std::size_t{particle}];
+      const float y = scratch.positions[2 * std::size_t{particle} + 1];
+      const std::uint32_t component =
+          input.components.ComponentOf(input.bins.tiles, input.crossings, tile, x, y);
+      if (component == kNoComponent) continue;
+      const std::uint32_t ring = input.ring_of_component[component];
+      if (ring == kNoRing) continue;
+      visit(SampleAt(input.bins.tiles[tile], x, y, input.ids[particle], ring));
     }
   }
 }

@@ -149,25 +149,18 @@ void AddRingLoops(Work& w) {
   }
 }
 
-std::uint32_t OuterRingAt(const Work& w, const TilePlace& inside_node) {
-  const RingTopology& rings = w.input.topology;
-  return rings.outer_ring[rings.components.At(w.input.crossings, inside_node)];
-}
-
+// The corners of interior cells are inside, in one component: cells stay on their side of every
+// ring, or were excluded.
 void AddStaircaseLoops(Work& w, bool reversed) {
   const Staircases& staircases = w.scratch.staircases;
-  const std::size_t count = staircases.offsets.size() - 1;
-  // The corners of interior cells are inside, in one component: cells stay on their side of every
-  // ring, or were excluded. Looked up for all loops in a row, as each waits for memory.
-  w.scratch.staircase_rings.resize(count);
-  for (std::size_t loop = 0; loop < count; ++loop) {
-    w.scratch.staircase_rings[loop] = OuterRingAt(w, staircases.corners[staircases.offsets[loop]]);
-  }
+  const RingTopology& rings = w.input.topology;
   const std::span<const std::uint32_t> numbers = w.scratch.corner_numbers;
-  for (std::size_t loop = 0; loop < count; ++loop) {
+  for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
     const std::uint32_t first = staircases.offsets[loop];
     w.scratch.loops.AddPoints(numbers.subspan(first, staircases.offsets[loop + 1] - first));
-    w.scratch.loops.EndLoop(w.scratch.staircase_rings[loop], reversed);
+    const std::uint32_t component =
+        rings.components.At(w.input.crossings, staircases.corners[first]);
+    w.scratch.loops.EndLoop(rings.outer_ring[component], reversed);
   }
 }
 

@@ -26,10 +26,9 @@ struct MeshScratch {
   std::vector<CellRectangle> rectangles;
   LoopGroups loops;
   NodeVertices nodes;
-  std::vector<std::uint32_t> corner_numbers;   // By corner of the staircases: of its node.
-  std::vector<std::uint32_t> staircase_rings;  // By loop of the staircases: the outer ring around.
-  std::vector<std::uint32_t> triangles;        // Of the rectangles.
-  std::vector<double> points;                  // Of a connectivity that is not yet the mesh's.
+  std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: of its node.
+  std::vector<std::uint32_t> triangles;       // Of the rectangles.
+  std::vector<double> points;                 // Of a connectivity that is not yet the mesh's.
 };
 
 struct MeshInput {
