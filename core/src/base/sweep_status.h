@@ -25,7 +25,6 @@ class SweepStatus {
     unused_.clear();
   }
 
-  bool IsEmpty() const { return directory_.empty(); }
   bool IsEnd(Cursor cursor) const { return cursor.block == directory_.size(); }
 
   /// Requires: cursor is not the end.

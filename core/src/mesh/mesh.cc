@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <numeric>
 
 #include "base/parallel.h"
 #include "base/predicates.h"
@@ -109,14 +108,10 @@ void NumberCorners(Work& w) {
 
 // Appends the corners of the staircases to the points; a node that loops pass twice comes twice.
 void AppendCorners(Work& w) {
-  const std::vector<TilePlace>& corners = w.scratch.staircases.corners;
-  for (const TilePlace& corner : corners) {
+  for (const TilePlace& corner : w.scratch.staircases.corners) {
     const Point point = NodePoint(w.input.directory, corner, w.input.scale.cell_size);
     w.mesh.points.insert(w.mesh.points.end(), {point.x, point.y});
   }
-  w.scratch.corner_numbers.resize(corners.size());
-  std::iota(w.scratch.corner_numbers.begin(), w.scratch.corner_numbers.end(),
-            static_cast<std::uint32_t>(w.ring_points));
 }
 
 // Puts the nodes in the place of the corners of the staircases.
@@ -154,10 +149,10 @@ void AddRingLoops(Work& w) {
 void AddStaircaseLoops(Work& w, bool reversed) {
   const Staircases& staircases = w.scratch.staircases;
   const RingTopology& rings = w.input.topology;
-  const std::span<const std::uint32_t> numbers = w.scratch.corner_numbers;
+  const auto before = static_cast<std::uint32_t>(w.ring_points);
   for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
     const std::uint32_t first = staircases.offsets[loop];
-    w.scratch.loops.AddPoints(numbers.subspan(first, staircases.offsets[loop + 1] - first));
+    w.scratch.loops.AddPoints(before + first, before + staircases.offsets[loop + 1]);
     const std::uint32_t component =
         rings.components.At(w.input.crossings, staircases.corners[first]);
     w.scratch.loops.EndLoop(rings.outer_ring[component], reversed);
