@@ -1,6 +1,7 @@
 // The buffers of all stages, kept warm from frame to frame.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -15,7 +16,6 @@
 #include "partiemc/reconstructor.h"
 #include "rings/rings.h"
 #include "sampler/point_field.h"
-#include "vertices/intersections.h"
 #include "vertices/vertices.h"
 
 namespace partiemc {
@@ -32,12 +32,13 @@ struct Workspace::Buffers {
   NormalScratch normal_scratch;
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;
+  VertexScratch vertex_scratch;
   PlacedVertices placed;
   std::optional<double> next_area_offset;
   IdentityScratch identity_scratch;
   RingHistory next_history;
   MeshScratch mesh_scratch;
-  TouchingPairsBuffers intersections;
+  std::vector<std::uint32_t> tangled;  // Outer rings that could not be triangulated.
 };
 
 }  // namespace partiemc

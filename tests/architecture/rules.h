@@ -31,7 +31,7 @@ Violations NoFolderIsTooFull(const SourceTree& tree);
 /// own lines, alone include gRPC and messages.
 Violations GrpcStaysInItsRooms(const SourceTree& tree);
 
-/// Each of the seven stages has its header and source; a stage reaches the headers of earlier
+/// Each stage has its header and source; a stage reaches the headers of earlier
 /// stages only; no other source than reconstructor.cc reaches all of them.
 Violations StagesKeepTheirOrder(const SourceTree& tree);
 

@@ -76,8 +76,9 @@ PeerMeasures::PeerMeasures(const ReferenceScenes& scenes, bool quick, Harness& h
   for (CoreStream* stream : {contours_.get(), linear_.get(), filled_.get()}) stream->WarmUp();
   const int iterations = quick ? 3 : 8;
   AddStages(harness, "contours/1024", *contours_, iterations, {Stage::kCrossings, Stage::kRings});
-  AddStages(harness, "linear/1024", *linear_, iterations,
-            {Stage::kCrossings, Stage::kRings, Stage::kNormals, Stage::kVertices});
+  AddStages(
+      harness, "linear/1024", *linear_, iterations,
+      {Stage::kCrossings, Stage::kRings, Stage::kNormals, Stage::kVertices, Stage::kIdentities});
   AddStages(harness, "filled/1024", *filled_, iterations, {Stage::kMesh});
 
   vtk_contours_ = std::make_unique<ContourPeer>(SquareField(scene), kSide, kSide, HalfDensity());

@@ -84,12 +84,11 @@ TEST(CountTouchingPairs, EveryKindOfTouchCountsOnce) {
       << "two corners at one place";
 }
 
-TEST(CountTouchingPairs, TheExampleIsAPairThatTouches) {
+TEST(CountTouchingPairs, ListsThePairsThatTouch) {
   TouchingPairsBuffers buffers;
   const Region rings = RingsOf({Rectangle(5, 5, 6, 6), {{0, 0}, {1, 1}, {1, 0}, {0, 1}}});
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.loop_offsets, buffers), 1u);
-  EXPECT_EQ(buffers.example_first, 4u);
-  EXPECT_EQ(buffers.example_second, 6u);
+  EXPECT_EQ(buffers.pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{{4, 6}}));
 }
 
 TEST(CountTouchingPairs, AgreesWithAllPairsOnSmallLatticesFullOfDegeneracies) {
@@ -117,7 +116,6 @@ TEST(CountTouchingPairs, AgreesWithAllPairsForSegmentsOfVeryDifferentLengths) {
   }
 }
 
-/// Short rings that come near no other are searched by themselves, long ones and others are not.
 TEST(CountTouchingPairs, AgreesWithAllPairsWhetherRingsLieApartOrTogether) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     Random random(seed);
@@ -172,78 +170,6 @@ TEST(CountTouchingPairs, BuffersCarryNothingFromOneCallToTheNext) {
     if (rings.points.size() > 20) rings.points[12] += testing::Uniform(random, -5, 5);
     EXPECT_EQ(CountTouchingPairs(rings.points, rings.loop_offsets, warm), Count(rings))
         << "seed " << seed;
-  }
-}
-
-/// Rings come near each other and part again, as a whole or by single points.
-TEST(CountTouchingPairsAgain, FindsWhatASearchOfAllFindsWhateverHasMoved) {
-  for (std::uint64_t seed = 0; seed < 30; ++seed) {
-    Random random(seed);
-    Region rings;
-    for (int k = 0; k < 12; ++k) {
-      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % (k % 4 == 0 ? 600 : 60));
-      for (Point& point : ring) point.x += 30 * k;
-      rings.AddLoop(ring);
-    }
-    TouchingPairsBuffers buffers;
-    CountTouchingPairs(rings.points, rings.loop_offsets, buffers);
-    for (int round = 0; round < 20; ++round) {
-      std::vector<std::uint8_t> is_moved(rings.points.size() / 2, 0);
-      for (std::size_t moves = random() % 3; moves > 0; --moves) {
-        const std::size_t ring = random() % rings.LoopCount();
-        const std::uint32_t begin = rings.loop_offsets[ring], end = rings.loop_offsets[ring + 1];
-        const bool moves_all = random() % 2 == 0;
-        const std::uint32_t only = begin + static_cast<std::uint32_t>(random() % (end - begin));
-        const double shift = testing::Uniform(random, -1, 1) * (moves_all ? 40 : 10);
-        for (std::uint32_t k = begin; k < end; ++k) {
-          if (!moves_all && k != only) continue;
-          rings.points[2 * k] += shift;
-          is_moved[k] = 1;
-        }
-      }
-      TouchingPairsBuffers fresh;
-      const std::size_t expected = CountTouchingPairs(rings.points, rings.loop_offsets, fresh);
-      EXPECT_EQ(CountTouchingPairsAgain(rings.points, rings.loop_offsets, is_moved, buffers),
-                expected)
-          << "seed " << seed << ", round " << round;
-      EXPECT_EQ(buffers.pairs, fresh.pairs) << "seed " << seed << ", round " << round;
-    }
-  }
-}
-
-/// A ring that was searched with others is alone as soon as the last of these has left it. Its long
-/// segments come first and short ones cross them: which of the two find their pairs is then
-/// another.
-TEST(CountTouchingPairsAgain, FindsWhatCrossesInARingThatIsLeftAlone) {
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    Random random(seed);
-    std::vector<Point> ring;
-    constexpr int kLong = 16, kShort = 15;
-    for (int k = 0; k < kLong; ++k) {
-      const double angle = 2 * std::numbers::pi * k / (kLong + 1);
-      ring.push_back({10 * std::cos(angle), 10 * std::sin(angle)});
-    }
-    const Point middle{(ring[0].x + ring[1].x) / 2, (ring[0].y + ring[1].y) / 2};
-    for (int k = 0; k < kShort; ++k) {
-      ring.push_back({middle.x + testing::Uniform(random, -.1, .1),
-                      middle.y + testing::Uniform(random, -.1, .1)});
-    }
-    Region rings;
-    rings.AddLoop(ring);
-    rings.AddLoop({{9, 0}, {11, 0}, {11, 1}, {9, 1}});
-    TouchingPairsBuffers buffers;
-    CountTouchingPairs(rings.points, rings.loop_offsets, buffers);
-    std::vector<std::uint8_t> is_moved(rings.points.size() / 2, 0);
-    for (std::uint32_t k = rings.loop_offsets[1]; k < rings.loop_offsets[2]; ++k) {
-      rings.points[2 * k] += 100;
-      is_moved[k] = 1;
-    }
-    TouchingPairsBuffers fresh;
-    const std::size_t expected = CountTouchingPairs(rings.points, rings.loop_offsets, fresh);
-    EXPECT_EQ(CountTouchingPairsAgain(rings.points, rings.loop_offsets, is_moved, buffers),
-              expected)
-        << "seed " << seed;
-    EXPECT_EQ(buffers.pairs, fresh.pairs) << "seed " << seed;
   }
 }
 

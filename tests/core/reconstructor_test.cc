@@ -179,7 +179,7 @@ class Recorder : public StageObserver {
   void Tell(char what, Stage stage) { told.emplace_back(1, what).append(Name(stage)); }
 };
 
-TEST(Reconstructor, TellsAnObserverTheSevenStagesInTheirOrder) {
+TEST(Reconstructor, TellsAnObserverTheStagesInTheirOrder) {
   const Reconstructor reconstructor = Make({});
   State state;
   Workspace workspace;
@@ -190,10 +190,10 @@ TEST(Reconstructor, TellsAnObserverTheSevenStagesInTheirOrder) {
       reconstructor
           .Reconstruct(particles.AsFrame(), state, workspace, result, {.observer = &recorder})
           .ok());
-  EXPECT_EQ(recorder.told,
-            (std::vector<std::string>{"+bins", "-bins", "+field", "-field", "+crossings",
-                                      "-crossings", "+rings", "-rings", "+normals", "-normals",
-                                      "+vertices", "-vertices", "+mesh", "-mesh"}));
+  EXPECT_EQ(recorder.told, (std::vector<std::string>{
+                               "+bins", "-bins", "+field", "-field", "+crossings", "-crossings",
+                               "+rings", "-rings", "+normals", "-normals", "+vertices", "-vertices",
+                               "+identities", "-identities", "+mesh", "-mesh"}));
 }
 
 TEST(Reconstructor, AnObserverChangesNothing) {

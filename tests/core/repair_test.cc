@@ -36,8 +36,9 @@ std::vector<double> Reversed(const std::vector<double>& ring) {
 // measured as they are now.
 Rings Repaired(const Rings& roots, Rings rings) {
   RepairScratch scratch;
-  RepairRings(roots.points, scratch, rings);
-  EXPECT_TRUE(scratch.tangled.empty());
+  std::vector<std::uint32_t> tangled;
+  RepairRings(roots.points, scratch, rings, tangled);
+  EXPECT_TRUE(tangled.empty());
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.offsets, scratch.pairs), 0u);
   EXPECT_EQ(rings.measures.size(), rings.RingCount());
   for (std::size_t ring = 0; ring < rings.measures.size(); ++ring) {
@@ -129,13 +130,14 @@ TEST(Repair, NamesTheOuterRingsOfWhatCrossesAtItsRootsToo) {
   Rings rings = roots;
   rings.outer_of[5] = 4;
   RepairScratch scratch;
-  RepairRings(roots.points, scratch, rings);
-  EXPECT_EQ(scratch.tangled, (std::vector<std::uint32_t>{0, 2, 4}));
+  std::vector<std::uint32_t> tangled;
+  RepairRings(roots.points, scratch, rings, tangled);
+  EXPECT_EQ(tangled, (std::vector<std::uint32_t>{0, 2, 4}));
   EXPECT_EQ(rings.points, roots.points);
   EXPECT_EQ(rings.measures.size(), 6u);
   rings = RingsOf({Square(0, 0, 1)}, 1);
-  RepairRings(rings.points, scratch, rings);
-  EXPECT_TRUE(scratch.tangled.empty()) << "it is of the frame before";
+  RepairRings(rings.points, scratch, rings, tangled);
+  EXPECT_TRUE(tangled.empty()) << "it is of the frame before";
 }
 
 TEST(Repair, SeparatesPointsThatFellTogether) {

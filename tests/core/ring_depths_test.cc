@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <numbers>
-#include <numeric>
 #include <vector>
 
 #include "base/predicates.h"
@@ -18,16 +17,16 @@ namespace {
 using testing::Random;
 using testing::Region;
 
-// Depths of the named rings; of all if none is.
-std::vector<std::int32_t> Depths(const Region& region, std::vector<std::uint32_t> rings = {}) {
-  if (rings.empty()) {
-    rings.resize(region.LoopCount());
-    std::iota(rings.begin(), rings.end(), 0u);
-  }
-  RingDepths ring_depths;
+std::vector<std::int32_t> DepthsOf(const Region& region, RingDepths& nesting) {
+  nesting.Find(region.points, region.loop_offsets);
   std::vector<std::int32_t> depths;
-  ring_depths.Find(region.points, region.loop_offsets, rings, depths);
+  for (std::size_t k = 0; k < region.LoopCount(); ++k) depths.push_back(nesting.DepthOf(k));
   return depths;
+}
+
+std::vector<std::int32_t> Depths(const Region& region) {
+  RingDepths nesting;
+  return DepthsOf(region, nesting);
 }
 
 // How often a ring winds around a point, by all of its segments.
@@ -57,6 +56,19 @@ std::vector<std::int32_t> DepthsOneByOne(const Region& region) {
   return depths;
 }
 
+// Of the rings around a ring the one that lies in all others of them.
+std::uint32_t AroundOneByOne(const Region& region, std::size_t ring) {
+  const auto is_in = [&](std::size_t inner, std::size_t outer) {
+    return WindingNumber(region, outer, region.PointAt(region.loop_offsets[inner])) != 0;
+  };
+  std::uint32_t around = kNoRing;
+  for (std::uint32_t other = 0; other < region.LoopCount(); ++other) {
+    if (other == ring || !is_in(ring, other)) continue;
+    if (around == kNoRing || is_in(other, around)) around = other;
+  }
+  return around;
+}
+
 std::vector<Point> Square(double x, double y, double half, bool is_hole = false) {
   std::vector<Point> ring{
       {x - half, y - half}, {x + half, y - half}, {x + half, y + half}, {x - half, y + half}};
@@ -82,12 +94,6 @@ TEST(RingDepths, OuterRingsInsideEachOtherAddUp) {
             (std::vector<std::int32_t>{0, -1, 0}));
   EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)})),
             (std::vector<std::int32_t>{2, 1, 0}));
-}
-
-TEST(RingDepths, RingsThatAreNotNamedAreNotThere) {
-  const Region region = RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)});
-  EXPECT_EQ(Depths(region, {0, 2}), (std::vector<std::int32_t>{1, 0}));
-  EXPECT_EQ(Depths(region, {2, 0}), (std::vector<std::int32_t>{0, 1}));
 }
 
 TEST(RingDepths, ARingIsLookedForWhereItIsLowestNotWhereItTurnsFirst) {
@@ -131,11 +137,10 @@ TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
     const std::vector<std::int32_t> expected = DepthsOneByOne(region);
     nested +=
         static_cast<int>(std::ranges::count_if(expected, [](int depth) { return depth != 0; }));
-    std::vector<std::uint32_t> rings(region.LoopCount());
-    std::iota(rings.begin(), rings.end(), 0u);
-    std::vector<std::int32_t> depths;
-    warm.Find(region.points, region.loop_offsets, rings, depths);
-    ASSERT_EQ(depths, expected) << "seed " << seed;
+    ASSERT_EQ(DepthsOf(region, warm), expected) << "seed " << seed;
+    for (std::size_t ring = 0; ring < region.LoopCount(); ++ring) {
+      ASSERT_EQ(warm.AroundOf(ring), AroundOneByOne(region, ring)) << "seed " << seed;
+    }
   }
   EXPECT_GT(nested, 300);
 }

@@ -13,6 +13,7 @@
 #include "support/stages.h"
 #include "vertices/placement.h"
 #include "vertices/repair.h"
+#include "vertices/virtual_plane.h"
 
 namespace partiemc {
 namespace {
@@ -192,6 +193,7 @@ TEST(Roots, TheRepairFindsBackToThemFromAnywhere) {
   Stages stages;
   Result result;
   RepairScratch scratch;
+  std::vector<std::uint32_t> tangled;
   std::size_t crossing = 0;
   for (std::uint64_t seed = 1; seed <= 2'000; ++seed) {
     Random random(seed);
@@ -206,7 +208,7 @@ TEST(Roots, TheRepairFindsBackToThemFromAnywhere) {
       result.rings.points[k + 1] += random.Uniform(-reach, reach);
     }
     crossing += CountTouchingPairs(result.rings.points, result.rings.offsets, scratch.pairs) > 0;
-    RepairRings(roots, scratch, result.rings);
+    RepairRings(roots, scratch, result.rings, tangled);
     const absl::Status valid = Validate(result, Fill::kNone);
     ASSERT_TRUE(valid.ok()) << "seed " << seed << ": " << valid;
   }
@@ -232,8 +234,8 @@ TEST(Roots, ThoseOfThePlacementAreSimpleWithAnyEdgeVerticesAndSoIsWhatItMakesOfT
         for (std::size_t i = 2 * stages.topology.offsets[ring];
              i < 2 * stages.topology.offsets[ring + 1]; ++i) {
           if (i % 2 == 0 && !random.Chance(kept)) continue;
-          result.rings.points.push_back(stages.placed.vertices.root[i].x);
-          result.rings.points.push_back(stages.placed.vertices.root[i].y);
+          result.rings.points.push_back(stages.vertex_scratch.vertices.root[i].x);
+          result.rings.points.push_back(stages.vertex_scratch.vertices.root[i].y);
         }
         result.rings.offsets.push_back(static_cast<std::uint32_t>(result.rings.PointCount()));
       }

@@ -10,6 +10,7 @@
 #include "support/particles.h"
 #include "support/stages.h"
 #include "vertices/placement.h"
+#include "vertices/virtual_plane.h"
 
 namespace partiemc {
 namespace {
@@ -178,8 +179,7 @@ TEST(Vertices, OfTheQefLieOnTheCornerOfTwoStraightLines) {
     const double ax = 10.5 - px, ay = 10 - py, bx = 10 - px, by = 10.5 - py;
     const double a = ax * 10.5 + ay * 10, b = bx * 10 + by * 10.5;
     const double determinant = ax * by - ay * bx;
-    const LatticePoint vertex =
-        QefVertex(InputOf(corner, frame), corner.topology.segments[k], corner.planes[k]);
+    const LatticePoint vertex = QefVertex(InputOf(corner, frame), corner.planes[k]);
     EXPECT_NEAR(vertex.x, (a * by - ay * b) / determinant, 1e-5);
     EXPECT_NEAR(vertex.y, (ax * b - a * bx) / determinant, 1e-5);
   }
@@ -190,8 +190,7 @@ TEST(Vertices, OfTheQefStayAtTheMiddleAlongADirectionThatNormalsDoNotConstrain) 
   const Corner corner(8.2, 8.2);
   const Frame frame = corner.particles.AsFrame();
   const std::size_t k = corner.SegmentInCell(10, 10);
-  const LatticePoint vertex =
-      QefVertex(InputOf(corner, frame), corner.topology.segments[k], corner.planes[k]);
+  const LatticePoint vertex = QefVertex(InputOf(corner, frame), corner.planes[k]);
   EXPECT_NEAR(vertex.x, vertex.y, 1e-5);
   EXPECT_NEAR(vertex.x + vertex.y, 20.5, 0.1);
 }
@@ -203,7 +202,7 @@ TEST(Vertices, OfTheQefBeyondTheirCellAreMovedToItsSide) {
     const Frame frame = corner.particles.AsFrame();
     const std::size_t k = corner.SegmentInCell(10, 10);
     const std::uint32_t segment = corner.topology.segments[k];
-    const LatticePoint free = QefVertex(InputOf(corner, frame), segment, corner.planes[k]);
+    const LatticePoint free = QefVertex(InputOf(corner, frame), corner.planes[k]);
     const LatticePoint kept = ClampToCell(corner.bins.tiles, corner.planes[k].cell,
                                           corner.crossings.segments[segment], free);
     const auto within = [](double v) { return std::clamp(v, 10.0, 11.0); };
@@ -243,8 +242,8 @@ TEST(Vertices, OfTheFarthestParticleAreTheParticlesThatTheSectionPicks) {
       const support::FarthestChoice choice = support::FarthestParticle(
           stages.particles, *mean, {sign * gradient.x / length, sign * gradient.y / length}, cell);
       if (choice.is_close_call) continue;
-      const double x = stages.placed.points[2 * k];
-      const double y = stages.placed.points[2 * k + 1];
+      const double x = stages.vertex_scratch.points[2 * k];
+      const double y = stages.vertex_scratch.points[2 * k + 1];
       if (choice.particle) {
         EXPECT_EQ(x, stages.particles.x(*choice.particle));
         EXPECT_EQ(y, stages.particles.y(*choice.particle));
@@ -269,9 +268,9 @@ TEST(Vertices, OfTheFarthestParticleMoveOutwardByTheSurfaceOffset) {
             {.placement = Placement::kFarthestParticle, .spacing = 0.1, .surface_offset = 0.5});
   ASSERT_EQ(plain.planes.size(), moved.planes.size());
   for (std::size_t k = 0; k < plain.planes.size(); ++k) {
-    EXPECT_NEAR(moved.placed.points[2 * k] - plain.placed.points[2 * k],
+    EXPECT_NEAR(moved.vertex_scratch.points[2 * k] - plain.vertex_scratch.points[2 * k],
                 0.05 * plain.planes[k].normal_x, 1e-12);
-    EXPECT_NEAR(moved.placed.points[2 * k + 1] - plain.placed.points[2 * k + 1],
+    EXPECT_NEAR(moved.vertex_scratch.points[2 * k + 1] - plain.vertex_scratch.points[2 * k + 1],
                 0.05 * plain.planes[k].normal_y, 1e-12);
   }
 }
@@ -297,8 +296,8 @@ TEST(Vertices, OfTheFarthestParticleDropConsecutiveDuplicatesAndCollapsedRings) 
       EXPECT_NEAR(stages.planes[k].point.x, 30, 2);
       continue;
     }
-    EXPECT_EQ(rings.points[2 * point], stages.placed.points[2 * k]);
-    EXPECT_EQ(rings.points[2 * point + 1], stages.placed.points[2 * k + 1]);
+    EXPECT_EQ(rings.points[2 * point], stages.vertex_scratch.points[2 * k]);
+    EXPECT_EQ(rings.points[2 * point + 1], stages.vertex_scratch.points[2 * k + 1]);
   }
 }
 

@@ -144,15 +144,15 @@ TEST(VirtualPlane, ChangesItsAreaOffsetByLittleAFrameAndRemembersItInTheState) {
   State state;
   Reconstructed(positions, {}, state);
   ASSERT_TRUE(state.area_offset.has_value());
-  const double wish = *state.area_offset;
+  const double target = *state.area_offset;
   for (const double side : {-1.0, 1.0}) {
-    state.area_offset = wish + side * 2.5 * change;
+    state.area_offset = target + side * 2.5 * change;
     Reconstructed(positions, {}, state);
-    EXPECT_NEAR(*state.area_offset, wish + side * 1.5 * change, 1e-12);
+    EXPECT_NEAR(*state.area_offset, target + side * 1.5 * change, 1e-12);
     Reconstructed(positions, {}, state);
-    EXPECT_NEAR(*state.area_offset, wish + side * 0.5 * change, 1e-12);
+    EXPECT_NEAR(*state.area_offset, target + side * 0.5 * change, 1e-12);
     Reconstructed(positions, {}, state);
-    EXPECT_NEAR(*state.area_offset, wish, 1e-12);
+    EXPECT_NEAR(*state.area_offset, target, 1e-12);
   }
 }
 

@@ -37,6 +37,7 @@ struct Stages {
   NormalScratch normal_scratch;
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;
+  VertexScratch vertex_scratch;
   PlacedVertices placed;
   MeshScratch mesh_scratch;
   Result result;
@@ -45,13 +46,13 @@ struct Stages {
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
 
-  /// Stages 1 to 7 of `particles`; parameters need a spacing.
+  /// All stages but identities of `particles`; parameters need a spacing.
   void Run(const Particles& frame, const ReconstructionParameters& wanted,
            std::span<const CellNormal> previous = {});
 
-  /// Stages 3 to 7 of a level set made by hand, with values of `function` at nodes (column, row),
-  /// on the tiles [low, high]. Particles count for components and for the point field, not for the
-  /// level set. Nodes in the outermost row and column of tiles must be outside.
+  /// The same from stage 3 on, of a level set made by hand, with values of `function` at nodes
+  /// (column, row), on the tiles [low, high]. Particles count for components and for the point
+  /// field, not for the level set. Nodes in the outermost row and column of tiles must be outside.
   void RunOn(const std::function<double(int, int)>& function, TileCoordinate low,
              TileCoordinate high, const Particles& frame, const ReconstructionParameters& wanted,
              std::span<const CellNormal> previous = {});

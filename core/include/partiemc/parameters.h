@@ -58,6 +58,9 @@ struct ReconstructionParameters {
   Placement placement = Placement::kVirtualPlane;
   Fill fill = Fill::kGreedy;
 
+  /// The widest range of spacings whose squares and products neither overflow nor underflow.
+  static constexpr double kMinSpacing = 1e-60, kMaxSpacing = 1e60;
+
   /// Particle spacing h in world units, in [1e-60, 1e60]. The normal case: a simulator knows it.
   /// Every other length below is a multiple of it. Absent: estimated as `spacing_rule` says.
   std::optional<double> spacing = std::nullopt;

@@ -55,7 +55,7 @@ struct FrameControl {
   const std::atomic<bool>* cancelled = nullptr;
 };
 
-/// Knows the order of the seven stages; holds no state of a stream. Safe to share between threads.
+/// Knows the order of the stages; holds no state of a stream. Safe to share between threads.
 class Reconstructor {
  public:
   /// Errors: INVALID_ARGUMENT, see Validate of either.

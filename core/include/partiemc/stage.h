@@ -1,4 +1,4 @@
-// The seven stages, under the names that they carry everywhere.
+// The eight stages, under the names that they carry everywhere.
 #pragma once
 
 #include <array>
@@ -8,18 +8,19 @@
 namespace partiemc {
 
 enum class Stage : std::uint8_t {
-  kBins,       ///< Particles sorted into tiles of the lattice.
-  kField,      ///< Level set at every node of every tile (paper, Eq. 1-5).
-  kCrossings,  ///< Active cells and the segments through them (marching squares' topology).
-  kRings,      ///< Segments joined to closed rings, nested, cleaned.
-  kNormals,    ///< Stabilised cell normals (paper, Eq. 9-11).
-  kVertices,   ///< Vertices placed (paper, sections 3.4-3.5).
-  kMesh,       ///< Inside filled with triangles (paper, sections 3.7-3.8).
+  kBins,        ///< Particles sorted into tiles of the lattice.
+  kField,       ///< Level set at every node of every tile (paper, Eq. 1-5).
+  kCrossings,   ///< Active cells and the segments through them (marching squares' topology).
+  kRings,       ///< Segments joined to closed rings, nested, cleaned.
+  kNormals,     ///< Stabilised cell normals (paper, Eq. 9-11).
+  kVertices,    ///< Vertices placed (paper, sections 3.4-3.5).
+  kIdentities,  ///< Rings related to those of the frame before (core/IDENTITIES.md).
+  kMesh,        ///< Inside filled with triangles (paper, sections 3.7-3.8).
 };
 
-inline constexpr std::size_t kStageCount = 7;
+inline constexpr std::size_t kStageCount = 8;
 inline constexpr std::array<std::string_view, kStageCount> kStageNames = {
-    "bins", "field", "crossings", "rings", "normals", "vertices", "mesh"};
+    "bins", "field", "crossings", "rings", "normals", "vertices", "identities", "mesh"};
 
 constexpr std::string_view Name(Stage stage) {
   return kStageNames[static_cast<std::size_t>(stage)];

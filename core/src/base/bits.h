@@ -1,9 +1,12 @@
-// Bits of a row of nodes or cells.
+// Bits of a row of nodes or cells; an index that is none.
 #pragma once
 
 #include <cstdint>
 
 namespace partiemc {
+
+/// Marks the index of nothing.
+inline constexpr std::uint32_t kNoIndex = 0xffffffff;
 
 /// How many bits are set. Unlike std::popcount, inline on processors that are not known to have an
 /// instruction for it: the library's call costs more than the sum.

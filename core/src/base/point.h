@@ -1,6 +1,9 @@
 // A point of the plane, in whatever unit the caller works in.
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 namespace partiemc {
 
 struct Point {
@@ -14,6 +17,11 @@ struct Point {
 /// two distinct points are met at once.
 constexpr bool SweepsBefore(const Point& a, const Point& b) {
   return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
+/// Of interleaved points.
+inline Point PointAt(std::span<const double> points, std::size_t index) {
+  return {points[2 * index], points[2 * index + 1]};
 }
 
 }  // namespace partiemc

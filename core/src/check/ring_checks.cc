@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "base/predicates.h"
-#include "mesh/triangulate.h"
 #include "vertices/intersections.h"
+#include "vertices/ring_depths.h"
 
 namespace partiemc {
 namespace {
@@ -79,10 +80,10 @@ absl::Status CheckR2(const Rings& rings) {
   TouchingPairsBuffers buffers;
   const std::size_t count = CountTouchingPairs(rings.points, rings.offsets, buffers);
   if (count == 0) return absl::OkStatus();
+  const auto [first, second] = std::minmax(buffers.pairs[0].first, buffers.pairs[0].second);
   return Broken("R2: ", count, " pairs of segments cross or touch, one of them those from point ",
-                buffers.example_first, " of ring ", RingOf(rings, buffers.example_first),
-                " and from point ", buffers.example_second, " of ring ",
-                RingOf(rings, buffers.example_second));
+                first, " of ring ", RingOf(rings, first), " and from point ", second, " of ring ",
+                RingOf(rings, second));
 }
 
 /// +1 for a counter-clockwise ring, -1 for a clockwise one. Requires R1 and R2: then the turn at an
@@ -111,82 +112,25 @@ absl::Status CheckR3(const Rings& rings) {
 
 // --- R4 -----------------------------------------------------------------------------------------
 
-/// Whether `point`, which is not on the ring, lies inside it: counts the edges to its right.
-bool IsInside(std::span<const double> ring, const Point& point) {
-  const std::size_t count = ring.size() / 2;
-  bool inside = false;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Point a = PointAt(ring, i);
-    const Point b = PointAt(ring, (i + 1) % count);
-    if ((a.y <= point.y) == (b.y <= point.y)) continue;
-    const bool rises = a.y < b.y;
-    if ((Orientation(a, b, point) > 0) == rises) inside = !inside;
-  }
-  return inside;
-}
-
-/// Called when rings are known not to alternate as they should: outer rings lie inside an even
-/// number of others, holes inside an odd number. Finds the first that does not. Cost: quadratic.
-absl::Status NameMisplacedRing(const Rings& rings) {
-  const auto ring_count = rings.RingCount();
-  const auto enclosing = [&](std::size_t ring) {
-    std::size_t count = 0;
-    for (std::size_t other = 0; other < ring_count; ++other) {
-      if (other == ring) continue;
-      count += IsInside(rings.RingPoints(other), PointAt(rings.RingPoints(ring), 0)) ? 1 : 0;
-    }
-    return count;
-  };
-  const auto is_hole = [&](std::size_t ring) { return rings.outer_of[ring] != kNoRing; };
-  std::size_t ring = 0;
-  while (ring + 1 < ring_count && (enclosing(ring) % 2 == 1) == is_hole(ring)) ++ring;
-  return Broken("R4: ring ", ring, is_hole(ring) ? ", a hole," : ", an outer ring,",
-                " lies inside ", enclosing(ring), " other rings");
-}
-
-/// Disjoint sets of points.
-class PointSets {
- public:
-  explicit PointSets(std::size_t count) : parents_(count) {
-    std::iota(parents_.begin(), parents_.end(), 0u);
-  }
-  std::uint32_t Find(std::uint32_t point) {
-    while (parents_[point] != point) point = parents_[point] = parents_[parents_[point]];
-    return point;
-  }
-  void Unite(std::uint32_t a, std::uint32_t b) { parents_[Find(a)] = Find(b); }
-
- private:
-  std::vector<std::uint32_t> parents_;
-};
-
-/// Requires R1-R3. A hole lies inside an outer ring, with no other ring between, exactly when both
-/// bound the same component of the inside, which triangles show.
+/// Requires R1-R3. Each hole lies in the ring that it names, with no other between, and that is an
+/// outer ring; outer rings lie in holes or in nothing.
 absl::Status CheckR4(const Rings& rings) {
-  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+  const auto is_hole = [&](std::uint32_t ring) { return rings.outer_of[ring] != kNoRing; };
+  RingDepths nesting;
+  nesting.Find(rings.points, rings.offsets);
+  for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::uint32_t outer = rings.outer_of[ring];
-    if (outer == kNoRing) continue;
-    if (outer >= rings.RingCount() || rings.outer_of[outer] != kNoRing) {
+    const std::uint32_t around = nesting.AroundOf(ring);
+    const std::string where = around == kNoRing ? "nothing" : absl::StrCat("ring ", around);
+    if (!is_hole(ring)) {
+      if (around == kNoRing || is_hole(around)) continue;
+      return Broken("R4: ring ", ring, ", an outer ring, lies in ", where, ", which is no hole");
+    }
+    if (outer >= rings.RingCount() || is_hole(outer)) {
       return Broken("R4: hole ", ring, " names ring ", outer, ", which is no outer ring");
     }
-  }
-  std::vector<std::uint32_t> loop_points(rings.PointCount());
-  std::iota(loop_points.begin(), loop_points.end(), 0u);
-  std::vector<std::uint32_t> triangles;
-  if (!Triangulator().Triangulate(rings.points, loop_points, rings.offsets, triangles)) {
-    return NameMisplacedRing(rings);
-  }
-  PointSets components(rings.PointCount());
-  for (std::size_t i = 0; i < triangles.size(); i += 3) {
-    components.Unite(triangles[i], triangles[i + 1]);
-    components.Unite(triangles[i], triangles[i + 2]);
-  }
-  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-    const std::uint32_t outer = rings.outer_of[ring];
-    if (outer == kNoRing) continue;
-    if (components.Find(rings.offsets[ring]) == components.Find(rings.offsets[outer])) continue;
-    return Broken("R4: hole ", ring, " lies in another component than outer ring ", outer,
-                  ", which it names");
+    if (around == outer) continue;
+    return Broken("R4: ring ", ring, ", a hole, lies in ", where, ", but names ring ", outer);
   }
   return absl::OkStatus();
 }

@@ -17,10 +17,6 @@ absl::Status Broken(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
 
-inline Point PointAt(std::span<const double> points, std::size_t index) {
-  return {points[2 * index], points[2 * index + 1]};
-}
-
 /// OK if all coordinates are finite and in the domain of the predicates; `guarantee` names what is
 /// broken if not.
 absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> points);

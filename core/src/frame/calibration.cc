@@ -2,26 +2,10 @@
 
 #include <cmath>
 
+#include "frame/placement_traits.h"
+
 namespace partiemc {
 namespace {
-
-// What a whole chain wants on top of an axis-aligned lattice for no mean offset on discs under
-// relaxed sampling (core/METHOD.md, "Calibration"): the linear interpolation of marching squares
-// cuts the contour's bulge off and so wants more, vertices on the level set less.
-// `farthest-particle` takes only its topology from the level set.
-double Factor(Placement placement) {
-  switch (placement) {
-    case Placement::kMarchingSquares:
-      return 1.09;
-    case Placement::kQef:
-      return 1.085;
-    case Placement::kFarthestParticle:
-      return 1.0;
-    case Placement::kVirtualPlane:
-      return 1.05;
-  }
-  return 1.0;
-}
 
 // Distance of the weighted mean from a point h/2 outside the outermost layer of an axis-aligned
 // lattice, in spacings: layers lie at d = k + 1/2, and the kernel integrated along a layer is
@@ -41,7 +25,7 @@ double AxisAlignedLatticeDistance(double beta) {
 }  // namespace
 
 double CalibratedReferenceRadius(Placement placement, double kernel_radius) {
-  return Factor(placement) * AxisAlignedLatticeDistance(kernel_radius);
+  return TraitsOf(placement).calibration * AxisAlignedLatticeDistance(kernel_radius);
 }
 
 }  // namespace partiemc

@@ -1,24 +1,25 @@
 #include "partiemc/parameters.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "frame/calibration.h"
+#include "frame/placement_traits.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
 namespace {
 
-constexpr std::array kPlacements = {Placement::kMarchingSquares, Placement::kQef,
-                                    Placement::kFarthestParticle, Placement::kVirtualPlane};
+constexpr auto kAllPlacements = [] {
+  std::array<Placement, kPlacements.size()> placements;
+  std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
+  return placements;
+}();
 constexpr std::array kFills = {Fill::kNone, Fill::kGrid, Fill::kGreedy, Fill::kConforming,
                                Fill::kPolygon};
-
-// The widest spacing at which squares and products of lengths neither overflow nor underflow.
-constexpr double kMinSpacing = 1e-60;
-constexpr double kMaxSpacing = 1e60;
 
 absl::Status OutOfRange(std::string_view field, double value, std::string_view rule) {
   return ViolationError(absl::StatusCode::kInvalidArgument,
@@ -32,7 +33,7 @@ bool Within(double value, double low, double high) { return value >= low && valu
 
 absl::Status Validate(const ReconstructionParameters& parameters) {
   const auto& p = parameters;
-  if (p.spacing && !Within(*p.spacing, kMinSpacing, kMaxSpacing)) {
+  if (p.spacing && !Within(*p.spacing, p.kMinSpacing, p.kMaxSpacing)) {
     return OutOfRange("spacing", *p.spacing, "must be in [1e-60, 1e60]");
   }
   if (!Within(p.kernel_radius, 1.5, 8)) {
@@ -61,23 +62,11 @@ ReconstructionParameters Resolve(ReconstructionParameters parameters) {
     parameters.reference_radius =
         CalibratedReferenceRadius(parameters.placement, parameters.kernel_radius);
   }
-  if (!parameters.clean) parameters.clean = parameters.placement == Placement::kVirtualPlane;
+  if (!parameters.clean) parameters.clean = TraitsOf(parameters.placement).cleans;
   return parameters;
 }
 
-std::string_view Name(Placement placement) {
-  switch (placement) {
-    case Placement::kMarchingSquares:
-      return "marching-squares";
-    case Placement::kQef:
-      return "qef";
-    case Placement::kFarthestParticle:
-      return "farthest-particle";
-    case Placement::kVirtualPlane:
-      return "virtual-plane";
-  }
-  return "";
-}
+std::string_view Name(Placement placement) { return TraitsOf(placement).name; }
 
 std::string_view Name(Fill fill) {
   switch (fill) {
@@ -111,12 +100,12 @@ std::string_view Name(Plane plane) {
   return "";
 }
 
-std::span<const Placement> AllPlacements() { return kPlacements; }
+std::span<const Placement> AllPlacements() { return kAllPlacements; }
 std::span<const Fill> AllFills() { return kFills; }
 
 std::optional<Placement> FindPlacement(std::string_view name) {
-  for (const Placement placement : kPlacements) {
-    if (Name(placement) == name) return placement;
+  for (const PlacementTraits& traits : kPlacements) {
+    if (traits.name == name) return traits.placement;
   }
   return std::nullopt;
 }

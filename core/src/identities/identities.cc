@@ -3,27 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <tuple>
 
 namespace partiemc {
 namespace {
-
-// Where each ring of the topology is in the result: placing vertices may have dropped it.
-void FindKeptRings(const RingTopology& topology, const PlacedVertices& placed,
-                   std::vector<std::uint32_t>& result_ring) {
-  result_ring.assign(topology.RingCount(), kNoRing);
-  std::uint32_t kept = 0;
-  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    if (placed.point_of_segment[topology.offsets[ring]] != kNoPoint) result_ring[ring] = kept++;
-  }
-}
 
 // The number of a ring, given to it now if it has none.
 std::uint32_t NumberOf(std::uint32_t ring, const RingTopology& topology, IdentityScratch& s) {
   if (s.number[ring] == kNoRing) {
     s.number[ring] = static_cast<std::uint32_t>(s.topology_ring.size());
     s.topology_ring.push_back(ring);
-    s.is_hole.push_back(topology.outer_of[ring] != kNoRing);
   }
   return s.number[ring];
 }
@@ -35,7 +25,6 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
   runs.clear();
   s.number.assign(topology.RingCount(), kNoRing);
   s.topology_ring.clear();
-  s.is_hole.clear();
   CrossedEdge last;
   s.rows.SetRings(input.crossings, topology.segments, topology.offsets);
   s.rows.ForEachEdge(input.bins.tiles, input.crossings, [&](const CrossedEdge& edge) {
@@ -49,7 +38,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
       ring = from.ring;  // A void between two islands is next to no hole's ring.
       if (topology.outer_of[ring] == kNoRing) return;
     }
-    if (s.result_ring[ring] == kNoRing) return;
+    if (input.placed.kept_as[ring] == kNoRing) return;
     runs.push_back({edge.row, from.column + 1, edge.column, NumberOf(ring, topology, s)});
   });
 }
@@ -57,23 +46,23 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
 // What belongs to the numbers: outer rings of holes and of components, particles.
 void NumberOuterRings(const IdentityInput& input, IdentityScratch& s) {
   const RingTopology& topology = input.topology;
-  s.outer.clear();
+  s.rings.clear();
   s.particle_count.clear();
   for (const std::uint32_t ring : s.topology_ring) {
     const std::uint32_t outer = topology.outer_of[ring];
-    s.outer.push_back(outer == kNoRing ? kNoRing : s.number[outer]);
+    s.rings.push_back(
+        {.is_hole = outer != kNoRing, .outer = outer == kNoRing ? kNoRing : s.number[outer]});
     s.particle_count.push_back(topology.particle_count[ring]);
   }
-  s.ring_of_component.assign(input.traced.components.size(), kNoRing);
+  s.ring_of_component.assign(input.topology.components.size(), kNoRing);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
     if (topology.outer_of[ring] != kNoRing) continue;
-    s.ring_of_component[input.traced.component_of_ring[ring]] = s.number[ring];
+    s.ring_of_component[input.topology.component_of_ring[ring]] = s.number[ring];
   }
 }
 
 // Hands identities on along the largest relations, then gives new ones.
 void GiveIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory& next) {
-  s.identity.assign(s.topology_ring.size(), 0);
   std::sort(s.relations.begin(), s.relations.end(),
             [](const RingRelation& x, const RingRelation& y) {
               return std::tie(y.nodes, x.before, x.now) < std::tie(x.nodes, y.before, y.now);
@@ -81,32 +70,30 @@ void GiveIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory
   std::vector<std::uint8_t>& is_continued = s.is_continued;
   is_continued.assign(previous.rings.size(), 0);
   for (const RingRelation& pair : s.relations) {
-    if (is_continued[pair.before] || s.identity[pair.now] != 0) continue;
+    if (is_continued[pair.before] || s.rings[pair.now].identity != 0) continue;
     is_continued[pair.before] = 1;
-    s.identity[pair.now] = previous.rings[pair.before].identity;
+    s.rings[pair.now].identity = previous.rings[pair.before].identity;
   }
   next.identities_given = previous.identities_given;
-  for (std::uint64_t& identity : s.identity) {
-    if (identity == 0) identity = ++next.identities_given;
+  for (KnownRing& ring : s.rings) {
+    if (ring.identity == 0) ring.identity = ++next.identities_given;
   }
 }
 
 // Identities and parents into the result.
-void Tell(const RingHistory& previous, IdentityScratch& s, Rings& rings) {
+void Tell(const RingHistory& previous, std::span<const std::uint32_t> kept_as, IdentityScratch& s,
+          Rings& rings) {
   std::sort(s.relations.begin(), s.relations.end(),
             [](const RingRelation& x, const RingRelation& y) {
               return std::tie(x.now, x.before) < std::tie(y.now, y.before);
             });
-  std::vector<std::uint32_t>& first_relation = s.rank;
-  first_relation.assign(s.topology_ring.size() + 1, 0);
-  for (const RingRelation& pair : s.relations) ++first_relation[pair.now + 1];
-  std::partial_sum(first_relation.begin(), first_relation.end(), first_relation.begin());
-  for (std::size_t ring = 0; ring < s.result_ring.size(); ++ring) {
-    if (s.result_ring[ring] == kNoRing) continue;
+  for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {
+    if (kept_as[ring] == kNoRing) continue;
     const std::uint32_t number = s.number[ring];
-    rings.measures[s.result_ring[ring]].identity = s.identity[number];
-    for (std::uint32_t k = first_relation[number]; k < first_relation[number + 1]; ++k) {
-      rings.parents.push_back(previous.rings[s.relations[k].before].identity);
+    rings.measures[kept_as[ring]].identity = s.rings[number].identity;
+    for (const RingRelation& relation :
+         std::ranges::equal_range(s.relations, number, {}, &RingRelation::now)) {
+      rings.parents.push_back(previous.rings[relation.before].identity);
     }
     rings.parent_offsets.push_back(static_cast<std::uint32_t>(rings.parents.size()));
   }
@@ -114,28 +101,22 @@ void Tell(const RingHistory& previous, IdentityScratch& s, Rings& rings) {
 
 // Rings by identity, and what belongs to them with indices into them.
 void Remember(const IdentityInput& input, IdentityScratch& s, RingHistory& next) {
-  const std::size_t count = s.identity.size();
+  const std::size_t count = s.rings.size();
   std::vector<std::uint32_t>& by_identity = s.by_identity;
   by_identity.resize(count);
   std::iota(by_identity.begin(), by_identity.end(), 0u);
-  std::sort(by_identity.begin(), by_identity.end(),
-            [&](std::uint32_t x, std::uint32_t y) { return s.identity[x] < s.identity[y]; });
+  std::ranges::sort(by_identity, {}, [&](std::uint32_t k) { return s.rings[k].identity; });
   s.rank.resize(count);
   for (std::uint32_t place = 0; place < count; ++place) s.rank[by_identity[place]] = place;
   next.rings.clear();
   for (const std::uint32_t number : by_identity) {
-    const std::uint32_t outer = s.outer[number];
-    next.rings.push_back({.identity = s.identity[number],
-                          .is_hole = s.is_hole[number] != 0,
-                          .outer = outer == kNoRing ? kNoRing : s.rank[outer],
-                          .velocity_x = s.tracks.velocity_x[number],
-                          .velocity_y = s.tracks.velocity_y[number]});
+    KnownRing& ring = next.rings.emplace_back(s.rings[number]);
+    if (ring.outer != kNoRing) ring.outer = s.rank[ring.outer];
   }
   for (NodeRun& run : next.runs) run.ring = s.rank[run.ring];
   next.samples = s.tracks.by_id.samples;
   for (ParticleSample& sample : next.samples) sample.ring = s.rank[sample.ring];
-  std::sort(next.samples.begin(), next.samples.end(),
-            [](const ParticleSample& x, const ParticleSample& y) { return x.hash < y.hash; });
+  std::ranges::sort(next.samples, {}, &ParticleSample::hash);
   next.time.reset();
   if (std::isfinite(input.frame.time)) next.time = input.frame.time;
 }
@@ -144,28 +125,27 @@ void Remember(const IdentityInput& input, IdentityScratch& s, RingHistory& next)
 
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                    IdentityScratch& scratch, RingHistory& next, Rings& rings) {
-  FindKeptRings(input.topology, input.placed, scratch.result_ring);
   CollectRuns(input, scratch, next.runs);
   NumberOuterRings(input, scratch);
   FollowParticles({.frame = input.frame,
                    .plane = input.plane,
-                   .bins = input.bins,
-                   .crossings = input.crossings,
-                   .components = input.traced.components,
-                   .ring_of_component = scratch.ring_of_component,
-                   .particle_count = scratch.particle_count},
-                  previous, scratch.tracks);
+                   .particles = {.ids = input.frame.ids,
+                                 .bins = input.bins,
+                                 .crossings = input.crossings,
+                                 .components = input.topology.components,
+                                 .ring_of_component = scratch.ring_of_component,
+                                 .particle_count = scratch.particle_count}},
+                  previous, scratch.rings, scratch.tracks);
   RelateRings(previous,
               {.runs = next.runs,
-               .is_hole = scratch.is_hole,
-               .outer = scratch.outer,
-               .tracks = scratch.tracks,
+               .rings = scratch.rings,
+               .found = scratch.tracks.by_id.found,
                .has_ids = !input.frame.ids.empty(),
                .time = input.frame.time,
                .cell_size = input.cell_size},
               scratch.relation_scratch, scratch.relations);
   GiveIdentities(previous, scratch, next);
-  Tell(previous, scratch, rings);
+  Tell(previous, input.placed.kept_as, scratch, rings);
   Remember(input, scratch, next);
 }
 

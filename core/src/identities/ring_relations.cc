@@ -31,10 +31,9 @@ void CountNodes(std::span<const NodeRun> runs, std::size_t rings,
 }
 
 // Holes go with their outer rings.
-template <typename IsHole, typename Outer>
-void MoveHolesAlong(std::vector<CellShift>& shifts, IsHole is_hole, Outer outer) {
+void MoveHolesAlong(std::span<const KnownRing> rings, std::vector<CellShift>& shifts) {
   for (std::size_t ring = 0; ring < shifts.size(); ++ring) {
-    if (is_hole(ring) && outer(ring) != kNoRing) shifts[ring] = shifts[outer(ring)];
+    if (rings[ring].outer != kNoRing) shifts[ring] = shifts[rings[ring].outer];
   }
 }
 
@@ -46,8 +45,7 @@ std::int64_t MedianOf(std::vector<std::int64_t>& ways) {
 }
 
 // Each outer ring goes the way of its samples.
-void ShiftBySamples(const RingTracks& tracks, RelationScratch& s) {
-  const std::vector<FoundSample>& found = tracks.by_id.found;
+void ShiftBySamples(std::span<const FoundSample> found, RelationScratch& s) {
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
     while (last < found.size() && found[last].before == found[first].before) ++last;
     const auto median = [&](std::int64_t CellShift::*part) {
@@ -76,8 +74,8 @@ void ShiftByVelocities(const RingHistory& previous, const RingsNow& now, bool by
     s.shift_before[ring] = ShiftOf(known.velocity_x * cells, known.velocity_y * cells);
   }
   for (std::size_t ring = 0; ring < s.shift_now.size(); ++ring) {
-    s.shift_now[ring] =
-        ShiftOf(-now.tracks.velocity_x[ring] * cells, -now.tracks.velocity_y[ring] * cells);
+    const KnownRing& known = now.rings[ring];
+    s.shift_now[ring] = ShiftOf(-known.velocity_x * cells, -known.velocity_y * cells);
   }
 }
 
@@ -108,7 +106,7 @@ void Unite(std::vector<RingRelation>& relations) {
 
 bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_t before,
                   std::uint32_t number) {
-  return previous.rings[before].is_hole == (now.is_hole[number] != 0);
+  return previous.rings[before].is_hole == now.rings[number].is_hole;
 }
 
 // Nodes that rings share once they have moved, forward or, where this frame has velocities, back.
@@ -132,7 +130,7 @@ void AddFoundSamples(const RingHistory& previous, const RingsNow& now, RelationS
                      std::vector<RingRelation>& relations) {
   s.sample_count.assign(previous.rings.size(), 0);
   for (const ParticleSample& sample : previous.samples) ++s.sample_count[sample.ring];
-  const std::vector<FoundSample>& found = now.tracks.by_id.found;
+  const std::span<const FoundSample> found = now.found;
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
     while (last < found.size() && found[last].before == found[first].before &&
            found[last].now == found[first].now) {
@@ -227,19 +225,15 @@ void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScrat
                  std::vector<RingRelation>& relations) {
   relations.clear();
   CountNodes(previous.runs, previous.rings.size(), s.nodes_before);
-  CountNodes(now.runs, now.is_hole.size(), s.nodes_now);
+  CountNodes(now.runs, now.rings.size(), s.nodes_now);
   s.shift_before.assign(previous.rings.size(), {});
-  s.shift_now.assign(now.is_hole.size(), {});
+  s.shift_now.assign(now.rings.size(), {});
   s.sample_count.clear();
   const bool by_samples = now.has_ids && !previous.samples.empty();
-  if (by_samples) ShiftBySamples(now.tracks, s);
+  if (by_samples) ShiftBySamples(now.found, s);
   ShiftByVelocities(previous, now, by_samples, s);
-  MoveHolesAlong(
-      s.shift_before, [&](std::size_t ring) { return previous.rings[ring].is_hole; },
-      [&](std::size_t ring) { return previous.rings[ring].outer; });
-  MoveHolesAlong(
-      s.shift_now, [&](std::size_t ring) { return now.is_hole[ring] != 0; },
-      [&](std::size_t ring) { return now.outer[ring]; });
+  MoveHolesAlong(previous.rings, s.shift_before);
+  MoveHolesAlong(now.rings, s.shift_now);
 
   RelateByNodes(previous, now, s, relations);
   if (by_samples) {
@@ -247,7 +241,7 @@ void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScrat
     LetSamplesDecide(previous, s, relations);
   }
   s.linked_before.assign(previous.rings.size(), 0);
-  s.linked_now.assign(now.is_hole.size(), 0);
+  s.linked_now.assign(now.rings.size(), 0);
   MarkCounting(s, relations);
   if (AnyMoves(s.shift_before) || AnyMoves(s.shift_now)) {
     AddUnmoved(previous, now, s, relations);

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "identities/ring_tracks.h"
+#include "identities/ring_samples.h"
 #include "identities/run_overlaps.h"
 #include "partiemc/state.h"
 
@@ -13,10 +13,9 @@ namespace partiemc {
 
 /// The rings of this frame, by number.
 struct RingsNow {
-  std::span<const NodeRun> runs;  ///< `ring` is a number.
-  std::span<const std::uint8_t> is_hole;
-  std::span<const std::uint32_t> outer;  ///< Number of a hole's outer ring, or kNoRing.
-  const RingTracks& tracks;
+  std::span<const NodeRun> runs;       ///< `ring` is a number.
+  std::span<const KnownRing> rings;    ///< `outer` is a number.
+  std::span<const FoundSample> found;  ///< By `before`, then `now`.
   bool has_ids = false;
   double time = 0;
   double cell_size = 1;  ///< World units.

@@ -1,9 +1,6 @@
 #include "identities/ring_samples.h"
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <limits>
 #include <tuple>
@@ -103,17 +100,9 @@ void SetTileLimits(const SampleInput& input, RingSamples& s) {
   });
 }
 
-// Whether no tile's limit keeps a sample of the last frame from being chosen: as a rule in frames
-// of large bodies, to which one look-up less for each particle is due.
-bool LimitsCover(std::span<const ParticleSample> samples, const RingSamples& s) {
-  if (samples.empty()) return true;
-  return std::all_of(s.tile_limit.begin(), s.tile_limit.end(), [&](std::uint64_t limit) {
-    return limit == 0 || limit >= samples.back().hash;
-  });
-}
-
-// The particles that may be samples or, as `is_known` says, have been.
-void ChooseParticles(const SampleInput& input, const auto& is_known, RingSamples& s) {
+// The particles that may be samples or have been.
+void ChooseParticles(const SampleInput& input, const KnownHashes& known,
+                     const HashIndex<ParticleSample>& index, RingSamples& s) {
   const std::span<const BinStretch> stretches = input.bins.scratch.stretches;
   if (s.stretches.size() < stretches.size()) s.stretches.resize(stretches.size());
   ParallelFor(stretches.size(), [&](std::size_t k) {
@@ -126,49 +115,28 @@ void ChooseParticles(const SampleInput& input, const auto& is_known, RingSamples
     const std::uint32_t* const home = input.bins.scratch.home.data();
     for (std::size_t particle = stretch.first; particle < stretch.last; ++particle) {
       const std::uint64_t hash = HashOf(input.ids[particle]);
-      if (hash <= limit[home[particle]] || is_known(hash)) {
+      if (hash <= limit[home[particle]] || (known.MayHave(hash) && index.Find(hash) != nullptr)) {
         chosen.push_back(static_cast<std::uint32_t>(particle));
       }
     }
   });
 }
 
-// Particles that are looked up together, so that their memory, which is anywhere, comes at once.
-constexpr std::size_t kBlock = 32;
-
 // Calls visit(sample) for each chosen particle that is in a ring.
 template <typename Visit>
 void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) {
-  struct Place {
-    std::uint32_t tile;
-    float x, y;
-    std::uint64_t id;
-  };
-  std::array<Place, kBlock> places;
   const BinScratch& scratch = input.bins.scratch;
   for (std::size_t k = 0; k < scratch.stretches.size(); ++k) {
-    const std::vector<std::uint32_t>& tiles = scratch.stretches[k].tiles;
-    std::span<const std::uint32_t> rest = s.stretches[k].chosen;
-    while (!rest.empty()) {
-      const auto block = rest.first(std::min(kBlock, rest.size()));
-      rest = rest.subspan(block.size());
-      for (std::size_t p = 0; p < block.size(); ++p) {
-        const std::size_t particle = block[p];
-        const std::uint32_t tile = tiles[scratch.home[particle]];
-        places[p] = {tile, scratch.positions[2 * particle], scratch.positions[2 * particle + 1],
-                     input.ids[particle]};
-        hwy::Prefetch(&input.crossings.tiles[tile].inside[static_cast<int>(places[p].y)]);
-        hwy::Prefetch(&input.bins.tiles[tile]);
-        input.components.Prefetch(tile, static_cast<int>(places[p].y));
-      }
-      for (const Place& place : std::span(places).first(block.size())) {
-        const std::uint32_t component = input.components.ComponentOf(
-            input.bins.tiles, input.crossings, place.tile, place.x, place.y);
-        if (component == kNoComponent) continue;
-        const std::uint32_t ring = input.ring_of_component[component];
-        if (ring == kNoRing) continue;
-        visit(SampleAt(input.bins.tiles[place.tile], place.x, place.y, place.id, ring));
-      }
+    for (const std::uint32_t particle : s.stretches[k].chosen) {
+      const std::uint32_t tile = scratch.stretches[k].tiles[scratch.home[particle]];
+      const float x = scratch.positions[2 * std::size_t{particle}];
+      const float y = scratch.positions[2 * std::size_t{particle} + 1];
+      const std::uint32_t component =
+          input.components.ComponentOf(input.bins.tiles, input.crossings, tile, x, y);
+      if (component == kNoComponent) continue;
+      const std::uint32_t ring = input.ring_of_component[component];
+      if (ring == kNoRing) continue;
+      visit(SampleAt(input.bins.tiles[tile], x, y, input.ids[particle], ring));
     }
   }
 }
@@ -208,15 +176,7 @@ void SampleRings(const SampleInput& input, std::span<const ParticleSample> previ
   for (const std::uint64_t count : input.particle_count) s.ring_limit.push_back(LimitOf(count));
   SetTileLimits(input, s);
   const HashIndex<ParticleSample> index(previous, s.bucket);
-  if (LimitsCover(previous, s)) {
-    ChooseParticles(
-        input, [](std::uint64_t) { return false; }, s);
-  } else {
-    const KnownHashes known(previous, s.known);
-    ChooseParticles(
-        input,
-        [&](std::uint64_t hash) { return known.MayHave(hash) && index.Find(hash) != nullptr; }, s);
-  }
+  ChooseParticles(input, KnownHashes(previous, s.known), index, s);
   s.found.clear();
   ForEachChosen(input, s, [&](const ParticleSample& now) {
     // Only what is below the limit: a ring must not seem to be full by others.

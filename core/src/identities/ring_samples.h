@@ -47,16 +47,13 @@ struct SampleInput {
 };
 
 /// Samples are the particles with the least hashes of their ids, kMaxSamples of each outer ring (a
-/// bottom-k sketch: Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007): the same
-/// whatever the order of the particles, a random choice as to where they are, and, as hashes stay,
-/// largely the same ones in the next frame.
+/// bottom-k sketch: Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007): a random choice
+/// of places, the same whatever the order of the particles, and largely that of the next frame.
 ///
-/// Hashes are spread evenly, so that of a ring of n particles twice as many as it needs lie below
-/// 2 kMaxSamples / n of the largest hash. One pass over the ids, in the order of the frame, leaves
-/// aside each particle that is above this limit for all rings that its tile sees, and that the last
-/// frame does not remember. A ring that gets too few (one in 1,500 by chance, more where ids were
-/// chosen for it) is sampled anew from all particles of the tiles that see it. So the samples are
-/// exact, whatever the ids.
+/// Of a ring of n particles twice as many as it needs lie below 2 kMaxSamples / n of the largest
+/// hash. One pass over the ids leaves aside each particle that is above this limit for all rings
+/// that its tile sees, and that the last frame does not remember. A ring that gets too few is
+/// sampled anew from all particles of the tiles that see it, so the samples are exact.
 /// Cost: a hash and a comparison for each particle; log n in samples for those that pass.
 void SampleRings(const SampleInput& input, std::span<const ParticleSample> previous,
                  RingSamples& samples);

@@ -32,36 +32,29 @@ class VelocityUnits {
 
 }  // namespace
 
-void FollowParticles(const TrackInput& input, const RingHistory& previous, RingTracks& t) {
+void FollowParticles(const TrackInput& input, const RingHistory& previous,
+                     std::span<KnownRing> rings, RingTracks& t) {
   const Frame& frame = input.frame;
-  const std::size_t rings = input.particle_count.size();
+  const SampleInput& in = input.particles;
   t.by_id.samples.clear();
   t.by_id.found.clear();
-  t.velocity_x.assign(rings, 0);
-  t.velocity_y.assign(rings, 0);
-  if (!frame.ids.empty()) {
-    SampleRings({frame.ids, input.bins, input.crossings, input.components, input.ring_of_component,
-                 input.particle_count},
-                previous.samples, t.by_id);
-  }
+  if (!frame.ids.empty()) SampleRings(in, previous.samples, t.by_id);
   if (frame.velocities.empty()) return;
-  t.sum_x.assign(rings, 0);
-  t.sum_y.assign(rings, 0);
+  t.sum_x.assign(rings.size(), 0);
+  t.sum_y.assign(rings.size(), 0);
   const VelocityUnits units(frame);
-  input.components.ForEachParticle(
-      input.bins, input.crossings,
-      [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
-        const std::uint32_t ring = input.ring_of_component[component];
-        if (ring == kNoRing) return;
-        const PlaneVelocity velocity =
-            VelocityOf(frame, input.plane, input.bins.entries[entry].source);
-        t.sum_x[ring] += units.Of(velocity.x);
-        t.sum_y[ring] += units.Of(velocity.y);
-      });
-  for (std::size_t ring = 0; ring < rings; ++ring) {
-    if (input.particle_count[ring] == 0) continue;
-    t.velocity_x[ring] = units.Mean(t.sum_x[ring], input.particle_count[ring]);
-    t.velocity_y[ring] = units.Mean(t.sum_y[ring], input.particle_count[ring]);
+  const auto add = [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+    const std::uint32_t ring = in.ring_of_component[component];
+    if (ring == kNoRing) return;
+    const PlaneVelocity velocity = VelocityOf(frame, input.plane, in.bins.entries[entry].source);
+    t.sum_x[ring] += units.Of(velocity.x);
+    t.sum_y[ring] += units.Of(velocity.y);
+  };
+  in.components.ForEachParticle(in.bins, in.crossings, add);
+  for (std::size_t ring = 0; ring < rings.size(); ++ring) {
+    if (in.particle_count[ring] == 0) continue;
+    rings[ring].velocity_x = units.Mean(t.sum_x[ring], in.particle_count[ring]);
+    rings[ring].velocity_y = units.Mean(t.sum_y[ring], in.particle_count[ring]);
   }
 }
 

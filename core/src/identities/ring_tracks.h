@@ -6,36 +6,30 @@
 #include <span>
 #include <vector>
 
-#include "bins/bins.h"
-#include "crossings/crossings.h"
 #include "identities/ring_samples.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
-#include "rings/components.h"
 
 namespace partiemc {
 
 /// By numbers of the rings of a frame; keeps its memory from frame to frame.
 struct RingTracks {
   RingSamples by_id;
-  std::vector<double> velocity_x, velocity_y;  ///< World units per time; 0 for holes.
-  std::vector<std::int64_t> sum_x, sum_y;      // Working memory.
+  std::vector<std::int64_t> sum_x, sum_y;  // Working memory.
 };
 
 struct TrackInput {
   const Frame& frame;
   Plane plane;
-  const ParticleBins& bins;
-  const Crossings& crossings;
-  const Components& components;
-  std::span<const std::uint32_t> ring_of_component;  ///< Number of its outer ring, or kNoRing.
-  std::span<const std::uint64_t> particle_count;     ///< By number, as CountParticles counts.
+  SampleInput particles;  ///< With the ids of the frame.
 };
 
-/// Follows the particles of a checked frame: samples as SampleRings takes them, velocities as means
-/// over the particles, in sums of integers, which have no order. Without ids there are no samples,
-/// without velocities they are 0. Cost: that of SampleRings; with velocities, linear in particles.
-void FollowParticles(const TrackInput& input, const RingHistory& previous, RingTracks& tracks);
+/// Follows the particles of a checked frame: samples as SampleRings takes them, and the velocities
+/// of `rings`, which are 0 before: means over the particles, in sums of integers, which have no
+/// order. Without ids there are no samples, without velocities they stay 0. Cost: that of
+/// SampleRings; with velocities, linear in particles.
+void FollowParticles(const TrackInput& input, const RingHistory& previous,
+                     std::span<KnownRing> rings, RingTracks& tracks);
 
 }  // namespace partiemc

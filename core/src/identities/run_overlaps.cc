@@ -5,11 +5,12 @@
 #include <limits>
 #include <tuple>
 
+#include "base/bits.h"
+
 namespace partiemc {
 namespace {
 
 constexpr std::size_t kMaxEncountersPerRun = 16;
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 bool Fits(std::int64_t value) {
   return value >= std::numeric_limits<std::int32_t>::min() &&
@@ -77,9 +78,9 @@ void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b
       const NodeRun& b = b_runs[k];
       const std::uint64_t nodes = NodeCount(std::max(a.first, b.first), std::min(a.last, b.last));
       // As a rule a ring meets the one that it met last, row after row.
-      if (a.ring >= newest.size()) newest.resize(a.ring + 1, kNone);
+      if (a.ring >= newest.size()) newest.resize(a.ring + 1, kNoIndex);
       std::uint32_t& pair = newest[a.ring];
-      if (pair != kNone && shared[pair].b == b.ring) {
+      if (pair != kNoIndex && shared[pair].b == b.ring) {
         shared[pair].nodes += nodes;
       } else {
         pair = static_cast<std::uint32_t>(shared.size());

@@ -7,10 +7,6 @@
 namespace partiemc {
 namespace {
 
-Point PointAt(std::span<const double> points, std::uint32_t index) {
-  return {points[2 * std::size_t{index}], points[2 * std::size_t{index} + 1]};
-}
-
 double SquaredDistance(const Point& a, const Point& b) {
   const double dx = a.x - b.x;
   const double dy = a.y - b.y;

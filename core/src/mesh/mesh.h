@@ -1,4 +1,4 @@
-// Stage 7 of 7: rings and interior cells -> triangles (paper, sections 3.7-3.8).
+// Stage 8 of 8: rings and interior cells -> triangles (paper, sections 3.7-3.8).
 #pragma once
 
 #include <cstdint>
@@ -6,9 +6,10 @@
 
 #include "absl/status/status.h"
 #include "crossings/crossings.h"
-#include "mesh/interior.h"
 #include "mesh/loop_groups.h"
 #include "mesh/node_vertices.h"
+#include "mesh/rectangles.h"
+#include "mesh/staircase.h"
 #include "normals/normals.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
@@ -25,17 +26,14 @@ struct MeshScratch {
   std::vector<CellRectangle> rectangles;
   LoopGroups loops;
   NodeVertices nodes;
-  std::vector<std::uint32_t> corner_numbers;   // By corner of the staircases: of its node.
-  std::vector<std::uint32_t> staircase_rings;  // By loop of the staircases: the outer ring around.
-  std::vector<std::uint32_t> triangles;        // Of the rectangles.
-  std::vector<double> points;                  // Of a connectivity that is not yet the mesh's.
-  std::vector<std::uint32_t> tangled;          // Outer rings, of RingTopology (BuildMesh).
+  std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: of its node.
+  std::vector<std::uint32_t> triangles;       // Of the rectangles.
+  std::vector<double> points;                 // Of a connectivity that is not yet the mesh's.
 };
 
 struct MeshInput {
   const TileDirectory& directory;
   const Crossings& crossings;
-  const RingScratch& ring_scratch;  ///< Components, and the outer rings of them.
   const RingTopology& topology;
   const std::vector<CellPlane>& planes;
   const PlacedVertices& placed;
@@ -51,10 +49,10 @@ struct MeshInput {
 /// points, and is the same for grid, greedy and conforming. `farthest-particle` takes its
 /// connectivity from the middles of the segments and only then moves the vertices, so that a
 /// triangle folds where the vertices do.
-/// Components that cannot be triangulated, which is a bug, are named in `scratch.tangled` by their
-/// outer rings; the mesh is then worth nothing.
+/// Components that cannot be triangulated, which is a bug, are named in `tangled` by their outer
+/// rings of RingTopology; the mesh is then worth nothing.
 /// Cost: n log n in the points of rings and staircases, linear in cells.
 void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
-               FrameStatistics& statistics);
+               FrameStatistics& statistics, std::vector<std::uint32_t>& tangled);
 
 }  // namespace partiemc

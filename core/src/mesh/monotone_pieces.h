@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/bits.h"
 #include "base/point.h"
 #include "base/predicates.h"
 
@@ -26,10 +27,10 @@ class MonotonePieces {
   /// bottom, and above it the end of the other chain, which turns nowhere towards the inside, so
   /// that no triangle could be cut off. A handle, to be used with the object that started it only.
   struct Piece {
-    std::uint32_t top = kNone;
+    std::uint32_t top = kNoIndex;
     bool is_left_chain = false;  ///< Which chain lies on the stack; no meaning for one vertex.
 
-    bool IsEmpty() const { return top == kNone; }
+    bool IsEmpty() const { return top == kNoIndex; }
   };
 
   /// Forgets all pieces. Triangles will be appended to `triangles`, three indices each,
@@ -37,7 +38,7 @@ class MonotonePieces {
   void Clear(std::vector<std::uint32_t>& triangles) {
     triangles_ = &triangles;
     nodes_.clear();
-    unused_ = kNone;
+    unused_ = kNoIndex;
   }
 
   Piece Start(Vertex first) {
@@ -54,7 +55,7 @@ class MonotonePieces {
 
   /// Adds the last vertex of both chains, which sees the whole stack, and leaves the piece empty.
   void Finish(Piece& piece, const Vertex& last) {
-    while (nodes_[piece.top].below != kNone) {
+    while (nodes_[piece.top].below != kNoIndex) {
       EmitTopmost(piece, last);
       PopNode(piece);
     }
@@ -62,11 +63,9 @@ class MonotonePieces {
   }
 
  private:
-  static constexpr std::uint32_t kNone = 0xffffffff;
-
   struct Node {
     Vertex vertex;
-    std::uint32_t below = kNone;  // In a stack, or in the list of unused nodes.
+    std::uint32_t below = kNoIndex;  // In a stack, or in the list of unused nodes.
   };
 
   void Add(Piece& piece, const Vertex& vertex, bool to_left_chain) {
@@ -77,7 +76,7 @@ class MonotonePieces {
       PushNode(piece, last);
       piece.is_left_chain = to_left_chain;
     } else {
-      while (nodes_[piece.top].below != kNone && TopmostTurnsInward(piece, vertex)) {
+      while (nodes_[piece.top].below != kNoIndex && TopmostTurnsInward(piece, vertex)) {
         EmitTopmost(piece, vertex);
         PopNode(piece);
       }
@@ -104,7 +103,7 @@ class MonotonePieces {
   // By value: the vertex may be one of the nodes, which move when there are more of them.
   void PushNode(Piece& piece, Vertex vertex) {
     std::uint32_t node = unused_;
-    if (node == kNone) {
+    if (node == kNoIndex) {
       node = static_cast<std::uint32_t>(nodes_.size());
       nodes_.emplace_back();
     } else {
@@ -123,7 +122,7 @@ class MonotonePieces {
 
   std::vector<std::uint32_t>* triangles_ = nullptr;
   std::vector<Node> nodes_;
-  std::uint32_t unused_ = kNone;
+  std::uint32_t unused_ = kNoIndex;
 };
 
 }  // namespace partiemc

@@ -1,107 +1,31 @@
 #include "mesh/triangulate.h"
 
 #include <algorithm>
-#include <cstddef>
-#include <optional>
 #include <utility>
-
-#include "base/interval_order.h"
-#include "base/point.h"
-#include "base/predicates.h"
-#include "mesh/monotone_pieces.h"
-#include "mesh/sweep_corners.h"
 
 namespace partiemc {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffff;
-
-/// An edge on the sweep line, directed upward whatever the direction of its loop.
-struct Edge {
-  Point lower, upper;
-
-  /// +1 where `point` lies left of the edge, 0 on its line, -1 right of it.
-  int SideOf(const Point& point) const { return Orientation(lower, upper, point); }
-};
-
-MonotonePieces::Vertex VertexOf(const Corner& corner) { return {corner.point, corner.index}; }
-
-/// An edge that begins at the point in hand and rises from it.
-struct RisingEdge {
-  Point upper;
-  bool is_left;  // Bounds an interval of the region on its left; otherwise on its right.
-};
-
-/// A maximal part of the sweep line inside the region. Above a merge point, where two intervals
-/// have become one, it holds two pieces until a diagonal from the merge point to the next vertex of
-/// the interval shows which of them ends there: `left_piece` has the merge point as the end of its
-/// right chain, `right_piece` as the end of its left one. Otherwise there is `left_piece` only.
-struct Interval {
-  Edge left, right;
-  MonotonePieces::Piece left_piece, right_piece;
-
-  bool IsMerged() const { return !right_piece.IsEmpty(); }
-};
-
-/// Which intervals a point touches from the inside, after those that end in it were closed.
-struct Surroundings {
-  std::uint32_t left = kNone;    // Has the region directly to the left of the point.
-  std::uint32_t right = kNone;   // The same to the right. Equal to `left`: the point is inside.
-  IntervalOrder::Cursor cursor;  // At `right`, if there is one; where new intervals go, if not.
-};
+MonotonePieces::Vertex VertexOf(const SweepEvent& event) { return {event.point, event.index}; }
 
 }  // namespace
 
-class Triangulator::Sweep {
- public:
-  bool Run(std::span<const double> points, std::span<const std::uint32_t> loop_points,
-           std::span<const std::uint32_t> loop_offsets, std::vector<std::uint32_t>& triangles);
-
- private:
-  Point PointAt(std::uint32_t index) const {
-    return {points_[2 * std::size_t{index}], points_[2 * std::size_t{index} + 1]};
-  }
-
-  bool Visit(std::span<const Corner> corners);
-  std::optional<std::size_t> SplitEdges(std::span<const Corner> corners);
-  bool RisingEdgesAlternate(const Point& point) const;
-  bool Surround(const Corner& vertex, std::size_t ending_edges, Surroundings& found);
-  void Advance(const Corner& vertex, const Surroundings& around);
-  IntervalOrder::Cursor Start(const Corner& vertex, std::span<const RisingEdge> edges,
-                              IntervalOrder::Cursor cursor);
-
-  std::uint32_t SplitInterval(std::uint32_t id, const Corner& vertex);
-  void AddToLeftChain(Interval& interval, const Corner& vertex);
-  void AddToRightChain(Interval& interval, const Corner& vertex);
-  void Close(std::uint32_t id, const Corner& vertex);
-
-  std::uint32_t NewInterval();
-
-  std::span<const double> points_;
-  SweepCorners corners_;
-  std::vector<RisingEdge> rising_;
-  std::vector<Interval> intervals_;
-  std::vector<std::uint32_t> unused_intervals_;
-  MonotonePieces pieces_;
-  IntervalOrder order_;
-};
-
-bool Triangulator::Sweep::Run(std::span<const double> points,
-                              std::span<const std::uint32_t> loop_points,
-                              std::span<const std::uint32_t> loop_offsets,
-                              std::vector<std::uint32_t>& triangles) {
+bool Triangulator::Triangulate(std::span<const double> points,
+                               std::span<const std::uint32_t> loop_points,
+                               std::span<const std::uint32_t> loop_offsets,
+                               std::vector<std::uint32_t>& triangles) {
   points_ = points;
   const std::size_t size_before = triangles.size();
   intervals_.clear();
   unused_intervals_.clear();
   pieces_.Clear(triangles);
-  order_.Clear();
+  status_.Clear();
 
-  if (!corners_.Collect(points, loop_points, loop_offsets)) return false;
-  const std::span<const Corner> corners = corners_.corners();
-  for (auto begin = corners.begin(); begin != corners.end();) {
-    const auto end = std::find_if(begin + 1, corners.end(), [&](const Corner& corner) {
-      return corner.point != begin->point;
+  if (!events_.Collect(points, loop_points, loop_offsets)) return false;
+  const std::span<const SweepEvent> events = events_.events();
+  for (auto begin = events.begin(); begin != events.end();) {
+    const auto end = std::find_if(begin + 1, events.end(), [&](const SweepEvent& event) {
+      return event.point != begin->point;
     });
     if (!Visit(std::span(begin, end))) {
       triangles.resize(size_before);
@@ -117,16 +41,16 @@ bool Triangulator::Sweep::Run(std::span<const double> points,
 /// the sweep line finds every crossing: the first one exchanges two neighbours, nothing can be
 /// inserted between these any more, and the one that ends first ends on the wrong side of the
 /// other.
-bool Triangulator::Sweep::Visit(std::span<const Corner> corners) {
-  const Corner& vertex = corners.front();
-  const std::optional<std::size_t> ending_edges = SplitEdges(corners);
+bool Triangulator::Visit(std::span<const SweepEvent> events) {
+  const SweepEvent& vertex = events.front();
+  const std::optional<std::size_t> ending_edges = SplitEdges(events);
   if (!ending_edges.has_value() || !RisingEdgesAlternate(vertex.point)) return false;
   Surroundings around;
   if (!Surround(vertex, *ending_edges, around)) return false;
 
   // What the region is directly to the left and right of the point must agree below and above it.
-  const bool inside_on_left = around.left != kNone;
-  const bool inside_on_right = around.right != kNone;
+  const bool inside_on_left = around.left != kNoIndex;
+  const bool inside_on_right = around.right != kNoIndex;
   if (rising_.empty()) {
     if (inside_on_left != inside_on_right) return false;
   } else if (rising_.front().is_left == inside_on_left ||
@@ -139,12 +63,12 @@ bool Triangulator::Sweep::Visit(std::span<const Corner> corners) {
 
 /// Collects the edges that rise from a point, from left to right; returns the number of those that
 /// end in it. Nothing if an edge has no length.
-std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const Corner> corners) {
-  const Point point = corners.front().point;
+std::optional<std::size_t> Triangulator::SplitEdges(std::span<const SweepEvent> events) {
+  const Point point = events.front().point;
   rising_.clear();
-  for (const Corner& corner : corners) {
-    const Point previous = PointAt(corner.previous);
-    const Point next = PointAt(corner.next);
+  for (const SweepEvent& event : events) {
+    const Point previous = PointAt(points_, event.previous);
+    const Point next = PointAt(points_, event.next);
     if (previous == point || next == point) return std::nullopt;
     // The region lies to the left of the loop: an edge that the loop goes down is a left one.
     if (SweepsBefore(point, previous)) rising_.push_back({previous, true});
@@ -155,10 +79,10 @@ std::optional<std::size_t> Triangulator::Sweep::SplitEdges(std::span<const Corne
       return Orientation(point, a.upper, b.upper) < 0;
     });
   }
-  return 2 * corners.size() - rising_.size();
+  return 2 * events.size() - rising_.size();
 }
 
-bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
+bool Triangulator::RisingEdgesAlternate(const Point& point) const {
   for (std::size_t i = 1; i < rising_.size(); ++i) {
     if (rising_[i - 1].is_left == rising_[i].is_left) return false;
     if (Orientation(point, rising_[i - 1].upper, rising_[i].upper) == 0) return false;
@@ -168,14 +92,14 @@ bool Triangulator::Sweep::RisingEdgesAlternate(const Point& point) const {
 
 /// Finds the intervals around a point and closes those that end in it. False if an edge runs
 /// through the point, or if the edges found to end here are not all that should.
-bool Triangulator::Sweep::Surround(const Corner& vertex, std::size_t ending_edges,
-                                   Surroundings& found) {
+bool Triangulator::Surround(const SweepEvent& vertex, std::size_t ending_edges,
+                            Surroundings& found) {
   const Point& point = vertex.point;
-  found.cursor =
-      order_.FindFirstNot([&](std::uint32_t id) { return intervals_[id].right.SideOf(point) < 0; });
+  found.cursor = status_.FindFirstNot(
+      [&](std::uint32_t id) { return intervals_[id].right.SideOf(point) < 0; });
   std::size_t ended = 0;
-  if (!order_.IsEnd(found.cursor)) {
-    const std::uint32_t id = order_.At(found.cursor);
+  if (!status_.IsEnd(found.cursor)) {
+    const std::uint32_t id = status_.At(found.cursor);
     const Interval& interval = intervals_[id];
     if (interval.left.SideOf(point) < 0) {
       found.left = id;
@@ -185,11 +109,11 @@ bool Triangulator::Sweep::Surround(const Corner& vertex, std::size_t ending_edge
       }
       if (interval.right.upper != point) return false;
       ++ended;
-      found.cursor = order_.Next(found.cursor);
+      found.cursor = status_.Next(found.cursor);
     }
   }
-  while (!order_.IsEnd(found.cursor)) {
-    const std::uint32_t id = order_.At(found.cursor);
+  while (!status_.IsEnd(found.cursor)) {
+    const std::uint32_t id = status_.At(found.cursor);
     const Interval& interval = intervals_[id];
     const int left_side = interval.left.SideOf(point);
     if (left_side > 0) break;
@@ -203,7 +127,7 @@ bool Triangulator::Sweep::Surround(const Corner& vertex, std::size_t ending_edge
     if (right_side < 0 || interval.right.upper != point) return false;
     ++ended;
     Close(id, vertex);
-    found.cursor = order_.Erase(found.cursor);
+    found.cursor = status_.Erase(found.cursor);
   }
   return ended == ending_edges;
 }
@@ -213,57 +137,56 @@ bool Triangulator::Sweep::Surround(const Corner& vertex, std::size_t ending_edge
 ///   \ | /    \  /       /  \        \ /
 ///    \|/      \/ split   \/ merge    | several rising edges: the outer ones go on with the
 ///     *       *           *          * intervals around, each pair between starts a new one
-void Triangulator::Sweep::Advance(const Corner& vertex, const Surroundings& around) {
-  IntervalOrder::Cursor cursor = around.cursor;
+void Triangulator::Advance(const SweepEvent& vertex, const Surroundings& around) {
+  SweepStatus::Cursor cursor = around.cursor;
   std::span<const RisingEdge> starting = rising_;
-  if (around.left != kNone && !starting.empty()) starting = starting.subspan(1);
-  if (around.right != kNone && !starting.empty()) starting = starting.first(starting.size() - 1);
+  if (around.left != kNoIndex && !starting.empty()) starting = starting.subspan(1);
+  if (around.right != kNoIndex && !starting.empty()) starting = starting.first(starting.size() - 1);
 
-  if (around.left != kNone && around.left == around.right) {
+  if (around.left != kNoIndex && around.left == around.right) {
     const std::uint32_t upper = SplitInterval(around.left, vertex);
-    cursor = Start(vertex, starting, order_.Next(cursor));
-    order_.Insert(cursor, upper);
+    cursor = Start(vertex, starting, status_.Next(cursor));
+    status_.Insert(cursor, upper);
     return;
   }
-  if (around.left != kNone) AddToRightChain(intervals_[around.left], vertex);
-  if (around.right != kNone) AddToLeftChain(intervals_[around.right], vertex);
+  if (around.left != kNoIndex) AddToRightChain(intervals_[around.left], vertex);
+  if (around.right != kNoIndex) AddToLeftChain(intervals_[around.right], vertex);
   if (rising_.empty()) {
-    if (around.left == kNone) return;
+    if (around.left == kNoIndex) return;
     Interval& merged = intervals_[around.left];
     const Interval& other = intervals_[around.right];
     merged.right = other.right;
     merged.right_piece = other.left_piece;
     unused_intervals_.push_back(around.right);
-    order_.Erase(cursor);
+    status_.Erase(cursor);
     return;
   }
-  if (around.left != kNone) {
+  if (around.left != kNoIndex) {
     intervals_[around.left].right = {vertex.point, rising_.front().upper};
   }
-  if (around.right != kNone) {
+  if (around.right != kNoIndex) {
     intervals_[around.right].left = {vertex.point, rising_.back().upper};
   }
   Start(vertex, starting, cursor);
 }
 
 /// Starts an interval between every two of `edges`; returns the cursor behind them.
-IntervalOrder::Cursor Triangulator::Sweep::Start(const Corner& vertex,
-                                                 std::span<const RisingEdge> edges,
-                                                 IntervalOrder::Cursor cursor) {
+SweepStatus::Cursor Triangulator::Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
+                                        SweepStatus::Cursor cursor) {
   for (std::size_t i = 0; i + 1 < edges.size(); i += 2) {
     const std::uint32_t id = NewInterval();
     Interval& interval = intervals_[id];
     interval.left = {vertex.point, edges[i].upper};
     interval.right = {vertex.point, edges[i + 1].upper};
     interval.left_piece = pieces_.Start(VertexOf(vertex));
-    cursor = order_.Insert(cursor, id);
+    cursor = status_.Insert(cursor, id);
   }
   return cursor;
 }
 
 /// A vertex inside an interval: a diagonal from it to the last vertex of the interval below cuts
 /// the piece in two. Returns the new interval, which goes to the right of interval `id`.
-std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const Corner& vertex) {
+std::uint32_t Triangulator::SplitInterval(std::uint32_t id, const SweepEvent& vertex) {
   const std::uint32_t right_id = NewInterval();
   Interval& left = intervals_[id];
   Interval& right = intervals_[right_id];
@@ -285,7 +208,7 @@ std::uint32_t Triangulator::Sweep::SplitInterval(std::uint32_t id, const Corner&
   return right_id;
 }
 
-void Triangulator::Sweep::AddToLeftChain(Interval& interval, const Corner& vertex) {
+void Triangulator::AddToLeftChain(Interval& interval, const SweepEvent& vertex) {
   if (interval.IsMerged()) {
     pieces_.Finish(interval.left_piece, VertexOf(vertex));
     interval.left_piece = interval.right_piece;
@@ -294,19 +217,19 @@ void Triangulator::Sweep::AddToLeftChain(Interval& interval, const Corner& verte
   pieces_.AddToLeftChain(interval.left_piece, VertexOf(vertex));
 }
 
-void Triangulator::Sweep::AddToRightChain(Interval& interval, const Corner& vertex) {
+void Triangulator::AddToRightChain(Interval& interval, const SweepEvent& vertex) {
   if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
   pieces_.AddToRightChain(interval.left_piece, VertexOf(vertex));
 }
 
-void Triangulator::Sweep::Close(std::uint32_t id, const Corner& vertex) {
+void Triangulator::Close(std::uint32_t id, const SweepEvent& vertex) {
   Interval& interval = intervals_[id];
   if (interval.IsMerged()) pieces_.Finish(interval.right_piece, VertexOf(vertex));
   pieces_.Finish(interval.left_piece, VertexOf(vertex));
   unused_intervals_.push_back(id);
 }
 
-std::uint32_t Triangulator::Sweep::NewInterval() {
+std::uint32_t Triangulator::NewInterval() {
   if (unused_intervals_.empty()) {
     intervals_.emplace_back();
     return static_cast<std::uint32_t>(intervals_.size() - 1);
@@ -315,18 +238,6 @@ std::uint32_t Triangulator::Sweep::NewInterval() {
   unused_intervals_.pop_back();
   intervals_[id] = {};
   return id;
-}
-
-Triangulator::Triangulator() : sweep_(std::make_unique<Sweep>()) {}
-Triangulator::~Triangulator() = default;
-Triangulator::Triangulator(Triangulator&&) noexcept = default;
-Triangulator& Triangulator::operator=(Triangulator&&) noexcept = default;
-
-bool Triangulator::Triangulate(std::span<const double> points,
-                               std::span<const std::uint32_t> loop_points,
-                               std::span<const std::uint32_t> loop_offsets,
-                               std::vector<std::uint32_t>& triangles) {
-  return sweep_->Run(points, loop_points, loop_offsets, triangles);
 }
 
 }  // namespace partiemc

@@ -1,10 +1,18 @@
 // Triangulates regions bounded by closed loops, without adding a point.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
+
+#include "base/bits.h"
+#include "base/point.h"
+#include "base/predicates.h"
+#include "base/sweep_status.h"
+#include "mesh/monotone_pieces.h"
+#include "mesh/sweep_events.h"
 
 namespace partiemc {
 
@@ -24,11 +32,6 @@ namespace partiemc {
 /// them.
 class Triangulator {
  public:
-  Triangulator();
-  ~Triangulator();
-  Triangulator(Triangulator&&) noexcept;
-  Triangulator& operator=(Triangulator&&) noexcept;
-
   /// Appends the triangles, three point indices each, to `triangles`. Loop k runs through the
   /// points loop_points[loop_offsets[k]] up to, but not including, loop_points[loop_offsets[k +
   /// 1]], and back to its first.
@@ -61,8 +64,61 @@ class Triangulator {
                                  std::vector<std::uint32_t>& triangles);
 
  private:
-  class Sweep;
-  std::unique_ptr<Sweep> sweep_;
+  /// An edge on the sweep line, directed upward whatever the direction of its loop.
+  struct Edge {
+    Point lower, upper;
+
+    /// +1 where `point` lies left of the edge, 0 on its line, -1 right of it.
+    int SideOf(const Point& point) const { return Orientation(lower, upper, point); }
+  };
+
+  /// An edge that begins at the point in hand and rises from it.
+  struct RisingEdge {
+    Point upper;
+    bool is_left;  // Bounds an interval of the region on its left; otherwise on its right.
+  };
+
+  /// A maximal part of the sweep line inside the region. Above a merge point, where two intervals
+  /// have become one, it holds two pieces until a diagonal from the merge point to the next vertex
+  /// of the interval shows which of them ends there: `left_piece` has the merge point as the end of
+  /// its right chain, `right_piece` as the end of its left one. Otherwise there is `left_piece`
+  /// only.
+  struct Interval {
+    Edge left, right;
+    MonotonePieces::Piece left_piece, right_piece;
+
+    bool IsMerged() const { return !right_piece.IsEmpty(); }
+  };
+
+  /// Which intervals a point touches from the inside, after those that end in it were closed.
+  struct Surroundings {
+    std::uint32_t left = kNoIndex;   // Has the region directly to the left of the point.
+    std::uint32_t right = kNoIndex;  // The same to the right. Equal to `left`: the point is inside.
+    SweepStatus::Cursor cursor;      // At `right`, if there is one; where new intervals go, if not.
+  };
+
+  bool Visit(std::span<const SweepEvent> events);
+  std::optional<std::size_t> SplitEdges(std::span<const SweepEvent> events);
+  bool RisingEdgesAlternate(const Point& point) const;
+  bool Surround(const SweepEvent& vertex, std::size_t ending_edges, Surroundings& found);
+  void Advance(const SweepEvent& vertex, const Surroundings& around);
+  SweepStatus::Cursor Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
+                            SweepStatus::Cursor cursor);
+
+  std::uint32_t SplitInterval(std::uint32_t id, const SweepEvent& vertex);
+  void AddToLeftChain(Interval& interval, const SweepEvent& vertex);
+  void AddToRightChain(Interval& interval, const SweepEvent& vertex);
+  void Close(std::uint32_t id, const SweepEvent& vertex);
+
+  std::uint32_t NewInterval();
+
+  std::span<const double> points_;
+  SweepEvents events_;
+  std::vector<RisingEdge> rising_;
+  std::vector<Interval> intervals_;
+  std::vector<std::uint32_t> unused_intervals_;
+  MonotonePieces pieces_;
+  SweepStatus status_;
 };
 
 }  // namespace partiemc

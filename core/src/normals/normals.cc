@@ -5,7 +5,9 @@
 #include <atomic>
 #include <cmath>
 
+#include "base/bits.h"
 #include "base/parallel.h"
+#include "frame/placement_traits.h"
 #include "sampler/point_groups.h"
 
 namespace partiemc {
@@ -22,14 +24,12 @@ CellNormal PlaceOf(const TileDirectory& directory, const ActiveCell& cell) {
   return {(tile.x << kTileShift) + cell.i, (tile.y << kTileShift) + cell.j, 0, 0};
 }
 
-constexpr std::uint32_t kNone = 0xffffffff;
-
 // Finds the normals that the cells of `order` had in the frame before: both are in one order.
 // Writes the cells' places to `next`.
 void MatchPrevious(std::span<const CellNormal> previous, std::span<const std::uint32_t> order,
                    const TileDirectory& directory, const Crossings& crossings,
                    NormalScratch& scratch, std::vector<CellNormal>& next) {
-  scratch.previous.assign(crossings.cells.size(), kNone);
+  scratch.previous.assign(crossings.cells.size(), kNoIndex);
   next.resize(order.size());
   std::uint32_t before = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -170,7 +170,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
   // The normal that a cell had in the frame before, or nullptr.
   const auto previous_of = [&](std::uint32_t cell) {
     const std::uint32_t index = scratch.previous[cell];
-    return index == kNone ? nullptr : &previous[index];
+    return index == kNoIndex ? nullptr : &previous[index];
   };
   planes.resize(rings.segments.size());
   scratch.normal.assign(crossings.cells.size(), {0, 0});
@@ -195,7 +195,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       }
     }
   };
-  const bool at_entries = parameters.placement == Placement::kVirtualPlane;
+  const PlacementTraits& traits = TraitsOf(parameters.placement);
   const auto estimate = [&](std::size_t first, std::size_t last) {
     // Cells lie anywhere in memory: all are looked up before anything waits for one of them.
     std::array<std::uint32_t, kSegmentsAtOnce + kSegmentsOfGroup> cells;
@@ -211,13 +211,13 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
       begins_group[k - first] = BeginsGroup(k - *(end - 1));
     }
-    if (parameters.placement == Placement::kFarthestParticle) {
+    if (traits.takes_particles) {
       for (std::size_t k = first; k < last; ++k) SampleAtMean(bins.tiles, field, planes[k]);
     } else {
       auto groups = CollectPoints<LatticePoint>(sample);
       for (std::size_t k = first; k < last; ++k) {
         if (begins_group[k - first]) groups.Part();
-        AddPoints(bins.tiles, k, at_entries, planes[k], groups);
+        AddPoints(bins.tiles, k, traits.refines, planes[k], groups);
       }
       groups.Finish();
     }

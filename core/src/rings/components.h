@@ -1,8 +1,6 @@
 // Connected components of the inside nodes: which polygon a node, a ring or a particle belongs to.
 #pragma once
 
-#include <hwy/cache_control.h>
-
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -33,11 +31,6 @@ class Components {
   /// cell that is nearest to it. None: kNoComponent.
   std::uint32_t ComponentOf(const TileDirectory& directory, const Crossings& crossings,
                             std::uint32_t tile, float x, float y) const;
-
-  /// Asks the memory for what ComponentOf will look up there.
-  void Prefetch(std::uint32_t tile, int row) const {
-    hwy::Prefetch(&first_run_[tile * kTileSize + row]);
-  }
 
   /// Calls visit(component) for the components of which a tile's particles may be: once or several
   /// times for each. Cost: linear in the runs of inside nodes on the tile and its upper right rim.

@@ -122,7 +122,7 @@ void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopolog
   rings.dropped_components = static_cast<std::uint64_t>(
       std::count(scratch.particle_count.begin(), scratch.particle_count.end(), 0u));
   if (rings.dropped_components == 0) return;
-  scratch.components.ForEachRun(
+  rings.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
         // ForEachRun has already read this row: clearing its bits does not disturb it.
         if (scratch.particle_count[component] == 0) crossings.tiles[tile].inside[j] &= ~mask;
@@ -179,12 +179,12 @@ void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings, R
   rings.offsets[kept] = end;
 }
 
-void CountComponents(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch) {
-  scratch.components.Label(bins.tiles, crossings);
-  scratch.particle_count.assign(scratch.components.size(), 0);
-  scratch.particle_weight.assign(scratch.components.size(), 0);
-  scratch.components.CountParticles(bins, crossings, scratch.particle_count,
-                                    scratch.particle_weight);
+void CountComponents(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch,
+                     RingTopology& rings) {
+  rings.components.Label(bins.tiles, crossings);
+  scratch.particle_count.assign(rings.components.size(), 0);
+  scratch.particle_weight.assign(rings.components.size(), 0);
+  rings.components.CountParticles(bins, crossings, scratch.particle_count, scratch.particle_weight);
 }
 
 void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, RingScratch& scratch,
@@ -202,7 +202,7 @@ void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, R
   if (rings.dropped_holes > 0) KeepSurvivors(bins.tiles, crossings, scratch, rings);
   if (rings.dropped_holes + rings.dropped_components > 0) {
     MarkInteriorCells(bins.tiles, crossings);
-    CountComponents(bins, crossings, scratch);
+    CountComponents(bins, crossings, scratch, rings);
   }
 }
 
@@ -210,21 +210,21 @@ void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, R
 void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch,
           RingTopology& rings) {
   const std::size_t ring_count = rings.offsets.size() - 1;
-  scratch.outer_ring.assign(scratch.components.size(), kNoRing);
-  scratch.component_of_ring.resize(ring_count);
+  rings.outer_ring.assign(rings.components.size(), kNoRing);
+  rings.component_of_ring.resize(ring_count);
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
     const EdgeNodes nodes = EntryNodes(bins.tiles, crossings, rings.segments[rings.offsets[ring]]);
-    const std::uint32_t component = scratch.components.At(crossings, nodes.inside);
-    scratch.component_of_ring[ring] = component;
-    if (scratch.area[ring] >= 0) scratch.outer_ring[component] = static_cast<std::uint32_t>(ring);
+    const std::uint32_t component = rings.components.At(crossings, nodes.inside);
+    rings.component_of_ring[ring] = component;
+    if (scratch.area[ring] >= 0) rings.outer_ring[component] = static_cast<std::uint32_t>(ring);
   }
   rings.outer_of.assign(ring_count, kNoRing);
   rings.particle_count.assign(ring_count, 0);
   rings.particle_weight.assign(ring_count, 0);
   for (std::size_t ring = 0; ring < ring_count; ++ring) {
-    const std::uint32_t component = scratch.component_of_ring[ring];
+    const std::uint32_t component = rings.component_of_ring[ring];
     if (scratch.area[ring] < 0) {
-      rings.outer_of[ring] = scratch.outer_ring[component];
+      rings.outer_of[ring] = rings.outer_ring[component];
     } else {
       rings.particle_count[ring] = scratch.particle_count[component];
       rings.particle_weight[ring] = scratch.particle_weight[component];
@@ -265,15 +265,15 @@ std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spaci
     if (around != kNoRing) scratch.enclosed[around] += scratch.enclosed[ring];
   }
   const double min_area = parameters.min_component_area * spacing * spacing;
-  scratch.dropped.assign(scratch.components.size(), 0);
+  scratch.dropped.assign(rings.components.size(), 0);
   std::uint64_t count = 0;
   for (const std::uint32_t ring : scratch.outer_rings) {
     const std::uint32_t around = scratch.container[ring];
     const bool drop = scratch.area[ring] < min_area ||
                       scratch.enclosed[ring] < parameters.min_component_particles ||
-                      (around != kNoRing && scratch.dropped[scratch.component_of_ring[around]]);
+                      (around != kNoRing && scratch.dropped[rings.component_of_ring[around]]);
     if (!drop) continue;
-    scratch.dropped[scratch.component_of_ring[ring]] = 1;
+    scratch.dropped[rings.component_of_ring[ring]] = 1;
     ++count;
   }
   return count;
@@ -282,13 +282,13 @@ std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spaci
 // Drops the components that are marked.
 void DropMarked(const ParticleBins& bins, Crossings& crossings, RingScratch& scratch,
                 RingTopology& rings) {
-  scratch.components.ForEachRun(
+  rings.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
         if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
       });
   KeepSurvivors(bins.tiles, crossings, scratch, rings);
   MarkInteriorCells(bins.tiles, crossings);
-  CountComponents(bins, crossings, scratch);
+  CountComponents(bins, crossings, scratch, rings);
   Nest(bins, crossings, scratch, rings);
 }
 
@@ -314,7 +314,7 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
         FindEntries(bins.tiles, level_set, crossings, rings);
         MeasureAreas(rings, scratch);
       },
-      [&] { CountComponents(bins, crossings, scratch); });
+      [&] { CountComponents(bins, crossings, scratch, rings); });
   if (*parameters.clean) Clean(bins, scale, crossings, scratch, rings);
   Nest(bins, crossings, scratch, rings);
   if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {
@@ -324,9 +324,9 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
 
 void DropComponents(const ParticleBins& bins, std::span<const std::uint32_t> outer_rings,
                     Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
-  scratch.dropped.assign(scratch.components.size(), 0);
+  scratch.dropped.assign(rings.components.size(), 0);
   for (const std::uint32_t ring : outer_rings) {
-    std::uint8_t& dropped = scratch.dropped[scratch.component_of_ring[ring]];
+    std::uint8_t& dropped = scratch.dropped[rings.component_of_ring[ring]];
     if (std::exchange(dropped, std::uint8_t{1}) == 0) ++rings.dropped_components;
   }
   DropMarked(bins, crossings, scratch, rings);

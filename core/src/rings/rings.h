@@ -1,4 +1,4 @@
-// Stage 4 of 7: segments -> closed rings, nested and cleaned.
+// Stage 4 of 8: segments -> closed rings, nested and cleaned.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,9 @@ struct RingTopology {
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;  ///< Per ring: of its component; 0 for holes.
   std::vector<double> particle_weight;  ///< The same for the field's weights, where they differ.
+  Components components;                ///< Of the inside nodes: one for each outer ring.
+  std::vector<std::uint32_t> component_of_ring;
+  std::vector<std::uint32_t> outer_ring;  ///< By component.
   std::uint64_t dropped_holes = 0;
   std::uint64_t dropped_components = 0;
   std::uint64_t dropped_spray = 0;
@@ -32,15 +35,12 @@ struct RingTopology {
 
 /// Warm buffers of TraceRings.
 struct RingScratch {
-  Components components;
   std::vector<std::uint64_t> particle_count;
   std::vector<double> particle_weight;
   std::vector<std::uint32_t> next_segment;                   // kTaken once it belongs to a ring.
   std::vector<std::uint8_t> visited;                         // By ring.
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
-  std::vector<std::uint32_t> outer_ring;                     // By component.
-  std::vector<std::uint32_t> component_of_ring;
-  std::vector<double> area;  // By ring, in cells.
+  std::vector<double> area;                                  // By ring, in cells.
   CrossedRows rows;
   std::vector<std::uint32_t> outer_rings;  // From the outside inwards.
   std::vector<std::uint32_t> container;    // By outer ring: the one around it, or kNoRing.

@@ -7,40 +7,30 @@
 #include <utility>
 #include <vector>
 
-#include "base/boxes_apart.h"
+#include "base/box.h"
 
 namespace partiemc {
 
 /// Buffers of CountTouchingPairs, kept warm from call to call; they carry nothing from one to the
-/// next, but to CountTouchingPairsAgain. Memory: about 20 bytes per segment, whatever the input.
+/// next. Memory: about 10 bytes per segment, whatever the input.
 struct TouchingPairsBuffers {
   /// Successive segments of a ring, each named by the point that it begins at.
   struct Run {
-    double left, bottom, right, top;     // The box around them.
+    Box box;                             // Around them.
     std::uint32_t first, last;           // Segments [first, last),
     std::uint32_t ring_begin, ring_end;  // of a ring of [ring_begin, ring_end).
     std::uint64_t cell = 0;              // Where it lies in the grid of its size.
     std::uint32_t next_in_slot = 0;      // A list of runs whose cells share a slot.
     std::uint8_t level = 0;              // Of its grid (intersections.cc).
     std::uint8_t directions = 0;         // In which all of its segments go (intersections.cc).
-    bool is_settled = false;             // Its ring is as it was (CountTouchingPairsAgain).
-    bool is_alone = false;               // Its ring is searched by itself (intersections.cc).
     bool finds_pair = false;             // Whether it is the earlier one of a pair that counts.
   };
   std::vector<Run> runs;
-  std::vector<Box> ring_boxes;
-  /// By ring: 1 only where its box touches no other ring's. Says nothing where there is no point.
-  std::vector<std::uint8_t> is_apart;
-  BoxesApartScratch boxes_apart;
   std::vector<std::uint32_t> slots;
 
   /// Pairs that were counted, each segment named by the point that it begins at. At most as many as
   /// there are segments; a frame with more of them has lost the later ones.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-
-  /// One of them, each segment named by the point that it begins at. Only to be read
-  /// when the count was not zero.
-  std::uint32_t example_first = 0, example_second = 0;
 };
 
 /// The number of pairs of segments that have a point in common, over all segments of all rings.
@@ -56,14 +46,5 @@ struct TouchingPairsBuffers {
 std::size_t CountTouchingPairs(std::span<const double> points,
                                std::span<const std::uint32_t> ring_offsets,
                                TouchingPairsBuffers& buffers);
-
-/// The same, with the same results, where of the points of the last call on these buffers only
-/// those with is_moved[k] != 0 have changed, and `ring_offsets` have not: rings that are apart,
-/// touched nothing and did not move are not searched again. Requires: a call on these buffers
-/// before.
-std::size_t CountTouchingPairsAgain(std::span<const double> points,
-                                    std::span<const std::uint32_t> ring_offsets,
-                                    std::span<const std::uint8_t> is_moved,
-                                    TouchingPairsBuffers& buffers);
 
 }  // namespace partiemc

@@ -11,4 +11,7 @@ namespace partiemc {
 /// Relative to the first point, so that a ring far from the origin loses no digits.
 RingMeasures MeasureRing(std::span<const double> points);
 
+/// All of them, in parallel.
+void MeasureRings(Rings& rings);
+
 }  // namespace partiemc

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "vertices/vertices.h"
 
@@ -28,32 +27,13 @@ inline LatticePoint ClampToCell(const TileDirectory& directory, const ActiveCell
   return {origin.x + of_cell.x, origin.y + of_cell.y};
 }
 
-/// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
-/// `max_step` cells; `point` itself where the gradient is weak.
-inline LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient,
-                               double max_step) {
-  const double square = gradient.x * gradient.x + gradient.y * gradient.y;
-  if (square < kWeakGradientSquare) return point;
-  double step = -value / square;
-  // Its length is that of the gradient times as much.
-  if (step * step * square > max_step * max_step) {
-    step = std::copysign(max_step / std::sqrt(square), step);
-  }
-  return {point.x + step * gradient.x, point.y + step * gradient.y};
-}
-
-/// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
-/// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
-LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
-
 /// Minimiser of sum_j (n_j . (v - p_j))^2 over the segment's two ends (Eq. 14), in closed form;
 /// directions that the normals hardly constrain stay at the middle. In lattice coordinates.
-LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane);
+LatticePoint QefVertex(const VertexInput& input, const CellPlane& plane);
 
 /// The particle that lies farthest along the plane's normal, among those on or above the plane and
 /// within one cell (and one kernel radius) of its point; the middle of the segment if there is
 /// none. In world units, moved outward by the surface offset.
-WorldPosition FarthestParticleVertex(const VertexInput& input, std::uint32_t segment,
-                                     const CellPlane& plane);
+WorldPosition FarthestParticleVertex(const VertexInput& input, const CellPlane& plane);
 
 }  // namespace partiemc

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/cancellation.h"
-#include "base/parallel.h"
 #include "base/predicates.h"
 #include "vertices/measure.h"
 
@@ -12,17 +11,12 @@ namespace {
 
 constexpr int kGentleRounds = 4;
 
-// Each round costs as much as all of the points, and frames may be made that need one for every few
-// of them: after so many everything goes back at once. Of 59,276 frames of noise, clusters and
-// bodies through each other, one needed nine.
+// Frames may be made that need a round for every few of their points: after so many everything goes
+// back at once. Ordinary frames need none, frames made to hurt up to nine.
 constexpr int kMostRounds = 24;
 
 // Rings of a round that lie on the wrong side of others. Hardly any frame has one.
 constexpr std::size_t kMostMisplaced = 100;
-
-Point PointAt(const Rings& rings, std::size_t k) {
-  return {rings.points[2 * k], rings.points[2 * k + 1]};
-}
 
 // Marks both ends of a segment and the points before and after it.
 void MarkSegment(const Rings& rings, std::uint32_t segment, std::vector<std::uint8_t>& is_marked) {
@@ -42,49 +36,33 @@ void MarkRing(const Rings& rings, std::size_t ring, std::vector<std::uint8_t>& i
 Box BoxOf(const Rings& rings, std::size_t ring) {
   Box box;
   for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
-    box.Add(PointAt(rings, k));
+    box.Add(PointAt(rings.points, k));
   }
   return box;
 }
 
 // The point with the smallest x, of those the one with the smallest y.
 Point LeftmostOf(const Rings& rings, std::size_t ring) {
-  Point leftmost = PointAt(rings, rings.offsets[ring]);
+  Point leftmost = PointAt(rings.points, rings.offsets[ring]);
   for (std::uint32_t k = rings.offsets[ring] + 1; k < rings.offsets[ring + 1]; ++k) {
-    const Point point = PointAt(rings, k);
+    const Point point = PointAt(rings.points, k);
     if (point.x < leftmost.x || (point.x == leftmost.x && point.y < leftmost.y)) leftmost = point;
   }
   return leftmost;
 }
 
-void MeasureRings(Rings& rings) {
-  rings.measures.resize(rings.RingCount());
-  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
-    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
-  });
-}
-
 // Lists the rings that are turned inside out or lie on the wrong side of others. Requires: rings
-// were measured, and searched for pairs. Of rings that do not cross, one is in its place if and
-// only if the others wind around it as often as around the region outside of an outer ring (0), or
-// around the fluid that a hole lies in (1). What touches no other ring's box has none around it,
-// and is around none.
+// were measured, and do not cross. Then one is in its place if and only if the others wind around
+// it as often as around the region outside of an outer ring (0), or around the fluid that a hole
+// lies in (1).
 void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   scratch.misplaced.clear();
-  scratch.together.clear();
+  scratch.ring_depths.Find(rings.points, rings.offsets);
   for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
-    if (scratch.pairs.is_apart[ring] == 0 || rings.outer_of[ring] != kNoRing) {
-      scratch.together.push_back(ring);
-    } else if (rings.measures[ring].area < 0) {
-      scratch.misplaced.push_back(ring);
-    }
-  }
-  scratch.ring_depths.Find(rings.points, rings.offsets, scratch.together, scratch.depths);
-  for (std::size_t k = 0; k < scratch.together.size(); ++k) {
-    const std::uint32_t ring = scratch.together[k];
     const bool is_hole = rings.outer_of[ring] != kNoRing;
     const bool is_turned = (rings.measures[ring].area < 0) != is_hole;
-    if (is_turned || scratch.depths[k] != (is_hole ? 1 : 0)) scratch.misplaced.push_back(ring);
+    if (is_turned || scratch.ring_depths.DepthOf(ring) != (is_hole ? 1 : 0))
+      scratch.misplaced.push_back(ring);
   }
 }
 
@@ -101,7 +79,7 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
     scratch.leftmost.push_back(LeftmostOf(rings, ring));
   }
   if (scratch.misplaced.empty()) return;
-  for (const std::uint32_t other : scratch.together) {
+  for (std::uint32_t other = 0; other < rings.RingCount(); ++other) {
     const Box box = BoxOf(rings, other);
     for (std::size_t k = 0; k < scratch.misplaced.size(); ++k) {
       const Point& point = scratch.leftmost[k];
@@ -118,18 +96,18 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
 }
 
 // Names the outer rings of all that have a marked point.
-void NameTangledRings(const Rings& rings, RepairScratch& scratch) {
+void NameTangledRings(const Rings& rings, const RepairScratch& scratch,
+                      std::vector<std::uint32_t>& tangled) {
   for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
     const auto points =
         std::span(scratch.is_marked)
             .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
     if (std::ranges::none_of(points, [](std::uint8_t marked) { return marked != 0; })) continue;
     const std::uint32_t outer = rings.outer_of[ring];
-    scratch.tangled.push_back(outer == kNoRing ? ring : outer);
+    tangled.push_back(outer == kNoRing ? ring : outer);
   }
-  std::ranges::sort(scratch.tangled);
-  scratch.tangled.erase(std::unique(scratch.tangled.begin(), scratch.tangled.end()),
-                        scratch.tangled.end());
+  std::ranges::sort(tangled);
+  tangled.erase(std::unique(tangled.begin(), tangled.end()), tangled.end());
 }
 
 // Moves the marked points; returns whether any was not at its root yet.
@@ -146,15 +124,12 @@ bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratc
 
 }  // namespace
 
-void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings) {
-  scratch.tangled.clear();
+void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings,
+                 std::vector<std::uint32_t>& tangled) {
+  tangled.clear();
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
-    // Only what the round before has marked may have moved.
-    const std::size_t touching =
-        round == 0 ? CountTouchingPairs(rings.points, rings.offsets, scratch.pairs)
-                   : CountTouchingPairsAgain(rings.points, rings.offsets, scratch.is_marked,
-                                             scratch.pairs);
+    const std::size_t touching = CountTouchingPairs(rings.points, rings.offsets, scratch.pairs);
     scratch.is_marked.assign(rings.PointCount(), 0);
     bool all_the_way = round >= kGentleRounds;
     if (touching > 0) {
@@ -171,10 +146,10 @@ void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
     }
     if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
     // What is marked is at its roots already, so it is something else that is out of its place.
-    NameTangledRings(rings, scratch);
+    NameTangledRings(rings, scratch, tangled);
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
     if (!Retreat(roots, true, scratch, rings)) break;
-    scratch.tangled.clear();
+    tangled.clear();
   }
   MeasureRings(rings);
 }

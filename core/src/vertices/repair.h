@@ -15,12 +15,9 @@ namespace partiemc {
 struct RepairScratch {
   TouchingPairsBuffers pairs;
   std::vector<std::uint8_t> is_marked;   // Per point.
-  std::vector<std::uint32_t> together;   // Rings that others may be around, or in.
-  std::vector<std::int32_t> depths;      // By these.
   std::vector<std::uint32_t> misplaced;  // Rings.
   std::vector<Point> leftmost;           // By these.
   RingDepths ring_depths;
-  std::vector<std::uint32_t> tangled;  // Outer rings that nothing helps.
 };
 
 /// Moves points of `rings` back towards their roots until the rings are simple, do not touch and
@@ -33,16 +30,13 @@ struct RepairScratch {
 /// whole, with those around it. Ordinary frames need no round. After the twenty-fourth, everything
 /// goes back.
 ///
-/// Ends, and in such rings: rings through the roots are so. Each of their pieces, from the root of
-/// a cell to that of the next, lies in these two cells and leaves the first by an inner point of
-/// their common edge, which no other piece crosses. A cell has one path, or two in a saddle, each
-/// in its own half. All of it holds by more than 2^-13 cells, and world coordinates are rounded by
-/// at most 2^-22 (core/METHOD.md, "Why rings are simple"). Should that be wrong, `scratch.tangled`
-/// names the outer rings of all that still cross or are misplaced, ascending, with every point at
-/// its root; else it is empty.
+/// Ends, and in such rings: rings through the roots are so (core/METHOD.md, "Why rings are
+/// simple"). Should that be wrong, `tangled` names the outer rings of all that still cross or are
+/// misplaced, ascending, with every point at its root; else it is empty.
 ///
 /// Measures the rings (measure.h) as they are in the end.
 /// Cost: for each round near-linear in the points, and n log n in the places where rings turn.
-void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings);
+void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings,
+                 std::vector<std::uint32_t>& tangled);
 
 }  // namespace partiemc

@@ -8,17 +8,16 @@
 
 namespace partiemc {
 
-void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets,
-                              std::span<const std::uint32_t> rings) {
+void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets) {
   turns_.clear();
-  for (std::uint32_t ring = 0; ring < rings.size(); ++ring) {
-    const std::uint32_t first = offsets[rings[ring]], last = offsets[rings[ring] + 1];
+  for (std::uint32_t ring = 0; ring + 1 < offsets.size(); ++ring) {
+    const std::uint32_t first = offsets[ring], last = offsets[ring + 1];
     const std::size_t before = turns_.size();
     std::size_t lowest = before;
-    Point point = PointAt(last - 1);
-    bool rises = last - first > 1 && SweepsBefore(PointAt(last - 2), point);
+    Point point = PointAt(points_, last - 1);
+    bool rises = last - first > 1 && SweepsBefore(PointAt(points_, last - 2), point);
     for (std::uint32_t next = first; next < last; ++next) {
-      const Point to = PointAt(next);
+      const Point to = PointAt(points_, next);
       const bool goes_on_rising = SweepsBefore(point, to);
       if (goes_on_rising != rises) {
         const std::uint32_t index = (next == first ? last : next) - 1;
@@ -46,24 +45,32 @@ std::uint32_t RingDepths::Above(const Chain& chain) {
 bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
   Chain& c = chains_[chain];
   std::uint32_t above = Above(c);
-  while (SweepsBefore(PointAt(above), point)) {
+  while (SweepsBefore(PointAt(points_, above), point)) {
     c.at = above;
     above = Above(c);
   }
-  return Orientation(PointAt(c.at), PointAt(above), point) < 0;
+  return Orientation(PointAt(points_, c.at), PointAt(points_, above), point) < 0;
 }
 
-void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
-                       std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
-  const IntervalOrder::Cursor right =
-      order_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
-  const std::int32_t depth = order_.IsEnd(right) ? 0 : chains_[order_.At(right)].depth;
-  if (turn.is_lowest) depths[turn.ring] = depth;
-  const std::uint32_t ring = rings[turn.ring];
-  Chain on{turn.index, offsets[ring], offsets[ring + 1], true, depth};
-  Chain back{turn.index, offsets[ring], offsets[ring + 1], false, depth};
+void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets) {
+  const SweepStatus::Cursor right =
+      status_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
+  const std::int32_t depth = status_.IsEnd(right) ? 0 : chains_[status_.At(right)].depth;
+  const std::uint32_t first = offsets[turn.ring], last = offsets[turn.ring + 1];
+  Chain on{turn.ring, turn.index, first, last, true, depth};
+  Chain back{turn.ring, turn.index, first, last, false, depth};
   // A ring that runs upwards on the right winds counter-clockwise around what lies between.
-  const bool on_is_right = Orientation(turn.point, PointAt(Above(on)), PointAt(Above(back))) > 0;
+  const bool on_is_right =
+      Orientation(turn.point, PointAt(points_, Above(on)), PointAt(points_, Above(back))) > 0;
+  if (turn.is_lowest) {
+    Ring& ring = rings_[turn.ring];
+    ring = {depth, kNoRing, on_is_right};
+    if (!status_.IsEnd(right)) {
+      const Chain& beside = chains_[status_.At(right)];
+      const Ring& other = rings_[beside.ring];  // Was met before, as its chain goes on already.
+      ring.around = beside.goes_on == other.is_counter_clockwise ? beside.ring : other.around;
+    }
+  }
   (on_is_right ? on : back).depth += on_is_right ? 1 : -1;
   const auto add = [&](const Chain& chain) {
     if (unused_.empty()) {
@@ -75,31 +82,30 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets,
     chains_[id] = chain;
     return id;
   };
-  const IntervalOrder::Cursor behind = order_.Insert(right, add(on_is_right ? back : on));
-  order_.Insert(behind, add(on_is_right ? on : back));
+  const SweepStatus::Cursor behind = status_.Insert(right, add(on_is_right ? back : on));
+  status_.Insert(behind, add(on_is_right ? on : back));
 }
 
 void RingDepths::End(const Turn& turn) {
-  IntervalOrder::Cursor cursor =
-      order_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
-  for (int side = 0; side < 2 && !order_.IsEnd(cursor); ++side) {
-    unused_.push_back(order_.At(cursor));
-    cursor = order_.Erase(cursor);
+  SweepStatus::Cursor cursor =
+      status_.FindFirstNot([&](std::uint32_t chain) { return RunsLeftOf(chain, turn.point); });
+  for (int side = 0; side < 2 && !status_.IsEnd(cursor); ++side) {
+    unused_.push_back(status_.At(cursor));
+    cursor = status_.Erase(cursor);
   }
 }
 
-void RingDepths::Find(std::span<const double> points, std::span<const std::uint32_t> offsets,
-                      std::span<const std::uint32_t> rings, std::vector<std::int32_t>& depths) {
+void RingDepths::Find(std::span<const double> points, std::span<const std::uint32_t> offsets) {
   points_ = points;
-  depths.assign(rings.size(), 0);
+  rings_.assign(offsets.empty() ? 0 : offsets.size() - 1, {});
   chains_.clear();
   unused_.clear();
-  order_.Clear();
-  CollectTurns(offsets, rings);
+  status_.Clear();
+  CollectTurns(offsets);
   for (const Turn& turn : turns_) {
     ThrowIfCancelled();
     if (turn.is_low) {
-      Begin(turn, offsets, rings, depths);
+      Begin(turn, offsets);
     } else {
       End(turn);
     }

@@ -5,10 +5,12 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "vertices/area.h"
+#include "frame/placement_traits.h"
+#include "vertices/intersections.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
 #include "vertices/virtual_plane.h"
+#include "vertices/volume_correction.h"
 
 namespace partiemc {
 namespace {
@@ -30,29 +32,22 @@ void Store(LatticePoint point, double cell_size, double* target) {
   target[1] = point.y * cell_size;
 }
 
-// The vertices of segment k of the topology, `per_segment` of them.
+// The vertices of segment k of the topology; `virtual-plane` goes ring by ring, below.
 void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   const CellPlane& plane = input.planes[k];
-  const std::uint32_t segment = input.topology.segments[k];
   const double cell_size = input.scale.cell_size;
-  switch (input.parameters.placement) {
-    case Placement::kMarchingSquares:
-      Store(plane.entry, cell_size, target);
-      break;
-    case Placement::kQef:
-      Store(plane.entry, cell_size, target);
-      Store(ClampToCell(input.bins.tiles, plane.cell, input.crossings.segments[segment],
-                        QefVertex(input, segment, plane)),
-            cell_size, target + 2);
-      break;
-    case Placement::kFarthestParticle: {
-      const WorldPosition vertex = FarthestParticleVertex(input, segment, plane);
-      target[0] = vertex.x;
-      target[1] = vertex.y;
-      break;
-    }
-    case Placement::kVirtualPlane:
-      break;  // Placed ring by ring, below.
+  if (TraitsOf(input.parameters.placement).on_edges) {
+    Store(plane.entry, cell_size, target);
+    target += 2;
+  }
+  if (input.parameters.placement == Placement::kQef) {
+    const Segment& segment = input.crossings.segments[input.topology.segments[k]];
+    Store(ClampToCell(input.bins.tiles, plane.cell, segment, QefVertex(input, plane)), cell_size,
+          target);
+  } else if (input.parameters.placement == Placement::kFarthestParticle) {
+    const WorldPosition vertex = FarthestParticleVertex(input, plane);
+    target[0] = vertex.x;
+    target[1] = vertex.y;
   }
 }
 
@@ -80,12 +75,12 @@ void AppendNormals(const VertexInput& input, std::size_t before, std::size_t her
   const CellPlane& b = input.planes[here];
   const double sa = OutwardSign(a);
   const double sb = OutwardSign(b);
-  const Placement placement = input.parameters.placement;
-  if (placement == Placement::kMarchingSquares || placement == Placement::kQef) {
+  const PlacementTraits& traits = TraitsOf(input.parameters.placement);
+  if (traits.on_edges) {
     AppendNormal(sa * a.normal_x + sb * b.normal_x, sa * a.normal_y + sb * b.normal_y, b,
                  rings.normals);
   }
-  if (placement != Placement::kMarchingSquares) {
+  if (traits.in_cells) {
     AppendNormal(sb * b.normal_x, sb * b.normal_y, b, rings.normals);
   }
 }
@@ -94,13 +89,13 @@ bool AreEqual(const double* a, const double* b) { return a[0] == b[0] && a[1] ==
 
 // Appends one ring's points without consecutive duplicates. Takes it back and returns false if
 // fewer than three remain.
-bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment, PlacedVertices& placed,
-                Rings& rings) {
+bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment,
+                std::span<const double> points, PlacedVertices& placed, Rings& rings) {
   const std::size_t first = input.topology.offsets[ring];
   const std::size_t last = input.topology.offsets[ring + 1];
   const std::size_t start = rings.PointCount();
   for (std::size_t k = first; k < last; ++k) {
-    const double* source = placed.points.data() + 2 * per_segment * k;
+    const double* source = points.data() + 2 * per_segment * k;
     const bool repeats = rings.PointCount() > start &&
                          AreEqual(source, rings.points.data() + rings.points.size() - 2);
     if (!repeats) {
@@ -131,8 +126,8 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment, Pla
 
 // The rings of `virtual-plane`, moved, matched to their area and repaired.
 void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
-                       PlacedVertices& placed, Rings& rings) {
-  RingVertices& vertices = placed.vertices;
+                       VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
+  RingVertices& vertices = scratch.vertices;
   PlaceOnVirtualPlanes(input, vertices);
   const RingTopology& topology = input.topology;
   const double cell_size = input.scale.cell_size;
@@ -145,7 +140,6 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   rings.points.resize(2 * std::size_t{count});
   rings.normals.resize(2 * std::size_t{count});
   placed.roots.resize(2 * std::size_t{count});
-  placed.point_of_segment.resize(topology.segments.size());
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
@@ -161,48 +155,59 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     }
   });
   rings.outer_of = topology.outer_of;
-  MatchArea(input, placed.offset_points, area_offset, rings);
+  std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
+  CorrectVolume(input, scratch.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
-  RepairRings(placed.roots, placed.repair, rings);
+  RepairRings(placed.roots, scratch.repair, rings, placed.tangled);
+}
+
+// The rings of the other placements, segment by segment.
+void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices& placed,
+                Rings& rings) {
+  const RingTopology& topology = input.topology;
+  const PlacementTraits& traits = TraitsOf(input.parameters.placement);
+  const int per_segment = traits.on_edges + traits.in_cells;
+  scratch.points.resize(2 * per_segment * topology.segments.size());
+  ParallelFor(topology.segments.size(), [&](std::size_t k) {
+    PlaceSegment(input, k, scratch.points.data() + 2 * per_segment * k);
+  });
+  SnapToAxes(input.scale.cell_size, scratch.points);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    rings.measures[ring].particle_count = topology.particle_count[ring];
+    placed.kept_as[ring] = kNoRing;
+    if (!AppendRing(input, ring, per_segment, scratch.points, placed, rings)) continue;
+    placed.kept_as[ring] = static_cast<std::uint32_t>(rings.RingCount());
+    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
+    rings.outer_of.push_back(topology.outer_of[ring]);
   }
+  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
+  for (std::uint32_t& outer : rings.outer_of) {
+    if (outer != kNoRing) outer = placed.kept_as[outer];
+  }
+  MeasureRings(rings);
+  // The others do not cross: Validate checks that claim, the hot path trusts it.
+  if (!traits.takes_particles) return;
+  placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }
 
 }  // namespace
 
 void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
-                   PlacedVertices& placed, Rings& rings) {
-  rings.Clear();
-  placed.repair.tangled.clear();
-  if (input.parameters.placement == Placement::kVirtualPlane) {
-    PlaceRefinedRings(input, area_offset, placed, rings);
-    return;
-  }
+                   VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
   const RingTopology& topology = input.topology;
-  const int per_segment = input.parameters.placement == Placement::kQef ? 2 : 1;
-  placed.points.resize(2 * per_segment * topology.segments.size());
+  rings.Clear();
+  placed.tangled.clear();
+  placed.self_intersections = 0;
   placed.point_of_segment.resize(topology.segments.size());
-  ParallelFor(topology.segments.size(), [&](std::size_t k) {
-    PlaceSegment(input, k, placed.points.data() + 2 * per_segment * k);
-  });
-  SnapToAxes(input.scale.cell_size, placed.points);
-
-  std::vector<std::uint32_t>& kept_as = placed.kept_as;
-  kept_as.assign(topology.RingCount(), kNoRing);
-  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    if (!AppendRing(input, ring, per_segment, placed, rings)) continue;
-    kept_as[ring] = static_cast<std::uint32_t>(rings.measures.size());
-    rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
-    rings.outer_of.push_back(topology.outer_of[ring]);
-    const std::size_t start = rings.offsets[rings.offsets.size() - 2];
-    rings.measures.push_back(MeasureRing(std::span(rings.points).subspan(2 * start)));
-    rings.measures.back().particle_count = topology.particle_count[ring];
+  placed.kept_as.resize(topology.RingCount());
+  if (TraitsOf(input.parameters.placement).refines) {
+    PlaceRefinedRings(input, area_offset, scratch, placed, rings);
+  } else {
+    PlaceRings(input, scratch, placed, rings);
   }
-  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
-  for (std::uint32_t& outer : rings.outer_of) {
-    if (outer != kNoRing) outer = kept_as[outer];
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    const std::uint32_t kept_as = placed.kept_as[ring];
+    if (kept_as != kNoRing) rings.measures[kept_as].particle_count = topology.particle_count[ring];
   }
 }
 

@@ -1,4 +1,4 @@
-// Stage 6 of 7: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
+// Stage 6 of 8: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
 #pragma once
 
 #include <cstdint>
@@ -11,26 +11,56 @@
 #include "partiemc/result.h"
 #include "rings/rings.h"
 #include "sampler/point_field.h"
+#include "vertices/periodic_ring.h"
 #include "vertices/repair.h"
-#include "vertices/ring_vertices.h"
 
 namespace partiemc {
 
 /// Marks a segment whose ring was dropped in PlacedVertices::point_of_segment.
 inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 
-/// Warm buffers of PlaceVertices, and how its points belong to segments.
+/// How the points of Rings belong to the rings of RingTopology and their segments.
 struct PlacedVertices {
-  std::vector<double> points;  ///< One or two per segment, in world units, before duplicates go.
-  /// Per segment of RingTopology: index in Rings::points of the vertex of its cell (of its entry
-  /// crossing for `marching-squares`), or kNoPoint.
+  /// Per segment: index in Rings::points of the vertex of its cell (of its entry crossing for
+  /// `marching-squares`), or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
-  std::vector<std::uint32_t>
-      kept_as;  ///< Per ring of RingTopology: its index in Rings, or kNoRing.
-  /// `virtual-plane` only: the vertices on their way, and where each point of the rings may retreat
-  /// to, interleaved, in world units.
-  RingVertices vertices;
+  std::vector<std::uint32_t> kept_as;  ///< Per ring: its index in Rings, or kNoRing.
+  /// `virtual-plane` only: where each point of the rings may retreat to, interleaved, in world
+  /// units.
   std::vector<double> roots;
+  std::vector<std::uint32_t>
+      tangled;  ///< Outer rings that repair could not make simple (repair.h).
+  std::uint64_t self_intersections = 0;  ///< Of placements that do not promise to have none.
+};
+
+/// Unit, outward.
+struct VertexNormal {
+  float x = 0, y = 0;
+};
+
+/// Two vertices per segment of the topology, ring after ring: the crossing of its entry edge, then
+/// the vertex of its cell. Lengths in cells, positions in lattice coordinates of the world. Segment
+/// k has vertices 2 k and 2 k + 1.
+struct RingVertices {
+  std::vector<LatticePoint> point;
+  /// Where a vertex may always retreat to: with all vertices there, rings are simple.
+  std::vector<LatticePoint> root;
+  std::vector<VertexNormal> normal;
+  std::vector<std::uint8_t> is_kept;  ///< 0 for vertices that thinning dropped.
+  PeriodicRings periodic_rings;       ///< Scratch of the steps.
+
+  void Resize(std::size_t count) {
+    point.resize(count);
+    root.resize(count);
+    normal.resize(count);
+    is_kept.resize(count);
+  }
+};
+
+/// Warm buffers of PlaceVertices.
+struct VertexScratch {
+  std::vector<double> points;  ///< One or two per segment, in world units, before duplicates go.
+  RingVertices vertices;       ///< Of `virtual-plane`, on their way.
   std::vector<double> offset_points;
   RepairScratch repair;
 };
@@ -54,14 +84,15 @@ struct VertexInput {
 ///   farthest-particle  section 3.5: the particle farthest along the normal, one cell around;
 ///   virtual-plane      one vertex per cell and crossed edge, moved to the plane that its
 ///                      surroundings support (virtual_plane.h), matched to the particles' area
-///                      (area.h) and repaired (repair.h).
+///                      (volume_correction.h) and repaired (repair.h).
 /// marching-squares and qef keep every vertex in its cell or on its edge, so that rings are simple
 /// by construction (core/METHOD.md, "Why rings are simple"); virtual-plane may leave the cells and
 /// is simple by its repair. farthest-particle drops consecutive equal vertices, and rings of which
 /// fewer than three points remain.
-/// `area_offset`: of `virtual-plane`, that of the last frame, then of this one (area.h).
-/// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
+/// `area_offset`: of `virtual-plane`, that of the last frame, then of this one
+/// (volume_correction.h). Deterministic, in parallel over segments. Cost: linear in segments and
+/// the particles near them.
 void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
-                   PlacedVertices& placed, Rings& rings);
+                   VertexScratch& scratch, PlacedVertices& placed, Rings& rings);
 
 }  // namespace partiemc

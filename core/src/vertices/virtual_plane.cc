@@ -7,24 +7,15 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "base/prefetch.h"
 #include "sampler/point_groups.h"
 #include "vertices/placement.h"
-#include "vertices/plane_estimates.h"
-#include "vertices/ring_windows.h"
+#include "vertices/plane_support.h"
+#include "vertices/ring_filters.h"
 
 namespace partiemc {
 namespace {
 
-// Segments between one and that whose memory is asked for.
-constexpr std::size_t kAskedAhead = 24;
-
 double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
-
-double Distance(const LatticePoint& a, const LatticePoint& b) {
-  const LatticePoint chord{b.x - a.x, b.y - a.y};
-  return std::sqrt(Dot(chord, chord));
-}
 
 VertexNormal UnitOf(const LatticePoint& v) {
   const double square = Dot(v, v);
@@ -33,37 +24,32 @@ VertexNormal UnitOf(const LatticePoint& v) {
   return {static_cast<float>(v.x * inverse), static_cast<float>(v.y * inverse)};
 }
 
-// A point beyond the sides of a tile, in cells relative to it.
-FieldPoint LocateBeyond(const VertexInput& input, std::uint32_t tile, double x, double y) {
+// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
+// `max_step` cells; `point` itself where the gradient is weak.
+LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
+  const double square = Dot(gradient, gradient);
+  if (square < kWeakGradientSquare) return point;
+  double step = -value / square;
+  // Its length is that of the gradient times as much.
+  if (step * step * square > max_step * max_step) {
+    step = std::copysign(max_step / std::sqrt(square), step);
+  }
+  return {point.x + step * gradient.x, point.y + step * gradient.y};
+}
+
+// Where a point in or next to a cell is: in most cases in the cell's own tile, which is indexed as
+// it has an active cell.
+FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const LatticePoint& point) {
+  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
+  const double x = point.x - origin.x + cell.i;
+  const double y = point.y - origin.y + cell.j;
+  if (x >= 0 && y >= 0 && x < kTileSize && y < kTileSize) return {cell.tile, x, y};
   const int i = static_cast<int>(std::floor(x));
   const int j = static_cast<int>(std::floor(y));
-  const TilePlace place = Normalise(input.bins.tiles, tile, i, j);
+  const TilePlace place = Normalise(input.bins.tiles, cell.tile, i, j);
   const bool usable = place.tile != kNoTile && input.field.IsIndexed(place.tile);
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
-
-// Tells where points in or next to the cell of a segment are: in most cases in the tile of that.
-class SegmentLocator {
- public:
-  SegmentLocator(const VertexInput& input, std::size_t segment)
-      : input_(input),
-        cell_(input.planes[segment].cell),
-        origin_(CellOrigin(input.bins.tiles, cell_)) {}
-
-  FieldPoint Locate(const LatticePoint& point) const {
-    const double x = point.x - origin_.x + cell_.i;
-    const double y = point.y - origin_.y + cell_.j;
-    if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
-      return LocateBeyond(input_, cell_.tile, x, y);
-    }
-    return {cell_.tile, x, y};  // Indexed, as it has an active cell.
-  }
-
- private:
-  const VertexInput& input_;
-  const ActiveCell& cell_;
-  LatticePoint origin_;
-};
 
 // Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
 // that of a distance stays the same: unless a step is long, normals are those of the points that it
@@ -83,7 +69,7 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
     const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
     if (Dot(step, step) > constants.long_step * constants.long_step) {
-      const FieldPoint at = SegmentLocator(input, segment).Locate(v.point[i]);
+      const FieldPoint at = Locate(input, plane.cell, v.point[i]);
       const FieldSample sample =
           at.tile == kNoTile ? FieldSample{} : input.field.Sample(at.tile, at.x, at.y);
       gradient = {sample.gradient_x, sample.gradient_y};
@@ -96,40 +82,28 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
 }
 
-// Step 1 of a ring.
-void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
-  const std::size_t begin = input.topology.offsets[ring];
-  const std::size_t count = input.topology.offsets[ring + 1] - begin;
-  const auto find = [&](std::size_t first, std::size_t last) {
-    for (std::size_t k = begin + first; k < begin + last; ++k) {
-      if (const std::size_t later = k + kAskedAhead; later < input.planes.size()) {
-        PrefetchLines(std::span(input.planes).subspan(later, 1));
-      }
-      FindRoots(input, k, v);
-    }
-  };
-  count <= kSegmentsAtOnce ? find(0, count) : ParallelForRanges(count, kSegmentsAtOnce, find);
-}
-
 // Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
-UnrolledRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
+PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
   const auto length_after = [&](std::size_t k) {
-    return Distance(v.point[first + k], v.point[first + (k + 1 == count ? 0 : k + 1)]);
+    const LatticePoint& a = v.point[first + k];
+    const LatticePoint& b = v.point[first + (k + 1 == count ? 0 : k + 1)];
+    const LatticePoint chord{b.x - a.x, b.y - a.y};
+    return std::sqrt(Dot(chord, chord));
   };
   const double min_length = input.parameters.constants.ShortestRing() * input.scale.spacing;
   double length = 0;
   for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
   if (length < min_length) return {};
-  UnrolledRings::Size size =
+  PeriodicRings::Size size =
       SizeForWindows(std::span(v.point).subspan(first, count), min_length / 2);
   size.margin += kWindowPadding;
   return size;
 }
 
 // Copies what the steps need, and measures the ring.
-void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) {
+void CopyRing(const RingVertices& v, std::size_t first, const PeriodicRing& ring) {
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     ring.x[k] = RingUnits(v.point[first + k].x);
     ring.y[k] = RingUnits(v.point[first + k].y);
@@ -143,7 +117,7 @@ void Unroll(const RingVertices& v, std::size_t first, const UnrolledRing& ring) 
 
 // Calls body(begin, end) for stretches of a ring, in parallel where it is long.
 template <typename Body>
-void ForEachStretch(const UnrolledRing& ring, Body body) {
+void ForEachStretch(const PeriodicRing& ring, Body body) {
   constexpr std::ptrdiff_t kStretch = 512;
   if (ring.count <= kStretch) {
     body(0, ring.count);
@@ -156,7 +130,7 @@ void ForEachStretch(const UnrolledRing& ring, Body body) {
 }
 
 // Step 2: normals averaged along the ring, first by distance, then also by angle.
-void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
+void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   const VirtualPlaneConstants& c = input.parameters.constants;
   for (const bool by_angle : {false, true}) {
     const double reach = (by_angle ? c.bilateral_reach : c.normal_reach) * input.scale.spacing;
@@ -171,7 +145,7 @@ void SmoothNormals(const VertexInput& input, UnrolledRing& ring) {
 }
 
 // Mean of a ring's values by length.
-double MeanOf(const UnrolledRing& ring, const float* values) {
+double MeanOf(const PeriodicRing& ring, const float* values) {
   double sum = 0, weight = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     sum += double{ring.weight[k]} * values[k];
@@ -180,36 +154,61 @@ double MeanOf(const UnrolledRing& ring, const float* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
+// How far outside of a plane the boundary is, in cells: by the mean distance of the particles that
+// support it, plus half a spacing, at most the support's height either way. Then the variance of
+// these distances, in squared spacings. Both 0 where nothing supports the plane.
+std::pair<double, double> EstimateOf(const SupportSums& sums, const SupportShape& support) {
+  if (!(sums.weight > 0)) return {};
+  const double mean = sums.distance / sums.weight;
+  const double variance = std::max(0.0, sums.square / sums.weight - mean * mean);
+  return {std::clamp(mean + support.spacing / 2, -support.height, support.height),
+          variance / (support.spacing * support.spacing)};
+}
+
+void FindSupports(const PointField& field, const SupportShape& support,
+                  std::span<const PointGroup<BentPlane>> groups, std::span<QuerySupports> sums) {
+  std::array<SupportQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].planes = std::span(groups[q].points).first(groups[q].count);
+    field.FindNear(groups[q].tile, queries[q].planes, support.radius, queries[q].near);
+  }
+  SumSupports(std::span(queries).first(groups.size()), support, sums);
+}
+
 // Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
 // along the ring counts: their mean depends on how the particles are arranged, not on the shape.
 // The more the particles that support a ring's planes scatter, the less they are believed.
-void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRing& ring,
+void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.parameters.steps;
   const VirtualPlaneConstants& c = input.parameters.constants;
-  const PlaneEstimator estimator(input.field, input.scale, c);
+  const SupportShape support{// Particles are listed within the kernel radius.
+                             .radius = std::min(c.support_radius * h, input.scale.kernel_radius),
+                             .height = c.support_height * h,
+                             .spacing = h,
+                             .depth = c.support_depth};
   // What the kernel takes off a bend grows with the square of its radius R: R^2 kappa / 18.
   const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
   float* scatter = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, c.curvature_reach * h);
-    auto planes = CollectPoints<BentPlane>([&](std::span<const PlaneEstimator::Planes> groups) {
-      std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates;
-      estimator.Estimate(groups, estimates);
+    auto planes = CollectPoints<BentPlane>([&](std::span<const PointGroup<BentPlane>> groups) {
+      std::array<QuerySupports, kQueriesAtOnce> sums;
+      FindSupports(input.field, support, groups, sums);
       for (std::size_t q = 0; q < groups.size(); ++q) {
         for (std::size_t of = 0; of < groups[q].count; ++of) {
           const std::size_t i = groups[q].vertices[of];
-          const auto [offset, spread] = estimates[q][of];
+          const auto [offset, variance] = EstimateOf(sums[q][of], support);
           ring.shift[i] = static_cast<float>(offset) - ring.base[i];
-          scatter[i] = static_cast<float>(spread);
+          scatter[i] = static_cast<float>(variance);
         }
       }
     });
     // Each segment has two vertices.
     for (std::ptrdiff_t k = begin; k < end; k += 2) {
       if (BeginsGroup(k / 2)) planes.Part();
-      const SegmentLocator locator(input, first_segment + k / 2);
+      const ActiveCell& cell = input.planes[first_segment + k / 2].cell;
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
         // Nothing bends within less than a spacing.
         const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
@@ -217,7 +216,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
         ring.shift[i] = -ring.base[i];  // What is kept where nothing tells where a plane belongs.
         scatter[i] = 0;
         if (!steps.support) continue;
-        const FieldPoint at = locator.Locate(v.point[2 * first_segment + i]);
+        const FieldPoint at = Locate(input, cell, v.point[2 * first_segment + i]);
         if (at.tile == kNoTile) continue;
         planes.Add(i, at.tile,
                    {.x = at.x,
@@ -242,7 +241,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
 // Step 3, its end: every vertex to the weighted mean of what its neighbours' planes say, along its
 // normal. A circle stays as it is: of two points of it, the mean normal is perpendicular to their
 // chord.
-void SmoothPositions(const VertexInput& input, std::size_t first, const UnrolledRing& ring,
+void SmoothPositions(const VertexInput& input, std::size_t first, const PeriodicRing& ring,
                      RingVertices& v) {
   const double reach = input.parameters.constants.smoothing_reach * input.scale.spacing;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -261,9 +260,9 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Unrolled
 }
 
 // Steps 2 and 3 of a ring.
-void RefineRing(const VertexInput& input, std::size_t r, UnrolledRing ring, RingVertices& v) {
+void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, RingVertices& v) {
   const std::size_t first_segment = input.topology.offsets[r];
-  Unroll(v, 2 * first_segment, ring);
+  CopyRing(v, 2 * first_segment, ring);
   if (input.parameters.steps.normals) SmoothNormals(input, ring);
   ShiftPlanes(input, first_segment, ring, v);
   SmoothPositions(input, 2 * first_segment, ring, v);
@@ -288,29 +287,25 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 
 }  // namespace
 
+LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step) {
+  if (plane.is_weak) return plane.point;
+  return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, max_step);
+}
+
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size());
-  UnrolledRings& unrolled = vertices.unrolled;
-  unrolled.sizes().assign(topology.RingCount(), {});
-  // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
+  PeriodicRings& periodic = vertices.periodic_rings;
+  periodic.sizes().assign(topology.RingCount(), {});
+  ParallelForRanges(topology.segments.size(), kSegmentsAtOnce,
+                    [&](std::size_t first, std::size_t last) {
+                      for (std::size_t k = first; k < last; ++k) FindRoots(input, k, vertices);
+                    });
+  ParallelFor(topology.RingCount(),
+              [&](std::size_t ring) { periodic.sizes()[ring] = SizeOf(input, ring, vertices); });
+  periodic.Allocate();
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    FindRingRoots(input, ring, vertices);
-    const UnrolledRings::Size size = SizeOf(input, ring, vertices);
-    if (size.count > 0 && !ShortRing::Holds(size)) {
-      unrolled.sizes()[ring] = size;
-      return;
-    }
-    if (size.count > 0) {
-      ShortRing memory;
-      RefineRing(input, ring, memory.Of(size), vertices);
-    }
-    Thin(input, ring, vertices);
-  });
-  unrolled.Allocate();
-  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    if (unrolled.sizes()[ring].count == 0) return;
-    RefineRing(input, ring, unrolled[ring], vertices);
+    if (periodic.sizes()[ring].count > 0) RefineRing(input, ring, periodic[ring], vertices);
     Thin(input, ring, vertices);
   });
 }

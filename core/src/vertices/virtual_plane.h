@@ -2,13 +2,15 @@
 // support (core/METHOD.md, "The default placement").
 #pragma once
 
-#include "vertices/ring_vertices.h"
 #include "vertices/vertices.h"
 
 namespace partiemc {
 
-/// Steps 1 to 5: roots, normals, planes, smoothing, thinning. Requires: the point field indexed
-/// with neighbours. Leaves area and repair to area.h and repair.h.
+/// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
+/// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
+LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
+
+/// Steps 1 to 3: roots, normals, planes. Leaves the rest to volume_correction.h and repair.h.
 /// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
 /// samples and a window of about twenty vertices per vertex.
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "vertices/unrolled_rings.h"
+#include "vertices/periodic_ring.h"
 
 namespace partiemc {
 
@@ -12,7 +12,7 @@ inline constexpr std::ptrdiff_t kWindowPadding = 17;
 
 /// Sets the arc and the weights of a ring by its coordinates, in the margins, too.
 /// Requires: coordinates are repeated in the margins, of kWindowPadding vertices at least.
-void MeasureArc(const UnrolledRing& ring);
+void MeasureArc(const PeriodicRing& ring);
 
 /// Each of these functions sums, for each of the vertices [begin, end) of a ring, over the vertices
 /// j less than `reach` from it along the ring, with weights that begin with l_j B(d, reach)
@@ -24,15 +24,15 @@ void MeasureArc(const UnrolledRing& ring);
 
 /// Unit mean of the normals, into next_x and next_y; with `by_angle`, weighted by the angle between
 /// them, too (max(0, n_i . n_j)^16). The vertex's own normal where they cancel out.
-void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
+void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle);
 
 /// How normals turn along the tangent, positive where the ring is convex, into shift.
-void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach);
 
 /// The mean of what the neighbours' planes say, shifted by their bases, along the vertex's normal,
 /// weighted by angle, into shift.
-void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach);
+void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach);
 
 }  // namespace partiemc

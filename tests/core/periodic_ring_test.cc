@@ -1,5 +1,5 @@
-// Margins of unrolled rings, against walks along the ring.
-#include "vertices/unrolled_rings.h"
+// Margins of periodic rings, against walks along the ring.
+#include "vertices/periodic_ring.h"
 
 #include <gtest/gtest.h>
 
@@ -44,14 +44,14 @@ std::vector<LatticePoint> CrowdedSquare(support::Random& random, double reach) {
   return ring;
 }
 
-// As windows judge it (ring_windows.cc).
+// As windows judge it (ring_filters.cc).
 bool IsNear(std::int64_t units, double reach) {
   const double reach_units = reach * kRingUnitsPerCell;
   const auto distance = static_cast<float>(units);
   return 1.0f - distance * distance * static_cast<float>(1 / (reach_units * reach_units)) > 0;
 }
 
-TEST(UnrolledRings, HaveMarginsThatHoldEveryVertexThatAWindowTakesForNear) {
+TEST(PeriodicRings, HaveMarginsThatHoldEveryVertexThatAWindowTakesForNear) {
   for (unsigned seed = 1; seed <= 300; ++seed) {
     support::Random random(seed);
     const double reach = random.Uniform(3, 18);

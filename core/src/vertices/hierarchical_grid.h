@@ -1,4 +1,5 @@
-// Grids of all sizes in one hash table: a box lies in one cell of the grid of its size.
+// Grids of all sizes in one hash table (a hierarchical grid): a box lies in one cell of the grid of
+// its size.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "base/boxes_apart.h"
+#include "base/box.h"
 
 namespace partiemc {
 
@@ -22,21 +23,16 @@ static_assert(2 * kGridIndexBits + kGridLevelBits <= 64);
 // 2^-24, the error of an index, will do.
 inline constexpr double kGridSlack = 1.0 + 0x1p-10;
 
-template <typename AnyBox>
-double Extent(const AnyBox& box) {
-  return std::max(box.right - box.left, box.top - box.bottom);
-}
-
 /// Level k has square cells of side `finest` * 2^k.
-class HashGrids {
+class HierarchicalGrid {
  public:
-  HashGrids(const Box& bounds, double mean_extent)
+  HierarchicalGrid(const Box& bounds, double mean_extent)
       : origin_{bounds.left, bounds.bottom},
         // Cells of twice the mean extent hold almost all boxes of like things in one grid and
         // still make few candidates; the second bound keeps
         // indices below 2^27, the third keeps sizes above zero when all points coincide.
         finest_(std::max(
-            {2 * mean_extent, Extent(bounds) * 0x1p-27, std::numeric_limits<double>::min()})) {
+            {2 * mean_extent, bounds.Extent() * 0x1p-27, std::numeric_limits<double>::min()})) {
     for (int level = 0; level < kGridLevels; ++level) per_length_[level] = 1 / CellSize(level);
   }
 
@@ -67,19 +63,9 @@ class HashGrids {
   std::array<double, kGridLevels> per_length_;  // By level: 1 / size of its cells.
 };
 
-// Cells of a block of this many by this many share a line of the cache: neighbours on a ring, and
-// all that they are compared with, are found in few of them.
-inline constexpr int kBlockBits = 2;
-inline constexpr std::uint64_t kInBlock = (1u << kBlockBits) - 1;
-inline constexpr std::size_t kBlockSlots = std::size_t{1} << (2 * kBlockBits);
-
-/// Fibonacci hashing of the block: the high bits of the product depend on all bits of the key.
+/// Fibonacci hashing: the high bits of the product depend on all bits of the key.
 inline std::size_t SlotOf(std::uint64_t cell, std::size_t slot_count) {
-  const std::uint64_t block = cell & ~(kInBlock << kGridIndexBits | kInBlock);
-  const std::uint64_t in_block =
-      (cell >> kGridIndexBits & kInBlock) << kBlockBits | (cell & kInBlock);
-  const std::uint64_t hash = (block * 0x9e3779b97f4a7c15u) >> 32;
-  return static_cast<std::size_t>(hash * kBlockSlots | in_block) & (slot_count - 1);
+  return static_cast<std::size_t>((cell * 0x9e3779b97f4a7c15u) >> 32) & (slot_count - 1);
 }
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-#include "vertices/unrolled_rings.h"
+#include "vertices/periodic_ring.h"
 
 #include <algorithm>
 
@@ -10,7 +10,7 @@ constexpr double kReachTolerance = 1e-6;
 
 }  // namespace
 
-UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach) {
+PeriodicRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach) {
   const std::size_t count = ring.size();
   const auto length_after = [&](std::size_t k) {
     const LatticePoint& from = ring[k];
@@ -32,7 +32,7 @@ UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach
   return {static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(std::max(after, before))};
 }
 
-void UnrolledRings::Allocate() {
+void PeriodicRings::Allocate() {
   starts_.resize(sizes_.size());
   std::size_t end = 0;
   for (std::size_t ring = 0; ring < sizes_.size(); ++ring) {
@@ -43,8 +43,8 @@ void UnrolledRings::Allocate() {
   for (std::vector<float>& array : floats_) array.resize(end);
 }
 
-UnrolledRing UnrolledRings::operator[](std::size_t ring) {
-  return UnrolledRing::In(
+PeriodicRing PeriodicRings::operator[](std::size_t ring) {
+  return PeriodicRing::In(
       sizes_[ring], [&](int array) { return units_[array].data() + starts_[ring]; },
       [&](int array) { return floats_[array].data() + starts_[ring]; });
 }

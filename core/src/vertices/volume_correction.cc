@@ -1,14 +1,17 @@
-#include "vertices/area.h"
+#include "vertices/volume_correction.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/point.h"
 #include "vertices/measure.h"
-#include "vertices/ring_offset.h"
 
 namespace partiemc {
 namespace {
+
+// Longest mitre, as a multiple of the offset.
+constexpr double kMaxMitre = 2;
 
 // Sum of the volumes of an outer ring's particles, in cells.
 double VolumeOf(const VertexInput& input, std::size_t ring) {
@@ -20,12 +23,9 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
 }
 
 // The offset that a frame alone would ask for, in spacings. Nothing without large components.
-std::optional<double> WishOf(const VertexInput& input, double spacing, Rings& rings) {
+std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.parameters.constants;
-  rings.measures.resize(rings.RingCount());
-  ParallelFor(rings.RingCount(), [&](std::size_t ring) {
-    rings.measures[ring] = MeasureRing(rings.RingPoints(ring));
-  });
+  MeasureRings(rings);
   double volume = 0, area = 0, perimeter = 0;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const bool is_outer = rings.outer_of[ring] == kNoRing;
@@ -44,14 +44,37 @@ std::optional<double> WishOf(const VertexInput& input, double spacing, Rings& ri
 
 }  // namespace
 
-void MatchArea(const VertexInput& input, std::vector<double>& scratch,
-               std::optional<double>& offset, Rings& rings) {
+void OffsetRing(std::span<const double> points, double offset, double* target) {
+  // To the right of the segment from one point to another; 0 where they are the same.
+  const auto normal_of = [](const Point& from, const Point& to) {
+    const Point normal{to.y - from.y, from.x - to.x};
+    const double length = std::sqrt(normal.x * normal.x + normal.y * normal.y);
+    return length > 0 ? Point{normal.x / length, normal.y / length} : normal;
+  };
+  const std::size_t count = points.size() / 2;
+  Point point = PointAt(points, 0);
+  Point before = normal_of(PointAt(points, count - 1), point);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Point next = PointAt(points, k + 1 < count ? k + 1 : 0);
+    const Point after = normal_of(point, next);
+    // (a + b) / (1 + a . b) has length 1 / cos of half the turn.
+    const double divisor =
+        std::max(1 + before.x * after.x + before.y * after.y, 2 / (kMaxMitre * kMaxMitre));
+    target[2 * k] = point.x + offset * (before.x + after.x) / divisor;
+    target[2 * k + 1] = point.y + offset * (before.y + after.y) / divisor;
+    point = next;
+    before = after;
+  }
+}
+
+void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
+                   std::optional<double>& offset, Rings& rings) {
   const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
   if (!is_known || !input.parameters.steps.area) return;
   const double spacing = input.scale.spacing * input.scale.cell_size;
-  if (const std::optional<double> wish = WishOf(input, spacing, rings)) {
+  if (const std::optional<double> target = TargetOf(input, spacing, rings)) {
     const double change = input.parameters.constants.area_change;
-    offset = offset ? std::clamp(*wish, *offset - change, *offset + change) : *wish;
+    offset = offset ? std::clamp(*target, *offset - change, *offset + change) : *target;
   }
   if (!offset) return;
   scratch.resize(rings.points.size());

@@ -1,4 +1,4 @@
-#include "vertices/ring_windows.h"
+#include "vertices/ring_filters.h"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "vertices/ring_windows.cc"
+#define HWY_TARGET_INCLUDE "vertices/ring_filters.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -49,7 +49,7 @@ HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
 // is in the window of one of its vertices; j is the neighbour of the first vertex, w the weights of
 // the neighbours, 0 beyond a window. Then finish(block).
 template <typename Start, typename Add, typename Finish>
-HWY_INLINE void ForEachWindow(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {
   const Lanes d;
   const Vector one = hn::Set(d, 1.0f);
@@ -103,23 +103,8 @@ HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
   }
 }
 
-// LengthInUnits of the step after each vertex, in place of its arc.
-void MeasureSteps(const UnrolledRing& ring) {
-  const Lanes d;
-  const Units d_units;
-  // May go on into the margin.
-  for (std::ptrdiff_t k = 0; k < ring.count; k += kLanes) {
-    const auto along = [&](const std::int32_t* at) HWY_ATTR {
-      return hn::ConvertTo(d, hn::Sub(hn::LoadU(d_units, at + k + 1), hn::LoadU(d_units, at + k)));
-    };
-    const Vector x = along(ring.x);
-    const Vector y = along(ring.y);
-    hn::StoreU(hn::ConvertTo(d_units, hn::Sqrt(Dot(x, y, x, y))), d_units, ring.arc + k);
-  }
-}
-
 template <bool kByAngle>
-void SumNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
+void SumNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
   Vector own_x, own_y, sum_x, sum_y;
   ForEachWindow(
@@ -146,7 +131,7 @@ void SumNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t e
       });
 }
 
-void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
+void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle) {
   if (by_angle) {
     SumNormals<true>(ring, begin, end, reach);
@@ -155,7 +140,7 @@ void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t 
   }
 }
 
-void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach) {
   const Lanes d;
   hn::Vec<Units> x, y;
@@ -188,7 +173,7 @@ void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_
       });
 }
 
-void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
+void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
   hn::Vec<Units> x, y;
   Vector normal_x, normal_y, base, sum, weight;
@@ -229,18 +214,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(MeasureSteps);
 HWY_EXPORT(MeanNormals);
 HWY_EXPORT(MeanCurvature);
 HWY_EXPORT(MeanShift);
 
-void MeasureArc(const UnrolledRing& ring) {
-  HWY_DYNAMIC_DISPATCH(MeasureSteps)(ring);
+void MeasureArc(const PeriodicRing& ring) {
   std::uint32_t length = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    const auto step = static_cast<std::uint32_t>(ring.arc[k]);
     ring.arc[k] = static_cast<std::int32_t>(length);
-    length += step;
+    length += static_cast<std::uint32_t>(LengthInUnits(UnitsBetween(ring.x[k], ring.x[k + 1]),
+                                                       UnitsBetween(ring.y[k], ring.y[k + 1])));
   }
   const auto moved = [&](std::int32_t arc, std::uint32_t by) {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(arc) + by);
@@ -258,17 +241,17 @@ void MeasureArc(const UnrolledRing& ring) {
   ring.Repeat(ring.weight, 0, ring.count);
 }
 
-void MeanNormals(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
+void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle) {
   HWY_DYNAMIC_DISPATCH(MeanNormals)(ring, begin, end, reach, by_angle);
 }
 
-void MeanCurvature(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
+void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach) {
   HWY_DYNAMIC_DISPATCH(MeanCurvature)(ring, begin, end, reach);
 }
 
-void MeanShift(const UnrolledRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
+void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   HWY_DYNAMIC_DISPATCH(MeanShift)(ring, begin, end, reach);
 }
 

@@ -1,4 +1,4 @@
-#include "mesh/sweep_corners.h"
+#include "mesh/sweep_events.h"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 namespace partiemc {
 namespace {
 
-bool ComesFirst(const Corner& a, const Corner& b) {
+bool ComesFirst(const SweepEvent& a, const SweepEvent& b) {
   if (a.point == b.point) return a.index < b.index;
   return SweepsBefore(a.point, b.point);
 }
@@ -16,19 +16,19 @@ bool ComesFirst(const Corner& a, const Corner& b) {
 /// never is in a lower stretch.
 class Buckets {
  public:
-  /// Requires: there are corners.
-  explicit Buckets(std::span<const Corner> corners) : last_(corners.size() - 1) {
-    double highest = lowest_ = corners.front().point.y;
-    for (const Corner& corner : corners) {
-      lowest_ = std::min(lowest_, corner.point.y);
-      highest = std::max(highest, corner.point.y);
+  /// Requires: there are events.
+  explicit Buckets(std::span<const SweepEvent> events) : last_(events.size() - 1) {
+    double highest = lowest_ = events.front().point.y;
+    for (const SweepEvent& event : events) {
+      lowest_ = std::min(lowest_, event.point.y);
+      highest = std::max(highest, event.point.y);
     }
     if (highest > lowest_) per_unit_ = static_cast<double>(last_) / (highest - lowest_);
   }
 
   std::size_t size() const { return last_ + 1; }
-  std::size_t Of(const Corner& corner) const {
-    const double place = (corner.point.y - lowest_) * per_unit_;
+  std::size_t Of(const SweepEvent& event) const {
+    const double place = (event.point.y - lowest_) * per_unit_;
     return std::min(static_cast<std::size_t>(place), last_);
   }
 
@@ -39,20 +39,20 @@ class Buckets {
 
 }  // namespace
 
-bool SweepCorners::Collect(std::span<const double> points,
-                           std::span<const std::uint32_t> loop_points,
-                           std::span<const std::uint32_t> loop_offsets) {
-  corners_.clear();
+bool SweepEvents::Collect(std::span<const double> points,
+                          std::span<const std::uint32_t> loop_points,
+                          std::span<const std::uint32_t> loop_offsets) {
+  events_.clear();
   if (!List(points, loop_points, loop_offsets)) {
-    corners_.clear();
+    events_.clear();
     return false;
   }
-  if (!corners_.empty()) Sort();
+  if (!events_.empty()) Sort();
   return true;
 }
 
-bool SweepCorners::List(std::span<const double> points, std::span<const std::uint32_t> loop_points,
-                        std::span<const std::uint32_t> loop_offsets) {
+bool SweepEvents::List(std::span<const double> points, std::span<const std::uint32_t> loop_points,
+                       std::span<const std::uint32_t> loop_offsets) {
   if (loop_offsets.empty()) return loop_points.empty();
   if (loop_offsets.front() != 0 || loop_offsets.back() != loop_points.size()) return false;
   for (std::size_t loop = 0; loop + 1 < loop_offsets.size(); ++loop) {
@@ -63,30 +63,30 @@ bool SweepCorners::List(std::span<const double> points, std::span<const std::uin
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t index = loop_points[i];
       if (index >= points.size() / 2) return false;
-      const Point point{points[2 * std::size_t{index}], points[2 * std::size_t{index} + 1]};
+      const Point point = PointAt(points, index);
       if (!InPredicateDomain(point.x) || !InPredicateDomain(point.y)) return false;
-      corners_.push_back({point, index, loop_points[i == begin ? end - 1 : i - 1],
-                          loop_points[i + 1 == end ? begin : i + 1]});
+      events_.push_back({point, index, loop_points[i == begin ? end - 1 : i - 1],
+                         loop_points[i + 1 == end ? begin : i + 1]});
     }
   }
   return true;
 }
 
-/// Deals the corners to as many buckets by height as there are corners, then sorts each bucket.
-void SweepCorners::Sort() {
-  const Buckets buckets(corners_);
+/// Deals the events to as many buckets by height as there are events, then sorts each bucket.
+void SweepEvents::Sort() {
+  const Buckets buckets(events_);
   ends_.assign(buckets.size() + 1, 0);
-  for (const Corner& corner : corners_) ++ends_[buckets.Of(corner) + 1];
+  for (const SweepEvent& event : events_) ++ends_[buckets.Of(event) + 1];
   for (std::size_t k = 1; k < ends_.size(); ++k) ends_[k] += ends_[k - 1];
-  dealt_.resize(corners_.size());
+  dealt_.resize(events_.size());
   // A bucket's start moves on until it is its end.
-  for (const Corner& corner : corners_) dealt_[ends_[buckets.Of(corner)]++] = corner;
+  for (const SweepEvent& event : events_) dealt_[ends_[buckets.Of(event)]++] = event;
   std::size_t begin = 0;
   for (const std::uint32_t end : ends_) {
     if (end - begin > 1) std::sort(dealt_.begin() + begin, dealt_.begin() + end, ComesFirst);
     begin = end;
   }
-  corners_.swap(dealt_);
+  events_.swap(dealt_);
 }
 
 }  // namespace partiemc

@@ -13,7 +13,7 @@
 namespace partiemc {
 
 /// Numbers of a ring's vertices and of those that repeat it beyond each end.
-struct UnrolledRingSize {
+struct PeriodicRingSize {
   std::uint32_t count = 0, margin = 0;
 };
 
@@ -33,7 +33,7 @@ inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
                                    static_cast<std::uint32_t>(from));
 }
 
-/// Length of a step, rounded down; MeasureArc (ring_windows.h) adds up such lengths.
+/// Length of a step, rounded down; MeasureArc (ring_filters.h) adds up such lengths.
 inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
   const auto x = static_cast<float>(step_x);
   const auto y = static_cast<float>(step_y);
@@ -43,16 +43,16 @@ inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
 /// Numbers of a closed ring's vertices and of those that a window of `reach` cells holds at most
 /// beyond either of its ends, by the very lengths that windows go by: of two vertices that have all
 /// but fallen together none may be taken for being beyond it. Cost: the ring's length.
-UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach);
+PeriodicRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach);
 
 /// One ring. Arrays are by vertex, 0 <= k < count, and go on beyond both ends by `margin` vertices
 /// that repeat the ring, so that a window is a contiguous stretch of them.
-struct UnrolledRing {
+struct PeriodicRing {
   static constexpr int kUnitArrays = 3, kFloatArrays = 7;
 
   /// With arrays of which units(k) and floats(k) tell where the first vertex is.
   template <typename Units, typename Floats>
-  static UnrolledRing In(const UnrolledRingSize& size, Units units, Floats floats) {
+  static PeriodicRing In(const PeriodicRingSize& size, Units units, Floats floats) {
     return {.count = size.count,
             .margin = size.margin,
             .x = units(0),
@@ -92,29 +92,10 @@ struct UnrolledRing {
   }
 };
 
-/// Memory of one ring that is short enough for the stack: it stays in the cache.
-class ShortRing {
- public:
-  static bool Holds(const UnrolledRingSize& size) {
-    return std::size_t{size.count} + 2 * std::size_t{size.margin} <= kRoom;
-  }
-  /// Requires: Holds(size). Valid as long as this object; elements have no values yet.
-  UnrolledRing Of(const UnrolledRingSize& size) {
-    return UnrolledRing::In(
-        size, [&](int array) { return units_[array] + size.margin; },
-        [&](int array) { return floats_[array] + size.margin; });
-  }
-
- private:
-  static constexpr std::size_t kRoom = 768;
-  std::int32_t units_[UnrolledRing::kUnitArrays][kRoom];
-  float floats_[UnrolledRing::kFloatArrays][kRoom];
-};
-
 /// Memory of the rings of a frame, kept warm from frame to frame.
-class UnrolledRings {
+class PeriodicRings {
  public:
-  using Size = UnrolledRingSize;
+  using Size = PeriodicRingSize;
 
   /// Makes room for rings of the given numbers of vertices and margins; 0 vertices for a ring that
   /// has none here. Elements keep no values.
@@ -122,13 +103,13 @@ class UnrolledRings {
   void Allocate();
 
   /// Requires: Allocate was called after `sizes` were set.
-  UnrolledRing operator[](std::size_t ring);
+  PeriodicRing operator[](std::size_t ring);
 
  private:
   std::vector<Size> sizes_;
   std::vector<std::size_t> starts_;
-  std::vector<std::int32_t> units_[UnrolledRing::kUnitArrays];
-  std::vector<float> floats_[UnrolledRing::kFloatArrays];
+  std::vector<std::int32_t> units_[PeriodicRing::kUnitArrays];
+  std::vector<float> floats_[PeriodicRing::kFloatArrays];
 };
 
 }  // namespace partiemc

@@ -1,5 +1,5 @@
 // Window sums along rings, against walks along the ring that know of neither vectors nor margins.
-#include "vertices/ring_windows.h"
+#include "vertices/ring_filters.h"
 
 #include <gtest/gtest.h>
 
@@ -48,12 +48,12 @@ class RandomRing {
   }
   const std::vector<LatticePoint>& normals() const { return normals_; }
 
-  UnrolledRing Unrolled(UnrolledRings& rings) const {
+  PeriodicRing Copied(PeriodicRings& rings) const {
     // More than a turn in either direction.
     const int margin = count() + 20;
     rings.sizes() = {{static_cast<std::uint32_t>(count()), static_cast<std::uint32_t>(margin)}};
     rings.Allocate();
-    const UnrolledRing ring = rings[0];
+    const PeriodicRing ring = rings[0];
     for (int k = 0; k < count(); ++k) {
       ring.x[k] = RingUnits(points_[k].x);
       ring.y[k] = RingUnits(points_[k].y);
@@ -78,7 +78,7 @@ class RandomRing {
     return ring;
   }
 
-  // What the three functions of ring_windows.h say, vertex by vertex.
+  // What the three functions of ring_filters.h say, vertex by vertex.
   LatticePoint MeanNormal(int k, double reach, bool by_angle) const {
     LatticePoint sum;
     ForEachNear(k, reach, [&](int j, double w) {
@@ -136,13 +136,13 @@ class RandomRing {
   std::vector<double> bases_, steps_;
 };
 
-TEST(RingWindows, GoByTheLengthsOfStepsForAnyInstructionSet) {
+TEST(RingFilters, GoByTheLengthsOfStepsForAnyInstructionSet) {
   for (const int count : {24, 31, 100}) {
     support::Random random(static_cast<std::uint64_t>(count));
     const RandomRing source(random, count);
     support::ForEachInstructionSet([&] {
-      UnrolledRings rings;
-      const UnrolledRing ring = source.Unrolled(rings);
+      PeriodicRings rings;
+      const PeriodicRing ring = source.Copied(rings);
       MeasureArc(ring);
       for (std::ptrdiff_t k = 0; k + 1 < ring.count + ring.margin; ++k) {
         const auto step = [&](std::ptrdiff_t from) {
@@ -161,13 +161,13 @@ TEST(RingWindows, GoByTheLengthsOfStepsForAnyInstructionSet) {
   }
 }
 
-TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
+TEST(RingFilters, AgreeWithAWalkAlongTheRing) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     support::Random random(seed);
     const RandomRing expected(random, 16 + static_cast<int>(seed) * 2);
     const double reach = expected.Length() * random.Uniform(0.02, 0.5);
-    UnrolledRings rings;
-    const UnrolledRing ring = expected.Unrolled(rings);
+    PeriodicRings rings;
+    const PeriodicRing ring = expected.Copied(rings);
     MeanCurvature(ring, 0, ring.count, reach);
     for (int k = 0; k < ring.count; ++k) {
       const double curvature = expected.Curvature(k, reach);
@@ -188,11 +188,11 @@ TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
   }
 }
 
-TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
+TEST(RingFilters, KeepTheOwnNormalWhereTheMeanVanishes) {
   support::Random random(3);
   const RandomRing source(random, 40);
-  UnrolledRings rings;
-  const UnrolledRing ring = source.Unrolled(rings);
+  PeriodicRings rings;
+  const PeriodicRing ring = source.Copied(rings);
   std::fill(ring.weight - ring.margin, ring.weight + ring.count + ring.margin, 0.0f);
   MeanNormals(ring, 0, ring.count, source.Length() / 4, true);
   for (int k = 0; k < ring.count; ++k) {
@@ -202,7 +202,7 @@ TEST(RingWindows, KeepTheOwnNormalWhereTheMeanVanishes) {
 }
 
 // A polygon whose windows hold many more vertices in one place than at the ends of the ring.
-TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
+TEST(RingFilters, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
   constexpr int kSides = 60, kCrowd = 80;
   constexpr double kReach = 10.5;
   for (const int crowded : {15, kSides - 14}) {
@@ -215,12 +215,12 @@ TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
     const auto count = static_cast<std::ptrdiff_t>(points.size());
     // What lies beyond the margins looks near and spoils every sum.
     const auto results_with = [&](std::uint32_t more) {
-      UnrolledRingSize size = SizeForWindows(points, kReach);
+      PeriodicRingSize size = SizeForWindows(points, kReach);
       size.margin += static_cast<std::uint32_t>(kWindowPadding) + more;
       const std::ptrdiff_t room = 3 * count;
       std::vector<std::int32_t> units(3 * room, 0);
       std::vector<float> floats(7 * room, std::numeric_limits<float>::quiet_NaN());
-      const UnrolledRing ring = UnrolledRing::In(
+      const PeriodicRing ring = PeriodicRing::In(
           size, [&](int array) { return units.data() + array * room + count; },
           [&](int array) { return floats.data() + array * room + count; });
       for (std::ptrdiff_t k = 0; k < count; ++k) {
@@ -250,15 +250,15 @@ TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
   }
 }
 
-TEST(RingWindows, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
+TEST(RingFilters, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
   support::Random random(5);
   const RandomRing source(random, 103);
   const double reach = source.Length() / 7;
   std::vector<std::vector<float>> results;
   support::ForEachInstructionSet([&] {
     for (const int stretch : {1, 5, 16, 50, 103}) {
-      UnrolledRings rings;
-      const UnrolledRing ring = source.Unrolled(rings);
+      PeriodicRings rings;
+      const PeriodicRing ring = source.Copied(rings);
       std::vector<float> result;
       const auto in_stretches = [&](auto step) {
         for (std::ptrdiff_t begin = 0; begin < ring.count; begin += stretch) {

@@ -1,5 +1,5 @@
-// The intervals that a sweep line meets, from left to right: a sequence of identifiers in which one
-// finds, inserts and erases in about the square root of its length.
+// The status of a sweep: the intervals that its line meets, from left to right. A sequence of
+// identifiers in which one finds, inserts and erases in about the square root of its length.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace partiemc {
 
 /// A directory of short blocks. Sorted by its user: the class only ever asks a predicate.
 /// Allocates nothing once it has been as long before. Not safe to share between threads.
-class IntervalOrder {
+class SweepStatus {
  public:
   /// Names an element or, past the last one, the end. Valid until the next change.
   struct Cursor {
@@ -25,7 +25,6 @@ class IntervalOrder {
     unused_.clear();
   }
 
-  bool IsEmpty() const { return directory_.empty(); }
   bool IsEnd(Cursor cursor) const { return cursor.block == directory_.size(); }
 
   /// Requires: cursor is not the end.

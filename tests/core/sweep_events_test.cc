@@ -1,4 +1,4 @@
-#include "mesh/sweep_corners.h"
+#include "mesh/sweep_events.h"
 
 #include <gtest/gtest.h>
 
@@ -35,12 +35,11 @@ std::vector<Passage> Expected(const Region& region) {
   return passages;
 }
 
-std::vector<Passage> Collected(const Region& region, SweepCorners& corners) {
-  EXPECT_TRUE(corners.Collect(region.points, region.loop_points, region.loop_offsets));
+std::vector<Passage> Collected(const Region& region, SweepEvents& events) {
+  EXPECT_TRUE(events.Collect(region.points, region.loop_points, region.loop_offsets));
   std::vector<Passage> passages;
-  for (const Corner& corner : corners.corners()) {
-    passages.emplace_back(corner.point.y, corner.point.x, corner.index, corner.previous,
-                          corner.next);
+  for (const SweepEvent& event : events.events()) {
+    passages.emplace_back(event.point.y, event.point.x, event.index, event.previous, event.next);
   }
   // A loop may pass through a point several times: in which order is left open.
   const auto same_point = [](const Passage& a, const Passage& b) {
@@ -55,22 +54,22 @@ std::vector<Passage> Collected(const Region& region, SweepCorners& corners) {
   return passages;
 }
 
-TEST(SweepCorners, ComeAsASortWouldBringThem) {
+TEST(SweepEvents, ComeAsASortWouldBringThem) {
   Random random(21);
-  SweepCorners corners;
+  SweepEvents events;
   for (int round = 0; round < 300; ++round) {
     SCOPED_TRACE("seed 21, round " + std::to_string(round));
     // Lattices have many points of one height, and some passed through again.
     Region region = testing::RandomGarbage(random, 2 + round % 30, 6, 60);
-    EXPECT_EQ(Collected(region, corners), Expected(region));
+    EXPECT_EQ(Collected(region, events), Expected(region));
     for (double& coordinate : region.points) coordinate += Uniform(random, -1e-9, 1e-9);
-    EXPECT_EQ(Collected(region, corners), Expected(region));
+    EXPECT_EQ(Collected(region, events), Expected(region));
   }
 }
 
-TEST(SweepCorners, HeightsOfAnySpreadAreInOrder) {
+TEST(SweepEvents, HeightsOfAnySpreadAreInOrder) {
   Random random(22);
-  SweepCorners corners;
+  SweepEvents events;
   for (const double spread : {0.0, 1e-100, 1e-15, 1.0, 1e15, 1e149}) {
     for (const double base : {0.0, 1.0, -1e149}) {
       SCOPED_TRACE(std::to_string(spread) + " about " + std::to_string(base));
@@ -83,7 +82,7 @@ TEST(SweepCorners, HeightsOfAnySpreadAreInOrder) {
       }
       Region region;
       region.AddLoop(loop);
-      EXPECT_EQ(Collected(region, corners), Expected(region));
+      EXPECT_EQ(Collected(region, events), Expected(region));
     }
   }
 }

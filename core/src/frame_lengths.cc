@@ -1,0 +1,119 @@
+#include "frame_lengths.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "bins/resolution.h"
+#include "bins/spacing_doubt.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+// The spacing estimated from a later frame may leave the lattice's by these factors at most, so
+// that a kernel always spans a sensible number of cells.
+constexpr double kMinSpacingInCells = 0.25;
+constexpr double kMaxSpacingInCells = 4;
+
+// Particles of one frame may stand for areas this far from h^2: beyond it a single particle would
+// decide the guard of the whole frame, and float sums would lose the others.
+constexpr double kMaxVolumeRatio = 1e6;
+
+// Volumes of a frame are doubtful where more than half of them are this many times the squared
+// spacing, or less than its inverse: discs of a diameter h are at 0.79, hexagonal packing at 0.87.
+constexpr double kDoubtfulVolumeRatio = 2;
+
+// The side of the square of the median volume.
+double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scratch) {
+  scratch.assign(volumes.begin(), volumes.end());
+  const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(scratch.size() / 2);
+  std::nth_element(scratch.begin(), middle, scratch.end());
+  return std::sqrt(*middle);
+}
+
+// The spacing that a frame tells by itself; nothing where it tells none. What its particles do not
+// agree on is only a guess, for which volumes are better than distances.
+absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(const Frame& frame, Plane plane,
+                                                          SpacingScratch& scratch) {
+  std::optional<SpacingEstimate> own = EstimateSpacing(frame, plane, scratch);
+  if ((!own || !own->is_agreed) && !frame.volumes.empty()) {
+    own = SpacingEstimate{SpacingOfVolumes(frame.volumes, scratch.weights), false};
+  }
+  if (!own || (own->spacing >= ReconstructionParameters::kMinSpacing &&
+               own->spacing <= ReconstructionParameters::kMaxSpacing))
+    return own;
+  if (!own->is_agreed) return std::nullopt;
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonOutOfRange), "positions",
+                         absl::StrCat("spacing of ", ShortestNumber(own->spacing)),
+                         "must have a spacing in [1e-60, 1e60]"});
+}
+
+}  // namespace
+
+absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
+                                                     const Frame& frame, const State& state,
+                                                     SpacingScratch& scratch) {
+  std::optional<double> spacing = parameters.spacing;
+  if (!spacing && parameters.spacing_rule == SpacingRule::kFirstFrame) spacing = state.spacing;
+  bool is_provisional = false;
+  if (!spacing) {
+    const auto own = OwnSpacing(frame, parameters.plane, scratch);
+    if (!own.ok()) return own.status();
+    const bool is_agreed = *own && (*own)->is_agreed;
+    is_provisional = !is_agreed && !state.spacing;
+    if (is_agreed || (is_provisional && *own)) {
+      spacing = (*own)->spacing;
+    } else {
+      spacing = state.spacing;
+    }
+  }
+  if (!spacing) return std::nullopt;
+  const double cell_size = state.cell_size.value_or(parameters.cell_size * *spacing);
+  return Lengths{
+      std::clamp(*spacing, kMinSpacingInCells * cell_size, kMaxSpacingInCells * cell_size),
+      cell_size, is_provisional};
+}
+
+absl::StatusOr<double> LightestVolume(const Frame& frame, double spacing, Doubts& doubts) {
+  const double usual = spacing * spacing;
+  if (frame.volumes.empty()) return usual;
+  double lightest = std::numeric_limits<double>::infinity();
+  std::size_t large = 0, small = 0;
+  for (std::size_t k = 0; k < frame.volumes.size(); ++k) {
+    const double volume = frame.volumes[k];
+    if (!(volume <= kMaxVolumeRatio * usual && volume >= usual / kMaxVolumeRatio)) {
+      return ViolationError(
+          absl::StatusCode::kInvalidArgument,
+          {std::string(kReasonOutOfRange), absl::StrCat("volumes[", k, "]"), ShortestNumber(volume),
+           absl::StrCat("must be within a factor of 1e6 of the squared spacing, ",
+                        ShortestNumber(usual))});
+    }
+    lightest = std::min(lightest, volume);
+    large += volume > kDoubtfulVolumeRatio * usual ? 1 : 0;
+    small += kDoubtfulVolumeRatio * volume < usual ? 1 : 0;
+  }
+  if (2 * std::max(large, small) > frame.volumes.size()) {
+    doubts.Add(Doubt::kVolumesContradictSpacing);
+  }
+  return lightest;
+}
+
+absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& lengths,
+                          const Scale& scale, const ParticleBins& bins, Doubts& doubts) {
+  absl::Status fine =
+      CheckResolution(frame, plane, bins.tiles, lengths.cell_size, lengths.spacing, doubts);
+  if (lengths.is_provisional) {
+    doubts.Add(Doubt::kSpacingProvisional);
+    return absl::OkStatus();
+  }
+  if (ContradictsSpacing(bins, scale)) doubts.Add(Doubt::kSpacingContradicted);
+  return fine;
+}
+
+}  // namespace partiemc

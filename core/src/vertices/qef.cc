@@ -1,0 +1,59 @@
+#include <cmath>
+
+#include "vertices/placement.h"
+
+namespace partiemc {
+namespace {
+
+// Eigenvalues of the QEF below this share of the larger one leave their direction free.
+constexpr double kQefCutoff = 0.1;
+
+// The normal of the level set at a point of the plane's cell; the plane's own where it is weak.
+LatticePoint NormalAt(const VertexInput& input, const CellPlane& plane, const LatticePoint& point) {
+  const ActiveCell& cell = plane.cell;
+  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
+  const FieldSample sample =
+      input.field.Sample(cell.tile, point.x - origin.x + cell.i, point.y - origin.y + cell.j);
+  const double square =
+      sample.gradient_x * sample.gradient_x + sample.gradient_y * sample.gradient_y;
+  if (square < kWeakGradientSquare) return {plane.normal_x, plane.normal_y};
+  const double length = std::sqrt(square);
+  return {sample.gradient_x / length, sample.gradient_y / length};
+}
+
+}  // namespace
+
+LatticePoint QefVertex(const VertexInput& input, const CellPlane& plane) {
+  const LatticePoint middle{(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
+  double xx = 0, xy = 0, yy = 0, bx = 0, by = 0;  // Normal equations about the middle.
+  for (const LatticePoint& point : {plane.entry, plane.exit}) {
+    const LatticePoint n = NormalAt(input, plane, point);
+    const double offset = n.x * (point.x - middle.x) + n.y * (point.y - middle.y);
+    xx += n.x * n.x;
+    xy += n.x * n.y;
+    yy += n.y * n.y;
+    bx += n.x * offset;
+    by += n.y * offset;
+  }
+  // Closed-form eigenvalues of the symmetric 2 x 2 matrix; the trace is 2 as normals are unit.
+  const double mean = (xx + yy) / 2;
+  const double radius = std::sqrt((xx - yy) * (xx - yy) / 4 + xy * xy);
+  const double large = mean + radius;
+  const double small = mean - radius;
+  // Of the two forms of the eigenvector, the one without cancellation.
+  double ex = xx >= yy ? large - yy : xy;
+  double ey = xx >= yy ? xy : large - xx;
+  const double length = std::sqrt(ex * ex + ey * ey);
+  if (length > 0) {
+    ex /= length;
+    ey /= length;
+  } else {
+    ex = 1;
+    ey = 0;
+  }
+  const double along = (ex * bx + ey * by) / large;
+  const double across = small > kQefCutoff * large ? (-ey * bx + ex * by) / small : 0;
+  return {middle.x + along * ex - across * ey, middle.y + along * ey + across * ex};
+}
+
+}  // namespace partiemc
