@@ -119,14 +119,14 @@ std::span<const std::uint32_t> Outline(const ReconstructionParameters& parameter
                                        Workspace::Buffers& b, Result& result) {
   InStage(observer, Stage::kNormals, [&] {
     const PlacementTraits& traits = TraitsOf(parameters.placement);
-    b.point_field.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
-                        traits.takes_particles);
-    EstimateNormals(b.bins, b.crossings, b.topology, b.point_field, parameters, previous.normals,
+    b.level_set_sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
+                              traits.takes_particles);
+    EstimateNormals(b.bins, b.crossings, b.topology, b.sampler, parameters, previous.normals,
                     b.normal_scratch, b.planes, b.next_normals);
   });
   InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;
-    PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.point_field, b.planes,
+    PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
                    parameters, scale},
                   b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
     result.statistics.self_intersections = b.placed.self_intersections;

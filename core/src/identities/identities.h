@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "bins/bins.h"
-#include "crossings/crossed_rows.h"
 #include "crossings/crossings.h"
+#include "crossings/scanlines.h"
 #include "identities/ring_relations.h"
 #include "identities/ring_tracks.h"
 #include "partiemc/frame.h"
@@ -20,7 +20,7 @@ namespace partiemc {
 
 /// Warm buffers of ContinueRings.
 struct IdentityScratch {
-  CrossedRows rows;
+  Scanlines rows;
   std::vector<std::uint32_t> number;         // By ring of the topology, in the order of their runs.
   std::vector<std::uint32_t> topology_ring;  // By number.
   std::vector<std::uint32_t> ring_of_component;  // Number of its outer ring, or kNoRing.

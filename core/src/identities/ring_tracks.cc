@@ -43,10 +43,11 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous,
   t.sum_x.assign(rings.size(), 0);
   t.sum_y.assign(rings.size(), 0);
   const VelocityUnits units(frame);
-  const auto add = [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+  const auto add = [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
     const std::uint32_t ring = in.ring_of_component[component];
     if (ring == kNoRing) return;
-    const PlaneVelocity velocity = VelocityOf(frame, input.plane, in.bins.entries[entry].source);
+    const PlaneVelocity velocity =
+        VelocityOf(frame, input.plane, in.bins.particles[particle].source);
     t.sum_x[ring] += units.Of(velocity.x);
     t.sum_y[ring] += units.Of(velocity.y);
   };

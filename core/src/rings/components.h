@@ -145,8 +145,8 @@ void Components::ForEachSeenFrom(const TileDirectory& directory, const Crossings
 template <typename Visit>
 void Components::ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings,
                                    std::uint32_t tile, Visit visit) const {
-  for (std::uint32_t entry = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
-    const BinEntry& at = bins.entries[entry];
+  for (std::uint32_t particle = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
+    const BinnedParticle& at = bins.particles[particle];
     const std::uint32_t component = ComponentOf(bins.tiles, crossings, tile, at.x, at.y);
     if (component != kNoComponent) visit(tile, entry, component);
   }

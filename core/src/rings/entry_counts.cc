@@ -32,7 +32,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Reads whole vectors, if need be of the entries behind the last one.
-std::uint32_t CountEntriesInHere(const BitRows& cells, std::span<const BinEntry> entries,
+std::uint32_t CountEntriesInHere(const BitRows& cells, std::span<const BinnedParticle> entries,
                                  std::uint32_t first, std::uint32_t last) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> d_bits;
@@ -63,7 +63,7 @@ namespace partiemc {
 
 HWY_EXPORT(CountEntriesInHere);
 
-std::uint32_t CountEntriesIn(const BitRows& cells, std::span<const BinEntry> entries,
+std::uint32_t CountEntriesIn(const BitRows& cells, std::span<const BinnedParticle> entries,
                              std::uint32_t first, std::uint32_t last) {
   return HWY_DYNAMIC_DISPATCH(CountEntriesInHere)(cells, entries, first, last);
 }

@@ -11,7 +11,7 @@ namespace partiemc {
 
 /// The entries [first, last) of one tile that lie in `cells` of it. In vectors. Cost: linear, less
 /// than half a nanosecond each.
-std::uint32_t CountEntriesIn(const BitRows& cells, std::span<const BinEntry> entries,
+std::uint32_t CountEntriesIn(const BitRows& cells, std::span<const BinnedParticle> entries,
                              std::uint32_t first, std::uint32_t last);
 
 }  // namespace partiemc

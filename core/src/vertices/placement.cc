@@ -10,7 +10,7 @@ int CornerOf(const Segment& segment) {
 
 }  // namespace
 
-LatticePoint ClampToHalf(const Segment& segment, LatticePoint point) {
+Point ClampToHalf(const Segment& segment, Point point) {
   auto [u, v] = point;
   const int corner = CornerOf(segment);
   const bool right = corner == 1 || corner == 2;

@@ -9,9 +9,9 @@ namespace {
 constexpr double kQefCutoff = 0.1;
 
 // The normal of the level set at a point of the plane's cell; the plane's own where it is weak.
-LatticePoint NormalAt(const VertexInput& input, const CellPlane& plane, const LatticePoint& point) {
+Point NormalAt(const VertexInput& input, const CellPlane& plane, const Point& point) {
   const ActiveCell& cell = plane.cell;
-  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
+  const Point origin = CellOrigin(input.bins.tiles, cell);
   const FieldSample sample =
       input.field.Sample(cell.tile, point.x - origin.x + cell.i, point.y - origin.y + cell.j);
   const double square =
@@ -23,11 +23,11 @@ LatticePoint NormalAt(const VertexInput& input, const CellPlane& plane, const La
 
 }  // namespace
 
-LatticePoint QefVertex(const VertexInput& input, const CellPlane& plane) {
-  const LatticePoint middle{(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
+Point QefVertex(const VertexInput& input, const CellPlane& plane) {
+  const Point middle{(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
   double xx = 0, xy = 0, yy = 0, bx = 0, by = 0;  // Normal equations about the middle.
-  for (const LatticePoint& point : {plane.entry, plane.exit}) {
-    const LatticePoint n = NormalAt(input, plane, point);
+  for (const Point& point : {plane.entry, plane.exit}) {
+    const Point n = NormalAt(input, plane, point);
     const double offset = n.x * (point.x - middle.x) + n.y * (point.y - middle.y);
     xx += n.x * n.x;
     xy += n.x * n.y;

@@ -27,7 +27,7 @@ void SnapToAxes(double cell_size, std::span<double> coordinates) {
   }
 }
 
-void Store(LatticePoint point, double cell_size, double* target) {
+void Store(Point point, double cell_size, double* target) {
   target[0] = point.x * cell_size;
   target[1] = point.y * cell_size;
 }
@@ -45,7 +45,7 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
     Store(ClampToCell(input.bins.tiles, plane.cell, segment, QefVertex(input, plane)), cell_size,
           target);
   } else if (input.parameters.placement == Placement::kFarthestParticle) {
-    const WorldPosition vertex = FarthestParticleVertex(input, plane);
+    const Point vertex = FarthestParticleVertex(input, plane);
     target[0] = vertex.x;
     target[1] = vertex.y;
   }

@@ -10,7 +10,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "rings/rings.h"
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 #include "vertices/periodic_ring.h"
 #include "vertices/repair.h"
 
@@ -42,9 +42,9 @@ struct VertexNormal {
 /// the vertex of its cell. Lengths in cells, positions in lattice coordinates of the world. Segment
 /// k has vertices 2 k and 2 k + 1.
 struct RingVertices {
-  std::vector<LatticePoint> point;
+  std::vector<Point> point;
   /// Where a vertex may always retreat to: with all vertices there, rings are simple.
-  std::vector<LatticePoint> root;
+  std::vector<Point> root;
   std::vector<VertexNormal> normal;
   std::vector<std::uint8_t> is_kept;  ///< 0 for vertices that thinning dropped.
   PeriodicRings periodic_rings;       ///< Scratch of the steps.
@@ -72,7 +72,7 @@ struct VertexInput {
   const LevelSet& level_set;
   const Crossings& crossings;
   const RingTopology& topology;
-  const PointField& field;
+  const LevelSetSampler& field;
   const std::vector<CellPlane>& planes;
   const ReconstructionParameters& parameters;
   const Scale& scale;

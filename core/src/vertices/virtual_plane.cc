@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "sampler/point_groups.h"
+#include "sampler/query_batch.h"
 #include "vertices/placement.h"
 #include "vertices/plane_support.h"
 #include "vertices/ring_filters.h"
@@ -15,9 +15,9 @@
 namespace partiemc {
 namespace {
 
-double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
+double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
 
-VertexNormal UnitOf(const LatticePoint& v) {
+VertexNormal UnitOf(const Point& v) {
   const double square = Dot(v, v);
   if (square < kWeakGradientSquare * kWeakGradientSquare) return {1, 0};
   const double inverse = 1 / std::sqrt(square);
@@ -26,7 +26,7 @@ VertexNormal UnitOf(const LatticePoint& v) {
 
 // `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
 // `max_step` cells; `point` itself where the gradient is weak.
-LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient, double max_step) {
+Point NewtonStep(Point point, double value, Point gradient, double max_step) {
   const double square = Dot(gradient, gradient);
   if (square < kWeakGradientSquare) return point;
   double step = -value / square;
@@ -39,8 +39,8 @@ LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient,
 
 // Where a point in or next to a cell is: in most cases in the cell's own tile, which is indexed as
 // it has an active cell.
-FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const LatticePoint& point) {
-  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
+FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point& point) {
+  const Point origin = CellOrigin(input.bins.tiles, cell);
   const double x = point.x - origin.x + cell.i;
   const double y = point.y - origin.y + cell.j;
   if (x >= 0 && y >= 0 && x < kTileSize && y < kTileSize) return {cell.tile, x, y};
@@ -66,8 +66,8 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   v.root[inner] = v.point[inner] = ClampToCell(
       input.bins.tiles, plane.cell, input.crossings.segments[input.topology.segments[segment]],
       VirtualPlaneVertex(plane, constants.newton_step));
-  const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
-    const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
+  const auto set_normal = [&](std::size_t i, const Point& from, Point gradient) {
+    const Point step{v.point[i].x - from.x, v.point[i].y - from.y};
     if (Dot(step, step) > constants.long_step * constants.long_step) {
       const FieldPoint at = Locate(input, plane.cell, v.point[i]);
       const FieldSample sample =
@@ -87,9 +87,9 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
   const auto length_after = [&](std::size_t k) {
-    const LatticePoint& a = v.point[first + k];
-    const LatticePoint& b = v.point[first + (k + 1 == count ? 0 : k + 1)];
-    const LatticePoint chord{b.x - a.x, b.y - a.y};
+    const Point& a = v.point[first + k];
+    const Point& b = v.point[first + (k + 1 == count ? 0 : k + 1)];
+    const Point chord{b.x - a.x, b.y - a.y};
     return std::sqrt(Dot(chord, chord));
   };
   const double min_length = input.parameters.constants.ShortestRing() * input.scale.spacing;
@@ -165,7 +165,7 @@ std::pair<double, double> EstimateOf(const SupportSums& sums, const SupportShape
           variance / (support.spacing * support.spacing)};
 }
 
-void FindSupports(const PointField& field, const SupportShape& support,
+void FindSupports(const LevelSetSampler& field, const SupportShape& support,
                   std::span<const PointGroup<BentPlane>> groups, std::span<QuerySupports> sums) {
   std::array<SupportQuery, kQueriesAtOnce> queries;
   for (std::size_t q = 0; q < groups.size(); ++q) {
@@ -252,7 +252,7 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Periodic
     }
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       v.normal[first + k] = {ring.normal_x[k], ring.normal_y[k]};
-      LatticePoint& point = v.point[first + k];
+      Point& point = v.point[first + k];
       point.x += double{ring.shift[k]} * ring.normal_x[k];
       point.y += double{ring.shift[k]} * ring.normal_y[k];
     }
@@ -274,10 +274,10 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
   for (std::size_t k = first; k < last; k += 2) {
-    const LatticePoint& a = v.point[(k == first ? last : k) - 1];
-    const LatticePoint& p = v.point[k];
-    const LatticePoint& b = v.point[k + 1];
-    const LatticePoint chord{b.x - a.x, b.y - a.y};
+    const Point& a = v.point[(k == first ? last : k) - 1];
+    const Point& p = v.point[k];
+    const Point& b = v.point[k + 1];
+    const Point chord{b.x - a.x, b.y - a.y};
     const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
     v.is_kept[k] = input.parameters.steps.edge_vertices &&
                    std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));
@@ -287,7 +287,7 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
 
 }  // namespace
 
-LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step) {
+Point VirtualPlaneVertex(const CellPlane& plane, double max_step) {
   if (plane.is_weak) return plane.point;
   return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, max_step);
 }

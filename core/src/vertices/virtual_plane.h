@@ -8,7 +8,7 @@ namespace partiemc {
 
 /// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
 /// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
-LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
+Point VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
 /// Steps 1 to 3: roots, normals, planes. Leaves the rest to volume_correction.h and repair.h.
 /// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
