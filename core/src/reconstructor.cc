@@ -235,15 +235,14 @@ void Outline(const ReconstructionParameters& parameters, const Frame& frame, con
   const bool farthest = parameters.placement == Placement::kFarthestParticle;
   {
     const StageScope scope(observer, Stage::kNormals);
-    b.point_field.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale),
-                        farthest);
-    EstimateNormals(b.bins, b.crossings, b.topology, b.point_field, parameters, previous.normals,
+    b.sampler.Build(b.bins, b.crossings, scale, WanderOf(parameters.placement, scale), farthest);
+    EstimateNormals(b.bins, b.crossings, b.topology, b.sampler, parameters, previous.normals,
                     b.normal_scratch, b.planes, b.next_normals);
   }
   {
     const StageScope scope(observer, Stage::kVertices);
     b.next_area_offset = previous.area_offset;
-    PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.point_field, b.planes,
+    PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
                    parameters, scale},
                   b.next_area_offset, b.placed, result.rings);
     ContinueRings({frame, parameters.plane, b.bins, b.crossings, b.ring_scratch, b.topology,

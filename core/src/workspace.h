@@ -14,7 +14,7 @@
 #include "normals/normals.h"
 #include "partiemc/reconstructor.h"
 #include "rings/rings.h"
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 #include "vertices/intersections.h"
 #include "vertices/vertices.h"
 
@@ -28,7 +28,7 @@ struct Workspace::Buffers {
   Crossings crossings;
   RingScratch ring_scratch;
   RingTopology topology;
-  PointField point_field;
+  LevelSetSampler sampler;
   NormalScratch normal_scratch;
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;

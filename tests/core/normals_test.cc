@@ -20,7 +20,7 @@ const ActiveCell& CellOf(const Stages& stages, std::size_t k) {
 }
 
 CellNormal KeyOf(const Stages& stages, std::size_t k) {
-  const LatticePoint origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
+  const Point origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
   CellNormal key;
   key.column = static_cast<std::int32_t>(origin.x);
   key.row = static_cast<std::int32_t>(origin.y);

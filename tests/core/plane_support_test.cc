@@ -17,9 +17,9 @@ namespace partiemc {
 namespace {
 
 // Rows of particles in one band. `xs` are told modulo kColumnPeriod; the disc has all.
-NearRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys, const float* weights,
-                 NearBand band, float origin_x, float origin_y) {
-  NearRows near;
+NeighbourRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys,
+                      const float* weights, NeighbourBand band, float origin_x, float origin_y) {
+  NeighbourRows near;
   near.x = xs.data();
   near.y = ys.data();
   near.weight = weights;
@@ -64,8 +64,8 @@ struct Rows {
     weight.resize(weight.size() + kRowPadding);
   }
 
-  NearRows AsNear(bool weighted) const {
-    const NearBand band{
+  NeighbourRows AsNear(bool weighted) const {
+    const NeighbourBand band{
         .offsets = offsets.data(), .columns = 3, .rows = 5, .row_stride = 4, .origin_y = 0};
     return OneBand(columns, y, weighted ? weight.data() : nullptr, band, -1, 1);
   }
@@ -82,7 +82,8 @@ double Bump(double distance, double reach) {
   return t * t;
 }
 
-SupportSums SumSupport(const NearRows& near, const BentPlane& plane, const SupportShape& support) {
+SupportSums SumSupport(const NeighbourRows& near, const BentPlane& plane,
+                       const SupportShape& support) {
   const SupportQuery query{near, {&plane, 1}};
   QuerySupports sums;
   SumSupports({&query, 1}, support, {&sums, 1});
@@ -163,7 +164,7 @@ TEST(PlaneSupport, HasTheSameBitsForAnyInstructionSet) {
   for (int round = 0; round < 50; ++round) {
     const Rows rows(random);
     const BentPlane plane = RandomPlane(random);
-    const NearRows near = rows.AsNear(round % 2 == 1);
+    const NeighbourRows near = rows.AsNear(round % 2 == 1);
     std::vector<SupportSums> results;
     support::ForEachInstructionSet([&] { results.push_back(SumSupport(near, plane, kShape)); });
     for (const SupportSums& result : results) {

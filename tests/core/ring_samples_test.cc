@@ -59,8 +59,8 @@ void ExpectAsBySorting(const Traced& traced, std::span<const std::uint64_t> ids,
   const ParticleBins& bins = traced.stages.bins;
   traced.components.ForEachParticle(
       bins, traced.stages.crossings,
-      [&](std::uint32_t tile, std::uint32_t entry, std::uint32_t component) {
-        const BinEntry& at = bins.entries[entry];
+      [&](std::uint32_t tile, std::uint32_t particle, std::uint32_t component) {
+        const BinnedParticle& at = bins.particles[particle];
         all.push_back({HashOf(ids[at.source]),
                        bins.tiles[tile].x * kTileSize + static_cast<std::int32_t>(at.x + 0.5f),
                        bins.tiles[tile].y * kTileSize + static_cast<std::int32_t>(at.y + 0.5f),

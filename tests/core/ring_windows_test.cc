@@ -34,8 +34,8 @@ class RandomRing {
       if (k > 0 && random.Uniform(0, 1) < 0.1) points_[k] = points_[k - 1];
     }
     for (int k = 0; k < count; ++k) {
-      const LatticePoint& a = points_[k];
-      const LatticePoint& b = points_[(k + 1) % count];
+      const Point& a = points_[k];
+      const Point& b = points_[(k + 1) % count];
       steps_.push_back(std::hypot(b.x - a.x, b.y - a.y));
     }
   }
@@ -46,7 +46,7 @@ class RandomRing {
     for (const double step : steps_) length += step;
     return length;
   }
-  const std::vector<LatticePoint>& normals() const { return normals_; }
+  const std::vector<Point>& normals() const { return normals_; }
 
   UnrolledRing Unrolled(UnrolledRings& rings) const {
     // More than a turn in either direction.
@@ -79,8 +79,8 @@ class RandomRing {
   }
 
   // What the three functions of ring_windows.h say, vertex by vertex.
-  LatticePoint MeanNormal(int k, double reach, bool by_angle) const {
-    LatticePoint sum;
+  Point MeanNormal(int k, double reach, bool by_angle) const {
+    Point sum;
     ForEachNear(k, reach, [&](int j, double w) {
       if (by_angle) w *= std::pow(std::max(0.0, Dot(normals_[k], normals_[j])), 16);
       sum.x += w * normals_[j].x;
@@ -91,7 +91,7 @@ class RandomRing {
   }
 
   double Curvature(int k, double reach) const {
-    const LatticePoint tangent{-normals_[k].y, normals_[k].x};
+    const Point tangent{-normals_[k].y, normals_[k].x};
     double turn = 0, square = 0;
     ForEachNear(k, reach, [&](int j, double w) {
       const double along = Dot(Minus(points_[j], points_[k]), tangent);
@@ -105,7 +105,7 @@ class RandomRing {
     double sum = 0, weight = 0;
     ForEachNear(k, reach, [&](int j, double w) {
       w *= std::pow(std::max(0.0, Dot(normals_[k], normals_[j])), 16);
-      const LatticePoint chord = Minus(points_[j], points_[k]);
+      const Point chord = Minus(points_[j], points_[k]);
       sum += w * ((Dot(normals_[k], chord) + Dot(normals_[j], chord)) / 2 + bases_[j]);
       weight += w;
     });
@@ -113,10 +113,8 @@ class RandomRing {
   }
 
  private:
-  static double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
-  static LatticePoint Minus(const LatticePoint& a, const LatticePoint& b) {
-    return {a.x - b.x, a.y - b.y};
-  }
+  static double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
+  static Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
   double WeightOf(int k) const { return (steps_[(k + count() - 1) % count()] + steps_[k]) / 2; }
 
   template <typename Visit>
@@ -132,7 +130,7 @@ class RandomRing {
     }
   }
 
-  std::vector<LatticePoint> points_, normals_;
+  std::vector<Point> points_, normals_;
   std::vector<double> bases_, steps_;
 };
 
@@ -180,7 +178,7 @@ TEST(RingWindows, AgreeWithAWalkAlongTheRing) {
     for (const bool by_angle : {false, true}) {
       MeanNormals(ring, 0, ring.count, reach, by_angle);
       for (int k = 0; k < ring.count; ++k) {
-        const LatticePoint normal = expected.MeanNormal(k, reach, by_angle);
+        const Point normal = expected.MeanNormal(k, reach, by_angle);
         EXPECT_NEAR(ring.next_x[k], normal.x, 1e-6) << "seed " << seed;
         EXPECT_NEAR(ring.next_y[k], normal.y, 1e-6) << "seed " << seed;
       }
@@ -206,7 +204,7 @@ TEST(RingWindows, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
   constexpr int kSides = 60, kCrowd = 80;
   constexpr double kReach = 10.5;
   for (const int crowded : {15, kSides - 14}) {
-    std::vector<LatticePoint> points;
+    std::vector<Point> points;
     for (int k = 0; k < kSides; ++k) {
       const double angle = 2 * 3.14159265358979323846 * k / kSides;
       points.insert(points.end(), k == crowded ? kCrowd : 1,

@@ -45,28 +45,27 @@ enum class Clamping {
   kToNodes,   // As the placement does, but crossings of lattice edges up to their very nodes.
 };
 
-LatticePoint Clamped(const Stages& stages, std::uint32_t segment, LatticePoint point,
-                     Clamping clamping) {
+Point Clamped(const Stages& stages, std::uint32_t segment, Point point, Clamping clamping) {
   if (clamping == Clamping::kNone) return point;
   const ActiveCell& cell = stages.crossings.cells[stages.crossings.segments[segment].cell];
   if (clamping == Clamping::kWhole || clamping == Clamping::kToNodes) {
     return ClampToCell(stages.bins.tiles, cell, stages.crossings.segments[segment], point);
   }
-  const LatticePoint origin = CellOrigin(stages.bins.tiles, cell);
+  const Point origin = CellOrigin(stages.bins.tiles, cell);
   const double margin = clamping == Clamping::kToSides ? 0 : 1.0 / 1024;
   return {origin.x + std::clamp(point.x - origin.x, margin, 1 - margin),
           origin.y + std::clamp(point.y - origin.y, margin, 1 - margin)};
 }
 
 // The crossing of a segment's entry edge, not kept away from the nodes.
-LatticePoint BareCrossing(const Stages& stages, const Segment& segment) {
+Point BareCrossing(const Stages& stages, const Segment& segment) {
   const ActiveCell& cell = stages.crossings.cells[segment.cell];
   const std::array<double, 4> f = stages.CornerValues(cell);
   constexpr int kCornerX[4] = {0, 1, 1, 0};
   constexpr int kCornerY[4] = {0, 0, 1, 1};
   const int a = segment.entry, b = (segment.entry + 1) % 4;
   const double t = f[a] / (f[a] - f[b]);
-  const LatticePoint origin = CellOrigin(stages.bins.tiles, cell);
+  const Point origin = CellOrigin(stages.bins.tiles, cell);
   return {origin.x + kCornerX[a] + t * (kCornerX[b] - kCornerX[a]),
           origin.y + kCornerY[a] + t * (kCornerY[b] - kCornerY[a])};
 }
@@ -74,8 +73,8 @@ LatticePoint BareCrossing(const Stages& stages, const Segment& segment) {
 // Where the vertices of a lattice's cells want to be.
 enum class Aim { kNewton, kAnywhere, kCorners, kOnePoint, kCount };
 
-LatticePoint Aimed(Random& random, Aim aim, const CellPlane& plane, LatticePoint target) {
-  const LatticePoint& p = plane.point;
+Point Aimed(Random& random, Aim aim, const CellPlane& plane, Point target) {
+  const Point& p = plane.point;
   switch (aim) {
     case Aim::kAnywhere:
       return {p.x + random.Uniform(-3, 3), p.y + random.Uniform(-3, 3)};
@@ -114,13 +113,13 @@ void RingsThroughRoots(Random& random, const Stages& stages, Clamping clamping, 
   constexpr double kShares[] = {0, 0.1, 0.5, 0.9, 1};
   const double kept = kShares[random.Below(5)];
   const auto aim = static_cast<Aim>(random.Below(static_cast<std::size_t>(Aim::kCount)));
-  const LatticePoint corner = topology.segments.empty()
-                                  ? LatticePoint{}
-                                  : CellOrigin(stages.bins.tiles, stages.crossings.cells[0]);
-  const LatticePoint target{corner.x + static_cast<double>(random.Below(12)) - 6,
-                            corner.y + static_cast<double>(random.Below(12))};
+  const Point corner = topology.segments.empty()
+                           ? Point{}
+                           : CellOrigin(stages.bins.tiles, stages.crossings.cells[0]);
+  const Point target{corner.x + static_cast<double>(random.Below(12)) - 6,
+                     corner.y + static_cast<double>(random.Below(12))};
   rings.Clear();
-  const auto add = [&](LatticePoint point) {
+  const auto add = [&](Point point) {
     rings.points.push_back(point.x * cell_size);
     rings.points.push_back(point.y * cell_size);
   };

@@ -16,14 +16,14 @@ namespace {
 
 // A square of side 20, whose corners are 20 cells of the ring apart, with many vertices that have
 // all but fallen together around those that are `reach` from the first one, either way.
-std::vector<LatticePoint> CrowdedSquare(support::Random& random, double reach) {
+std::vector<Point> CrowdedSquare(support::Random& random, double reach) {
   std::vector<double> at;
   for (int k = 0; k < 80; ++k) at.push_back(k + (k == 0 ? 0 : random.Uniform(-0.4, 0.4)));
   for (const double crowd : {reach, 80 - reach}) {
     for (int k = 0; k < 60; ++k) at.push_back(crowd + random.Uniform(-2e-6, 2e-5));
   }
   std::sort(at.begin(), at.end());
-  std::vector<LatticePoint> ring;
+  std::vector<Point> ring;
   for (const double s : at) {
     const double along = std::fmod(s, 20);
     switch (static_cast<int>(s / 20)) {
@@ -55,12 +55,12 @@ TEST(UnrolledRings, HaveMarginsThatHoldEveryVertexThatAWindowTakesForNear) {
   for (unsigned seed = 1; seed <= 300; ++seed) {
     support::Random random(seed);
     const double reach = random.Uniform(3, 18);
-    const std::vector<LatticePoint> ring = CrowdedSquare(random, reach);
+    const std::vector<Point> ring = CrowdedSquare(random, reach);
     const std::size_t count = ring.size();
     const auto size = SizeForWindows(ring, reach);
     ASSERT_EQ(size.count, count);
     const auto step = [&](std::size_t k) {
-      const LatticePoint &from = ring[k % count], &to = ring[(k + 1) % count];
+      const Point &from = ring[k % count], &to = ring[(k + 1) % count];
       return LengthInUnits(RingUnits(to.x) - RingUnits(from.x),
                            RingUnits(to.y) - RingUnits(from.y));
     };

@@ -64,7 +64,7 @@ TEST(Vertices, OfMarchingSquaresAreLinearInterpolationsOnLatticeEdges) {
     if (t < 1e-3 || t > 1 - 1e-3) continue;  // Kept off the nodes.
     constexpr double kX[] = {0, 1, 1, 0};
     constexpr double kY[] = {0, 0, 1, 1};
-    const LatticePoint origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
+    const Point origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
     const double x = origin.x + kX[edge] + t * (kX[(edge + 1) % 4] - kX[edge]);
     const double y = origin.y + kY[edge] + t * (kY[(edge + 1) % 4] - kY[edge]);
     EXPECT_NEAR(stages.result.rings.points[2 * k], x * cell_size, 1e-10);
@@ -81,7 +81,7 @@ TEST_P(VerticesInCells, StayStrictlyInsideTheirCellAndInASaddleOnTheirSide) {
   ASSERT_GT(stages.planes.size(), 500u);
   for (std::size_t k = 0; k < stages.planes.size(); ++k) {
     const ActiveCell& cell = CellOf(stages, k);
-    const LatticePoint origin = CellOrigin(stages.bins.tiles, cell);
+    const Point origin = CellOrigin(stages.bins.tiles, cell);
     const std::uint32_t point = stages.placed.point_of_segment[k];
     const double u = stages.result.rings.points[2 * point] - origin.x;
     const double v = stages.result.rings.points[2 * point + 1] - origin.y;
@@ -136,16 +136,16 @@ TEST(Vertices, OfTheVirtualPlaneTakeOneBoundedStepAlongTheGradient) {
     return VirtualPlaneVertex(plane, VirtualPlaneConstants{}.newton_step);
   };
   // F = value + g . d is zero at -value g / |g|^2.
-  const LatticePoint plain = vertex(0.1f, 0.6f, 0.8f);
+  const Point plain = vertex(0.1f, 0.6f, 0.8f);
   EXPECT_NEAR(plain.x, 10 - 0.06, kRounding);
   EXPECT_NEAR(plain.y, 20 - 0.08, kRounding);
-  const LatticePoint inward = vertex(-0.2f, 0, 2);
+  const Point inward = vertex(-0.2f, 0, 2);
   EXPECT_NEAR(inward.x, 10, 1e-12);
   EXPECT_NEAR(inward.y, 20.1, kRounding);
-  const LatticePoint longest = vertex(5, 1, 0);
+  const Point longest = vertex(5, 1, 0);
   EXPECT_NEAR(longest.x, 10 - VirtualPlaneConstants{}.newton_step, 1e-12);
   EXPECT_NEAR(longest.y, 20, 1e-12);
-  const LatticePoint weak = vertex(0.1f, 1, 1, true);
+  const Point weak = vertex(0.1f, 1, 1, true);
   EXPECT_EQ(weak.x, 10);
   EXPECT_EQ(weak.y, 20);
 }
@@ -178,7 +178,7 @@ TEST(Vertices, OfTheQefLieOnTheCornerOfTwoStraightLines) {
     const double ax = 10.5 - px, ay = 10 - py, bx = 10 - px, by = 10.5 - py;
     const double a = ax * 10.5 + ay * 10, b = bx * 10 + by * 10.5;
     const double determinant = ax * by - ay * bx;
-    const LatticePoint vertex =
+    const Point vertex =
         QefVertex(InputOf(corner, frame), corner.topology.segments[k], corner.planes[k]);
     EXPECT_NEAR(vertex.x, (a * by - ay * b) / determinant, 1e-5);
     EXPECT_NEAR(vertex.y, (ax * b - a * bx) / determinant, 1e-5);
@@ -190,7 +190,7 @@ TEST(Vertices, OfTheQefStayAtTheMiddleAlongADirectionThatNormalsDoNotConstrain) 
   const Corner corner(8.2, 8.2);
   const Frame frame = corner.particles.AsFrame();
   const std::size_t k = corner.SegmentInCell(10, 10);
-  const LatticePoint vertex =
+  const Point vertex =
       QefVertex(InputOf(corner, frame), corner.topology.segments[k], corner.planes[k]);
   EXPECT_NEAR(vertex.x, vertex.y, 1e-5);
   EXPECT_NEAR(vertex.x + vertex.y, 20.5, 0.1);
@@ -203,9 +203,9 @@ TEST(Vertices, OfTheQefBeyondTheirCellAreMovedToItsSide) {
     const Frame frame = corner.particles.AsFrame();
     const std::size_t k = corner.SegmentInCell(10, 10);
     const std::uint32_t segment = corner.topology.segments[k];
-    const LatticePoint free = QefVertex(InputOf(corner, frame), segment, corner.planes[k]);
-    const LatticePoint kept = ClampToCell(corner.bins.tiles, corner.planes[k].cell,
-                                          corner.crossings.segments[segment], free);
+    const Point free = QefVertex(InputOf(corner, frame), segment, corner.planes[k]);
+    const Point kept = ClampToCell(corner.bins.tiles, corner.planes[k].cell,
+                                   corner.crossings.segments[segment], free);
     const auto within = [](double v) { return std::clamp(v, 10.0, 11.0); };
     EXPECT_NEAR(kept.x, within(free.x), 2e-3);
     EXPECT_NEAR(kept.y, within(free.y), 2e-3);
@@ -231,7 +231,7 @@ TEST(Vertices, OfTheFarthestParticleAreTheParticlesThatTheSectionPicks) {
     const support::FieldOracle oracle(stages.particles, stages.parameters, 1.0);
     for (std::size_t k = 0; k < stages.planes.size(); ++k) {
       const CellPlane& plane = stages.planes[k];
-      const LatticePoint origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
+      const Point origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
       const auto mean = oracle.Mean({(origin.x + 0.5) * cell, (origin.y + 0.5) * cell});
       if (!mean) continue;
       const support::Vector gradient = oracle.PhiGradient(*mean);

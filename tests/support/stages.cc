@@ -72,11 +72,11 @@ void Stages::TraceOn(const std::function<double(int, int)>& function, TileCoordi
       const double py = particles.y(k) / scale.cell_size - row;
       if (std::min(px, py) < 0 || std::max(px, py) >= kTileSize) continue;
       const float last = std::nextafter(static_cast<float>(kTileSize), 0.0f);
-      bins.entries.push_back({std::min(static_cast<float>(px), last),
-                              std::min(static_cast<float>(py), last),
-                              static_cast<std::uint32_t>(k)});
+      bins.particles.push_back({std::min(static_cast<float>(px), last),
+                                std::min(static_cast<float>(py), last),
+                                static_cast<std::uint32_t>(k)});
     }
-    bins.offsets.push_back(static_cast<std::uint32_t>(bins.entries.size()));
+    bins.offsets.push_back(static_cast<std::uint32_t>(bins.particles.size()));
   }
   Trace();
 }

@@ -14,7 +14,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "rings/rings.h"
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 #include "support/particles.h"
 #include "vertices/vertices.h"
 
@@ -33,7 +33,7 @@ struct Stages {
   Crossings crossings;
   RingScratch ring_scratch;
   RingTopology topology;
-  PointField field;
+  LevelSetSampler field;
   NormalScratch normal_scratch;
   std::vector<CellPlane> planes;
   std::vector<CellNormal> next_normals;

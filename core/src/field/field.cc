@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "base/prefetch.h"
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 #include "field/level_set_formula.h"
 #include "field/tile_kernels.h"
 
@@ -25,10 +25,10 @@ const float* WeightsOf(const ParticleBins& bins) {
   return bins.weight.empty() ? nullptr : bins.weight.data();
 }
 
-TileEntries EntriesOf(const ParticleBins& bins, std::uint32_t tile) {
+TileParticles ParticlesOf(const ParticleBins& bins, std::uint32_t tile) {
   const std::uint32_t first = bins.offsets[tile];
   const float* const weights = WeightsOf(bins);
-  return {bins.entries.data() + first, weights == nullptr ? nullptr : weights + first,
+  return {bins.particles.data() + first, weights == nullptr ? nullptr : weights + first,
           bins.CountOf(tile)};
 }
 
@@ -47,18 +47,19 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
   if (fits && bins.CountOf(tile) == 0) return;
   // Written to as soon as the sums are known, which takes longer than memory far away.
   PrefetchLines(std::span<const float>(values));
-  if (fits) level_set.rims.Prefetch(tile);
+  if (fits) level_set.halo.Prefetch(tile);
   alignas(64) NodeSums sums;
   sums.fill(0);
   NodeRange rows = kAllNodes;
   if (fits) {
-    const NodeRange reached = ScatterKernels(EntriesOf(bins, tile), radius, sums);
-    level_set.rims.Keep(tile, sums, reached);
-    rows = level_set.rims.OwnRows(tile);
+    const NodeRange reached = ScatterKernels(ParticlesOf(bins, tile), radius, sums);
+    level_set.halo.Keep(tile, sums, reached);
+    rows = level_set.halo.OwnRows(tile);
   } else {
-    NearWalk(bins, tile, nullptr, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
-      ScatterNearKernels(near, WeightsOf(bins), radius, sums);
-    });
+    MaskedParticles(bins, tile, nullptr, ParticleFields::kAll)
+        .ForEachBlock([&](const ParticleBlock& near) {
+          ScatterNearKernels(near, WeightsOf(bins), radius, sums);
+        });
   }
   // Of a fixed size and without a call, unlike copy_n.
   for (int j = rows.first; j <= rows.last; ++j) {
@@ -89,11 +90,11 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
   BitRows& open = level_set.open[tile];
   NodeRange rows = kAllNodes;
   if (static_cast<float>(scale.kernel_radius) <= kSumMargin) {
-    const SumRims& rims = level_set.rims;
-    rows = rims.RowsReached(bins.tiles, tile);
-    const NodeRange own = rims.OwnRows(tile);
+    const DensityHalo& halo = level_set.halo;
+    rows = halo.RowsReached(bins.tiles, tile);
+    const NodeRange own = halo.OwnRows(tile);
     FillRowsOf(values, rows, own, 0);
-    rims.AddTo(bins.tiles, tile, values);
+    halo.AddTo(bins.tiles, tile, values);
     FillRowsOf(values, kAllNodes, rows, level_set.void_value);
     inside.fill(0);
     open.fill(0);
@@ -113,8 +114,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)
-      .ForEachBlock([&](const NearEntries& near) {
+  MaskedParticles(bins, tile, masked ? &mask : nullptr, ParticleFields::kPositions)
+      .ForEachBlock([&](const ParticleBlock& near) {
         AddNearMoments(near, radius, blocks, asked.has_kernel_sums, sums);
       });
   return EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale,
@@ -203,7 +204,7 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   level_set.open.resize(tiles);
   level_set.passes.assign(tiles, 0);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  if (radius <= kSumMargin) level_set.rims.Prepare(bins, radius);
+  if (radius <= kSumMargin) level_set.halo.Prepare(bins, radius);
   ParallelForRanges(tiles, kTilesAtOnce, [&](std::size_t first, std::size_t last) {
     SampleTiles(bins, scale, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
                 level_set);

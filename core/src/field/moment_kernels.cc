@@ -25,7 +25,7 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 // Particles that a step has chosen: their coordinates along the axis that it chose by, and along
 // the other one.
 struct Chosen {
-  alignas(64) NearEntries::PerEntry<float> along, across;
+  alignas(64) ParticleBlock::PerParticle<float> along, across;
   int count;
 };
 
@@ -95,7 +95,7 @@ HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inve
   }
 }
 
-void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums) {
   const float inverse_square = 1 / (radius * radius);
   Chosen of_rows, of_block;
@@ -122,7 +122,7 @@ namespace partiemc {
 
 HWY_EXPORT(AddNearMoments);
 
-void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums) {
   HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, radius, blocks, has_kernel_sums, sums);
 }

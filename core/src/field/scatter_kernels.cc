@@ -27,7 +27,7 @@ struct KernelCorners {
 };
 
 // Widens `rows`, of first rows, by those of these particles.
-HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
+HWY_INLINE void FindCorners(const BinnedParticle* particles, int count, float radius,
                             KernelCorners& corners, NodeRange& rows) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> d_int;
@@ -37,7 +37,7 @@ HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
   int k = 0;
   for (; k + step <= count; k += step) {
     hn::Vec<decltype(d)> x, y, source;
-    hn::LoadInterleaved3(d, &entries[k].x, x, y, source);
+    hn::LoadInterleaved3(d, &particles[k].x, x, y, source);
     const auto column = NodesAfter(d, hn::Sub(x, hn::Set(d, radius)));
     const auto row = NodesAfter(d, hn::Sub(y, hn::Set(d, radius)));
     hn::StoreU(hn::Sub(x, hn::ConvertTo(d, column)), d, corners.x.data() + k);
@@ -50,10 +50,10 @@ HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
   }
   rows = {hn::GetLane(hn::MinOfLanes(d_int, lowest)), hn::GetLane(hn::MaxOfLanes(d_int, highest))};
   for (; k < count; ++k) {
-    const int column = NodeAfter(entries[k].x - radius);
-    const int row = NodeAfter(entries[k].y - radius);
-    corners.x[k] = entries[k].x - static_cast<float>(column);
-    corners.y[k] = entries[k].y - static_cast<float>(row);
+    const int column = NodeAfter(particles[k].x - radius);
+    const int row = NodeAfter(particles[k].y - radius);
+    corners.x[k] = particles[k].x - static_cast<float>(column);
+    corners.y[k] = particles[k].y - static_cast<float>(row);
     corners.at[k] = SumIndex(column, row);
     rows = {std::min(rows.first, row), std::max(rows.last, row)};
   }
@@ -63,14 +63,14 @@ HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
 // that no branch depends on where a particle lies. add(x, y, index, first sum) adds one. Returns
 // the first rows of kernels, from the lowest to the highest.
 template <typename Add>
-HWY_INLINE NodeRange ForEachCorner(const TileEntries& entries, float radius, NodeSums& sums,
+HWY_INLINE NodeRange ForEachCorner(const TileParticles& particles, float radius, NodeSums& sums,
                                    Add add) {
   KernelCorners corners;
   NodeRange rows = {2 * kTileSize, -2 * kTileSize};
-  const auto count = static_cast<int>(entries.count);
+  const auto count = static_cast<int>(particles.count);
   for (int first = 0; first < count; first += kBlock) {
     const int in_block = std::min(kBlock, count - first);
-    FindCorners(entries.entries + first, in_block, radius, corners, rows);
+    FindCorners(particles.particles + first, in_block, radius, corners, rows);
     for (int k = 0; k < in_block; ++k) {
       add(corners.x[k], corners.y[k], first + k, sums.data() + corners.at[k]);
     }
@@ -84,7 +84,7 @@ HWY_INLINE NodeRange ForEachCorner(const TileEntries& entries, float radius, Nod
 constexpr int kNarrowSpan = kLanes;
 
 template <bool kWeighted, int kPairs>
-NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, NodeSums& sums) {
+NodeRange ScatterNarrow(const TileParticles& particles, float radius, int span, NodeSums& sums) {
   const hn::CappedTag<float, 2 * kLanes> d;
   const Lanes d_row;
   const auto inverse_square = hn::Set(d, 1 / (radius * radius));
@@ -98,7 +98,7 @@ NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, Node
   const auto column = hn::Load(d, columns);
   const auto reached_row = hn::Lt(lane, hn::Set(d, static_cast<float>(span)));
   const auto reached_column = hn::Lt(column, hn::Set(d, static_cast<float>(span)));
-  return ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
+  return ForEachCorner(particles, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
     const auto dx = hn::Sub(hn::Set(d, x), column);
     const auto dy = hn::Sub(hn::Set(d, y), lane);
     // Beyond the span terms that make k = 0, on every target alike.
@@ -110,7 +110,7 @@ NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, Node
       const auto row_term = hn::TableLookupLanes(row_terms, hn::SetTableIndices(d, rows[pair]));
       const auto t = hn::Max(hn::Zero(d), hn::Sub(row_term, column_term));
       auto kernel = hn::Mul(hn::Mul(t, t), t);
-      if constexpr (kWeighted) kernel = hn::Mul(kernel, hn::Set(d, entries.weight[k]));
+      if constexpr (kWeighted) kernel = hn::Mul(kernel, hn::Set(d, particles.weight[k]));
       AddTo(at + 2 * pair * kSumColumns, hn::LowerHalf(kernel));
       AddTo(at + (2 * pair + 1) * kSumColumns, hn::UpperHalf(d_row, kernel));
     }
@@ -118,29 +118,29 @@ NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, Node
 }
 
 template <bool kWeighted>
-NodeRange ScatterNarrowOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
+NodeRange ScatterNarrowOf(const TileParticles& particles, float radius, int span, NodeSums& sums) {
   const auto scatter = span <= 2   ? ScatterNarrow<kWeighted, 1>
                        : span <= 4 ? ScatterNarrow<kWeighted, 2>
                        : span <= 6 ? ScatterNarrow<kWeighted, 3>
                                    : ScatterNarrow<kWeighted, 4>;
-  return scatter(entries, radius, span, sums);
+  return scatter(particles, radius, span, sums);
 }
 #else
 constexpr int kNarrowSpan = 0;
 template <bool kWeighted>
-NodeRange ScatterNarrowOf(const TileEntries&, float, int, NodeSums&) {
+NodeRange ScatterNarrowOf(const TileParticles&, float, int, NodeSums&) {
   return kNoNodes;
 }
 #endif
 
 template <bool kWeighted>
-NodeRange ScatterKernelsOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
-  if (span <= kNarrowSpan) return ScatterNarrowOf<kWeighted>(entries, radius, span, sums);
+NodeRange ScatterKernelsOf(const TileParticles& particles, float radius, int span, NodeSums& sums) {
+  if (span <= kNarrowSpan) return ScatterNarrowOf<kWeighted>(particles, radius, span, sums);
   const float inverse_square = 1 / (radius * radius);
   alignas(64) RowTerms row_terms;
-  return ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
+  return ForEachCorner(particles, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
     SetRowTerms(y, {0, span - 1}, inverse_square, row_terms);
-    const float weight = kWeighted ? entries.weight[k] : 1.0f;
+    const float weight = kWeighted ? particles.weight[k] : 1.0f;
     for (int v = 0; v < span; v += kLanes) {
       const Vector column_term = ColumnTermsAt(x, v, span - 1, inverse_square).term;
       for (int row = 0; row < span; ++row) {
@@ -151,11 +151,11 @@ NodeRange ScatterKernelsOf(const TileEntries& entries, float radius, int span, N
   });
 }
 
-NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
+NodeRange ScatterKernels(const TileParticles& particles, float radius, NodeSums& sums) {
   const int span = static_cast<int>(std::ceil(2 * radius));
-  const NodeRange firsts = entries.weight != nullptr
-                               ? ScatterKernelsOf<true>(entries, radius, span, sums)
-                               : ScatterKernelsOf<false>(entries, radius, span, sums);
+  const NodeRange firsts = particles.weight != nullptr
+                               ? ScatterKernelsOf<true>(particles, radius, span, sums)
+                               : ScatterKernelsOf<false>(particles, radius, span, sums);
   return {firsts.first, firsts.last + span - 1};
 }
 
@@ -168,8 +168,8 @@ namespace partiemc {
 
 HWY_EXPORT(ScatterKernels);
 
-NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
-  return HWY_DYNAMIC_DISPATCH(ScatterKernels)(entries, radius, sums);
+NodeRange ScatterKernels(const TileParticles& particles, float radius, NodeSums& sums) {
+  return HWY_DYNAMIC_DISPATCH(ScatterKernels)(particles, radius, sums);
 }
 
 }  // namespace partiemc

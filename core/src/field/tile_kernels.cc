@@ -25,13 +25,13 @@ HWY_INLINE NodeRange NodesReached(float centre, float radius, NodeRange among) {
 }
 
 template <bool kWeighted>
-void ScatterNearKernelsOf(const NearEntries& near, const float* weight, float radius,
+void ScatterNearKernelsOf(const ParticleBlock& near, const float* weight, float radius,
                           NodeSums& sums) {
   const float inverse_square = 1 / (radius * radius);
   for (int e = 0; e < near.count; ++e) {
     const NodeRange columns = NodesReached(near.x[e], radius, kAllNodes);
     const NodeRange rows = NodesReached(near.y[e], radius, kAllNodes);
-    const float of = kWeighted ? weight[near.entry[e]] : 1.0f;
+    const float of = kWeighted ? weight[near.particle[e]] : 1.0f;
     ForEachVector(
         near.x[e], near.y[e], columns, rows, inverse_square,
         [&](int column, int row, const ColumnTerms& terms, Vector, Vector row_term) HWY_ATTR {
@@ -40,7 +40,7 @@ void ScatterNearKernelsOf(const NearEntries& near, const float* weight, float ra
   }
 }
 
-void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
+void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums) {
   weight != nullptr ? ScatterNearKernelsOf<true>(near, weight, radius, sums)
                     : ScatterNearKernelsOf<false>(near, weight, radius, sums);
@@ -203,7 +203,7 @@ HWY_EXPORT(ScatterNearKernels);
 HWY_EXPORT(ClassifyNodes);
 HWY_EXPORT(EvaluateNodes);
 
-void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
+void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums) {
   HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
 }

@@ -171,7 +171,7 @@ Axes AxesOf(Plane plane) {
   return {0, 1, 2};
 }
 
-WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle) {
+Point PositionOf(const Frame& frame, Plane plane, std::size_t particle) {
   return VisitPositions(frame, plane, [&](const auto& reader) { return reader[particle]; });
 }
 

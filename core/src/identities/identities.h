@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bins/bins.h"
-#include "crossings/crossed_rows.h"
 #include "crossings/crossings.h"
+#include "crossings/scanlines.h"
 #include "identities/ring_relations.h"
 #include "identities/ring_tracks.h"
 #include "partiemc/frame.h"
@@ -21,7 +21,7 @@ namespace partiemc {
 
 /// Warm buffers of ContinueRings.
 struct IdentityScratch {
-  CrossedRows rows;
+  Scanlines rows;
   std::vector<std::uint32_t> result_ring;    // By ring of the topology; kNoRing: it was dropped.
   std::vector<std::uint32_t> number;         // By ring of the topology, in the order of their runs.
   std::vector<std::uint32_t> topology_ring;  // By number.

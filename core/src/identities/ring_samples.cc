@@ -190,10 +190,10 @@ void FillShortRings(const SampleInput& input, RingSamples& s) {
     if (s.tile_limit[tile] == 0) continue;
     input.components.ForEachParticleOf(
         input.bins, input.crossings, tile,
-        [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+        [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
           const std::uint32_t ring = input.ring_of_component[component];
           if (ring == kNoRing || s.ring_limit[ring] == 0) return;
-          const BinEntry& at = input.bins.entries[entry];
+          const BinnedParticle& at = input.bins.particles[particle];
           TakeSample(SampleAt(input.bins.tiles[tile], at.x, at.y, input.ids[at.source], ring), s);
         });
   }

@@ -50,11 +50,11 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous, RingT
   const VelocityUnits units(frame);
   input.components.ForEachParticle(
       input.bins, input.crossings,
-      [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+      [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
         const std::uint32_t ring = input.ring_of_component[component];
         if (ring == kNoRing) return;
         const PlaneVelocity velocity =
-            VelocityOf(frame, input.plane, input.bins.entries[entry].source);
+            VelocityOf(frame, input.plane, input.bins.particles[particle].source);
         t.sum_x[ring] += units.Of(velocity.x);
         t.sum_y[ring] += units.Of(velocity.y);
       });

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
-#include "sampler/point_groups.h"
+#include "sampler/query_batch.h"
 
 namespace partiemc {
 namespace {
@@ -54,8 +54,8 @@ void AddPoints(const TileDirectory& directory, std::size_t k, bool with_entry, C
                Groups& groups) {
   const ActiveCell& cell = plane.cell;
   plane.point = {(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
-  const LatticePoint origin = CellOrigin(directory, cell);
-  const auto add = [&](std::size_t vertex, const LatticePoint& point) {
+  const Point origin = CellOrigin(directory, cell);
+  const auto add = [&](std::size_t vertex, const Point& point) {
     groups.Add(vertex, cell.tile, {point.x - origin.x + cell.i, point.y - origin.y + cell.j});
   };
   if (with_entry) add(2 * k, plane.entry);
@@ -80,12 +80,12 @@ std::size_t GroupOf(const RingTopology& rings, std::size_t segment) {
 
 // The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
 // no particle reaches the point the gradient stays 0, hence weak.
-void SampleAtMean(const TileDirectory& directory, const PointField& field, CellPlane& plane) {
+void SampleAtMean(const TileDirectory& directory, const LevelSetSampler& field, CellPlane& plane) {
   const ActiveCell& cell = plane.cell;
   const double centre_x = cell.i + 0.5;
   const double centre_y = cell.j + 0.5;
   const FieldSample centre = field.Sample(cell.tile, centre_x, centre_y);
-  const LatticePoint origin = CellOrigin(directory, cell);
+  const Point origin = CellOrigin(directory, cell);
   plane.point = {origin.x + 0.5 + centre.mean_x, origin.y + 0.5 + centre.mean_y};
   plane.gradient_x = plane.gradient_y = 0;
   plane.value = static_cast<float>(centre.value);
@@ -158,7 +158,7 @@ void Remember(std::span<const std::uint32_t> order, const NormalScratch& scratch
 }  // namespace
 
 void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
-                     const RingTopology& rings, const PointField& field,
+                     const RingTopology& rings, const LevelSetSampler& field,
                      const ReconstructionParameters& parameters,
                      std::span<const CellNormal> previous, NormalScratch& scratch,
                      std::vector<CellPlane>& planes, std::vector<CellNormal>& next) {
@@ -207,14 +207,14 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
     for (std::size_t k = first; k < last; ++k) {
       if (k == *end) ++end;
       planes[k].cell = crossings.cells[cells[k - first]];
-      planes[k].entry = rings.entries[k];
-      planes[k].exit = rings.entries[k + 1 == *end ? *(end - 1) : k + 1];
+      planes[k].entry = rings.entry_points[k];
+      planes[k].exit = rings.entry_points[k + 1 == *end ? *(end - 1) : k + 1];
       begins_group[k - first] = BeginsGroup(k - *(end - 1));
     }
     if (parameters.placement == Placement::kFarthestParticle) {
       for (std::size_t k = first; k < last; ++k) SampleAtMean(bins.tiles, field, planes[k]);
     } else {
-      auto groups = CollectPoints<LatticePoint>(sample);
+      auto groups = CollectPoints<Point>(sample);
       for (std::size_t k = first; k < last; ++k) {
         if (begins_group[k - first]) groups.Part();
         AddPoints(bins.tiles, k, at_entries, planes[k], groups);

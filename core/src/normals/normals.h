@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "crossings/cells_by_row.h"
 #include "crossings/crossings.h"
+#include "crossings/scanlines.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
 #include "rings/rings.h"
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 
 namespace partiemc {
 
@@ -20,11 +20,11 @@ namespace partiemc {
 /// cell's centre for `farthest-particle` (the paper's), the middle of the segment for the others.
 /// What comes of sums of floats is kept as floats: planes are more than a cache holds.
 struct CellPlane {
-  ActiveCell cell;           ///< Of the segment: along a ring, cells lie anywhere in memory.
-  bool is_weak = false;      ///< The gradient was too small; the normal is a fallback.
-  LatticePoint point;        ///< Lattice coordinates of the world, in cells.
-  LatticePoint entry, exit;  ///< The segment's ends: linear crossings of lattice edges.
-  float value = 0;           ///< F at the point.
+  ActiveCell cell;       ///< Of the segment: along a ring, cells lie anywhere in memory.
+  bool is_weak = false;  ///< The gradient was too small; the normal is a fallback.
+  Point point;           ///< Lattice coordinates of the world, in cells.
+  Point entry, exit;     ///< The segment's ends: linear crossings of lattice edges.
+  float value = 0;       ///< F at the point.
   float gradient_x = 0, gradient_y = 0;  ///< Of F; of phi for `farthest-particle`.
   double normal_x = 0, normal_y = 0;     ///< Unit, oriented (Eq. 11).
   /// `virtual-plane` only: F and its gradient at `entry`.
@@ -57,7 +57,7 @@ struct NormalScratch {
 /// neighbouring reliable ones, else the segment's own.
 /// Deterministic, in parallel over segments. Cost: a field sample per segment.
 void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
-                     const RingTopology& rings, const PointField& field,
+                     const RingTopology& rings, const LevelSetSampler& field,
                      const ReconstructionParameters& parameters,
                      std::span<const CellNormal> previous, NormalScratch& scratch,
                      std::vector<CellPlane>& planes, std::vector<CellNormal>& next);

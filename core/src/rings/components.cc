@@ -6,7 +6,7 @@
 
 #include "base/bits.h"
 #include "base/parallel.h"
-#include "rings/entry_counts.h"
+#include "rings/particle_counts.h"
 
 namespace partiemc {
 namespace {
@@ -139,10 +139,10 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
     cells[j] = rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1];
   }
   TileShare share{component, 0, 0};
-  share.count = CountEntriesIn(cells, bins.entries, bins.offsets[tile], bins.offsets[tile + 1]);
+  share.count = CountParticlesIn(cells, bins.particles, bins.offsets[tile], bins.offsets[tile + 1]);
   if (bins.weight.empty()) return share;
   for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    if (LiesIn(bins.entries[e], cells)) share.weight += bins.weight[e];
+    if (LiesIn(bins.particles[e], cells)) share.weight += bins.weight[e];
   }
   return share;
 }
@@ -187,9 +187,9 @@ void Components::CountParticles(const ParticleBins& bins, const Crossings& cross
       continue;
     }
     ForEachParticleOf(bins, crossings, tile,
-                      [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+                      [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
                         ++counts[component];
-                        if (!bins.weight.empty()) weights[component] += bins.weight[entry];
+                        if (!bins.weight.empty()) weights[component] += bins.weight[particle];
                       });
   }
 }

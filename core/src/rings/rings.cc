@@ -75,10 +75,10 @@ void FetchCorners(const LevelSet& level_set, const ActiveCell& cell) {
   if (cell.j + 1 < kTileSize) hwy::Prefetch(lower + kTileSize);
 }
 
-void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
-                 const Crossings& crossings, RingTopology& rings) {
+void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
+                     const Crossings& crossings, RingTopology& rings) {
   const std::size_t count = rings.segments.size();
-  rings.entries.resize(count);
+  rings.entry_points.resize(count);
   ParallelForRanges(count, kSegmentGrain, [&](std::size_t first, std::size_t last) {
     const auto segment_of = [&](std::size_t k) -> const Segment& {
       return crossings.segments[rings.segments[k]];
@@ -91,18 +91,18 @@ void FindEntries(const TileDirectory& directory, const LevelSet& level_set,
       if (k + 3 * kFetchedAhead < last) hwy::Prefetch(&segment_of(k + 3 * kFetchedAhead));
       if (k + 2 * kFetchedAhead < last) hwy::Prefetch(&cell_of(k + 2 * kFetchedAhead));
       if (k + kFetchedAhead < last) FetchCorners(level_set, cell_of(k + kFetchedAhead));
-      rings.entries[k] = EdgeCrossing(directory, level_set, cell_of(k), segment_of(k).entry);
+      rings.entry_points[k] = EdgeCrossing(directory, level_set, cell_of(k), segment_of(k).entry);
     }
   });
 }
 
 // Signed area of a ring through its edge crossings, in cells.
 double AreaOf(const RingTopology& rings, std::size_t ring) {
-  const std::span<const LatticePoint> points =
-      std::span(rings.entries)
+  const std::span<const Point> points =
+      std::span(rings.entry_points)
           .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
   double twice_area = 0;
-  const LatticePoint origin = points[0];
+  const Point origin = points[0];
   for (std::size_t k = 1; k + 1 < points.size(); ++k) {
     twice_area += (points[k].x - origin.x) * (points[k + 1].y - origin.y) -
                   (points[k + 1].x - origin.x) * (points[k].y - origin.y);
@@ -166,14 +166,14 @@ void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings, R
     if (IsInside(crossings, nodes.inside) == IsInside(crossings, nodes.outside)) continue;
     std::copy(rings.segments.begin() + first, rings.segments.begin() + last,
               rings.segments.begin() + end);
-    std::copy(rings.entries.begin() + first, rings.entries.begin() + last,
-              rings.entries.begin() + end);
+    std::copy(rings.entry_points.begin() + first, rings.entry_points.begin() + last,
+              rings.entry_points.begin() + end);
     scratch.area[kept] = scratch.area[ring];
     rings.offsets[kept++] = end;
     end += last - first;
   }
   rings.segments.resize(end);
-  rings.entries.resize(end);
+  rings.entry_points.resize(end);
   scratch.area.resize(kept);
   rings.offsets.resize(kept + 1);
   rings.offsets[kept] = end;
@@ -311,7 +311,7 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
   ParallelInvoke(
       [&] {
         Trace(bins.tiles, crossings, scratch.next_segment, rings);
-        FindEntries(bins.tiles, level_set, crossings, rings);
+        FindEntryPoints(bins.tiles, level_set, crossings, rings);
         MeasureAreas(rings, scratch);
       },
       [&] { CountComponents(bins, crossings, scratch); });

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "bins/bins.h"
-#include "crossings/crossed_rows.h"
 #include "crossings/crossings.h"
+#include "crossings/scanlines.h"
 #include "frame/scale.h"
 #include "partiemc/parameters.h"
 #include "rings/components.h"
@@ -18,7 +18,7 @@ namespace partiemc {
 /// Rings as sequences of segments, the inside on the left.
 struct RingTopology {
   std::vector<std::uint32_t> segments;        ///< Indices of segments, ring after ring.
-  std::vector<LatticePoint> entries;          ///< Where each of them enters its cell.
+  std::vector<Point> entry_points;            ///< Where each of them enters its cell.
   std::vector<std::uint32_t> offsets;         ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;  ///< Per ring: of its component; 0 for holes.
@@ -41,7 +41,7 @@ struct RingScratch {
   std::vector<std::uint32_t> outer_ring;                     // By component.
   std::vector<std::uint32_t> component_of_ring;
   std::vector<double> area;  // By ring, in cells.
-  CrossedRows rows;
+  Scanlines rows;
   std::vector<std::uint32_t> outer_rings;  // From the outside inwards.
   std::vector<std::uint32_t> container;    // By outer ring: the one around it, or kNoRing.
   std::vector<std::uint64_t> enclosed;     // By outer ring: particles in it and in its islands.

@@ -18,9 +18,9 @@ struct Direction {
   double x, y;
 };
 
-Direction NormalAt(const PointField& field, const TileDirectory& directory, const ActiveCell& cell,
-                   LatticePoint point, const CellPlane& plane) {
-  const LatticePoint origin = CellOrigin(directory, cell);
+Direction NormalAt(const LevelSetSampler& field, const TileDirectory& directory,
+                   const ActiveCell& cell, Point point, const CellPlane& plane) {
+  const Point origin = CellOrigin(directory, cell);
   const FieldSample sample =
       field.Sample(cell.tile, point.x - origin.x + cell.i, point.y - origin.y + cell.j);
   const double square =
@@ -32,7 +32,7 @@ Direction NormalAt(const PointField& field, const TileDirectory& directory, cons
 
 }  // namespace
 
-LatticePoint ClampToHalf(const Segment& segment, LatticePoint point) {
+Point ClampToHalf(const Segment& segment, Point point) {
   auto [u, v] = point;
   const int corner = CornerOf(segment);
   const bool right = corner == 1 || corner == 2;
@@ -49,16 +49,16 @@ LatticePoint ClampToHalf(const Segment& segment, LatticePoint point) {
   return {u, v};
 }
 
-LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step) {
+Point VirtualPlaneVertex(const CellPlane& plane, double max_step) {
   if (plane.is_weak) return plane.point;
   return NewtonStep(plane.point, plane.value, {plane.gradient_x, plane.gradient_y}, max_step);
 }
 
-LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane) {
+Point QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane) {
   const ActiveCell& cell = input.crossings.cells[input.crossings.segments[segment].cell];
-  const LatticePoint middle{(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
+  const Point middle{(plane.entry.x + plane.exit.x) / 2, (plane.entry.y + plane.exit.y) / 2};
   double xx = 0, xy = 0, yy = 0, bx = 0, by = 0;  // Normal equations about the middle.
-  for (const LatticePoint& point : {plane.entry, plane.exit}) {
+  for (const Point& point : {plane.entry, plane.exit}) {
     const Direction n = NormalAt(input.field, input.bins.tiles, cell, point, plane);
     const double offset = n.x * (point.x - middle.x) + n.y * (point.y - middle.y);
     xx += n.x * n.x;
@@ -88,11 +88,11 @@ LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const Ce
   return {middle.x + along * ex - across * ey, middle.y + along * ey + across * ex};
 }
 
-WorldPosition FarthestParticleVertex(const VertexInput& input, std::uint32_t segment,
-                                     const CellPlane& plane) {
+Point FarthestParticleVertex(const VertexInput& input, std::uint32_t segment,
+                             const CellPlane& plane) {
   const Scale& scale = input.scale;
   const ActiveCell& cell = input.crossings.cells[input.crossings.segments[segment].cell];
-  const LatticePoint origin = CellOrigin(input.bins.tiles, cell);
+  const Point origin = CellOrigin(input.bins.tiles, cell);
   const double x = plane.point.x - origin.x + cell.i;
   const double y = plane.point.y - origin.y + cell.j;
   const int i = static_cast<int>(std::floor(x));
@@ -107,19 +107,19 @@ WorldPosition FarthestParticleVertex(const VertexInput& input, std::uint32_t seg
     const double py = place.j + (y - j);
     const double radius = std::min(1.0, scale.kernel_radius);
     input.field.ForEachNear(place.tile, px, py, radius,
-                            [&](double qx, double qy, std::uint32_t entry) {
+                            [&](double qx, double qy, std::uint32_t particle) {
                               const double dx = qx - px;
                               const double dy = qy - py;
                               const double distance = dx * plane.normal_x + dy * plane.normal_y;
                               if (distance < 0 || dx * dx + dy * dy > radius * radius) return;
                               if (farthest == kNone || distance > farthest_distance) {
-                                farthest = input.field.SourceOf(entry);
+                                farthest = input.field.SourceOf(particle);
                                 farthest_distance = distance;
                               }
                             });
   }
-  WorldPosition vertex{(plane.entry.x + plane.exit.x) / 2 * scale.cell_size,
-                       (plane.entry.y + plane.exit.y) / 2 * scale.cell_size};
+  Point vertex{(plane.entry.x + plane.exit.x) / 2 * scale.cell_size,
+               (plane.entry.y + plane.exit.y) / 2 * scale.cell_size};
   if (farthest != kNone) vertex = PositionOf(input.frame, input.parameters.plane, farthest);
   const double offset = input.parameters.surface_offset * scale.spacing * scale.cell_size;
   return {vertex.x + offset * plane.normal_x, vertex.y + offset * plane.normal_y};

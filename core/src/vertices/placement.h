@@ -14,24 +14,23 @@ inline constexpr double kCellMargin = 1.0 / 1024;
 
 /// A point of a saddle's cell, kCellMargin or more away from its sides, moved into the half of it
 /// that belongs to `segment`. Relative to the cell.
-LatticePoint ClampToHalf(const Segment& segment, LatticePoint point);
+Point ClampToHalf(const Segment& segment, Point point);
 
 /// `point` moved into the cell of `segment`, a little away from its sides; in a saddle into the
 /// half of the cell that belongs to the segment, so that its two segments never meet. Only there
 /// the segment is looked at.
-inline LatticePoint ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
-                                const Segment& segment, LatticePoint point) {
-  const LatticePoint origin = CellOrigin(directory, cell);
-  LatticePoint of_cell{std::clamp(point.x - origin.x, kCellMargin, 1 - kCellMargin),
-                       std::clamp(point.y - origin.y, kCellMargin, 1 - kCellMargin)};
+inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
+                         const Segment& segment, Point point) {
+  const Point origin = CellOrigin(directory, cell);
+  Point of_cell{std::clamp(point.x - origin.x, kCellMargin, 1 - kCellMargin),
+                std::clamp(point.y - origin.y, kCellMargin, 1 - kCellMargin)};
   if (cell.IsSaddle()) of_cell = ClampToHalf(segment, of_cell);
   return {origin.x + of_cell.x, origin.y + of_cell.y};
 }
 
 /// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
 /// `max_step` cells; `point` itself where the gradient is weak.
-inline LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gradient,
-                               double max_step) {
+inline Point NewtonStep(Point point, double value, Point gradient, double max_step) {
   const double square = gradient.x * gradient.x + gradient.y * gradient.y;
   if (square < kWeakGradientSquare) return point;
   double step = -value / square;
@@ -44,16 +43,16 @@ inline LatticePoint NewtonStep(LatticePoint point, double value, LatticePoint gr
 
 /// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
 /// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
-LatticePoint VirtualPlaneVertex(const CellPlane& plane, double max_step);
+Point VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
 /// Minimiser of sum_j (n_j . (v - p_j))^2 over the segment's two ends (Eq. 14), in closed form;
 /// directions that the normals hardly constrain stay at the middle. In lattice coordinates.
-LatticePoint QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane);
+Point QefVertex(const VertexInput& input, std::uint32_t segment, const CellPlane& plane);
 
 /// The particle that lies farthest along the plane's normal, among those on or above the plane and
 /// within one cell (and one kernel radius) of its point; the middle of the segment if there is
 /// none. In world units, moved outward by the surface offset.
-WorldPosition FarthestParticleVertex(const VertexInput& input, std::uint32_t segment,
-                                     const CellPlane& plane);
+Point FarthestParticleVertex(const VertexInput& input, std::uint32_t segment,
+                             const CellPlane& plane);
 
 }  // namespace partiemc

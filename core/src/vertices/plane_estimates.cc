@@ -5,7 +5,7 @@
 
 namespace partiemc {
 
-PlaneEstimator::PlaneEstimator(const PointField& field, const Scale& scale,
+PlaneEstimator::PlaneEstimator(const LevelSetSampler& field, const Scale& scale,
                                const VirtualPlaneConstants& constants)
     : field_(field),
       spacing_(scale.spacing),

@@ -9,8 +9,8 @@
 
 #include "frame/scale.h"
 #include "partiemc/virtual_plane_constants.h"
-#include "sampler/point_field.h"
-#include "sampler/point_groups.h"
+#include "sampler/level_set_sampler.h"
+#include "sampler/query_batch.h"
 #include "vertices/plane_support.h"
 
 namespace partiemc {
@@ -26,7 +26,7 @@ struct PlaneEstimate {
 /// Estimates planes of one field.
 class PlaneEstimator {
  public:
-  PlaneEstimator(const PointField& field, const Scale& scale,
+  PlaneEstimator(const LevelSetSampler& field, const Scale& scale,
                  const VirtualPlaneConstants& constants);
 
   using Planes = PointGroup<BentPlane>;
@@ -39,7 +39,7 @@ class PlaneEstimator {
  private:
   PlaneEstimate EstimateOf(const SupportSums& sums) const;
 
-  const PointField& field_;
+  const LevelSetSampler& field_;
   double spacing_;
   SupportShape support_;
 };

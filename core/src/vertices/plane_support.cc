@@ -8,7 +8,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "sampler/near_lanes-inl.h"
+#include "sampler/neighbour_sums-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
@@ -38,8 +38,9 @@ struct Shape {
 };
 
 // The sums over a chunk's particles for a plane.
-HWY_INLINE PartialSums<kSupportSums> SumChunk(const NearRows& near, const NearChunk& chunk,
-                                              const BentPlane& plane, const Shape& shape) {
+HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
+                                              const NeighbourChunk& chunk, const BentPlane& plane,
+                                              const Shape& shape) {
   const Lanes d;
   const Vector x = Constant(plane.x - near.origin_x);
   const Vector y = Constant(plane.y - near.origin_y);
@@ -74,7 +75,7 @@ void SumSupports(std::span<const SupportQuery> queries, const SupportShape& supp
   for (std::size_t q = 0; q < queries.size(); ++q) {
     for (std::size_t k = 0; k < queries[q].planes.size(); ++k) sums[q][k] = {};
   }
-  const auto visit = [&](std::size_t q, const NearChunk& chunk, bool) HWY_ATTR {
+  const auto visit = [&](std::size_t q, const NeighbourChunk& chunk, bool) HWY_ATTR {
     const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.planes.size(); ++k) {
       double totals[kSupportSums] = {};

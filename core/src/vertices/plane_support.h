@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <span>
 
-#include "sampler/near_rows.h"
+#include "sampler/neighbour_query.h"
 
 namespace partiemc {
 
@@ -33,7 +33,7 @@ struct SupportSums {
 
 /// Up to kPointsAtOnce planes, and at least the particles in the disc of each.
 struct SupportQuery {
-  NearRows near;
+  NeighbourRows near;
   std::span<const BentPlane> planes;
 };
 

@@ -19,9 +19,9 @@ struct VertexNormal {
 /// the vertex of its cell. Lengths in cells, positions in lattice coordinates of the world. Segment
 /// k has vertices 2 k and 2 k + 1.
 struct RingVertices {
-  std::vector<LatticePoint> point;
+  std::vector<Point> point;
   /// Where a vertex may always retreat to: with all vertices there, rings are simple.
-  std::vector<LatticePoint> root;
+  std::vector<Point> root;
   std::vector<VertexNormal> normal;
   std::vector<std::uint8_t> is_kept;  ///< 0 for vertices that thinning dropped.
   UnrolledRings unrolled;             ///< Scratch of the steps.

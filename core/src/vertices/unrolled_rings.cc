@@ -10,11 +10,11 @@ constexpr double kReachTolerance = 1e-6;
 
 }  // namespace
 
-UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach) {
+UnrolledRingSize SizeForWindows(std::span<const Point> ring, double reach) {
   const std::size_t count = ring.size();
   const auto length_after = [&](std::size_t k) {
-    const LatticePoint& from = ring[k];
-    const LatticePoint& to = ring[k + 1 == count ? 0 : k + 1];
+    const Point& from = ring[k];
+    const Point& to = ring[k + 1 == count ? 0 : k + 1];
     return std::int64_t{LengthInUnits(UnitsBetween(RingUnits(from.x), RingUnits(to.x)),
                                       UnitsBetween(RingUnits(from.y), RingUnits(to.y)))};
   };

@@ -43,7 +43,7 @@ inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
 /// Numbers of a closed ring's vertices and of those that a window of `reach` cells holds at most
 /// beyond either of its ends, by the very lengths that windows go by: of two vertices that have all
 /// but fallen together none may be taken for being beyond it. Cost: the ring's length.
-UnrolledRingSize SizeForWindows(std::span<const LatticePoint> ring, double reach);
+UnrolledRingSize SizeForWindows(std::span<const Point> ring, double reach);
 
 /// One ring. Arrays are by vertex, 0 <= k < count, and go on beyond both ends by `margin` vertices
 /// that repeat the ring, so that a window is a contiguous stretch of them.

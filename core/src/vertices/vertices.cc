@@ -25,7 +25,7 @@ void SnapToAxes(double cell_size, std::span<double> coordinates) {
   }
 }
 
-void Store(LatticePoint point, double cell_size, double* target) {
+void Store(Point point, double cell_size, double* target) {
   target[0] = point.x * cell_size;
   target[1] = point.y * cell_size;
 }
@@ -46,7 +46,7 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
             cell_size, target + 2);
       break;
     case Placement::kFarthestParticle: {
-      const WorldPosition vertex = FarthestParticleVertex(input, segment, plane);
+      const Point vertex = FarthestParticleVertex(input, segment, plane);
       target[0] = vertex.x;
       target[1] = vertex.y;
       break;

@@ -10,7 +10,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "rings/rings.h"
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 #include "vertices/repair.h"
 #include "vertices/ring_vertices.h"
 
@@ -42,7 +42,7 @@ struct VertexInput {
   const LevelSet& level_set;
   const Crossings& crossings;
   const RingTopology& topology;
-  const PointField& field;
+  const LevelSetSampler& field;
   const std::vector<CellPlane>& planes;
   const ReconstructionParameters& parameters;
   const Scale& scale;

@@ -8,7 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/prefetch.h"
-#include "sampler/point_groups.h"
+#include "sampler/query_batch.h"
 #include "vertices/placement.h"
 #include "vertices/plane_estimates.h"
 #include "vertices/ring_windows.h"
@@ -19,14 +19,14 @@ namespace {
 // Segments between one and that whose memory is asked for.
 constexpr std::size_t kAskedAhead = 24;
 
-double Dot(const LatticePoint& a, const LatticePoint& b) { return a.x * b.x + a.y * b.y; }
+double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
 
-double Distance(const LatticePoint& a, const LatticePoint& b) {
-  const LatticePoint chord{b.x - a.x, b.y - a.y};
+double Distance(const Point& a, const Point& b) {
+  const Point chord{b.x - a.x, b.y - a.y};
   return std::sqrt(Dot(chord, chord));
 }
 
-VertexNormal UnitOf(const LatticePoint& v) {
+VertexNormal UnitOf(const Point& v) {
   const double square = Dot(v, v);
   if (square < kWeakGradientSquare * kWeakGradientSquare) return {1, 0};
   const double inverse = 1 / std::sqrt(square);
@@ -50,7 +50,7 @@ class SegmentLocator {
         cell_(input.planes[segment].cell),
         origin_(CellOrigin(input.bins.tiles, cell_)) {}
 
-  FieldPoint Locate(const LatticePoint& point) const {
+  FieldPoint Locate(const Point& point) const {
     const double x = point.x - origin_.x + cell_.i;
     const double y = point.y - origin_.y + cell_.j;
     if (!(x >= 0 && y >= 0 && x < kTileSize && y < kTileSize)) {
@@ -62,7 +62,7 @@ class SegmentLocator {
  private:
   const VertexInput& input_;
   const ActiveCell& cell_;
-  LatticePoint origin_;
+  Point origin_;
 };
 
 // Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
@@ -80,8 +80,8 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   v.root[inner] = v.point[inner] = ClampToCell(
       input.bins.tiles, plane.cell, input.crossings.segments[input.topology.segments[segment]],
       VirtualPlaneVertex(plane, constants.newton_step));
-  const auto set_normal = [&](std::size_t i, const LatticePoint& from, LatticePoint gradient) {
-    const LatticePoint step{v.point[i].x - from.x, v.point[i].y - from.y};
+  const auto set_normal = [&](std::size_t i, const Point& from, Point gradient) {
+    const Point step{v.point[i].x - from.x, v.point[i].y - from.y};
     if (Dot(step, step) > constants.long_step * constants.long_step) {
       const FieldPoint at = SegmentLocator(input, segment).Locate(v.point[i]);
       const FieldSample sample =
@@ -253,7 +253,7 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Unrolled
     }
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       v.normal[first + k] = {ring.normal_x[k], ring.normal_y[k]};
-      LatticePoint& point = v.point[first + k];
+      Point& point = v.point[first + k];
       point.x += double{ring.shift[k]} * ring.normal_x[k];
       point.y += double{ring.shift[k]} * ring.normal_y[k];
     }
@@ -275,10 +275,10 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
   for (std::size_t k = first; k < last; k += 2) {
-    const LatticePoint& a = v.point[(k == first ? last : k) - 1];
-    const LatticePoint& p = v.point[k];
-    const LatticePoint& b = v.point[k + 1];
-    const LatticePoint chord{b.x - a.x, b.y - a.y};
+    const Point& a = v.point[(k == first ? last : k) - 1];
+    const Point& p = v.point[k];
+    const Point& b = v.point[k + 1];
+    const Point chord{b.x - a.x, b.y - a.y};
     const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
     v.is_kept[k] = input.parameters.steps.edge_vertices &&
                    std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));

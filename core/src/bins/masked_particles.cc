@@ -1,18 +1,18 @@
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 
 #include <algorithm>
 
 #include "base/prefetch.h"
 
-#ifndef PARTIEMC_NEAR_ENTRIES_ONCE
-#define PARTIEMC_NEAR_ENTRIES_ONCE
+#ifndef PARTIEMC_MASKED_PARTICLES_ONCE
+#define PARTIEMC_MASKED_PARTICLES_ONCE
 namespace partiemc {
 namespace {
 
-// The entries [first, last) of a tile, those in `cells` of it; relative to another tile they are
+// The particles [first, last) of a tile, those in `cells` of it; relative to another tile they are
 // shifted.
 struct ListPart {
-  std::span<const BinEntry> entries;
+  std::span<const BinnedParticle> particles;
   std::uint32_t first, last;
   const BitRows& cells;
   float shift_x, shift_y;
@@ -27,7 +27,7 @@ constexpr std::uint32_t kAskedAhead = 128;
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bins/near_entries.cc"
+#define HWY_TARGET_INCLUDE "bins/masked_particles.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -40,27 +40,28 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Lanes = hn::CappedTag<float, NearEntries::kPadding>;
+using Lanes = hn::CappedTag<float, ParticleBlock::kPadding>;
 using Indices = hn::RebindToUnsigned<Lanes>;
 using Bits = hn::RebindToSigned<Lanes>;
 
-// Adds the chosen entries to `near`. Reads whole vectors, if need be of the entries behind them.
-template <NearFields kFields>
-void ChooseFields(const ListPart& part, NearEntries& near) {
+// Adds the chosen particles to `near`. Reads whole vectors, if need be of the particles behind
+// them.
+template <ParticleFields kFields>
+void ChooseFields(const ListPart& part, ParticleBlock& near) {
   const Lanes d;
   const Bits d_bits;
   const Indices d_index;
   const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
   const RowTable rows(part.cells);
   const auto lane = hn::Iota(d_index, 0);
-  const auto [entries, start, last, cells, shift_x, shift_y] = part;
+  const auto [particles, start, last, cells, shift_x, shift_y] = part;
   std::uint32_t first = start;
   int chosen = near.count;
-  for (; first < last && first + lanes <= entries.size(); first += lanes) {
-    const std::size_t later = std::min<std::size_t>(first + kAskedAhead, entries.size() - lanes);
-    PrefetchLines(entries.subspan(later, lanes));
+  for (; first < last && first + lanes <= particles.size(); first += lanes) {
+    const std::size_t later = std::min<std::size_t>(first + kAskedAhead, particles.size() - lanes);
+    PrefetchLines(particles.subspan(later, lanes));
     hn::Vec<Lanes> x, y, source;
-    hn::LoadInterleaved3(d, &entries[first].x, x, y, source);
+    hn::LoadInterleaved3(d, &particles[first].x, x, y, source);
     // Truncation rounds down: nothing is before its tile.
     const auto row = rows[hn::ConvertTo(d_bits, y)];
     const auto bit = hn::Shl(hn::Set(d_bits, 1), hn::ConvertTo(d_bits, x));
@@ -68,25 +69,25 @@ void ChooseFields(const ListPart& part, NearEntries& near) {
     const Compressor compress(is_in);
     hn::StoreU(compress(d, hn::Add(x, hn::Set(d, shift_x))), d, near.x.data() + chosen);
     hn::StoreU(compress(d, hn::Add(y, hn::Set(d, shift_y))), d, near.y.data() + chosen);
-    if constexpr (kFields == NearFields::kAll) {
+    if constexpr (kFields == ParticleFields::kAll) {
       hn::StoreU(compress(d_index, hn::Add(hn::Set(d_index, first), lane)), d_index,
-                 near.entry.data() + chosen);
+                 near.particle.data() + chosen);
     }
     chosen += static_cast<int>(hn::CountTrue(d_bits, is_in));
   }
   for (; first < last; ++first) {
-    const BinEntry& entry = entries[first];
-    near.x[chosen] = entry.x + shift_x;
-    near.y[chosen] = entry.y + shift_y;
-    near.entry[chosen] = first;
-    chosen += LiesIn(entry, cells);
+    const BinnedParticle& particle = particles[first];
+    near.x[chosen] = particle.x + shift_x;
+    near.y[chosen] = particle.y + shift_y;
+    near.particle[chosen] = first;
+    chosen += LiesIn(particle, cells);
   }
   near.count = chosen;
 }
 
-void ChooseEntries(const ListPart& part, NearFields fields, NearEntries& near) {
-  fields == NearFields::kAll ? ChooseFields<NearFields::kAll>(part, near)
-                             : ChooseFields<NearFields::kPositions>(part, near);
+void ChooseParticles(const ListPart& part, ParticleFields fields, ParticleBlock& near) {
+  fields == ParticleFields::kAll ? ChooseFields<ParticleFields::kAll>(part, near)
+                                 : ChooseFields<ParticleFields::kPositions>(part, near);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -96,11 +97,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(ChooseEntries);
+HWY_EXPORT(ChooseParticles);
 
-NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask,
-                   NearFields fields)
-    : entries_(bins.entries), fields_(fields) {
+MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask,
+                                 ParticleFields fields)
+    : particles_(bins.particles), fields_(fields) {
   const Neighbourhood& neighbours = bins.tiles.neighbours(tile);
   const unsigned places = mask != nullptr ? NeighboursWithCells(*mask) : ~0u;
   for (int place = 0; place < kMaxLists; ++place) {
@@ -119,9 +120,9 @@ NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask*
   }
 }
 
-NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells,
-                   NearFields fields)
-    : entries_(bins.entries), fields_(fields), list_count_(1) {
+MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells,
+                                 ParticleFields fields)
+    : particles_(bins.particles), fields_(fields), list_count_(1) {
   lists_.front() = {.next = bins.offsets[tile],
                     .end = bins.offsets[tile + 1],
                     .cells = cells,
@@ -129,18 +130,18 @@ NearWalk::NearWalk(const ParticleBins& bins, std::uint32_t tile, const BitRows& 
                     .shift_y = 0};
 }
 
-// Chooses entries until the block is full. Returns false if there are no more.
-bool NearWalk::ChooseMore() {
+// Chooses particles until the block is full. Returns false if there are no more.
+bool MaskedParticles::ChooseMore() {
   chosen_.count = 0;
   for (; list_ < list_count_; ++list_) {
     List& list = lists_[list_];
     while (list.next < list.end) {
-      const int room = NearEntries::kCapacity - chosen_.count;
+      const int room = ParticleBlock::kCapacity - chosen_.count;
       if (room < kLeastRoom) return true;
       const std::uint32_t last =
           list.next + std::min(static_cast<std::uint32_t>(room), list.end - list.next);
-      const ListPart part{entries_, list.next, last, list.cells, list.shift_x, list.shift_y};
-      HWY_DYNAMIC_DISPATCH(ChooseEntries)(part, fields_, chosen_);
+      const ListPart part{particles_, list.next, last, list.cells, list.shift_x, list.shift_y};
+      HWY_DYNAMIC_DISPATCH(ChooseParticles)(part, fields_, chosen_);
       list.next = last;
     }
   }

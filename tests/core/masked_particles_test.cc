@@ -1,4 +1,4 @@
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 
 #include <gtest/gtest.h>
 
@@ -14,9 +14,9 @@
 namespace partiemc {
 namespace {
 
-// An entry as a walk hands it out.
+// An particle as a walk hands it out.
 struct Seen {
-  std::uint32_t entry;
+  std::uint32_t particle;
   float x, y;
 
   bool operator==(const Seen&) const = default;
@@ -24,12 +24,13 @@ struct Seen {
 
 std::vector<Seen> InOrder(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
   std::vector<Seen> seen;
-  NearWalk(bins, tile, mask, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
-    EXPECT_GT(near.count, 0);
-    for (int k = 0; k < near.count; ++k) {
-      seen.push_back({near.entry[k], near.x[k], near.y[k]});
-    }
-  });
+  MaskedParticles(bins, tile, mask, ParticleFields::kAll)
+      .ForEachBlock([&](const ParticleBlock& near) {
+        EXPECT_GT(near.count, 0);
+        for (int k = 0; k < near.count; ++k) {
+          seen.push_back({near.particle[k], near.x[k], near.y[k]});
+        }
+      });
   return seen;
 }
 
@@ -37,15 +38,16 @@ std::vector<Seen> InOrder(const ParticleBins& bins, std::uint32_t tile, const Ce
 std::vector<std::pair<float, float>> Positions(const ParticleBins& bins, std::uint32_t tile,
                                                const CellMask* mask) {
   std::vector<std::pair<float, float>> positions;
-  NearWalk(bins, tile, mask, NearFields::kPositions).ForEachBlock([&](const NearEntries& near) {
-    EXPECT_GT(near.count, 0);
-    for (int k = 0; k < near.count; ++k) positions.push_back({near.x[k], near.y[k]});
-  });
+  MaskedParticles(bins, tile, mask, ParticleFields::kPositions)
+      .ForEachBlock([&](const ParticleBlock& near) {
+        EXPECT_GT(near.count, 0);
+        for (int k = 0; k < near.count; ++k) positions.push_back({near.x[k], near.y[k]});
+      });
   return positions;
 }
 
-// All entries of the bins in cells of the mask around a tile, tile after tile: these are sorted by
-// row, then column, and entries of a tile are in the order of the frame.
+// All particles of the bins in cells of the mask around a tile, tile after tile: these are sorted
+// by row, then column, and particles of a tile are in the order of the frame.
 std::vector<Seen> Expected(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
   std::vector<Seen> expected;
   for (std::uint32_t other = 0; other < bins.tiles.size(); ++other) {
@@ -53,8 +55,8 @@ std::vector<Seen> Expected(const ParticleBins& bins, std::uint32_t tile, const C
     const int dy = bins.tiles[other].y - bins.tiles[tile].y;
     if (std::abs(dx) > 1 || std::abs(dy) > 1) continue;
     for (std::uint32_t e = bins.offsets[other]; e < bins.offsets[other + 1]; ++e) {
-      const float x = bins.entries[e].x + static_cast<float>(dx * kTileSize);
-      const float y = bins.entries[e].y + static_cast<float>(dy * kTileSize);
+      const float x = bins.particles[e].x + static_cast<float>(dx * kTileSize);
+      const float y = bins.particles[e].y + static_cast<float>(dy * kTileSize);
       if (mask != nullptr) {
         const int column = static_cast<int>(std::floor(x)) + kMaskMargin;
         const int row = static_cast<int>(std::floor(y)) + kMaskMargin;
@@ -95,7 +97,7 @@ support::Particles CrowdedScene(support::Random& random) {
   return particles;
 }
 
-TEST(NearEntries, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstructionSet) {
+TEST(MaskedParticles, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstructionSet) {
   support::Random random(1);
   const ParticleBins bins = Bin(CrowdedScene(random));
   ASSERT_GE(bins.tiles.size(), 9u);
@@ -109,18 +111,18 @@ TEST(NearEntries, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstr
   EXPECT_GE(sets, 1);
 }
 
-TEST(NearEntries, WithoutAMaskAreAllOfATileAndItsNeighbours) {
+TEST(MaskedParticles, WithoutAMaskAreAllOfATileAndItsNeighbours) {
   support::Random random(2);
   ExpectAllSeen(Bin(CrowdedScene(random)), nullptr);
 }
 
-TEST(NearEntries, OfAnEmptyMaskAreNone) {
+TEST(MaskedParticles, OfAnEmptyMaskAreNone) {
   support::Random random(3);
   const CellMask empty{};
   ExpectAllSeen(Bin(CrowdedScene(random)), &empty);
 }
 
-TEST(NearEntries, OfATileAloneAreThoseOfAMaskThatHasNoCellsElsewhere) {
+TEST(MaskedParticles, OfATileAloneAreThoseOfAMaskThatHasNoCellsElsewhere) {
   support::Random random(4);
   const ParticleBins bins = Bin(CrowdedScene(random));
   BitRows cells;
@@ -132,18 +134,19 @@ TEST(NearEntries, OfATileAloneAreThoseOfAMaskThatHasNoCellsElsewhere) {
   std::size_t seen = 0;
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
     std::vector<Seen> own;
-    NearWalk(bins, tile, cells, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
-      for (int k = 0; k < near.count; ++k) {
-        own.push_back({near.entry[k], near.x[k], near.y[k]});
-      }
-    });
+    MaskedParticles(bins, tile, cells, ParticleFields::kAll)
+        .ForEachBlock([&](const ParticleBlock& near) {
+          for (int k = 0; k < near.count; ++k) {
+            own.push_back({near.particle[k], near.x[k], near.y[k]});
+          }
+        });
     EXPECT_EQ(own, Expected(bins, tile, &mask));
     seen += own.size();
   }
   EXPECT_GT(seen, 1000u);
 }
 
-TEST(NearEntries, OfAnySmallNumberOfParticlesAreRight) {
+TEST(MaskedParticles, OfAnySmallNumberOfParticlesAreRight) {
   // Fewer than a vector, at the end of the bins too.
   for (int count = 1; count <= 40; ++count) {
     support::Random random(static_cast<std::uint64_t>(count));

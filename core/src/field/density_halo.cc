@@ -1,4 +1,4 @@
-#include "field/sum_rims.h"
+#include "field/density_halo.h"
 
 #include <algorithm>
 #include <bit>
@@ -35,7 +35,7 @@ bool CopyRows(const float* from, int stride, int rows, float* to) {
 
 }  // namespace
 
-void SumRims::Prepare(const ParticleBins& bins, float radius) {
+void DensityHalo::Prepare(const ParticleBins& bins, float radius) {
   rows_ = static_cast<int>(std::ceil(radius));
   rim_.resize(bins.tiles.size());
   std::uint32_t rims = 0;
@@ -47,7 +47,7 @@ void SumRims::Prepare(const ParticleBins& bins, float radius) {
   values_.resize(std::size_t{rims} * Size());
 }
 
-void SumRims::Keep(std::uint32_t tile, const NodeSums& sums, NodeRange rows) {
+void DensityHalo::Keep(std::uint32_t tile, const NodeSums& sums, NodeRange rows) {
   const std::uint32_t at = rim_[tile];
   float* const rim = values_.data() + std::size_t{at} * Size();
   const NodeRange own = {std::max(rows.first, 0), std::min(rows.last, kTileSize - 1)};
@@ -68,7 +68,8 @@ void SumRims::Keep(std::uint32_t tile, const NodeSums& sums, NodeRange rows) {
 }
 
 template <typename Visit>
-void SumRims::ForEachPart(const TileDirectory& directory, std::uint32_t tile, Visit visit) const {
+void DensityHalo::ForEachPart(const TileDirectory& directory, std::uint32_t tile,
+                              Visit visit) const {
   const Neighbourhood& neighbours = directory.neighbours(tile);
   for (int place = 0; place < static_cast<int>(neighbours.size()); ++place) {
     const int dx = place % 3 - 1;
@@ -80,7 +81,7 @@ void SumRims::ForEachPart(const TileDirectory& directory, std::uint32_t tile, Vi
   }
 }
 
-NodeRange SumRims::RowsReached(const TileDirectory& directory, std::uint32_t tile) const {
+NodeRange DensityHalo::RowsReached(const TileDirectory& directory, std::uint32_t tile) const {
   NodeRange rows = OwnRows(tile);
   ForEachPart(directory, tile, [&](std::uint32_t from, int, int dy) {
     const NodeRange theirs = dy == 0  ? own_rows_[from]
@@ -91,7 +92,7 @@ NodeRange SumRims::RowsReached(const TileDirectory& directory, std::uint32_t til
   return rows;
 }
 
-void SumRims::AddTo(const TileDirectory& directory, std::uint32_t tile, float* values) const {
+void DensityHalo::AddTo(const TileDirectory& directory, std::uint32_t tile, float* values) const {
   ForEachPart(directory, tile, [&](std::uint32_t from, int dx, int dy) {
     const float* const rim = values_.data() + std::size_t{from} * Size();
     float* const to = values + (dy > 0 ? (kTileSize - rows_) * kTileSize : 0) +

@@ -20,7 +20,7 @@ namespace partiemc {
 ///   uuuuuuuuuuuuuu
 ///
 /// A part that no kernel of the tile reaches is left out.
-class SumRims {
+class DensityHalo {
  public:
   /// Makes room for kernels of a radius of at most kSumMargin.
   void Prepare(const ParticleBins& bins, float radius);
