@@ -32,7 +32,6 @@ constexpr std::uint32_t kAskedAhead = 128;
 #include <hwy/highway.h>
 
 #include "base/compressor-inl.h"
-#include "bins/row_table-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
@@ -46,15 +45,13 @@ using Bits = hn::RebindToSigned<Lanes>;
 
 // Adds the chosen particles to `near`. Reads whole vectors, if need be of the particles behind
 // them.
-template <ParticleFields kFields>
-void ChooseFields(const ListPart& part, ParticleBlock& near) {
+void ChooseParticles(const ListPart& part, ParticleBlock& near) {
   const Lanes d;
   const Bits d_bits;
   const Indices d_index;
   const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
-  const RowTable rows(part.cells);
-  const auto lane = hn::Iota(d_index, 0);
   const auto [particles, start, last, cells, shift_x, shift_y] = part;
+  const auto* const rows = reinterpret_cast<const std::int32_t*>(cells.data());
   std::uint32_t first = start;
   int chosen = near.count;
   for (; first < last && first + lanes <= particles.size(); first += lanes) {
@@ -63,16 +60,14 @@ void ChooseFields(const ListPart& part, ParticleBlock& near) {
     hn::Vec<Lanes> x, y, source;
     hn::LoadInterleaved3(d, &particles[first].x, x, y, source);
     // Truncation rounds down: nothing is before its tile.
-    const auto row = rows[hn::ConvertTo(d_bits, y)];
+    const auto row = hn::GatherIndex(d_bits, rows, hn::ConvertTo(d_bits, y));
     const auto bit = hn::Shl(hn::Set(d_bits, 1), hn::ConvertTo(d_bits, x));
     const auto is_in = hn::And(hn::TestBit(row, bit), hn::FirstN(d_bits, last - first));
     const Compressor compress(is_in);
     hn::StoreU(compress(d, hn::Add(x, hn::Set(d, shift_x))), d, near.x.data() + chosen);
     hn::StoreU(compress(d, hn::Add(y, hn::Set(d, shift_y))), d, near.y.data() + chosen);
-    if constexpr (kFields == ParticleFields::kAll) {
-      hn::StoreU(compress(d_index, hn::Add(hn::Set(d_index, first), lane)), d_index,
-                 near.particle.data() + chosen);
-    }
+    const auto index = hn::Add(hn::Set(d_index, first), hn::Iota(d_index, 0));
+    hn::StoreU(compress(d_index, index), d_index, near.particle.data() + chosen);
     chosen += static_cast<int>(hn::CountTrue(d_bits, is_in));
   }
   for (; first < last; ++first) {
@@ -85,11 +80,6 @@ void ChooseFields(const ListPart& part, ParticleBlock& near) {
   near.count = chosen;
 }
 
-void ChooseParticles(const ListPart& part, ParticleFields fields, ParticleBlock& near) {
-  fields == ParticleFields::kAll ? ChooseFields<ParticleFields::kAll>(part, near)
-                                 : ChooseFields<ParticleFields::kPositions>(part, near);
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc
 HWY_AFTER_NAMESPACE();
@@ -99,17 +89,16 @@ namespace partiemc {
 
 HWY_EXPORT(ChooseParticles);
 
-MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask,
-                                 ParticleFields fields)
-    : particles_(bins.particles), fields_(fields) {
+MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask)
+    : particles_(bins.particles) {
   const Neighbourhood& neighbours = bins.tiles.neighbours(tile);
-  const unsigned places = mask != nullptr ? NeighboursWithCells(*mask) : ~0u;
   for (int place = 0; place < kMaxLists; ++place) {
     const std::uint32_t from = neighbours[place];
-    if ((places >> place & 1) == 0 || from == kNoTile || bins.CountOf(from) == 0) continue;
-    List& list = lists_[list_count_++];
+    if (from == kNoTile || bins.CountOf(from) == 0) continue;
+    List& list = lists_[list_count_];
     if (mask != nullptr) {
       list.cells = CellsOfNeighbour(*mask, place);
+      if (IsEmpty(list.cells)) continue;
     } else {
       list.cells.fill(~std::uint32_t{0});
     }
@@ -117,17 +106,8 @@ MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, c
     list.end = bins.offsets[from + 1];
     list.shift_x = static_cast<float>((place % 3 - 1) * kTileSize);
     list.shift_y = static_cast<float>((place / 3 - 1) * kTileSize);
+    ++list_count_;
   }
-}
-
-MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells,
-                                 ParticleFields fields)
-    : particles_(bins.particles), fields_(fields), list_count_(1) {
-  lists_.front() = {.next = bins.offsets[tile],
-                    .end = bins.offsets[tile + 1],
-                    .cells = cells,
-                    .shift_x = 0,
-                    .shift_y = 0};
 }
 
 // Chooses particles until the block is full. Returns false if there are no more.
@@ -141,7 +121,7 @@ bool MaskedParticles::ChooseMore() {
       const std::uint32_t last =
           list.next + std::min(static_cast<std::uint32_t>(room), list.end - list.next);
       const ListPart part{particles_, list.next, last, list.cells, list.shift_x, list.shift_y};
-      HWY_DYNAMIC_DISPATCH(ChooseParticles)(part, fields_, chosen_);
+      HWY_DYNAMIC_DISPATCH(ChooseParticles)(part, chosen_);
       list.next = last;
     }
   }

@@ -26,19 +26,11 @@ struct ParticleBlock {
   int count = 0;
 };
 
-/// What a walk tells of particles.
-enum class ParticleFields { kPositions, kAll };
-
 /// A walk over the particles in cells of `mask`, or over all of a tile and its neighbours where it
 /// is null. Cost: linear in the lists of those tiles in which the mask has cells.
 class MaskedParticles {
  public:
-  MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask,
-                  ParticleFields fields);
-
-  /// Over the tile's own particles in `cells` of it alone.
-  MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells,
-                  ParticleFields fields);
+  MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask);
 
   /// Calls visit(const ParticleBlock&) for all, a block after the other: tile after tile in the
   /// order of Neighbourhood, those of each in the order of the frame.
@@ -62,7 +54,6 @@ class MaskedParticles {
   bool ChooseMore();
 
   std::span<const BinnedParticle> particles_;
-  ParticleFields fields_;
   std::array<List, kMaxLists> lists_;
   int list_count_ = 0;
   int list_ = 0;  // The one that the next particles come from.

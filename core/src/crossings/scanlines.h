@@ -2,8 +2,6 @@
 // tell what rings enclose without filling.
 #pragma once
 
-#include <hwy/cache_control.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -84,9 +82,6 @@ class Scanlines {
   void ForEachEdge(const TileDirectory& directory, const Crossings& crossings, Visit visit);
 
  private:
-  // How many cells before its turn one's ring is asked for.
-  static constexpr std::size_t kFetchedAhead = 16;
-
   std::vector<std::uint32_t> ring_of_segment_;
   CellsByRow cells_;
 };
@@ -108,14 +103,8 @@ void Scanlines::ForEachEdge(const TileDirectory& directory, const Crossings& cro
   const auto crosses_lower_edge = [](const ActiveCell& cell) {
     return ((cell.corners ^ cell.corners >> 1) & 1) != 0;
   };
-  const std::span<const std::uint32_t> order =
-      cells_.List(directory, crossings, crosses_lower_edge);
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    if (k + kFetchedAhead < order.size()) {
-      const ActiveCell& soon = crossings.cells[order[k + kFetchedAhead]];
-      hwy::Prefetch(&ring_of_segment_[soon.first_segment]);
-    }
-    const ActiveCell& cell = crossings.cells[order[k]];
+  for (const std::uint32_t index : cells_.List(directory, crossings, crosses_lower_edge)) {
+    const ActiveCell& cell = crossings.cells[index];
     const std::uint32_t ring = ring_of_segment_[cell.first_segment];
     if (ring == kNoRing) continue;
     visit(CrossedEdge{.row = directory[cell.tile].y * kTileSize + cell.j,

@@ -37,69 +37,45 @@ float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
 
-// First pass: the kernels of a tile's own particles in the rows that they reach, or, where they
-// reach too far for the margin of the sums, of all around it in every row.
+// First pass: the kernels of a tile's own particles, or, where they reach too far for the margin of
+// the sums, of all around it.
 void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
              LevelSet& level_set) {
   std::array<float, kTileNodes>& values = level_set.tiles[tile];
   const auto radius = static_cast<float>(scale.kernel_radius);
   const bool fits = radius <= kSumMargin;
-  if (fits && bins.CountOf(tile) == 0) return;
+  if (fits && bins.CountOf(tile) == 0) {
+    values.fill(0);
+    return;
+  }
   // Written to as soon as the sums are known, which takes longer than memory far away.
   PrefetchLines(std::span<const float>(values));
-  if (fits) level_set.halo.Prefetch(tile);
   alignas(64) NodeSums sums;
   sums.fill(0);
-  NodeRange rows = kAllNodes;
   if (fits) {
-    const NodeRange reached = ScatterKernels(ParticlesOf(bins, tile), radius, sums);
-    level_set.halo.Keep(tile, sums, reached);
-    rows = level_set.halo.OwnRows(tile);
+    level_set.halo.Prefetch(tile);
+    ScatterKernels(ParticlesOf(bins, tile), radius, sums);
+    level_set.halo.Keep(tile, sums);
   } else {
-    MaskedParticles(bins, tile, nullptr, ParticleFields::kAll)
-        .ForEachBlock([&](const ParticleBlock& near) {
-          ScatterNearKernels(near, WeightsOf(bins), radius, sums);
-        });
+    MaskedParticles(bins, tile, nullptr).ForEachBlock([&](const ParticleBlock& near) {
+      ScatterNearKernels(near, WeightsOf(bins), radius, sums);
+    });
   }
   // Of a fixed size and without a call, unlike copy_n.
-  for (int j = rows.first; j <= rows.last; ++j) {
+  for (int j = 0; j < kTileSize; ++j) {
     std::memcpy(values.data() + j * kTileSize, sums.data() + SumIndex(0, j),
                 kTileSize * sizeof(float));
   }
-}
-
-// Fills the rows of a tile's values that are among `rows` but not among `kept`, which is a part of
-// them.
-void FillRowsOf(float* values, NodeRange rows, NodeRange kept, float value) {
-  const auto fill = [&](int first, int end) {
-    std::fill(values + first * kTileSize, values + end * kTileSize, value);
-  };
-  if (kept.last < kept.first) {
-    if (rows.first <= rows.last) fill(rows.first, rows.last + 1);
-    return;
-  }
-  fill(rows.first, kept.first);
-  fill(kept.last + 1, rows.last + 1);
 }
 
 // Second pass: the density at every node, and what follows from it alone.
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
-  BitRows& inside = level_set.inside[tile];
-  BitRows& open = level_set.open[tile];
-  NodeRange rows = kAllNodes;
   if (static_cast<float>(scale.kernel_radius) <= kSumMargin) {
-    const DensityHalo& halo = level_set.halo;
-    rows = halo.RowsReached(bins.tiles, tile);
-    const NodeRange own = halo.OwnRows(tile);
-    FillRowsOf(values, rows, own, 0);
-    halo.AddTo(bins.tiles, tile, values);
-    FillRowsOf(values, kAllNodes, rows, level_set.void_value);
-    inside.fill(0);
-    open.fill(0);
+    level_set.halo.AddTo(bins.tiles, tile, values);
   }
-  ClassifyNodes(WeightOf(bins, scale), scale, rows, values, inside, open);
+  ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
 // F at nodes of a tile, from the moments there. Returns those that are inside.
@@ -114,7 +90,7 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  MaskedParticles(bins, tile, masked ? &mask : nullptr, ParticleFields::kPositions)
+  MaskedParticles(bins, tile, masked ? &mask : nullptr)
       .ForEachBlock([&](const ParticleBlock& near) {
         AddNearMoments(near, radius, blocks, asked.has_kernel_sums, sums);
       });

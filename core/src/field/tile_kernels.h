@@ -81,9 +81,8 @@ struct TileParticles {
 };
 
 /// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any:
-/// also beyond the tile's sides. Returns the rows that they reach, those beyond the sides too.
-/// Requires: there are particles, radius <= kSumMargin.
-NodeRange ScatterKernels(const TileParticles& particles, float radius, NodeSums& sums);
+/// also beyond the tile's sides. Requires: radius <= kSumMargin.
+void ScatterKernels(const TileParticles& particles, float radius, NodeSums& sums);
 
 /// The same of particles in and around a tile, to the tile's nodes only, for any radius. `weight`,
 /// by particle of the bins, is null where weights are uniform.
@@ -95,11 +94,10 @@ void ScatterNearKernels(const ParticleBlock& near, const float* weight, float ra
 void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums);
 
-/// What the density f = weight * sum says of the nodes in some rows of a tile: those that are
-/// inside, those that it leaves open, and, but for the latter, in place of the sums the branch of F
-/// that decides them; where f = 0, F itself.
-void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
-                   BitRows& open);
+/// What the density f = weight * sum says of the nodes of a tile: those that are inside, those that
+/// it leaves open, and, but for the latter, in place of the sums the branch of F that decides them;
+/// where f = 0, F itself.
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside, BitRows& open);
 
 /// Sets the values of the asked nodes, as ClassifyNodes has left them, to F. Returns those of them
 /// that are inside.

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "hwy/cache_control.h"
 #include "partiemc/result.h"
 
 namespace partiemc {
@@ -21,9 +20,6 @@ constexpr std::size_t kSegmentGrain = 512;
 
 // Rings that a task takes at least.
 constexpr std::size_t kRingGrain = 64;
-
-// How many segments before its turn a cell's values are asked for: as long as memory takes.
-constexpr std::size_t kFetchedAhead = 16;
 
 // What follows each segment is found in parallel; what is left to do in order is to walk.
 void Trace(const TileDirectory& directory, const Crossings& crossings,
@@ -67,31 +63,16 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
   return {node(here.entry), node((here.entry + 1) & 3)};
 }
 
-// Asks for the values of the level set at a cell's corners, which are far apart in memory from
-// those of the cells before. The next tile's are left out.
-void FetchCorners(const LevelSet& level_set, const ActiveCell& cell) {
-  const float* lower = level_set.tiles[cell.tile].data() + cell.j * kTileSize + cell.i;
-  hwy::Prefetch(lower);
-  if (cell.j + 1 < kTileSize) hwy::Prefetch(lower + kTileSize);
-}
-
+// Where each segment enters its cell.
 void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
                      const Crossings& crossings, RingTopology& rings) {
   const std::size_t count = rings.segments.size();
   rings.entry_points.resize(count);
   ParallelForRanges(count, kSegmentGrain, [&](std::size_t first, std::size_t last) {
-    const auto segment_of = [&](std::size_t k) -> const Segment& {
-      return crossings.segments[rings.segments[k]];
-    };
-    const auto cell_of = [&](std::size_t k) -> const ActiveCell& {
-      return crossings.cells[segment_of(k).cell];
-    };
     for (std::size_t k = first; k < last; ++k) {
-      // What tells where the values lie, and what tells where that lies, as long before each.
-      if (k + 3 * kFetchedAhead < last) hwy::Prefetch(&segment_of(k + 3 * kFetchedAhead));
-      if (k + 2 * kFetchedAhead < last) hwy::Prefetch(&cell_of(k + 2 * kFetchedAhead));
-      if (k + kFetchedAhead < last) FetchCorners(level_set, cell_of(k + kFetchedAhead));
-      rings.entry_points[k] = EdgeCrossing(directory, level_set, cell_of(k), segment_of(k).entry);
+      const Segment& segment = crossings.segments[rings.segments[k]];
+      rings.entry_points[k] =
+          EdgeCrossing(directory, level_set, crossings.cells[segment.cell], segment.entry);
     }
   });
 }

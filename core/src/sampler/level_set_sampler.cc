@@ -154,15 +154,15 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
     room += count;
     const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
     const auto first = static_cast<std::uint32_t>(columns);
-    MaskedParticles(bins, tile, wanted_[tile], ParticleFields::kAll)
-        .ForEachBlock([&](const auto& near) {
-          for (int k = 0; k < near.count; ++k) {
-            const std::uint32_t bucket = grid_.rows.InTile(near.y[k]) * run.row_stride + first +
-                                         grid_.columns.InTile(near.x[k]);
-            chosen_[chosen++] = {bucket, near.particle[k]};
-            ++offsets[bucket + 2];
-          }
-        });
+    const CellMask mask = MaskOf(wanted_[tile]);
+    MaskedParticles(bins, tile, &mask).ForEachBlock([&](const ParticleBlock& near) {
+      for (int k = 0; k < near.count; ++k) {
+        const std::uint32_t bucket =
+            grid_.rows.InTile(near.y[k]) * run.row_stride + first + grid_.columns.InTile(near.x[k]);
+        chosen_[chosen++] = {bucket, near.particle[k]};
+        ++offsets[bucket + 2];
+      }
+    });
     chosen_end_[tile] = chosen;
   });
   std::uint32_t next = run.first_particle;
