@@ -62,9 +62,9 @@ class LevelSetSampler {
   /// Cost: the particles of the rows of buckets within a kernel radius.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// The same of points of at most kQueriesAtOnce groups, for less than one after the other. Those
-  /// of a group look at the same particles: neighbours at best.
-  void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
+  /// The same of the points of a group, for less than one after the other. They look at the same
+  /// particles: neighbours at best.
+  void Sample(const FieldPoints& group, FieldSamples& samples) const;
 
   /// Whether particles weigh each their own.
   bool HasWeights() const { return !weight_.empty(); }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <span>
 
 #include "sampler/neighbour_query.h"
@@ -37,10 +36,9 @@ struct SupportQuery {
   std::span<const BentPlane> planes;
 };
 
-/// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce. In floats, with the
-/// same bits for any processor, as SumAtPoints.
+/// sums[k] are those of planes[k]. In floats, with the same bits for any processor, as
+/// SampleAtPoints.
 using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
-void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
-                 std::span<QuerySupports> sums);
+void SumSupports(const SupportQuery& query, const SupportShape& support, QuerySupports& sums);
 
 }  // namespace partiemc
