@@ -1,7 +1,6 @@
 // Sets of cells in a tile and around it, as bits: which particles a step has to look at.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -76,23 +75,15 @@ CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int mar
 /// Of cells beyond the margin nothing is known, so that those that they would add miss. Requires: 0
 /// <= before, after <= kMaskMargin.
 inline void Widen(CellMask& mask, int before, int after) {
-  // What reaches far already takes a step as long and one more without leaving a gap.
-  const auto reach = [](int distance, auto step_by) {
-    for (int reached = 0; reached < distance;) {
-      const int step = std::min(reached + 1, distance - reached);
-      step_by(step);
-      reached += step;
-    }
-  };
   // No row is read after it took another one in.
-  reach(before, [&](int step) {
-    for (std::uint64_t& row : mask) row |= row >> step;
-    for (std::size_t row = 0; row + step < mask.size(); ++row) mask[row] |= mask[row + step];
-  });
-  reach(after, [&](int step) {
-    for (std::uint64_t& row : mask) row |= row << step;
-    for (std::size_t row = mask.size() - step; row-- > 0;) mask[row + step] |= mask[row];
-  });
+  for (int step = 0; step < before; ++step) {
+    for (std::uint64_t& row : mask) row |= row >> 1;
+    for (std::size_t row = 0; row + 1 < mask.size(); ++row) mask[row] |= mask[row + 1];
+  }
+  for (int step = 0; step < after; ++step) {
+    for (std::uint64_t& row : mask) row |= row << 1;
+    for (std::size_t row = mask.size() - 1; row > 0; --row) mask[row] |= mask[row - 1];
+  }
 }
 
 }  // namespace partiemc

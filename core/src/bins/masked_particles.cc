@@ -4,27 +4,6 @@
 
 #include "base/prefetch.h"
 
-#ifndef PARTIEMC_MASKED_PARTICLES_ONCE
-#define PARTIEMC_MASKED_PARTICLES_ONCE
-namespace partiemc {
-namespace {
-
-// The particles [first, last) of a tile, those in `cells` of it; relative to another tile they are
-// shifted.
-struct ListPart {
-  std::span<const BinnedParticle> particles;
-  std::uint32_t first, last;
-  const BitRows& cells;
-  float shift_x, shift_y;
-};
-
-// Entries between those that are looked at and those whose memory is asked for.
-constexpr std::uint32_t kAskedAhead = 128;
-
-}  // namespace
-}  // namespace partiemc
-#endif
-
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bins/masked_particles.cc"
@@ -43,16 +22,19 @@ using Lanes = hn::CappedTag<float, ParticleBlock::kPadding>;
 using Indices = hn::RebindToUnsigned<Lanes>;
 using Bits = hn::RebindToSigned<Lanes>;
 
-// Adds the chosen particles to `near`. Reads whole vectors, if need be of the particles behind
-// them.
-void ChooseParticles(const ListPart& part, ParticleBlock& near) {
+// Particles between those that are looked at and those whose memory is asked for.
+constexpr std::uint32_t kAskedAhead = 128;
+
+// Adds those of a list's particles up to `last` that are in its cells to `near`. Reads whole
+// vectors, if need be of the particles behind them.
+void ChooseParticles(std::span<const BinnedParticle> particles, const MaskedParticles::List& list,
+                     std::uint32_t last, ParticleBlock& near) {
   const Lanes d;
   const Bits d_bits;
   const Indices d_index;
   const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
-  const auto [particles, start, last, cells, shift_x, shift_y] = part;
-  const auto* const rows = reinterpret_cast<const std::int32_t*>(cells.data());
-  std::uint32_t first = start;
+  const auto* const rows = reinterpret_cast<const std::int32_t*>(list.cells.data());
+  std::uint32_t first = list.next;
   int chosen = near.count;
   for (; first < last && first + lanes <= particles.size(); first += lanes) {
     const std::size_t later = std::min<std::size_t>(first + kAskedAhead, particles.size() - lanes);
@@ -64,18 +46,18 @@ void ChooseParticles(const ListPart& part, ParticleBlock& near) {
     const auto bit = hn::Shl(hn::Set(d_bits, 1), hn::ConvertTo(d_bits, x));
     const auto is_in = hn::And(hn::TestBit(row, bit), hn::FirstN(d_bits, last - first));
     const Compressor compress(is_in);
-    hn::StoreU(compress(d, hn::Add(x, hn::Set(d, shift_x))), d, near.x.data() + chosen);
-    hn::StoreU(compress(d, hn::Add(y, hn::Set(d, shift_y))), d, near.y.data() + chosen);
+    hn::StoreU(compress(d, hn::Add(x, hn::Set(d, list.shift_x))), d, near.x.data() + chosen);
+    hn::StoreU(compress(d, hn::Add(y, hn::Set(d, list.shift_y))), d, near.y.data() + chosen);
     const auto index = hn::Add(hn::Set(d_index, first), hn::Iota(d_index, 0));
     hn::StoreU(compress(d_index, index), d_index, near.particle.data() + chosen);
     chosen += static_cast<int>(hn::CountTrue(d_bits, is_in));
   }
   for (; first < last; ++first) {
     const BinnedParticle& particle = particles[first];
-    near.x[chosen] = particle.x + shift_x;
-    near.y[chosen] = particle.y + shift_y;
+    near.x[chosen] = particle.x + list.shift_x;
+    near.y[chosen] = particle.y + list.shift_y;
     near.particle[chosen] = first;
-    chosen += LiesIn(particle, cells);
+    chosen += LiesIn(particle, list.cells);
   }
   near.count = chosen;
 }
@@ -120,8 +102,7 @@ bool MaskedParticles::ChooseMore() {
       if (room < kLeastRoom) return true;
       const std::uint32_t last =
           list.next + std::min(static_cast<std::uint32_t>(room), list.end - list.next);
-      const ListPart part{particles_, list.next, last, list.cells, list.shift_x, list.shift_y};
-      HWY_DYNAMIC_DISPATCH(ChooseParticles)(part, chosen_);
+      HWY_DYNAMIC_DISPATCH(ChooseParticles)(particles_, list, last, chosen_);
       list.next = last;
     }
   }

@@ -30,6 +30,13 @@ struct ParticleBlock {
 /// is null. Cost: linear in the lists of those tiles in which the mask has cells.
 class MaskedParticles {
  public:
+  /// What is left of a tile's list, those in `cells` of it count; their positions are shifted.
+  struct List {
+    std::uint32_t next, end;
+    BitRows cells;
+    float shift_x, shift_y;
+  };
+
   MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask);
 
   /// Calls visit(const ParticleBlock&) for all, a block after the other: tile after tile in the
@@ -40,12 +47,6 @@ class MaskedParticles {
   }
 
  private:
-  // What is left of a tile's list.
-  struct List {
-    std::uint32_t next, end;
-    BitRows cells;
-    float shift_x, shift_y;
-  };
   static constexpr int kMaxLists = std::tuple_size_v<Neighbourhood>;
 
   // A block is full when no more particles than this could be looked at.

@@ -68,35 +68,30 @@ void BuildTree(std::span<Point> positions, int axis) {
   }
 }
 
-// Squared distance from `query` to the nearest other position, at most `best`.
-double NearestSquare(std::span<const Point> tree, const Point& query, int axis, double best) {
-  if (tree.empty()) return best;
-  const std::size_t middle = tree.size() / 2;
-  const double dx = tree[middle].x - query.x;
-  const double dy = tree[middle].y - query.y;
-  const double square = dx * dx + dy * dy;
-  if (square > 0) best = std::min(best, square);
-  const double across = Along(query, axis) - Along(tree[middle], axis);
-  const auto lower = tree.first(middle);
-  const auto upper = tree.subspan(middle + 1);
-  best = NearestSquare(across < 0 ? lower : upper, query, 1 - axis, best);
-  if (across * across < best) {
-    best = NearestSquare(across < 0 ? upper : lower, query, 1 - axis, best);
-  }
-  return best;
-}
+// The nearest other position.
+struct Nearest {
+  double square = std::numeric_limits<double>::infinity();
 
-// Gathers the positions nearest to `query`, the tree's order deciding between equal distances.
-void GatherNearest(std::span<const Point> tree, const Point& query, int axis, NearRing& ring) {
+  void Add(double dx, double dy) {
+    const double next = dx * dx + dy * dy;
+    if (next > 0) square = std::min(square, next);
+  }
+  double reach_square() const { return square; }
+};
+
+// Adds to `near` (Nearest, NearRing) the offsets of positions within its reach of `query`, of which
+// there is less with each. The tree's order decides between equal distances.
+template <typename Near>
+void GatherNearest(std::span<const Point> tree, const Point& query, int axis, Near& near) {
   if (tree.empty()) return;
   const std::size_t middle = tree.size() / 2;
-  ring.Add(tree[middle].x - query.x, tree[middle].y - query.y);
+  near.Add(tree[middle].x - query.x, tree[middle].y - query.y);
   const double across = Along(query, axis) - Along(tree[middle], axis);
   const auto lower = tree.first(middle);
   const auto upper = tree.subspan(middle + 1);
-  GatherNearest(across < 0 ? lower : upper, query, 1 - axis, ring);
-  if (across * across < ring.reach_square()) {
-    GatherNearest(across < 0 ? upper : lower, query, 1 - axis, ring);
+  GatherNearest(across < 0 ? lower : upper, query, 1 - axis, near);
+  if (across * across < near.reach_square()) {
+    GatherNearest(across < 0 ? upper : lower, query, 1 - axis, near);
   }
 }
 
@@ -219,17 +214,17 @@ std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
   BuildTree(positions, 0);
 
   const std::uint64_t stride = std::max<std::size_t>(1, positions.size() / kSampleSize);
-  const double infinity = std::numeric_limits<double>::infinity();
   asked.clear();
   for (const Point& position : positions) {
     if (HashOf(position) % stride == 0) asked.push_back(position);
   }
   distances.resize(asked.size());
   ParallelFor(asked.size(), [&](std::size_t k) {
-    scratch.distances[k] =
-        std::sqrt(NearestSquare(scratch.positions, scratch.asked[k], 0, infinity));
+    Nearest nearest;
+    GatherNearest<Nearest>(scratch.positions, scratch.asked[k], 0, nearest);
+    scratch.distances[k] = std::sqrt(nearest.square);
   });
-  std::erase(distances, infinity);
+  std::erase(distances, std::numeric_limits<double>::infinity());
   if (distances.empty()) return std::nullopt;
   const double median = MedianOf(distances);
   std::erase_if(distances, [&](double distance) { return distance > kLonelyRatio * median; });

@@ -58,16 +58,13 @@ class LevelSetSampler {
 
   /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
   /// Requires: the tile is indexed. Particles miss where Covers is false.
-  /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoints).
-  /// Cost: the particles of the rows of buckets within a kernel radius.
+  /// Deterministic: particles are summed in the order of buckets, then of the bins
+  /// (SampleAtPoints). Cost: the particles of the rows of buckets within a kernel radius.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
   /// The same of the points of a group, for less than one after the other. They look at the same
   /// particles: neighbours at best.
   void Sample(const FieldPoints& group, FieldSamples& samples) const;
-
-  /// Whether particles weigh each their own.
-  bool HasWeights() const { return !weight_.empty(); }
 
   /// Calls visit(x, y, particle) for the particles within `radius` of a point of `tile`, in cells
   /// relative to it, and for some more. Requires: radius <= kernel radius.
