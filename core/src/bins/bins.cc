@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -14,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "base/parallel.h"
 #include "bins/quantise.h"
+#include "bins/tile_halo.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -161,62 +161,35 @@ void FillTiles(std::size_t first, std::size_t last, std::span<const float> volum
   }
 }
 
-// Sets of tiles around one: bit 5 (dy + 2) + dx + 2 stands for the one at (dx, dy) from it.
-TileCoordinate TileBeside(TileCoordinate home, int bit) {
-  return {home.y + bit / 5 - 2, home.x + bit % 5 - 2};
-}
-
-// Those that do not exist yet, up to `distance` tiles away.
-std::uint32_t MissingTiles(const TileDirectory& tiles, TileCoordinate home, int distance) {
-  std::uint32_t missing = 0;
-  for (int dy = 2 - distance; dy <= 2 + distance; ++dy) {
-    for (int dx = 2 - distance; dx <= 2 + distance; ++dx) {
-      const int bit = 5 * dy + dx;
-      if (tiles.Find(TileBeside(home, bit)) == kNoTile) missing |= std::uint32_t{1} << bit;
+// Whether the eight neighbours of a tile are in the directory.
+bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (tiles.Find({tile.y + dy, tile.x + dx}) == kNoTile) return false;
     }
   }
-  return missing;
+  return true;
 }
 
-// Bit kStride (d + 2): whether a particle reaches the tile d from its own along an axis.
-template <int kStride>
-std::uint32_t ReachedAlong(float at, float reach) {
-  constexpr float kSize = kTileSize;
-  const auto bit = [](int k, bool reached) { return std::uint32_t{reached} << k * kStride; };
-  return bit(0, at < reach - kSize) | bit(1, at < reach) | bit(2, true) |
-         bit(3, at >= kSize - reach) | bit(4, at >= 2 * kSize - reach);
-}
-
-// Of the `missing` tiles those that a tile's particles reach.
-std::uint32_t ReachedTiles(std::span<const BinnedParticle> particles, float reach,
-                           std::uint32_t missing) {
-  std::uint32_t reached = 0;
-  for (const BinnedParticle& at : particles) {
-    if ((missing & ~reached) == 0) break;
-    // A box of tiles is the product of its bits along both axes.
-    reached |= ReachedAlong<1>(at.x, reach) * ReachedAlong<5>(at.y, reach);
-  }
-  return reached & missing;
-}
-
-// Adds the tiles that particles reach, within less than two tiles, and seals the directory. Returns
-// false if they are more than `max_tiles`.
+// Adds the tiles around those that hold particles, and seals the directory. Returns false if they
+// are more than `max_tiles`.
 bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   BinScratch& scratch = bins.scratch;
   const auto homes = static_cast<std::uint32_t>(scratch.homes.size());
-  const int distance = reach <= kTileSize ? 1 : 2;
+  const TileHalo reached(reach);
   scratch.reached.resize(homes);
   ParallelFor(homes, [&](std::uint32_t k) {
-    const std::uint32_t first = scratch.offsets[k];
+    // In the middle of a body nothing is to be added, whatever its particles reach.
+    scratch.reached[k] = 0;
+    if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) return;
     const std::uint32_t end =
         k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.particles.size());
-    scratch.reached[k] = ReachedTiles(std::span(bins.particles).subspan(first, end - first), reach,
-                                      MissingTiles(bins.tiles, scratch.homes[k], distance));
+    scratch.reached[k] =
+        reached.Of(std::span(bins.particles).subspan(scratch.offsets[k], end - scratch.offsets[k]));
   });
   for (std::uint32_t k = 0; k < homes; ++k) {
-    for (std::uint32_t bits = scratch.reached[k]; bits != 0; bits &= bits - 1) {
-      bins.tiles.Insert(TileBeside(scratch.homes[k], std::countr_zero(bits)));
-    }
+    TileHalo::ForEach(scratch.homes[k], scratch.reached[k],
+                      [&](TileCoordinate tile) { bins.tiles.Insert(tile); });
     if (bins.tiles.size() > max_tiles) return false;
   }
   bins.tiles.Seal();

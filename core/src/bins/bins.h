@@ -47,7 +47,7 @@ struct BinScratch {
   std::vector<TileCoordinate> homes;      ///< Tiles that hold particles, sorted.
   std::vector<std::uint32_t> offsets;     ///< By these: their first particle.
   std::vector<std::uint32_t> next;        ///< By these: where the next stretch goes on.
-  std::vector<std::uint32_t> reached;     ///< By these: missing tiles that their particles reach.
+  std::vector<std::uint32_t> reached;     ///< By these: tiles that must exist (AddReachedTiles).
 };
 
 /// Particles sorted by tile, each in the list of the tile that it lies in. Tiles exist farther out:
