@@ -24,7 +24,7 @@ struct BinnedParticle {
   std::uint32_t source;  ///< Index of the particle in the frame.
 };
 
-/// Whether the particle of an particle lies in one of these cells of its tile.
+/// Whether a particle lies in one of these cells of its tile.
 inline bool LiesIn(const BinnedParticle& particle, const BitRows& cells) {
   return (cells[static_cast<int>(particle.y)] >> static_cast<int>(particle.x) & 1) != 0;
 }

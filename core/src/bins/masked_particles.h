@@ -30,7 +30,7 @@ struct ParticleBlock {
 /// is null. Cost: linear in the lists of those tiles in which the mask has cells.
 class MaskedParticles {
  public:
-  /// What is left of a tile's list, those in `cells` of it count; their positions are shifted.
+  /// What is left of a tile's list: of its particles those in `cells`, shifted.
   struct List {
     std::uint32_t next, end;
     BitRows cells;

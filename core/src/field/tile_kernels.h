@@ -80,9 +80,9 @@ struct TileParticles {
   std::size_t count;
 };
 
-/// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any:
+/// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any,
 /// also beyond the tile's sides. Requires: radius <= kSumMargin.
-void ScatterKernels(const TileParticles& particles, float radius, NodeSums& sums);
+void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 
 /// The same of particles in and around a tile, to the tile's nodes only, for any radius. `weight`,
 /// by particle of the bins, is null where weights are uniform.

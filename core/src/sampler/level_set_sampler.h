@@ -77,7 +77,7 @@ class LevelSetSampler {
   void FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
                 NeighbourRows& near) const;
 
-  /// Index in the frame of the particle of an particle. Requires: built to tell it.
+  /// Index in the frame of a particle that ForEachNear visits. Requires: built to tell it.
   std::uint32_t SourceOf(std::uint32_t particle) const { return source_[particle]; }
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }

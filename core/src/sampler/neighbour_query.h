@@ -13,6 +13,7 @@ inline constexpr int kRowPadding = 16;
 /// A query asks for sums at up to so many points, which look at the same particles: those of four
 /// segments.
 inline constexpr std::size_t kPointsAtOnce = 8;
+
 /// Positions along x are told modulo this many cells, which is more than any points see of them.
 inline constexpr float kColumnPeriod = 128;
 
@@ -24,7 +25,7 @@ struct NeighbourBand {
   float origin_y;                ///< NeighbourRows::origin_y, relative to those tiles.
 };
 
-/// Entries around points of a tile: row after row of buckets, each row a contiguous span. Not
+/// Particles around points of a tile: row after row of buckets, each row a contiguous span. Not
 /// initialised: most points need one band.
 struct NeighbourRows {
   const float* x;       ///< By particle, in cells, modulo kColumnPeriod.

@@ -1,5 +1,5 @@
 // Sums over the particles near a point, in vectors of floats. Particles within reach are copied
-// together first, so that the sums of all points of a cell run over one short array. Entry k of
+// together first, so that the sums of all points of a cell run over one short array. Particle k of
 // that array goes to partial sum k modulo sixteen, and the sixteen are added up in one tree,
 // however wide the vectors of the processor are: the bits are the same everywhere. Compiled once
 // for each target, hence the guard that each of them turns.
