@@ -139,7 +139,7 @@ HWY_INLINE void ForEachChunk(const NeighbourRows& near, Visit visit) {
 
 // Lane k is the sum over all lanes of sums[k]: of lanes i and i + 8, of these i and i + 4 and so
 // on. Those from `count` on are 0.
-HWY_INLINE Vector SumsOfLanes([[maybe_unused]] int count, Vector (&sums)[kLanes]) {
+HWY_INLINE Vector SumsOfLanes(int count, Vector (&sums)[kLanes]) {
 #if HWY_TARGET == HWY_SCALAR
   return sums[0];
 #else
