@@ -210,26 +210,31 @@ std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   return all;
 }
 
-TEST(LevelSetSampler, SamplesHaveTheSameBitsOnEveryInstructionSet) {
+TEST(LevelSetSampler, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAtOnce) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);
     const std::vector<FieldPoints> places = NeighboursIn(stages);
-    std::vector<FieldSamples> first(places.size());
+    std::vector<FieldSamples> alone(places.size());
     int in_gaps = 0;  // Or nearly.
     for (std::size_t k = 0; k < places.size(); ++k) {
-      stages.field.Sample(places[k], first[k]);
+      stages.field.Sample({&places[k], 1}, {&alone[k], 1});
       const auto& [x, y] = places[k].points[0];
       const FieldSample sample = stages.field.Sample(places[k].tile, x, y);
       in_gaps += sample.value > sample.phi && sample.spread > stages.scale.gap_spread;
     }
     EXPECT_GT(in_gaps, 10);
     support::ForEachInstructionSet([&] {
-      for (std::size_t k = 0; k < places.size(); ++k) {
-        FieldSamples samples;
-        stages.field.Sample(places[k], samples);
-        for (std::size_t of = 0; of < places[k].count; ++of) {
-          ExpectSameBits(samples[of], first[k][of]);
+      for (std::size_t at_once = 1; at_once <= kQueriesAtOnce; ++at_once) {
+        for (std::size_t first = 0; first < places.size(); first += at_once) {
+          const std::size_t count = std::min(at_once, places.size() - first);
+          std::array<FieldSamples, kQueriesAtOnce> samples;
+          stages.field.Sample(std::span(places).subspan(first, count), samples);
+          for (std::size_t q = 0; q < count; ++q) {
+            for (std::size_t k = 0; k < places[first + q].count; ++k) {
+              ExpectSameBits(samples[q][k], alone[first + q][k]);
+            }
+          }
         }
       }
     });
@@ -242,7 +247,7 @@ TEST(LevelSetSampler, PointsOfAGroupAgreeWithEachAlone) {
     RunCrowdedBlob(weighted, stages);
     for (const FieldPoints& place : NeighboursIn(stages)) {
       FieldSamples samples;
-      stages.field.Sample(place, samples);
+      stages.field.Sample({&place, 1}, {&samples, 1});
       for (std::size_t k = 0; k < place.count; ++k) {
         const auto& [x, y] = place.points[k];
         const FieldSample alone = stages.field.Sample(place.tile, x, y);

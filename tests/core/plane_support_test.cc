@@ -86,7 +86,7 @@ SupportSums SumSupport(const NeighbourRows& near, const BentPlane& plane,
                        const SupportShape& support) {
   const SupportQuery query{near, {&plane, 1}};
   QuerySupports sums;
-  SumSupports(query, support, sums);
+  SumSupports({&query, 1}, support, {&sums, 1});
   return sums[0];
 }
 
@@ -132,22 +132,28 @@ TEST(PlaneSupport, AgreesWithASumOverAllParticles) {
 
 TEST(PlaneSupport, OfManyPlanesAtOnceHasTheBitsOfEachAlone) {
   support::Random random(5);
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 50; ++round) {
     const bool weighted = round % 2 == 1;
-    const Rows rows(random);
-    std::array<BentPlane, kPointsAtOnce> planes;
-    for (BentPlane& plane : planes) plane = RandomPlane(random);
-    const std::size_t count = 1 + random.Below(kPointsAtOnce);
-    SupportQuery query{rows.AsNear(weighted), std::span(planes).first(count)};
-    query.near.bands[0].rows = static_cast<int>(random.Below(6));
+    std::vector<Rows> rows;
+    for (std::size_t q = 0; q < kQueriesAtOnce; ++q) rows.emplace_back(random);
+    std::vector<std::array<BentPlane, kPointsAtOnce>> planes(rows.size());
+    std::vector<SupportQuery> queries;
+    for (std::size_t q = 0; q < rows.size(); ++q) {
+      for (BentPlane& plane : planes[q]) plane = RandomPlane(random);
+      const std::size_t count = 1 + random.Below(kPointsAtOnce);
+      queries.push_back({rows[q].AsNear(weighted), std::span(planes[q]).first(count)});
+      queries.back().near.bands[0].rows = static_cast<int>(random.Below(6));
+    }
     support::ForEachInstructionSet([&] {
-      QuerySupports all;
-      SumSupports(query, kShape, all);
-      for (std::size_t k = 0; k < count; ++k) {
-        const SupportSums alone = SumSupport(query.near, planes[k], kShape);
-        EXPECT_EQ(all[k].distance, alone.distance);
-        EXPECT_EQ(all[k].weight, alone.weight);
-        EXPECT_EQ(all[k].square, alone.square);
+      std::vector<QuerySupports> all(queries.size());
+      SumSupports(queries, kShape, all);
+      for (std::size_t q = 0; q < queries.size(); ++q) {
+        for (std::size_t k = 0; k < queries[q].planes.size(); ++k) {
+          const SupportSums alone = SumSupport(queries[q].near, queries[q].planes[k], kShape);
+          EXPECT_EQ(all[q][k].distance, alone.distance);
+          EXPECT_EQ(all[q][k].weight, alone.weight);
+          EXPECT_EQ(all[q][k].square, alone.square);
+        }
       }
     });
   }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "support/random.h"
@@ -32,10 +33,14 @@ struct Points {
   std::vector<std::uint32_t> tiles;   // By point.
 };
 
-// The groups of segments [first, last).
-std::vector<Group> GroupsOf(const Points& points, std::size_t first, std::size_t last) {
+// The groups of segments [first, last), and how many were handed on at a time.
+std::vector<Group> GroupsOf(const Points& points, std::size_t first, std::size_t last,
+                            std::vector<std::size_t>& at_once) {
   std::vector<Group> all;
-  auto groups = CollectPoints<Place>([&](const Group& group) { all.push_back(group); });
+  auto groups = CollectPoints<Place>([&](std::span<const Group> some) {
+    all.insert(all.end(), some.begin(), some.end());
+    at_once.push_back(some.size());
+  });
   std::size_t point = 0;
   for (std::size_t segment = 0; segment < last; ++segment) {
     if (segment >= first && BeginsGroup(segment)) groups.Part();
@@ -44,7 +49,7 @@ std::vector<Group> GroupsOf(const Points& points, std::size_t first, std::size_t
       groups.Add(point, points.tiles[point], {static_cast<double>(point), 0.0});
     }
   }
-  groups.Part();
+  groups.Finish();
   return all;
 }
 
@@ -56,9 +61,10 @@ TEST(QueryBatch, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
     for (std::size_t segment = 0; segment < points.count_of.size(); ++segment) {
       segment_of.insert(segment_of.end(), points.count_of[segment], segment);
     }
+    std::vector<std::size_t> at_once;
     std::size_t next = 0;
     const Group* before = nullptr;
-    const std::vector<Group> all = GroupsOf(points, 0, points.count_of.size());
+    const std::vector<Group> all = GroupsOf(points, 0, points.count_of.size(), at_once);
     for (const Group& group : all) {
       ASSERT_GT(group.count, 0u);
       ASSERT_LE(group.count, kPointsAtOnce);
@@ -76,6 +82,7 @@ TEST(QueryBatch, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
       before = &group;
     }
     EXPECT_EQ(next, points.tiles.size());
+    for (std::size_t k = 0; k + 1 < at_once.size(); ++k) EXPECT_EQ(at_once[k], kQueriesAtOnce);
   }
 }
 
@@ -86,9 +93,10 @@ TEST(QueryBatch, AreTheSameWhereverCollectingBegins) {
     const Points points(random);
     const std::size_t last = points.count_of.size();
     const std::size_t cut = BeginOfGroup(random.Below(last));
-    const std::vector<Group> all = GroupsOf(points, 0, last);
-    std::vector<Group> parts = GroupsOf(points, 0, cut);
-    for (const Group& group : GroupsOf(points, cut, last)) parts.push_back(group);
+    std::vector<std::size_t> at_once;
+    const std::vector<Group> all = GroupsOf(points, 0, last, at_once);
+    std::vector<Group> parts = GroupsOf(points, 0, cut, at_once);
+    for (const Group& group : GroupsOf(points, cut, last, at_once)) parts.push_back(group);
     ASSERT_EQ(parts.size(), all.size());
     for (std::size_t k = 0; k < all.size(); ++k) {
       EXPECT_EQ(parts[k].count, all[k].count);

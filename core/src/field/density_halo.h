@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "base/prefetch.h"
 #include "bins/bins.h"
 #include "field/tile_kernels.h"
 
@@ -22,6 +24,12 @@ class DensityHalo {
  public:
   /// Makes room for kernels of a radius of at most kSumMargin.
   void Prepare(const ParticleBins& bins, float radius);
+
+  /// Asks the memory for where the margins of a tile will be kept. Requires: it holds particles.
+  void Prefetch(std::uint32_t tile) const {
+    PrefetchLines(std::span(values_).subspan(std::size_t{rim_[tile]} * Size(),
+                                             static_cast<std::size_t>(Size())));
+  }
 
   /// Keeps the margins of a tile's sums. Requires: the tile holds particles.
   void Keep(std::uint32_t tile, const NodeSums& sums);

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "base/parallel.h"
+#include "base/prefetch.h"
 #include "bins/masked_particles.h"
 #include "field/level_set_formula.h"
 #include "field/tile_kernels.h"
@@ -47,9 +48,12 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     values.fill(0);
     return;
   }
+  // Written to as soon as the sums are known, which takes longer than memory far away.
+  PrefetchLines(std::span<const float>(values));
   alignas(64) NodeSums sums;
   sums.fill(0);
   if (fits) {
+    level_set.halo.Prefetch(tile);
     ScatterKernels(ParticlesOf(bins, tile), radius, sums);
     level_set.halo.Keep(tile, sums);
   } else {

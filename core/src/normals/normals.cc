@@ -186,11 +186,13 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
     Orient(previous_of(cell), plane);
     Keep(plane.cell, cell, plane, scratch);
   };
-  const auto sample = [&](const FieldPoints& group) {
-    FieldSamples samples;
-    field.Sample(group, samples);
-    for (std::size_t k = 0; k < group.count; ++k) {
-      SetSample(group.vertices[k], samples[k], planes);
+  const auto sample = [&](std::span<const FieldPoints> groups) {
+    std::array<FieldSamples, kQueriesAtOnce> samples;
+    field.Sample(groups, samples);
+    for (std::size_t q = 0; q < groups.size(); ++q) {
+      for (std::size_t k = 0; k < groups[q].count; ++k) {
+        SetSample(groups[q].vertices[k], samples[q][k], planes);
+      }
     }
   };
   const bool at_entries = parameters.placement == Placement::kVirtualPlane;
@@ -217,7 +219,7 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
         if (begins_group[k - first]) groups.Part();
         AddPoints(bins.tiles, k, at_entries, planes[k], groups);
       }
-      groups.Part();
+      groups.Finish();
     }
     for (std::size_t k = first; k < last; ++k) set_normal(cells[k - first], planes[k]);
   };

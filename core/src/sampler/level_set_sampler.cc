@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/parallel.h"
+#include "base/prefetch.h"
 #include "bins/cell_mask.h"
 #include "bins/masked_particles.h"
 
@@ -139,7 +141,17 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
     }
   };
   std::uint32_t chosen = run.first_particle;
+  // Where those of a tile, if all are wanted, are written: asked for while they are found.
+  std::uint32_t room = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
+    const std::uint32_t count = bins.CountOf(tile);
+    const auto ask = [&](const auto& values) {
+      PrefetchLines(std::span(values).subspan(room, count));
+    };
+    ask(std::as_const(chosen_));
+    ask(std::as_const(x_));
+    ask(std::as_const(y_));
+    room += count;
     const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
     const auto first = static_cast<std::uint32_t>(columns);
     const CellMask mask = MaskOf(wanted_[tile]);
@@ -174,7 +186,7 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
   query.points = {&point, 1};
   FindNear(tile, query.points, scale_.kernel_radius, query.near);
   PointSamples samples;
-  SampleAtPoints(scale_, query, samples);
+  SampleAtPoints(scale_, {&query, 1}, samples);
   return {.density = samples.density[0],
           .mean_x = samples.mean_x[0],
           .mean_y = samples.mean_y[0],
@@ -188,14 +200,20 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
           .has_support = samples.kernel[0] > 0};
 }
 
-void LevelSetSampler::Sample(const FieldPoints& group, FieldSamples& samples) const {
-  PointQuery query;
-  query.points = std::span(group.points).first(group.count);
-  FindNear(group.tile, query.points, scale_.kernel_radius, query.near);
+void LevelSetSampler::Sample(std::span<const FieldPoints> groups,
+                             std::span<FieldSamples> samples) const {
+  std::array<PointQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].points = std::span(groups[q].points).first(groups[q].count);
+    FindNear(groups[q].tile, queries[q].points, scale_.kernel_radius, queries[q].near);
+  }
   PointSamples at;
-  SampleAtPoints(scale_, query, at);
-  for (std::size_t k = 0; k < group.count; ++k) {
-    samples[k] = {at.value[k], at.gradient_x[k], at.gradient_y[k]};
+  SampleAtPoints(scale_, std::span(queries).first(groups.size()), at);
+  std::size_t point = 0;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    for (std::size_t k = 0; k < groups[q].count; ++k, ++point) {
+      samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point]};
+    }
   }
 }
 

@@ -62,9 +62,9 @@ class LevelSetSampler {
   /// (SampleAtPoints). Cost: the particles of the rows of buckets within a kernel radius.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// The same of the points of a group, for less than one after the other. They look at the same
-  /// particles: neighbours at best.
-  void Sample(const FieldPoints& group, FieldSamples& samples) const;
+  /// The same of points of at most kQueriesAtOnce groups, for less than one after the other. Those
+  /// of a group look at the same particles: neighbours at best.
+  void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
   /// Calls visit(x, y, particle) for the particles within `radius` of a point of `tile`, in cells
   /// relative to it, and for some more. Requires: radius <= kernel radius.

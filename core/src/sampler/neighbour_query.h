@@ -13,6 +13,8 @@ inline constexpr int kRowPadding = 16;
 /// A query asks for sums at up to so many points, which look at the same particles: those of four
 /// segments.
 inline constexpr std::size_t kPointsAtOnce = 8;
+/// So many queries run at once: none waits for what is looked up for another.
+inline constexpr std::size_t kQueriesAtOnce = 6;
 
 /// Positions along x are told modulo this many cells, which is more than any points see of them.
 inline constexpr float kColumnPeriod = 128;

@@ -108,17 +108,12 @@ HWY_INLINE void Close(NeighbourChunk& chunk) {
   }
 }
 
-// Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
-template <bool kWeighted, typename Visit>
-HWY_INLINE void ForEachChunk(const NeighbourRows& near, Visit visit) {
+// Collects the particles of `near` in a chunk. Whenever there may be no room for more, make_room()
+// has to use it up, or returns false to give up. Returns false if it did.
+template <bool kWeighted, typename MakeRoom>
+HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
   const NeighbourDisc disc(near);
-  NeighbourChunk chunk;
-  chunk.count = 0;
-  const auto use_up = [&]() HWY_ATTR {
-    Close<kWeighted>(chunk);
-    visit(std::as_const(chunk));
-    chunk.count = 0;
-  };
+  int count = 0;
   for (int b = 0; b < near.band_count; ++b) {
     const NeighbourBand& band = near.bands[b];
     const Vector origin_y = hn::Set(Lanes(), band.origin_y);
@@ -128,48 +123,58 @@ HWY_INLINE void ForEachChunk(const NeighbourRows& near, Visit visit) {
       std::uint32_t first = offsets[0];
       const std::uint32_t last = offsets[band.columns];
       do {
-        if (HWY_UNLIKELY(chunk.count + kPartialSums > NeighbourChunk::kCapacity)) use_up();
-        chunk.count = disc.Append<kWeighted>(origin_y, first, last, chunk.count, chunk);
+        if (HWY_UNLIKELY(count + kPartialSums > NeighbourChunk::kCapacity)) {
+          chunk.count = std::exchange(count, 0);
+          if (!make_room()) return false;
+        }
+        count = disc.Append<kWeighted>(origin_y, first, last, count, chunk);
         first += kPartialSums;
       } while (HWY_UNLIKELY(first < last));
     }
   }
-  if (chunk.count > 0) use_up();
+  chunk.count = count;
+  return true;
 }
 
-// Lane k is the sum over all lanes of sums[k]: of lanes i and i + 8, of these i and i + 4 and so
-// on. Those from `count` on are 0.
-HWY_INLINE Vector SumsOfLanes(int count, Vector (&sums)[kLanes]) {
-#if HWY_TARGET == HWY_SCALAR
-  return sums[0];
-#else
-  const Lanes d;
-  if constexpr (kLanes == 16) {
-    for (int k = 0; k < std::min(count, 8); ++k) {
-      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 8], sums[k]),
-                        hn::ConcatUpperUpper(d, sums[k + 8], sums[k]));
-    }
-    // In blocks of four lanes: those of k, k + 4, k + 8, k + 12.
-    for (int k = 0; k < std::min(count, 4); ++k) {
-      sums[k] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(sums[k + 4]), sums[k]),
-                        hn::OddEvenBlocks(sums[k + 4], hn::SwapAdjacentBlocks(sums[k])));
-    }
-  } else if constexpr (kLanes == 8) {
-    for (int k = 0; k < std::min(count, 4); ++k) {
-      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 4], sums[k]),
-                        hn::ConcatUpperUpper(d, sums[k + 4], sums[k]));
+// Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
+template <bool kWeighted, typename Visit>
+HWY_INLINE void ForEachChunk(const NeighbourRows& near, NeighbourChunk& chunk, Visit visit) {
+  const auto empty = [&]() HWY_ATTR {
+    Close<kWeighted>(chunk);
+    visit(std::as_const(chunk));
+    return true;
+  };
+  Collect<kWeighted>(near, chunk, empty);
+  if (chunk.count > 0) empty();
+}
+
+// The particles of `near` in one chunk. Returns false if they may not fit.
+template <bool kWeighted>
+HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
+  const bool fits = Collect<kWeighted>(near, chunk, [] { return false; });
+  if (fits) Close<kWeighted>(chunk);
+  return fits;
+}
+
+// Calls visit(query, chunk, is_all) for the particles of each of a few queries, as many at a time
+// as a chunk holds: is_all where these are all that the query has. First copies those of all
+// queries, so that the sums of one need not wait for what is looked up for it.
+template <bool kWeighted, typename Query, typename Visit>
+HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
+  NeighbourChunk chunks[kQueriesAtOnce];
+  bool fits[kQueriesAtOnce];
+  for (std::size_t k = 0; k < queries.size(); ++k) {
+    fits[k] = Gather<kWeighted>(queries[k].near, chunks[k]);
+  }
+  for (std::size_t k = 0; k < queries.size(); ++k) {
+    if (HWY_LIKELY(fits[k])) {
+      visit(k, chunks[k], true);
+    } else {
+      ForEachChunk<kWeighted>(queries[k].near, chunks[k],
+                              [&](const NeighbourChunk& chunk)
+                                  HWY_ATTR { visit(k, chunk, false); });
     }
   }
-  const hn::Repartition<double, Lanes> d_pair;
-  const auto pairs = [&](int k) HWY_ATTR {
-    return hn::BitCast(d_pair, hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
-                                       hn::InterleaveUpper(d, sums[k], sums[k + 1])));
-  };
-  const auto lower = pairs(0);
-  const auto upper = pairs(2);
-  return hn::Add(hn::BitCast(d, hn::InterleaveLower(d_pair, lower, upper)),
-                 hn::BitCast(d, hn::InterleaveUpper(d_pair, lower, upper)));
-#endif
 }
 
 // Sixteen partial sums of each of several channels.
@@ -187,32 +192,119 @@ class PartialSums {
     }
   }
 
-  // Adds the channels' totals: total_of(channel) is a double&.
-  template <typename TotalOf>
-  HWY_INLINE void AddTo(TotalOf total_of) {
-    HWY_ALIGN float totals[kLanes];
-    for (int first = 0; first < kChannels; first += kLanes) {
-      const int count = std::min(kLanes, kChannels - first);
-      Vector sums[kLanes];
-      for (int k = 0; k < kLanes; ++k) sums[k] = k < count ? Fold(first + k) : hn::Zero(Lanes());
-      hn::Store(SumsOfLanes(count, sums), Lanes(), totals);
-      for (int k = 0; k < count; ++k) total_of(first + k) += totals[k];
+  // Keeps them for TotalsAtPoints.
+  template <typename Parts>
+  HWY_INLINE void Store(Parts& parts, std::size_t point) const {
+    for (int channel = 0; channel < kChannels; ++channel) {
+      for (int part = 0; part < kParts; ++part) {
+        hn::Store(parts_[channel][part], Lanes(), parts[channel][point] + part * kLanes);
+      }
     }
   }
 
+  // Adds the channels' totals to `totals`.
+  HWY_INLINE void AddTo(double (&totals)[kChannels]) {
+    HWY_ALIGN float sums[kGroups * kGroup];
+    for (int group = 0; group < kGroups; ++group) Total(group * kGroup, sums + group * kGroup);
+    for (int channel = 0; channel < kChannels; ++channel) totals[channel] += sums[channel];
+  }
+
  private:
-  // Partial sums i and i + 8, then i and i + 4, as far as they are in different vectors.
-  HWY_INLINE Vector Fold(int channel) {
+  static constexpr int kGroup = 4;  // Channels that are added up at once.
+  static constexpr int kGroups = (kChannels + kGroup - 1) / kGroup;
+  using Group = hn::CappedTag<float, kGroup>;
+
+  // Partial sums i and i + 8, then i and i + 4.
+  HWY_INLINE hn::Vec<Group> Fold(int channel) {
+    if (channel >= kChannels) return hn::Zero(Group());
     for (int count = kParts / 2; count > 0; count /= 2) {
       for (int part = 0; part < count; ++part) {
         parts_[channel][part] = hn::Add(parts_[channel][part], parts_[channel][part + count]);
       }
     }
-    return parts_[channel][0];
+    return FoldLanes(Lanes(), parts_[channel][0]);
+  }
+  template <class D>
+  static HWY_INLINE hn::Vec<Group> FoldLanes([[maybe_unused]] D d, hn::Vec<D> sums) {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (hn::MaxLanes(D()) > kGroup) {
+      const hn::Half<D> half;
+      return FoldLanes(half, hn::Add(hn::LowerHalf(half, sums), hn::UpperHalf(half, sums)));
+    } else
+#endif
+      return sums;
+  }
+
+  // The totals of four channels: partial sums i and i + 2, then both of them.
+  HWY_INLINE void Total(int channel, float* totals) {
+    const Group d;
+    hn::Vec<Group> sums[kGroup];
+    for (int k = 0; k < kGroup; ++k) sums[k] = Fold(channel + k);
+#if HWY_TARGET == HWY_SCALAR
+    for (int k = 0; k < kGroup; ++k) hn::Store(sums[k], d, totals + k);
+#else
+    const auto pair = [&](int k) HWY_ATTR {
+      return hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
+                     hn::InterleaveUpper(d, sums[k], sums[k + 1]));
+    };
+    const auto first = pair(0);
+    const auto second = pair(2);
+    hn::Store(
+        hn::Add(hn::ConcatLowerLower(d, second, first), hn::ConcatUpperUpper(d, second, first)), d,
+        totals);
+#endif
   }
 
   Vector parts_[kChannels][kParts];
 };
+
+// Totals of one channel at kLanes points from the partial sums of each, added up as PartialSums
+// does: lane k is that of parts[first + k], or of parts[last] if that comes before.
+HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t first,
+                                 std::size_t last) {
+  const Lanes d;
+  Vector sums[kLanes];
+  for (std::size_t point = 0; point < kLanes; ++point) {
+    const float* const from = parts[std::min(first + point, last)];
+    Vector folded[kParts];
+    for (int part = 0; part < kParts; ++part) folded[part] = hn::Load(d, from + part * kLanes);
+    for (int count = kParts / 2; count > 0; count /= 2) {
+      for (int part = 0; part < count; ++part) {
+        folded[part] = hn::Add(folded[part], folded[part + count]);
+      }
+    }
+    sums[point] = folded[0];
+  }
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (kLanes == 16) {
+    for (int k = 0; k < 8; ++k) {
+      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 8], sums[k]),
+                        hn::ConcatUpperUpper(d, sums[k + 8], sums[k]));
+    }
+    // In blocks of four lanes: those of k, k + 4, k + 8, k + 12.
+    for (int k = 0; k < 4; ++k) {
+      sums[k] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(sums[k + 4]), sums[k]),
+                        hn::OddEvenBlocks(sums[k + 4], hn::SwapAdjacentBlocks(sums[k])));
+    }
+  } else if constexpr (kLanes == 8) {
+    for (int k = 0; k < 4; ++k) {
+      sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 4], sums[k]),
+                        hn::ConcatUpperUpper(d, sums[k + 4], sums[k]));
+    }
+  }
+  const hn::Repartition<double, Lanes> d_pair;
+  const auto pairs = [&](int k) HWY_ATTR {
+    return hn::BitCast(d_pair, hn::Add(hn::InterleaveLower(d, sums[k], sums[k + 1]),
+                                       hn::InterleaveUpper(d, sums[k], sums[k + 1])));
+  };
+  const auto lower = pairs(0);
+  const auto upper = pairs(2);
+  return hn::Add(hn::BitCast(d, hn::InterleaveLower(d_pair, lower, upper)),
+                 hn::BitCast(d, hn::InterleaveUpper(d_pair, lower, upper)));
+#else
+  return sums[0];
+#endif
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc

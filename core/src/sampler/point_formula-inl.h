@@ -49,21 +49,22 @@ template <bool kWeighted>
 class PointFormula {
  public:
   // By channel and point.
-  using Totals = double[kWeighted ? int{kWeightedSums} : int{kSums}][kPointsAtOnce];
+  using Totals = double[kWeighted ? int{kWeightedSums} : int{kSums}][PointSamples::kCapacity];
   // Points that are computed at once.
   static constexpr std::size_t kLanes = hn::MaxLanes(hn::CappedTag<double, 8>());
 
   HWY_INLINE explicit PointFormula(const Scale& scale)
       : scale_(scale), inverse_square_(1 / (scale.kernel_radius * scale.kernel_radius)) {}
 
-  // Sets the samples at all points. Returns those whose gradient is that of the gap, which is left:
-  // bit k is point k.
-  HWY_INLINE unsigned operator()(const Totals& totals, PointSamples& samples) const {
-    unsigned gaps = 0;
-    for (std::size_t at = 0; at < kPointsAtOnce; at += kLanes) {
-      gaps |= unsigned{Sample(totals, at, samples)} << at;
+  // Sets the samples at the first points, of which there are `count`, and some behind them. Returns
+  // those whose gradient is that of the gap, which is left: bit k is point k.
+  HWY_INLINE std::uint64_t operator()(const Totals& totals, std::size_t count,
+                                      PointSamples& samples) const {
+    std::uint64_t gaps = 0;
+    for (std::size_t at = 0; at < count; at += kLanes) {
+      gaps |= std::uint64_t{Sample(totals, at, samples)} << at;
     }
-    return gaps;
+    return gaps & ((std::uint64_t{1} << count) - 1);
   }
 
   // The gradient of the gap at a point, from its sums and third sums.

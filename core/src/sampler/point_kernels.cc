@@ -1,6 +1,8 @@
 #include "sampler/point_kernels.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 
 // Highway compiles the rest of this file once for each target.
@@ -93,34 +95,119 @@ HWY_INLINE PartialSums<AddTerms::kChannels> SumChunk(double inverse_square,
       });
 }
 
-template <bool kWeighted>
-HWY_INLINE void Sample(const Scale& scale, const PointQuery& query, PointSamples& samples) {
-  const double inverse_square = 1 / (scale.kernel_radius * scale.kernel_radius);
-  HWY_ALIGN typename PointFormula<kWeighted>::Totals totals = {};
-  ForEachChunk<kWeighted>(query.near, [&](const NeighbourChunk& chunk) HWY_ATTR {
-    for (std::size_t k = 0; k < query.points.size(); ++k) {
-      SumChunk<AddSums<kWeighted>>(inverse_square, query.near, chunk, query.points[k])
-          .AddTo([&](int channel) -> double& { return totals[channel][k]; });
-    }
+void SumThird(double inverse_square, const NeighbourRows& near, const Point& point,
+              double (&totals)[kThirdSums]) {
+  NeighbourChunk room;
+  ForEachChunk<false>(near, room, [&](const NeighbourChunk& chunk) HWY_ATTR {
+    SumChunk<AddThirdSums>(inverse_square, near, chunk, point).AddTo(totals);
   });
+}
+
+// Sums at the points of some queries. The totals of all points are added up at once. Where
+// particles are too many for one chunk, the totals of each chunk go to a sum in doubles, point by
+// point.
+template <bool kWeighted>
+class SumsAtPoints {
+ public:
+  HWY_INLINE SumsAtPoints(double inverse_square, std::span<const PointQuery> queries) {
+    std::size_t first[kQueriesAtOnce];
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+      first[q] = count_;
+      count_ += queries[q].points.size();
+    }
+    const auto visit = [&](std::size_t q, const NeighbourChunk& chunk, bool is_all) HWY_ATTR {
+      const PointQuery& query = queries[q];
+      for (std::size_t k = 0; k < query.points.size(); ++k) {
+        PartialSums<kChannels> sums =
+            SumChunk<AddSums<kWeighted>>(inverse_square, query.near, chunk, query.points[k]);
+        if (count_ > kFewPoints) sums.Store(parts_, first[q] + k);
+        if (HWY_UNLIKELY(!is_all || count_ <= kFewPoints)) AddAlone(first[q] + k, sums);
+      }
+    };
+    ForEachQuery<kWeighted>(queries, visit);
+    if (count_ > kFewPoints) {
+      Total();
+      for (std::size_t point = 0; alone_ >> point != 0; ++point) {
+        if ((alone_ >> point & 1) != 0) TakeAlone(point, point);
+      }
+    } else {
+      // What is behind the last point counts for nothing, but is computed with.
+      constexpr std::size_t kEnd = std::max(kFewPoints, PointFormula<kWeighted>::kLanes);
+      for (std::size_t point = 0; point < kEnd; ++point) {
+        TakeAlone(std::min(point, count_ - 1), point);
+      }
+    }
+  }
+
+  std::size_t count() const { return count_; }
+  const typename PointFormula<kWeighted>::Totals& totals() const { return totals_; }
+
+ private:
+  static constexpr int kChannels = AddSums<kWeighted>::kChannels;
+  // The totals of so many are faster added up one by one.
+  static constexpr std::size_t kFewPoints = 2;
+  static_assert(PointSamples::kCapacity % kPartialSums == 0 && PointSamples::kCapacity < 64);
+
+  HWY_INLINE void AddAlone(std::size_t point, PartialSums<kChannels>& sums) {
+    double(&totals)[kChannels] = totals_alone_[point];
+    if ((alone_ >> point & 1) == 0) std::fill(std::begin(totals), std::end(totals), 0.0);
+    alone_ |= std::uint64_t{1} << point;
+    sums.AddTo(totals);
+  }
+
+  void TakeAlone(std::size_t from, std::size_t to) {
+    for (int channel = 0; channel < kChannels; ++channel) {
+      totals_[channel][to] = totals_alone_[from][channel];
+    }
+  }
+
+  HWY_INLINE void Total() {
+    const hn::CappedTag<double, kPartialSums> d;
+    const hn::Rebind<float, decltype(d)> d_float;
+    HWY_ALIGN float totals[kLanes];
+    for (int channel = 0; channel < kChannels; ++channel) {
+      for (std::size_t first = 0; first < count_; first += kLanes) {
+        hn::Store(TotalsAtPoints(parts_[channel], first, count_ - 1), Lanes(), totals);
+        for (std::size_t k = 0; k < kLanes; k += hn::Lanes(d)) {
+          hn::Store(hn::PromoteTo(d, hn::Load(d_float, totals + k)), d,
+                    totals_[channel] + first + k);
+        }
+      }
+    }
+  }
+
+  std::size_t count_ = 0;
+  std::uint64_t alone_ = 0;  // Those in totals_alone_: bit k is point k.
+  HWY_ALIGN float parts_[kChannels][PointSamples::kCapacity][kPartialSums];
+  HWY_ALIGN typename PointFormula<kWeighted>::Totals totals_;
+  double totals_alone_[PointSamples::kCapacity][kChannels];
+};
+
+template <bool kWeighted>
+HWY_INLINE void Sample(const Scale& scale, std::span<const PointQuery> queries,
+                       PointSamples& samples) {
+  const double inverse_square = 1 / (scale.kernel_radius * scale.kernel_radius);
+  const SumsAtPoints<kWeighted> sums(inverse_square, queries);
   const PointFormula<kWeighted> formula(scale);
-  const unsigned gaps = formula(totals, samples);
-  for (std::size_t k = 0; k < query.points.size(); ++k) {
-    if ((gaps >> k & 1) == 0) continue;
-    double third[kThirdSums] = {};
-    ForEachChunk<false>(query.near, [&](const NeighbourChunk& chunk) HWY_ATTR {
-      SumChunk<AddThirdSums>(inverse_square, query.near, chunk, query.points[k])
-          .AddTo([&](int channel) -> double& { return third[channel]; });
-    });
-    const Point gradient = formula.GapGradient(totals, third, k);
-    samples.gradient_x[k] = gradient.x;
-    samples.gradient_y[k] = gradient.y;
+  const std::uint64_t gaps = formula(sums.totals(), sums.count(), samples);
+  if (gaps == 0) return;
+  std::size_t point = 0;
+  for (const PointQuery& query : queries) {
+    for (std::size_t k = 0; k < query.points.size(); ++k, ++point) {
+      if ((gaps >> point & 1) == 0) continue;
+      double third[kThirdSums] = {};
+      SumThird(inverse_square, query.near, query.points[k], third);
+      const Point gradient = formula.GapGradient(sums.totals(), third, point);
+      samples.gradient_x[point] = gradient.x;
+      samples.gradient_y[point] = gradient.y;
+    }
   }
 }
 
-void SampleAtPoints(const Scale& scale, const PointQuery& query, PointSamples& samples) {
-  query.near.weight != nullptr ? Sample<true>(scale, query, samples)
-                               : Sample<false>(scale, query, samples);
+void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries,
+                    PointSamples& samples) {
+  queries.front().near.weight != nullptr ? Sample<true>(scale, queries, samples)
+                                         : Sample<false>(scale, queries, samples);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -132,8 +219,9 @@ namespace partiemc {
 
 HWY_EXPORT(SampleAtPoints);
 
-void SampleAtPoints(const Scale& scale, const PointQuery& query, PointSamples& samples) {
-  HWY_DYNAMIC_DISPATCH(SampleAtPoints)(scale, query, samples);
+void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries,
+                    PointSamples& samples) {
+  HWY_DYNAMIC_DISPATCH(SampleAtPoints)(scale, queries, samples);
 }
 
 }  // namespace partiemc

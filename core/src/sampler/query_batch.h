@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <span>
 
 #include "bins/lattice.h"
 #include "sampler/neighbour_query.h"
@@ -20,32 +20,47 @@ struct PointGroup {
   std::array<std::size_t, kPointsAtOnce> vertices;  ///< What each belongs to.
 };
 
-/// Collects points of successive vertices of rings in groups, and hands each to a sink, a function
-/// of const PointGroup<Member>&.
+/// Collects points of successive vertices of rings in groups, and hands on kQueriesAtOnce groups at
+/// a time to a sink, a function of std::span<const PointGroup<Member>>. Which points share a group
+/// depends on what is added between two calls of Part alone, not on when groups are handed on.
 template <typename Member, typename Sink>
 class QueryBatch {
  public:
   explicit QueryBatch(Sink sink) : sink_(sink) {}
 
-  /// A point joins the group if that is of its tile and has room.
+  /// What comes is in no group with what has come.
+  void Part() { is_open_ = false; }
+
+  /// A point joins the last group if that is of its tile and has room.
   void Add(std::size_t vertex, std::uint32_t tile, const Member& point) {
-    if (group_.tile != tile || group_.count == kPointsAtOnce) {
-      Part();
-      group_.tile = tile;
+    if (!is_open_ || groups_[count_ - 1].tile != tile ||
+        groups_[count_ - 1].count == kPointsAtOnce) {
+      if (count_ == groups_.size()) HandOn();
+      groups_[count_].tile = tile;
+      groups_[count_++].count = 0;
+      is_open_ = true;
     }
-    group_.vertices[group_.count] = vertex;
-    group_.points[group_.count++] = point;
+    PointGroup<Member>& group = groups_[count_ - 1];
+    group.vertices[group.count] = vertex;
+    group.points[group.count++] = point;
   }
 
-  /// What comes is in no group with what has come. Call it last, too.
-  void Part() {
-    if (group_.count > 0) sink_(std::as_const(group_));
-    group_.count = 0;
+  /// Hands on what is left. Call it last.
+  void Finish() {
+    if (count_ > 0) HandOn();
   }
 
  private:
+  void HandOn() {
+    sink_(std::span<const PointGroup<Member>>(groups_).first(count_));
+    count_ = 0;
+    is_open_ = false;
+  }
+
   Sink sink_;
-  PointGroup<Member> group_;
+  std::array<PointGroup<Member>, kQueriesAtOnce> groups_;
+  std::size_t count_ = 0;
+  bool is_open_ = false;
 };
 
 /// Collects for `sink`.

@@ -1,7 +1,7 @@
 #include "vertices/plane_estimates.h"
 
 #include <algorithm>
-#include <span>
+#include <array>
 
 namespace partiemc {
 
@@ -23,13 +23,18 @@ PlaneEstimate PlaneEstimator::EstimateOf(const SupportSums& sums) const {
           .scatter = variance / (spacing_ * spacing_)};
 }
 
-void PlaneEstimator::Estimate(const Planes& group, Estimates& estimates) const {
-  SupportQuery query;
-  query.planes = std::span(group.points).first(group.count);
-  field_.FindNear(group.tile, query.planes, support_.radius, query.near);
-  QuerySupports sums;
-  SumSupports(query, support_, sums);
-  for (std::size_t k = 0; k < group.count; ++k) estimates[k] = EstimateOf(sums[k]);
+void PlaneEstimator::Estimate(std::span<const Planes> groups,
+                              std::span<Estimates> estimates) const {
+  std::array<SupportQuery, kQueriesAtOnce> queries;
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    queries[q].planes = std::span(groups[q].points).first(groups[q].count);
+    field_.FindNear(groups[q].tile, queries[q].planes, support_.radius, queries[q].near);
+  }
+  std::array<QuerySupports, kQueriesAtOnce> sums;
+  SumSupports(std::span(queries).first(groups.size()), support_, sums);
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    for (std::size_t k = 0; k < groups[q].count; ++k) estimates[q][k] = EstimateOf(sums[q][k]);
+  }
 }
 
 }  // namespace partiemc

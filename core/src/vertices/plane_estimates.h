@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "frame/scale.h"
 #include "partiemc/virtual_plane_constants.h"
@@ -31,8 +32,9 @@ class PlaneEstimator {
   using Planes = PointGroup<BentPlane>;
   using Estimates = std::array<PlaneEstimate, kPointsAtOnce>;
 
-  /// Of a group. Cost: the particles around it. Requires: field.Covers(tile, x, y) of each plane.
-  void Estimate(const Planes& group, Estimates& estimates) const;
+  /// Of at most kQueriesAtOnce groups. Cost: the particles around each.
+  /// Requires: field.Covers(tile, x, y) of each plane; groups and estimates are as many.
+  void Estimate(std::span<const Planes> groups, std::span<Estimates> estimates) const;
 
  private:
   PlaneEstimate EstimateOf(const SupportSums& sums) const;

@@ -1,6 +1,5 @@
 #include "vertices/plane_support.h"
 
-#include <algorithm>
 #include <cstddef>
 
 // Highway compiles the rest of this file once for each target.
@@ -70,17 +69,23 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
   });
 }
 
-void SumSupports(const SupportQuery& query, const SupportShape& support, QuerySupports& sums) {
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 std::span<QuerySupports> sums) {
   const Shape shape(support);
-  std::fill_n(sums.begin(), query.planes.size(), SupportSums{});
-  ForEachChunk<false>(query.near, [&](const NeighbourChunk& chunk) HWY_ATTR {
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    for (std::size_t k = 0; k < queries[q].planes.size(); ++k) sums[q][k] = {};
+  }
+  const auto visit = [&](std::size_t q, const NeighbourChunk& chunk, bool) HWY_ATTR {
+    const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.planes.size(); ++k) {
-      double* const totals[] = {&sums[k].weight, &sums[k].distance, &sums[k].square};
-      SumChunk(query.near, chunk, query.planes[k], shape).AddTo([&](int channel) -> double& {
-        return *totals[channel];
-      });
+      double totals[kSupportSums] = {};
+      SumChunk(query.near, chunk, query.planes[k], shape).AddTo(totals);
+      sums[q][k].weight += totals[kWeight];
+      sums[q][k].distance += totals[kDistance];
+      sums[q][k].square += totals[kSquare];
     }
-  });
+  };
+  ForEachQuery<false>(queries, visit);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -92,8 +97,9 @@ namespace partiemc {
 
 HWY_EXPORT(SumSupports);
 
-void SumSupports(const SupportQuery& query, const SupportShape& support, QuerySupports& sums) {
-  HWY_DYNAMIC_DISPATCH(SumSupports)(query, support, sums);
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 std::span<QuerySupports> sums) {
+  HWY_DYNAMIC_DISPATCH(SumSupports)(queries, support, sums);
 }
 
 }  // namespace partiemc

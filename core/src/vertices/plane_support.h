@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 
 #include "sampler/neighbour_query.h"
@@ -36,9 +37,10 @@ struct SupportQuery {
   std::span<const BentPlane> planes;
 };
 
-/// sums[k] are those of planes[k]. In floats, with the same bits for any processor, as
-/// SampleAtPoints.
+/// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce. In floats, with the
+/// same bits for any processor, as SumAtPoints.
 using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
-void SumSupports(const SupportQuery& query, const SupportShape& support, QuerySupports& sums);
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 std::span<QuerySupports> sums);
 
 }  // namespace partiemc

@@ -194,14 +194,16 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
   float* scatter = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, c.curvature_reach * h);
-    auto planes = CollectPoints<BentPlane>([&](const PlaneEstimator::Planes& group) {
-      PlaneEstimator::Estimates estimates;
-      estimator.Estimate(group, estimates);
-      for (std::size_t of = 0; of < group.count; ++of) {
-        const std::size_t i = group.vertices[of];
-        const auto [offset, spread] = estimates[of];
-        ring.shift[i] = static_cast<float>(offset) - ring.base[i];
-        scatter[i] = static_cast<float>(spread);
+    auto planes = CollectPoints<BentPlane>([&](std::span<const PlaneEstimator::Planes> groups) {
+      std::array<PlaneEstimator::Estimates, kQueriesAtOnce> estimates;
+      estimator.Estimate(groups, estimates);
+      for (std::size_t q = 0; q < groups.size(); ++q) {
+        for (std::size_t of = 0; of < groups[q].count; ++of) {
+          const std::size_t i = groups[q].vertices[of];
+          const auto [offset, spread] = estimates[q][of];
+          ring.shift[i] = static_cast<float>(offset) - ring.base[i];
+          scatter[i] = static_cast<float>(spread);
+        }
       }
     });
     // Each segment has two vertices.
@@ -225,7 +227,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, UnrolledRi
                     .curvature = curvature});
       }
     }
-    planes.Part();
+    planes.Finish();
   });
   if (steps.support) {
     const double mean = MeanOf(ring, ring.shift);
