@@ -119,8 +119,8 @@ std::span<const std::uint32_t> Outline(const ReconstructionParameters& parameter
                                        Workspace::Buffers& b, Result& result) {
   InStage(observer, Stage::kNormals, [&] {
     const PlacementTraits& traits = TraitsOf(parameters.placement);
-    b.level_set_sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
-                              traits.takes_particles);
+    b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
+                    traits.takes_particles);
     EstimateNormals(b.bins, b.crossings, b.topology, b.sampler, parameters, previous.normals,
                     b.normal_scratch, b.planes, b.next_normals);
   });

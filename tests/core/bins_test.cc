@@ -38,13 +38,13 @@ class RandomBins : public testing::TestWithParam<int> {
     bins_ = Bin(particles_, scale_);
   }
 
-  // Calls visit(tile, entry, x, y) with positions in cells from the world's origin.
+  // Calls visit(tile, particle, x, y) with positions in cells from the world's origin.
   template <typename Visit>
-  void ForEachEntry(Visit visit) const {
+  void ForEachParticle(Visit visit) const {
     for (std::size_t tile = 0; tile < bins_.tiles.size(); ++tile) {
       for (std::uint32_t e = bins_.offsets[tile]; e < bins_.offsets[tile + 1]; ++e) {
-        visit(tile, e, static_cast<double>(bins_.entries[e].x) + 32.0 * bins_.tiles[tile].x,
-              static_cast<double>(bins_.entries[e].y) + 32.0 * bins_.tiles[tile].y);
+        visit(tile, e, static_cast<double>(bins_.particles[e].x) + 32.0 * bins_.tiles[tile].x,
+              static_cast<double>(bins_.particles[e].y) + 32.0 * bins_.tiles[tile].y);
       }
     }
   }
@@ -57,11 +57,11 @@ class RandomBins : public testing::TestWithParam<int> {
 
 TEST_P(RandomBins, EachParticleStandsInTheListOfTheTileThatItLiesInAndInNoOther) {
   std::vector<int> listed(particles_.size());
-  ForEachEntry([&](std::size_t, std::uint32_t e, double, double) {
-    const BinEntry& entry = bins_.entries[e];
-    ++listed[entry.source];
-    EXPECT_GE(std::min(entry.x, entry.y), 0);
-    EXPECT_LT(std::max(entry.x, entry.y), kTileSize);
+  ForEachParticle([&](std::size_t, std::uint32_t e, double, double) {
+    const BinnedParticle& particle = bins_.particles[e];
+    ++listed[particle.source];
+    EXPECT_GE(std::min(particle.x, particle.y), 0);
+    EXPECT_LT(std::max(particle.x, particle.y), kTileSize);
   });
   for (std::size_t k = 0; k < listed.size(); ++k) EXPECT_EQ(listed[k], 1) << "particle " << k;
 }
@@ -97,8 +97,8 @@ TEST_P(RandomBins, TilesReachACellAndTheRadiusOfASmallHoleBeyondEveryKernel) {
 }
 
 TEST_P(RandomBins, PositionsAreRoundedToAFractionOfACell) {
-  ForEachEntry([&](std::size_t, std::uint32_t e, double x, double y) {
-    const std::uint32_t k = bins_.entries[e].source;
+  ForEachParticle([&](std::size_t, std::uint32_t e, double x, double y) {
+    const std::uint32_t k = bins_.particles[e].source;
     // To a multiple of 2^-17 cells, hence off by half of it at most.
     EXPECT_NEAR(x, particles_.x(k) / scale_.cell_size, 0x1p-18 + 1e-9);
     EXPECT_NEAR(y, particles_.y(k) / scale_.cell_size, 0x1p-18 + 1e-9);
@@ -107,12 +107,12 @@ TEST_P(RandomBins, PositionsAreRoundedToAFractionOfACell) {
   });
 }
 
-TEST_P(RandomBins, EntriesOfATileStandInTheOrderOfTheFrame) {
+TEST_P(RandomBins, ParticlesOfATileStandInTheOrderOfTheFrame) {
   ASSERT_EQ(bins_.offsets.size(), bins_.tiles.size() + 1);
-  EXPECT_EQ(bins_.offsets.back(), bins_.entries.size());
+  EXPECT_EQ(bins_.offsets.back(), bins_.particles.size());
   for (std::size_t tile = 0; tile < bins_.tiles.size(); ++tile) {
     for (std::uint32_t e = bins_.offsets[tile] + 1; e < bins_.offsets[tile + 1]; ++e) {
-      EXPECT_LT(bins_.entries[e - 1].source, bins_.entries[e].source);
+      EXPECT_LT(bins_.particles[e - 1].source, bins_.particles[e].source);
     }
   }
 }
@@ -122,10 +122,10 @@ TEST_P(RandomBins, WeightsAreVolumesInUnitsOfTheKernel) {
     EXPECT_TRUE(bins_.weight.empty());
     return;
   }
-  ForEachEntry([&](std::size_t, std::uint32_t e, double, double) {
+  ForEachParticle([&](std::size_t, std::uint32_t e, double, double) {
     const double radius = scale_.kernel_radius * scale_.cell_size;
     const double expected =
-        particles_.volumes[bins_.entries[e].source] * 4 / (std::acos(-1) * radius * radius);
+        particles_.volumes[bins_.particles[e].source] * 4 / (std::acos(-1) * radius * radius);
     EXPECT_NEAR(bins_.weight[e], expected, 1e-6 * expected);
   });
 }
@@ -135,7 +135,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, RandomBins, testing::Range(1, 21));
 TEST(Bins, AFrameWithoutParticlesHasNoTiles) {
   const ParticleBins bins = Bin({}, ScaleOf(1, 3, 1));
   EXPECT_EQ(bins.tiles.size(), 0u);
-  EXPECT_TRUE(bins.entries.empty());
+  EXPECT_TRUE(bins.particles.empty());
   EXPECT_EQ(bins.offsets, std::vector<std::uint32_t>{0});
 }
 
@@ -154,10 +154,10 @@ TEST(Bins, WhatAnEarlierFrameLeftBehindIsForgotten) {
   const support::Particles next = support::Lattice(3, 3, 100, 100);
   ASSERT_TRUE(BinParticles(next.AsFrame(), Plane::kXy, scale, {}, bins).ok());
   const ParticleBins fresh = Bin(next, scale);
-  ASSERT_EQ(bins.entries.size(), fresh.entries.size());
-  for (std::size_t k = 0; k < fresh.entries.size(); ++k) {
-    EXPECT_EQ(bins.entries[k].x, fresh.entries[k].x);
-    EXPECT_EQ(bins.entries[k].source, fresh.entries[k].source);
+  ASSERT_EQ(bins.particles.size(), fresh.particles.size());
+  for (std::size_t k = 0; k < fresh.particles.size(); ++k) {
+    EXPECT_EQ(bins.particles[k].x, fresh.particles[k].x);
+    EXPECT_EQ(bins.particles[k].source, fresh.particles[k].source);
   }
   EXPECT_EQ(bins.offsets, fresh.offsets);
   EXPECT_TRUE(bins.weight.empty());
@@ -320,7 +320,7 @@ TEST(Bins, ThreeComponentsAreReadInTheirPlane) {
   EXPECT_EQ(velocity(Plane::kXz), std::pair(4.0f, 6.0f));
   EXPECT_EQ(velocity(Plane::kYz), std::pair(5.0f, 6.0f));
   const auto read = [&](Plane plane) {
-    const WorldPosition position = PositionOf(frame, plane, 0);
+    const Point position = PositionOf(frame, plane, 0);
     return std::pair(position.x, position.y);
   };
   EXPECT_EQ(read(Plane::kXy), std::pair(1.0, 2.0));

@@ -42,10 +42,10 @@ TEST_P(ParticlesOfComponents, AreCountedAsIfEachWereAskedForItsNearestInsideCorn
     std::vector<double> weights(components.size()), asked_weights(components.size());
     components.CountParticles(stages.bins, stages.crossings, counts, weights);
     components.ForEachParticle(stages.bins, stages.crossings,
-                               [&](std::uint32_t, std::uint32_t entry, std::uint32_t component) {
+                               [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
                                  ++asked[component];
                                  if (!stages.bins.weight.empty()) {
-                                   asked_weights[component] += stages.bins.weight[entry];
+                                   asked_weights[component] += stages.bins.weight[particle];
                                  }
                                });
     EXPECT_EQ(counts, asked);

@@ -49,7 +49,7 @@ void WriteSegments(const support::Stages& stages) {
   std::printf("],\"segments\":[");
   const char* separator = "";
   for (const Segment& segment : stages.crossings.segments) {
-    const LatticePoint cell = CellOrigin(stages.bins.tiles, stages.crossings.cells[segment.cell]);
+    const Point cell = CellOrigin(stages.bins.tiles, stages.crossings.cells[segment.cell]);
     std::printf("%s[%d,%d,%d,%d]", separator, static_cast<int>(cell.x) - kOffset,
                 static_cast<int>(cell.y) - kOffset, segment.entry, segment.exit);
     separator = ",";

@@ -147,7 +147,7 @@ TEST(Crossings, AValueOfExactlyZeroIsOutside) {
     EXPECT_EQ(contour.CellOn(10, 10)->corners, 1);
     // The isoline stays off the node, though the value there is 0.
     const ActiveCell& cell = *contour.CellOn(10, 10);
-    const LatticePoint crossing = EdgeCrossing(contour.tiles, contour.level_set, cell, kBottom);
+    const Point crossing = EdgeCrossing(contour.tiles, contour.level_set, cell, kBottom);
     EXPECT_GT(crossing.x, 10.5);
     EXPECT_LT(crossing.x, 11);
   }
@@ -156,10 +156,10 @@ TEST(Crossings, AValueOfExactlyZeroIsOutside) {
 TEST(Crossings, AnEdgeIsCrossedWhereTheLinearInterpolantIsZero) {
   const Contour contour = OneCell({-1, 3, 1, 0.25});
   const ActiveCell& cell = *contour.CellOn(10, 10);
-  const LatticePoint bottom = EdgeCrossing(contour.tiles, contour.level_set, cell, kBottom);
+  const Point bottom = EdgeCrossing(contour.tiles, contour.level_set, cell, kBottom);
   EXPECT_DOUBLE_EQ(bottom.x, 10.25);
   EXPECT_DOUBLE_EQ(bottom.y, 10);
-  const LatticePoint left = EdgeCrossing(contour.tiles, contour.level_set, cell, kLeft);
+  const Point left = EdgeCrossing(contour.tiles, contour.level_set, cell, kLeft);
   EXPECT_DOUBLE_EQ(left.x, 10);
   EXPECT_DOUBLE_EQ(left.y, 10.8);
 }
@@ -215,10 +215,10 @@ TEST_P(RandomCrossings, EachSegmentEndsWhereTheNextBeginsAndNoTwoShareASuccessor
     EXPECT_TRUE(successors.insert(next).second);
     const Segment& here = contour_.crossings.segments[k];
     const Segment& there = contour_.crossings.segments[next];
-    const LatticePoint exit = EdgeCrossing(contour_.tiles, contour_.level_set,
-                                           contour_.crossings.cells[here.cell], here.exit);
-    const LatticePoint entry = EdgeCrossing(contour_.tiles, contour_.level_set,
-                                            contour_.crossings.cells[there.cell], there.entry);
+    const Point exit = EdgeCrossing(contour_.tiles, contour_.level_set,
+                                    contour_.crossings.cells[here.cell], here.exit);
+    const Point entry = EdgeCrossing(contour_.tiles, contour_.level_set,
+                                     contour_.crossings.cells[there.cell], there.entry);
     EXPECT_EQ(exit.x, entry.x);
     EXPECT_EQ(exit.y, entry.y);
   }
@@ -226,8 +226,8 @@ TEST_P(RandomCrossings, EachSegmentEndsWhereTheNextBeginsAndNoTwoShareASuccessor
 
 TEST_P(RandomCrossings, NoCrossingTouchesANode) {
   for (const Segment& segment : contour_.crossings.segments) {
-    const LatticePoint point = EdgeCrossing(contour_.tiles, contour_.level_set,
-                                            contour_.crossings.cells[segment.cell], segment.entry);
+    const Point point = EdgeCrossing(contour_.tiles, contour_.level_set,
+                                     contour_.crossings.cells[segment.cell], segment.entry);
     const double off_x = std::abs(point.x - std::round(point.x));
     const double off_y = std::abs(point.y - std::round(point.y));
     EXPECT_EQ(std::min(off_x, off_y), 0);

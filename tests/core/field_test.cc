@@ -195,7 +195,7 @@ TEST(NodeBlocks, HaveEachAskedNodeOnceAndNoOther) {
 TEST(NearMoments, AreThoseOfAllParticlesAtEachAskedNodeForAnyRadius) {
   support::Random random(18);
   for (const float radius : {0.5f, 1.5f, 3.0f, 11.2f, 31.5f}) {
-    NearEntries near;
+    ParticleBlock near;
     for (near.count = 0; near.count < 200; ++near.count) {
       near.x[near.count] = static_cast<float>(random.Uniform(-20, 52));
       near.y[near.count] = static_cast<float>(random.Uniform(-20, 52));
@@ -239,7 +239,7 @@ TEST(NearMoments, DoNotDependOnWhatLiesBehindTheLastParticle) {
   all.fill(~std::uint32_t{0});
   const NodeBlocks blocks = BlocksOf(all);
   const auto moments_with = [&](float behind) {
-    NearEntries near;
+    ParticleBlock near;
     near.x.fill(behind);
     near.y.fill(behind);
     near.count = 3;

@@ -12,8 +12,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/parallel.h"
-#include "bins/coordinate_block.h"
-#include "bins/reached_tiles.h"
+#include "bins/quantise.h"
+#include "bins/tile_halo.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -44,7 +44,7 @@ class RecentHomes {
     std::uint16_t& recent = index_[(tile.y & kRows) << kColumnBits | (tile.x & kColumns)];
     if (recent != kNone && stretch_.homes[recent] == tile) return recent;
     const std::uint32_t index = stretch_.homes.Insert(tile);
-    if (index == stretch_.entries.size()) stretch_.entries.push_back(0);
+    if (index == stretch_.places.size()) stretch_.places.push_back(0);
     recent = static_cast<std::uint16_t>(std::min<std::uint32_t>(index, kNone));
     return index;
   }
@@ -62,7 +62,7 @@ template <typename Reader>
 bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double units_per_world,
                std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {
   stretch.homes.Clear();
-  stretch.entries.clear();
+  stretch.places.clear();
   RecentHomes recent(stretch);
   std::array<typename Reader::Number, 2 * kBlockParticles> copy;
   std::array<std::int32_t, 2 * kBlockParticles> tiles;
@@ -76,7 +76,7 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
     reader.Prefetch(start + count, std::min(kBlockParticles, last - start - count));
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t home = recent.Find({tiles[2 * k + 1], tiles[2 * k]});
-      ++stretch.entries[home];
+      ++stretch.places[home];
       scratch.home[start + k] = home;
     }
     if (stretch.homes.size() > max_tiles) return false;
@@ -106,13 +106,13 @@ bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles)
   return true;
 }
 
-// Turns the counts of all stretches into the places of their first entries: a tile's list has the
-// entries of the first stretch, then those of the second. Returns how many entries there are.
-std::uint32_t PlaceEntries(BinScratch& scratch) {
+// Turns the counts of all stretches into the places of their first particles: a tile's list has the
+// particles of the first stretch, then those of the second. Returns how many particles there are.
+std::uint32_t PlaceParticles(BinScratch& scratch) {
   scratch.next.assign(scratch.homes.size(), 0);
   for (const BinStretch& stretch : scratch.stretches) {
-    for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
-      scratch.next[stretch.tiles[k]] += stretch.entries[k];
+    for (std::size_t k = 0; k < stretch.places.size(); ++k) {
+      scratch.next[stretch.tiles[k]] += stretch.places[k];
     }
   }
   std::uint32_t total = 0;
@@ -123,10 +123,10 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
   }
   scratch.offsets = scratch.next;
   for (BinStretch& stretch : scratch.stretches) {
-    for (std::size_t k = 0; k < stretch.entries.size(); ++k) {
+    for (std::size_t k = 0; k < stretch.places.size(); ++k) {
       std::uint32_t& next = scratch.next[stretch.tiles[k]];
-      const std::uint32_t count = stretch.entries[k];
-      stretch.entries[k] = next;
+      const std::uint32_t count = stretch.places[k];
+      stretch.places[k] = next;
       next += count;
     }
   }
@@ -135,28 +135,28 @@ std::uint32_t PlaceEntries(BinScratch& scratch) {
 
 // A particle asks for the line behind its own: its list goes on there after hundreds or thousands
 // of others, in which even memory far away has answered.
-constexpr std::size_t kNextLine = 64 / sizeof(BinEntry) + 1;
+constexpr std::size_t kNextLine = 64 / sizeof(BinnedParticle) + 1;
 
-// Second pass over a stretch: writes its entries.
-void FillEntries(std::size_t first, std::size_t last, std::span<const float> volumes,
-                 double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
+// Second pass over a stretch: writes its particles.
+void FillTiles(std::size_t first, std::size_t last, std::span<const float> volumes,
+               double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
   const float* const positions = bins.scratch.positions.data();
   const std::uint32_t* const home = bins.scratch.home.data();
-  std::uint32_t* const next = stretch.entries.data();
-  BinEntry* const entries = bins.entries.data();
+  std::uint32_t* const next = stretch.places.data();
+  BinnedParticle* const particles = bins.particles.data();
   const auto fill = [&](auto set_weight) {
     for (std::size_t k = first; k < last; ++k) {
-      const std::uint32_t entry = next[home[k]]++;
-      hwy::Prefetch(entries + entry + kNextLine);
-      entries[entry] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
-      set_weight(entry, k);
+      const std::uint32_t place = next[home[k]]++;
+      hwy::Prefetch(particles + place + kNextLine);
+      particles[place] = {positions[2 * k], positions[2 * k + 1], static_cast<std::uint32_t>(k)};
+      set_weight(place, k);
     }
   };
   if (volumes.empty()) {
     fill([](std::uint32_t, std::size_t) {});
   } else {
-    fill([&](std::uint32_t entry, std::size_t k) {
-      bins.weight[entry] = static_cast<float>(volumes[k] * weight_per_world_volume);
+    fill([&](std::uint32_t place, std::size_t k) {
+      bins.weight[place] = static_cast<float>(volumes[k] * weight_per_world_volume);
     });
   }
 }
@@ -176,39 +176,39 @@ bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
 bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   BinScratch& scratch = bins.scratch;
   const auto homes = static_cast<std::uint32_t>(scratch.homes.size());
-  const ReachedTiles reached(reach);
+  const TileHalo reached(reach);
   scratch.reached.resize(homes);
   ParallelFor(homes, [&](std::uint32_t k) {
     // In the middle of a body nothing is to be added, whatever its particles reach.
     scratch.reached[k] = 0;
     if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) return;
     const std::uint32_t end =
-        k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.entries.size());
+        k + 1 < homes ? scratch.offsets[k + 1] : static_cast<std::uint32_t>(bins.particles.size());
     scratch.reached[k] =
-        reached.Of(std::span(bins.entries).subspan(scratch.offsets[k], end - scratch.offsets[k]));
+        reached.Of(std::span(bins.particles).subspan(scratch.offsets[k], end - scratch.offsets[k]));
   });
   for (std::uint32_t k = 0; k < homes; ++k) {
-    ReachedTiles::ForEach(scratch.homes[k], scratch.reached[k],
-                          [&](TileCoordinate tile) { bins.tiles.Insert(tile); });
+    TileHalo::ForEach(scratch.homes[k], scratch.reached[k],
+                      [&](TileCoordinate tile) { bins.tiles.Insert(tile); });
     if (bins.tiles.size() > max_tiles) return false;
   }
   bins.tiles.Seal();
   return true;
 }
 
-// The first entry of each tile of the sealed directory, those without particles included, and the
-// tiles of the stretches' homes.
+// The first particle of each tile of the sealed directory, those without particles included, and
+// the tiles of the stretches' homes.
 void SetOffsets(ParticleBins& bins) {
   BinScratch& scratch = bins.scratch;
-  const auto entries = static_cast<std::uint32_t>(bins.entries.size());
+  const auto particles = static_cast<std::uint32_t>(bins.particles.size());
   bins.offsets.resize(bins.tiles.size() + 1);
   std::size_t home = 0;
   for (std::size_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    bins.offsets[tile] = home < scratch.homes.size() ? scratch.offsets[home] : entries;
+    bins.offsets[tile] = home < scratch.homes.size() ? scratch.offsets[home] : particles;
     if (home == scratch.homes.size() || scratch.homes[home] != bins.tiles[tile]) continue;
     scratch.next[home++] = static_cast<std::uint32_t>(tile);
   }
-  bins.offsets.back() = entries;
+  bins.offsets.back() = particles;
   for (BinStretch& stretch : scratch.stretches) {
     for (std::uint32_t& tile : stretch.tiles) tile = scratch.next[tile];
   }
@@ -219,7 +219,7 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
   const double units_per_world = UnitsPerWorld(scale);
   const Axes axes = AxesOf(frame, plane);
   for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
-    const WorldPosition position = PositionOf(frame, plane, k);
+    const Point position = PositionOf(frame, plane, k);
     for (const auto& [axis, value] :
          {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
       if (IsNearOrigin(value * units_per_world)) continue;
@@ -254,7 +254,7 @@ std::size_t MaxStretches() {
 void ParticleBins::Clear() {
   tiles.Clear();
   offsets.clear();
-  entries.clear();
+  particles.clear();
   weight.clear();
 }
 
@@ -293,13 +293,13 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   if (!found || !JoinHomes(limits.max_tiles, scratch, bins.tiles)) {
     return Refusal(frame, plane, scale, limits.max_tiles);
   }
-  const std::uint32_t entries = PlaceEntries(scratch);
-  bins.entries.resize(entries);
-  bins.weight.resize(frame.volumes.empty() ? 0 : entries);
+  const std::uint32_t particles = PlaceParticles(scratch);
+  bins.particles.resize(particles);
+  bins.weight.resize(frame.volumes.empty() ? 0 : particles);
   const double weight_per_world_volume =
       scale.weight_per_volume / scale.cell_size / scale.cell_size;
   for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
-    FillEntries(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
+    FillTiles(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
   });
   if (!AddReachedTiles(RoundedUp(scale.kernel_radius + TileMargin(scale)), limits.max_tiles,
                        bins)) {

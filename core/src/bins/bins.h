@@ -19,23 +19,23 @@ namespace partiemc {
 inline constexpr double kHoleMarginParticles = 6;
 
 /// A particle in the list of its tile.
-struct BinEntry {
+struct BinnedParticle {
   float x, y;            ///< Cells, relative to the tile: in [0, 32).
   std::uint32_t source;  ///< Index of the particle in the frame.
 };
 
-/// Whether the particle of an entry lies in one of these cells of its tile.
-inline bool LiesIn(const BinEntry& entry, const BitRows& cells) {
-  return (cells[static_cast<int>(entry.y)] >> static_cast<int>(entry.x) & 1) != 0;
+/// Whether a particle lies in one of these cells of its tile.
+inline bool LiesIn(const BinnedParticle& particle, const BitRows& cells) {
+  return (cells[static_cast<int>(particle.y)] >> static_cast<int>(particle.x) & 1) != 0;
 }
 
 /// A stretch of successive particles: sorted by one task.
 struct BinStretch {
   std::size_t first = 0, last = 0;  ///< Its particles are [first, last).
   TileDirectory homes;  ///< The tiles in which its particles lie, in the order in which they came.
-  std::vector<std::uint32_t> tiles;    ///< By home: its place among those of all stretches; in the
-                                       ///< end its tile.
-  std::vector<std::uint32_t> entries;  ///< By home: how many, then where the next one goes.
+  std::vector<std::uint32_t> tiles;   ///< By home: its place among those of all stretches; in the
+                                      ///< end its tile.
+  std::vector<std::uint32_t> places;  ///< By home: how many, then where the next one goes.
 };
 
 /// Warm buffers of BinParticles.
@@ -45,7 +45,7 @@ struct BinScratch {
   std::vector<std::uint32_t> home;        ///< By particle: its home in its stretch.
   std::vector<float> positions;           ///< By particle: x and y in its home.
   std::vector<TileCoordinate> homes;      ///< Tiles that hold particles, sorted.
-  std::vector<std::uint32_t> offsets;     ///< By these: their first entry.
+  std::vector<std::uint32_t> offsets;     ///< By these: their first particle.
   std::vector<std::uint32_t> next;        ///< By these: where the next stretch goes on.
   std::vector<std::uint32_t> reached;     ///< By these: tiles that must exist (AddReachedTiles).
 };
@@ -58,9 +58,9 @@ struct BinScratch {
 /// one is an exact float in its own tile and in each that its kernel reaches.
 struct ParticleBins {
   TileDirectory tiles;
-  std::vector<std::uint32_t> offsets;  ///< Tile t has entries [offsets[t], offsets[t + 1]).
-  std::vector<BinEntry> entries;       ///< Tile after tile.
-  std::vector<float> weight;           ///< By entry: w of the field; empty if all are equal.
+  std::vector<std::uint32_t> offsets;     ///< Tile t has particles [offsets[t], offsets[t + 1]).
+  std::vector<BinnedParticle> particles;  ///< Tile after tile.
+  std::vector<float> weight;              ///< By particle: w of the field; empty if all are equal.
   BinScratch scratch;
 
   std::uint32_t CountOf(std::size_t tile) const { return offsets[tile + 1] - offsets[tile]; }
@@ -70,8 +70,8 @@ struct ParticleBins {
 /// Sorts the particles of a checked frame.
 /// Errors: INVALID_ARGUMENT (a particle too many cells from the origin), RESOURCE_EXHAUSTED (more
 /// tiles than allowed), each with a Violation.
-/// Deterministic: entries of a tile stand in the order of the frame. In parallel over stretches of
-/// the frame: count, prefix sum, fill. Cost: linear.
+/// Deterministic: particles of a tile stand in the order of the frame. In parallel over stretches
+/// of the frame: count, prefix sum, fill. Cost: linear.
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
                           const FrameLimits& limits, ParticleBins& bins);
 

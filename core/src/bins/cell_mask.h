@@ -1,11 +1,9 @@
 // Sets of cells in a tile and around it, as bits: which particles a step has to look at.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 
 #include "bins/lattice.h"
 
@@ -25,29 +23,6 @@ inline bool IsEmpty(const BitRows& rows) {
   return any == 0;
 }
 
-/// Swaps the upper half of each group of 2 kHalf bits with the lower one of the row kHalf above.
-template <int kHalf>
-void SwapHalves(BitRows& rows) {
-  constexpr std::uint32_t kLower = ~std::uint32_t{0} / ((std::uint32_t{1} << kHalf) + 1);
-  for (int first = 0; first < kTileSize; first += 2 * kHalf) {
-    for (int j = first; j < first + kHalf; ++j) {
-      const std::uint32_t swapped = (rows[j] >> kHalf ^ rows[j + kHalf]) & kLower;
-      rows[j + kHalf] ^= swapped;
-      rows[j] ^= swapped << kHalf;
-    }
-  }
-}
-
-/// Bit i of row j becomes bit j of row i.
-inline BitRows Transposed(BitRows rows) {
-  SwapHalves<16>(rows);
-  SwapHalves<8>(rows);
-  SwapHalves<4>(rows);
-  SwapHalves<2>(rows);
-  SwapHalves<1>(rows);
-  return rows;
-}
-
 /// The cells of a mask that lie in the tile's neighbour at `place` (Neighbourhood), or in the tile
 /// itself.
 inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
@@ -64,24 +39,6 @@ inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
     cells[j] = static_cast<std::uint32_t>(bits << up >> down);
   }
   return cells;
-}
-
-/// In which of a tile's neighbours a mask has cells: bit `place` (Neighbourhood).
-inline unsigned NeighboursWithCells(const CellMask& mask) {
-  constexpr std::uint64_t kSide = (std::uint64_t{1} << kMaskMargin) - 1;
-  constexpr std::uint64_t kLeft = kSide, kRight = kSide << (kTileSize + kMaskMargin);
-  unsigned places = 0;
-  int row = 0;
-  for (const auto& [end, first_place] :
-       {std::pair(kMaskMargin, 0), std::pair(kMaskMargin + kTileSize, 3),
-        std::pair(kTileSize + 2 * kMaskMargin, 6)}) {
-    std::uint64_t any = 0;
-    for (; row < end; ++row) any |= mask[row];
-    const unsigned left = (any & kLeft) != 0, right = (any & kRight) != 0;
-    const unsigned middle = (any & ~(kLeft | kRight)) != 0;
-    places |= (left | middle << 1 | right << 2) << first_place;
-  }
-  return places;
 }
 
 /// The bits of a tile alone.
@@ -118,23 +75,15 @@ CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int mar
 /// Of cells beyond the margin nothing is known, so that those that they would add miss. Requires: 0
 /// <= before, after <= kMaskMargin.
 inline void Widen(CellMask& mask, int before, int after) {
-  // What reaches far already takes a step as long and one more without leaving a gap.
-  const auto reach = [](int distance, auto step_by) {
-    for (int reached = 0; reached < distance;) {
-      const int step = std::min(reached + 1, distance - reached);
-      step_by(step);
-      reached += step;
-    }
-  };
   // No row is read after it took another one in.
-  reach(before, [&](int step) {
-    for (std::uint64_t& row : mask) row |= row >> step;
-    for (std::size_t row = 0; row + step < mask.size(); ++row) mask[row] |= mask[row + step];
-  });
-  reach(after, [&](int step) {
-    for (std::uint64_t& row : mask) row |= row << step;
-    for (std::size_t row = mask.size() - step; row-- > 0;) mask[row + step] |= mask[row];
-  });
+  for (int step = 0; step < before; ++step) {
+    for (std::uint64_t& row : mask) row |= row >> 1;
+    for (std::size_t row = 0; row + 1 < mask.size(); ++row) mask[row] |= mask[row + 1];
+  }
+  for (int step = 0; step < after; ++step) {
+    for (std::uint64_t& row : mask) row |= row << 1;
+    for (std::size_t row = mask.size() - 1; row > 0; --row) mask[row] |= mask[row - 1];
+  }
 }
 
 }  // namespace partiemc

@@ -21,13 +21,6 @@ inline constexpr int kTileNodes = kTileSize * kTileSize;
 
 using BitRows = std::array<std::uint32_t, kTileSize>;
 
-/// Successive nodes of a row or column of a tile; none if last < first.
-struct NodeRange {
-  int first, last;  ///< Inclusive.
-};
-inline constexpr NodeRange kNoNodes = {kTileSize, -1};
-inline constexpr NodeRange kAllNodes = {0, kTileSize - 1};
-
 struct TileCoordinate {
   std::int32_t y = 0, x = 0;  // In this order: tiles are sorted by row, then column.
   friend auto operator<=>(const TileCoordinate&, const TileCoordinate&) = default;

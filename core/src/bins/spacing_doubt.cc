@@ -26,19 +26,19 @@ constexpr std::size_t kMaxLooks = std::size_t{1} << 20;
 constexpr double kMaxDensity = 4;
 
 // The particle of a tile that is asked as its k-th: the place, not the order, decides.
-const BinEntry& Chosen(std::span<const BinEntry> entries, std::uint64_t k) {
-  const auto hash = [k](const BinEntry& entry) {
-    const std::uint64_t bits = std::uint64_t{std::bit_cast<std::uint32_t>(entry.x)} << 32 |
-                               std::bit_cast<std::uint32_t>(entry.y);
+const BinnedParticle& Chosen(std::span<const BinnedParticle> particles, std::uint64_t k) {
+  const auto hash = [k](const BinnedParticle& particle) {
+    const std::uint64_t bits = std::uint64_t{std::bit_cast<std::uint32_t>(particle.x)} << 32 |
+                               std::bit_cast<std::uint32_t>(particle.y);
     const std::uint64_t mixed = (bits + k) * 0x9e3779b97f4a7c15u;
     return (mixed ^ mixed >> 32) * 0xc2b2ae3d27d4eb4fu;
   };
-  const BinEntry* chosen = entries.data();
+  const BinnedParticle* chosen = particles.data();
   std::uint64_t least = hash(*chosen);
-  for (const BinEntry& entry : entries.subspan(1)) {
-    if (const std::uint64_t next = hash(entry); next < least) {
+  for (const BinnedParticle& particle : particles.subspan(1)) {
+    if (const std::uint64_t next = hash(particle); next < least) {
       least = next;
-      chosen = &entry;
+      chosen = &particle;
     }
   }
   return *chosen;
@@ -58,11 +58,12 @@ class Probe {
 
   // Whether the k-th particle of `tile` that is asked tells another spacing.
   bool Contradicts(std::size_t tile, std::uint64_t k) {
-    const auto entries = EntriesOf(tile);
-    if (static_cast<double>(entries.size()) > most_in_tile_) return true;
-    looks_ += entries.size();
+    const auto particles = ParticlesOf(tile);
+    if (static_cast<double>(particles.size()) > most_in_tile_) return true;
+    looks_ += particles.size();
     // All of a small frame are asked.
-    const BinEntry& at = bins_.entries.size() <= kAsked ? entries[k] : Chosen(entries, k);
+    const BinnedParticle& at =
+        bins_.particles.size() <= kAsked ? particles[k] : Chosen(particles, k);
     NearRing ring;
     Gather(tile, tile, at, ring);
     const Neighbourhood& neighbours = bins_.tiles.neighbours(tile);
@@ -78,12 +79,12 @@ class Probe {
   bool IsExhausted() const { return looks_ > kMaxLooks; }
 
  private:
-  std::span<const BinEntry> EntriesOf(std::size_t tile) const {
-    return std::span(bins_.entries).subspan(bins_.offsets[tile], bins_.CountOf(tile));
+  std::span<const BinnedParticle> ParticlesOf(std::size_t tile) const {
+    return std::span(bins_.particles).subspan(bins_.offsets[tile], bins_.CountOf(tile));
   }
 
   // Takes the particles of `other`, unless all of it is farther away than those that are known.
-  void Gather(std::size_t other, std::size_t tile, const BinEntry& at, NearRing& ring) {
+  void Gather(std::size_t other, std::size_t tile, const BinnedParticle& at, NearRing& ring) {
     const double x =
         (static_cast<double>(bins_.tiles[other].x) - bins_.tiles[tile].x) * kTileSize - at.x;
     const double y =
@@ -91,13 +92,13 @@ class Probe {
     const double across_x = std::max({0.0, x, -x - kTileSize});
     const double across_y = std::max({0.0, y, -y - kTileSize});
     if (across_x * across_x + across_y * across_y >= ring.reach_square()) return;
-    const auto entries = EntriesOf(other);
-    looks_ += entries.size();
-    for (const BinEntry& entry : entries) ring.Add(x + entry.x, y + entry.y);
+    const auto particles = ParticlesOf(other);
+    looks_ += particles.size();
+    for (const BinnedParticle& particle : particles) ring.Add(x + particle.x, y + particle.y);
   }
 
   // Those of all tiles that are no neighbours.
-  void GatherFar(std::size_t tile, const BinEntry& at, NearRing& ring) {
+  void GatherFar(std::size_t tile, const BinnedParticle& at, NearRing& ring) {
     looks_ += bins_.tiles.size();
     for (std::size_t other = 0; other < bins_.tiles.size() && !IsExhausted(); ++other) {
       const auto& neighbours = bins_.tiles.neighbours(tile);
@@ -114,7 +115,7 @@ class Probe {
 }  // namespace
 
 bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale) {
-  const std::size_t count = bins.entries.size();
+  const std::size_t count = bins.particles.size();
   const std::size_t most = std::min(kAsked, count);
   Probe probe(bins, scale);
   std::size_t asked = 0, contradicting = 0;
@@ -122,10 +123,10 @@ bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale) {
     if (asked == kAskedFirst && contradicting < kCause) return false;
     // Spread over all particles, the first few too: multiples of an odd step, modulo a power of 2.
     const std::size_t place = asked * 37 % kAsked;
-    const std::size_t entry = count <= kAsked ? asked : count * place / kAsked;
-    const auto above = std::upper_bound(bins.offsets.begin(), bins.offsets.end(), entry);
+    const std::size_t particle = count <= kAsked ? asked : count * place / kAsked;
+    const auto above = std::upper_bound(bins.offsets.begin(), bins.offsets.end(), particle);
     const auto tile = static_cast<std::size_t>(above - bins.offsets.begin()) - 1;
-    if (probe.Contradicts(tile, entry - bins.offsets[tile])) ++contradicting;
+    if (probe.Contradicts(tile, particle - bins.offsets[tile])) ++contradicting;
   }
   return AreEnough(contradicting, asked);
 }

@@ -125,11 +125,6 @@ void FillTile(const TileDirectory& directory, const LevelSet& level_set, std::ui
   }
 }
 
-template <typename Visit>
-void ForEachTile(std::size_t count, Visit visit) {
-  ParallelFor(static_cast<std::uint32_t>(count), visit);
-}
-
 }  // namespace
 
 NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>& tiles,
@@ -151,19 +146,19 @@ NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>&
 
 void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
                    Crossings& crossings) {
-  const std::size_t tile_count = directory.size();
+  const auto tile_count = static_cast<std::uint32_t>(directory.size());
   crossings.tiles.resize(tile_count);
   crossings.interior.resize(tile_count);
-  ForEachTile(tile_count,
+  ParallelFor(tile_count,
               [&](std::uint32_t tile) { crossings.tiles[tile].inside = level_set.inside[tile]; });
 
   std::vector<CrossingCounts>& counts = crossings.counts;
   counts.resize(tile_count + 1);
-  ForEachTile(tile_count, [&](std::uint32_t tile) {
+  ParallelFor(tile_count, [&](std::uint32_t tile) {
     counts[tile] = ClassifyCells(directory, tile, crossings);
   });
   CrossingCounts total;
-  for (std::size_t tile = 0; tile < tile_count; ++tile) {
+  for (std::uint32_t tile = 0; tile < tile_count; ++tile) {
     const CrossingCounts here = counts[tile];
     counts[tile] = total;
     crossings.tiles[tile].first_cell = total.cells;
@@ -173,14 +168,14 @@ void FindCrossings(const TileDirectory& directory, const LevelSet& level_set,
 
   crossings.cells.resize(total.cells);
   crossings.segments.resize(total.segments);
-  ForEachTile(tile_count, [&](std::uint32_t tile) {
+  ParallelFor(tile_count, [&](std::uint32_t tile) {
     if (counts[tile].cells == counts[tile + 1].cells) return;
     FillTile(directory, level_set, tile, counts[tile], crossings);
   });
 }
 
 void MarkInteriorCells(const TileDirectory& directory, Crossings& crossings) {
-  ForEachTile(directory.size(), [&](std::uint32_t tile) {
+  ParallelFor(static_cast<std::uint32_t>(directory.size()), [&](std::uint32_t tile) {
     crossings.interior[tile] = InteriorCells(InsideRows(directory, crossings.tiles, tile));
   });
 }

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/point.h"
 #include "bins/lattice.h"
 #include "field/field.h"
 
@@ -33,11 +34,6 @@ struct ActiveCell {
 struct Segment {
   std::uint32_t cell = 0;
   std::uint8_t entry = 0, exit = 0;  ///< Edges of the cell.
-};
-
-/// A point in cells, in lattice coordinates of the world.
-struct LatticePoint {
-  double x = 0, y = 0;
 };
 
 /// Rows of bits of a tile.
@@ -92,7 +88,7 @@ std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& cross
                           std::uint32_t segment);
 
 /// Lower left node of a cell.
-inline LatticePoint CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
+inline Point CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
   const TileCoordinate& tile = directory[cell.tile];
   return {static_cast<double>((std::int64_t{tile.x} << kTileShift) + cell.i),
           static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
@@ -106,8 +102,8 @@ inline constexpr double kEdgeMargin = 1.0 / 4096;
 /// coordinates can move it onto or past one.
 /// Inline, and without a branch on which edge it is: those of many cells are found at a time, each
 /// of which waits for memory.
-inline LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
-                                 const ActiveCell& cell, int edge) {
+inline Point EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
+                          const ActiveCell& cell, int edge) {
   // Every edge is walked from its lower or left node, so that both cells compute the same.
   const int right = edge == 1, up = edge == 2;
   const int along_x = ~edge & 1, along_y = edge & 1;
@@ -116,7 +112,7 @@ inline LatticePoint EdgeCrossing(const TileDirectory& directory, const LevelSet&
   const double a = level_set.At(directory, cell.tile, i, j);
   const double b = level_set.At(directory, cell.tile, i + along_x, j + along_y);
   const double t = std::clamp(a / (a - b), kEdgeMargin, 1 - kEdgeMargin);
-  const LatticePoint origin = CellOrigin(directory, cell);
+  const Point origin = CellOrigin(directory, cell);
   return {origin.x + (right + along_x * t), origin.y + (up + along_y * t)};
 }
 

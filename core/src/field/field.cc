@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "base/prefetch.h"
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 #include "field/level_set_formula.h"
 #include "field/tile_kernels.h"
 
@@ -25,10 +25,10 @@ const float* WeightsOf(const ParticleBins& bins) {
   return bins.weight.empty() ? nullptr : bins.weight.data();
 }
 
-TileEntries EntriesOf(const ParticleBins& bins, std::uint32_t tile) {
+TileParticles ParticlesOf(const ParticleBins& bins, std::uint32_t tile) {
   const std::uint32_t first = bins.offsets[tile];
   const float* const weights = WeightsOf(bins);
-  return {bins.entries.data() + first, weights == nullptr ? nullptr : weights + first,
+  return {bins.particles.data() + first, weights == nullptr ? nullptr : weights + first,
           bins.CountOf(tile)};
 }
 
@@ -37,68 +37,45 @@ float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
 
-// First pass: the kernels of a tile's own particles in the rows that they reach, or, where they
-// reach too far for the margin of the sums, of all around it in every row.
+// First pass: the kernels of a tile's own particles, or, where they reach too far for the margin of
+// the sums, of all around it.
 void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
              LevelSet& level_set) {
   std::array<float, kTileNodes>& values = level_set.tiles[tile];
   const auto radius = static_cast<float>(scale.kernel_radius);
   const bool fits = radius <= kSumMargin;
-  if (fits && bins.CountOf(tile) == 0) return;
+  if (fits && bins.CountOf(tile) == 0) {
+    values.fill(0);
+    return;
+  }
   // Written to as soon as the sums are known, which takes longer than memory far away.
   PrefetchLines(std::span<const float>(values));
-  if (fits) level_set.rims.Prefetch(tile);
   alignas(64) NodeSums sums;
   sums.fill(0);
-  NodeRange rows = kAllNodes;
   if (fits) {
-    const NodeRange reached = ScatterKernels(EntriesOf(bins, tile), radius, sums);
-    level_set.rims.Keep(tile, sums, reached);
-    rows = level_set.rims.OwnRows(tile);
+    level_set.halo.Prefetch(tile);
+    ScatterKernels(ParticlesOf(bins, tile), radius, sums);
+    level_set.halo.Keep(tile, sums);
   } else {
-    NearWalk(bins, tile, nullptr, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
+    MaskedParticles(bins, tile, nullptr).ForEachBlock([&](const ParticleBlock& near) {
       ScatterNearKernels(near, WeightsOf(bins), radius, sums);
     });
   }
   // Of a fixed size and without a call, unlike copy_n.
-  for (int j = rows.first; j <= rows.last; ++j) {
+  for (int j = 0; j < kTileSize; ++j) {
     std::memcpy(values.data() + j * kTileSize, sums.data() + SumIndex(0, j),
                 kTileSize * sizeof(float));
   }
-}
-
-// Fills the rows of a tile's values that are among `rows` but not among `kept`, which is a part of
-// them.
-void FillRowsOf(float* values, NodeRange rows, NodeRange kept, float value) {
-  const auto fill = [&](int first, int end) {
-    std::fill(values + first * kTileSize, values + end * kTileSize, value);
-  };
-  if (kept.last < kept.first) {
-    if (rows.first <= rows.last) fill(rows.first, rows.last + 1);
-    return;
-  }
-  fill(rows.first, kept.first);
-  fill(kept.last + 1, rows.last + 1);
 }
 
 // Second pass: the density at every node, and what follows from it alone.
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
-  BitRows& inside = level_set.inside[tile];
-  BitRows& open = level_set.open[tile];
-  NodeRange rows = kAllNodes;
   if (static_cast<float>(scale.kernel_radius) <= kSumMargin) {
-    const SumRims& rims = level_set.rims;
-    rows = rims.RowsReached(bins.tiles, tile);
-    const NodeRange own = rims.OwnRows(tile);
-    FillRowsOf(values, rows, own, 0);
-    rims.AddTo(bins.tiles, tile, values);
-    FillRowsOf(values, kAllNodes, rows, level_set.void_value);
-    inside.fill(0);
-    open.fill(0);
+    level_set.halo.AddTo(bins.tiles, tile, values);
   }
-  ClassifyNodes(WeightOf(bins, scale), scale, rows, values, inside, open);
+  ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
 // F at nodes of a tile, from the moments there. Returns those that are inside.
@@ -113,8 +90,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   // A node is reached from the cells whose far side is less than the radius before it.
   if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  NearWalk(bins, tile, masked ? &mask : nullptr, NearFields::kPositions)
-      .ForEachBlock([&](const NearEntries& near) {
+  MaskedParticles(bins, tile, masked ? &mask : nullptr)
+      .ForEachBlock([&](const ParticleBlock& near) {
         AddNearMoments(near, radius, blocks, asked.has_kernel_sums, sums);
       });
   return EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale,
@@ -203,7 +180,7 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   level_set.open.resize(tiles);
   level_set.passes.assign(tiles, 0);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  if (radius <= kSumMargin) level_set.rims.Prepare(bins, radius);
+  if (radius <= kSumMargin) level_set.halo.Prepare(bins, radius);
   ParallelForRanges(tiles, kTilesAtOnce, [&](std::size_t first, std::size_t last) {
     SampleTiles(bins, scale, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
                 level_set);

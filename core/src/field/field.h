@@ -6,7 +6,7 @@
 
 #include "bins/bins.h"
 #include "bins/lattice.h"
-#include "field/sum_rims.h"
+#include "field/density_halo.h"
 #include "frame/scale.h"
 
 namespace partiemc {
@@ -24,7 +24,7 @@ struct LevelSet {
   // Scratch.
   std::vector<BitRows> open;         ///< By tile: the nodes that the density does not decide.
   std::vector<std::uint8_t> passes;  ///< By tile: how many are done (SampleField).
-  SumRims rims;
+  DensityHalo halo;
 
   /// F at the node (i, j) of `tile`, 0 <= i, j <= 32: the last row and column are the neighbours'.
   float At(const TileDirectory& directory, std::uint32_t tile, int i, int j) const {

@@ -25,7 +25,7 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 // Particles that a step has chosen: their coordinates along the axis that it chose by, and along
 // the other one.
 struct Chosen {
-  alignas(64) NearEntries::PerEntry<float> along, across;
+  alignas(64) ParticleBlock::PerParticle<float> along, across;
   int count;
 };
 
@@ -34,7 +34,6 @@ struct Chosen {
 HWY_INLINE void Choose(const float* along, const float* across, int count, int first, float radius,
                        Chosen& chosen) {
   const Lanes d;
-  const hn::RebindToSigned<Lanes> d_bits;
   constexpr float kMiddle = (NodeBlock::kSide - 1) / 2.0f;
   const auto origin = hn::Set(d, static_cast<float>(first));
   const auto middle = hn::Set(d, kMiddle);
@@ -43,12 +42,11 @@ HWY_INLINE void Choose(const float* along, const float* across, int count, int f
   for (int k = 0; k < count; k += kLanes) {
     const Vector at = hn::Sub(hn::LoadU(d, along + k), origin);
     const auto reaches = hn::Lt(hn::Abs(hn::Sub(at, middle)), reach);
-    const auto is_in = hn::And(hn::RebindMask(d_bits, reaches),
-                               hn::FirstN(d_bits, static_cast<std::size_t>(count - k)));
-    const Compressor compress(is_in);
+    const auto is_in = hn::And(reaches, hn::FirstN(d, static_cast<std::size_t>(count - k)));
+    const Compressor compress(hn::RebindMask(hn::RebindToSigned<Lanes>(), is_in));
     hn::StoreU(compress(d, at), d, chosen.along.data() + chosen_count);
     hn::StoreU(compress(d, hn::LoadU(d, across + k)), d, chosen.across.data() + chosen_count);
-    chosen_count += static_cast<int>(hn::CountTrue(d_bits, is_in));
+    chosen_count += static_cast<int>(hn::CountTrue(d, is_in));
   }
   chosen.count = chosen_count;
 }
@@ -95,7 +93,7 @@ HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inve
   }
 }
 
-void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums) {
   const float inverse_square = 1 / (radius * radius);
   Chosen of_rows, of_block;
@@ -122,7 +120,7 @@ namespace partiemc {
 
 HWY_EXPORT(AddNearMoments);
 
-void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums) {
   HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, radius, blocks, has_kernel_sums, sums);
 }

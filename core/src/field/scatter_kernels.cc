@@ -10,11 +10,67 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "field/kernel_rows-inl.h"
-
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// A row of a kernel of three spacings is six nodes: more than eight lanes would idle.
+using Lanes = hn::CappedTag<float, 8>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+
+// The first node after `coordinate`. Truncation rounds down: no particle in or next to a tile is
+// farther from it than a tile's width, and no kernel reaches farther than that from a particle.
+HWY_INLINE int NodeAfter(float coordinate) {
+  constexpr int kOffset = 2 * kTileSize;
+  return static_cast<int>(coordinate + kOffset) - kOffset + 1;
+}
+
+// The same of many coordinates at once.
+template <class D>
+HWY_INLINE hn::Vec<hn::RebindToSigned<D>> NodesAfter(D d, hn::Vec<D> coordinates) {
+  constexpr int kOffset = 2 * kTileSize;
+  const hn::RebindToSigned<D> d_int;
+  const auto shifted = hn::Add(coordinates, hn::Set(d, static_cast<float>(kOffset)));
+  return hn::Add(hn::ConvertTo(d_int, shifted), hn::Set(d_int, 1 - kOffset));
+}
+
+HWY_INLINE void AddTo(float* HWY_RESTRICT sums, Vector term) {
+  const Lanes d;
+  hn::StoreU(hn::Add(hn::LoadU(d, sums), term), d, sums);
+}
+
+// Adds the kernel of a particle to some rows and columns of sums, from `sums` on; x and y are
+// relative to that node. The kernel is a function of row term - column term:
+// k = max(0, that)^3 with 1 - dy^2 / R^2 and dx^2 / R^2.
+template <bool kWeighted>
+HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse_square,
+                          float weight, float* HWY_RESTRICT sums) {
+  const Lanes d;
+  const Vector lane = hn::Iota(d, 0.0f);
+  const Vector scale = hn::Set(d, inverse_square);
+  alignas(64) std::array<float, kTileSize> row_terms;
+  for (int row = 0; row < rows; row += kLanes) {
+    const Vector dy = hn::Sub(hn::Set(d, y), hn::Add(hn::Set(d, static_cast<float>(row)), lane));
+    hn::StoreU(hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dy, dy), scale)), d,
+               row_terms.data() + row);
+  }
+  for (int column = 0; column < columns; column += kLanes) {
+    const Vector dx = hn::Sub(hn::Set(d, x - static_cast<float>(column)), lane);
+    // Beyond the last column more than any row term, on every target alike: k = 0.
+    const auto reached = hn::Lt(lane, hn::Set(d, static_cast<float>(columns - column)));
+    const Vector column_term =
+        hn::IfThenElse(reached, hn::Mul(hn::Mul(dx, dx), scale), hn::Set(d, 2.0f));
+    for (int row = 0; row < rows; ++row) {
+      const Vector t = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, row_terms[row]), column_term));
+      Vector k = hn::Mul(hn::Mul(t, t), t);
+      if constexpr (kWeighted) k = hn::Mul(k, hn::Set(d, weight));
+      AddTo(sums + row * kSumColumns + column, k);
+    }
+  }
+}
 
 // Particles whose first nodes are looked for together.
 constexpr int kBlock = 64;
@@ -26,56 +82,45 @@ struct KernelCorners {
   alignas(64) std::array<std::int32_t, kBlock> at;
 };
 
-// Widens `rows`, of first rows, by those of these particles.
-HWY_INLINE void FindCorners(const BinEntry* entries, int count, float radius,
-                            KernelCorners& corners, NodeRange& rows) {
+HWY_INLINE void FindCorners(const BinnedParticle* particles, int count, float radius,
+                            KernelCorners& corners) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> d_int;
   const auto step = static_cast<int>(hn::Lanes(d));
-  auto lowest = hn::Set(d_int, rows.first);
-  auto highest = hn::Set(d_int, rows.last);
   int k = 0;
   for (; k + step <= count; k += step) {
     hn::Vec<decltype(d)> x, y, source;
-    hn::LoadInterleaved3(d, &entries[k].x, x, y, source);
+    hn::LoadInterleaved3(d, &particles[k].x, x, y, source);
     const auto column = NodesAfter(d, hn::Sub(x, hn::Set(d, radius)));
     const auto row = NodesAfter(d, hn::Sub(y, hn::Set(d, radius)));
     hn::StoreU(hn::Sub(x, hn::ConvertTo(d, column)), d, corners.x.data() + k);
     hn::StoreU(hn::Sub(y, hn::ConvertTo(d, row)), d, corners.y.data() + k);
-    lowest = hn::Min(lowest, row);
-    highest = hn::Max(highest, row);
     const auto in_row = hn::Add(column, hn::Set(d_int, SumIndex(0, 0)));
     hn::StoreU(hn::Add(hn::Mul(row, hn::Set(d_int, kSumColumns)), in_row), d_int,
                corners.at.data() + k);
   }
-  rows = {hn::GetLane(hn::MinOfLanes(d_int, lowest)), hn::GetLane(hn::MaxOfLanes(d_int, highest))};
   for (; k < count; ++k) {
-    const int column = NodeAfter(entries[k].x - radius);
-    const int row = NodeAfter(entries[k].y - radius);
-    corners.x[k] = entries[k].x - static_cast<float>(column);
-    corners.y[k] = entries[k].y - static_cast<float>(row);
+    const int column = NodeAfter(particles[k].x - radius);
+    const int row = NodeAfter(particles[k].y - radius);
+    corners.x[k] = particles[k].x - static_cast<float>(column);
+    corners.y[k] = particles[k].y - static_cast<float>(row);
     corners.at[k] = SumIndex(column, row);
-    rows = {std::min(rows.first, row), std::max(rows.last, row)};
   }
 }
 
 // Kernels that the margin has room for: every one covers the same number of rows and columns, so
-// that no branch depends on where a particle lies. add(x, y, index, first sum) adds one. Returns
-// the first rows of kernels, from the lowest to the highest.
+// that no branch depends on where a particle lies. add(x, y, index, first sum) adds one.
 template <typename Add>
-HWY_INLINE NodeRange ForEachCorner(const TileEntries& entries, float radius, NodeSums& sums,
-                                   Add add) {
+HWY_INLINE void ForEachCorner(const TileParticles& tile, float radius, NodeSums& sums, Add add) {
   KernelCorners corners;
-  NodeRange rows = {2 * kTileSize, -2 * kTileSize};
-  const auto count = static_cast<int>(entries.count);
+  const auto count = static_cast<int>(tile.count);
   for (int first = 0; first < count; first += kBlock) {
     const int in_block = std::min(kBlock, count - first);
-    FindCorners(entries.entries + first, in_block, radius, corners, rows);
+    FindCorners(tile.particles + first, in_block, radius, corners);
     for (int k = 0; k < in_block; ++k) {
       add(corners.x[k], corners.y[k], first + k, sums.data() + corners.at[k]);
     }
   }
-  return rows;
 }
 
 // Narrow kernels in vectors of sixteen: two rows of eight nodes at a time, which takes the same
@@ -84,7 +129,7 @@ HWY_INLINE NodeRange ForEachCorner(const TileEntries& entries, float radius, Nod
 constexpr int kNarrowSpan = kLanes;
 
 template <bool kWeighted, int kPairs>
-NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, NodeSums& sums) {
+void ScatterNarrow(const TileParticles& tile, float radius, int span, NodeSums& sums) {
   const hn::CappedTag<float, 2 * kLanes> d;
   const Lanes d_row;
   const auto inverse_square = hn::Set(d, 1 / (radius * radius));
@@ -98,7 +143,7 @@ NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, Node
   const auto column = hn::Load(d, columns);
   const auto reached_row = hn::Lt(lane, hn::Set(d, static_cast<float>(span)));
   const auto reached_column = hn::Lt(column, hn::Set(d, static_cast<float>(span)));
-  return ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
+  ForEachCorner(tile, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
     const auto dx = hn::Sub(hn::Set(d, x), column);
     const auto dy = hn::Sub(hn::Set(d, y), lane);
     // Beyond the span terms that make k = 0, on every target alike.
@@ -110,7 +155,7 @@ NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, Node
       const auto row_term = hn::TableLookupLanes(row_terms, hn::SetTableIndices(d, rows[pair]));
       const auto t = hn::Max(hn::Zero(d), hn::Sub(row_term, column_term));
       auto kernel = hn::Mul(hn::Mul(t, t), t);
-      if constexpr (kWeighted) kernel = hn::Mul(kernel, hn::Set(d, entries.weight[k]));
+      if constexpr (kWeighted) kernel = hn::Mul(kernel, hn::Set(d, tile.weight[k]));
       AddTo(at + 2 * pair * kSumColumns, hn::LowerHalf(kernel));
       AddTo(at + (2 * pair + 1) * kSumColumns, hn::UpperHalf(d_row, kernel));
     }
@@ -118,45 +163,53 @@ NodeRange ScatterNarrow(const TileEntries& entries, float radius, int span, Node
 }
 
 template <bool kWeighted>
-NodeRange ScatterNarrowOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
+void ScatterNarrowOf(const TileParticles& tile, float radius, int span, NodeSums& sums) {
   const auto scatter = span <= 2   ? ScatterNarrow<kWeighted, 1>
                        : span <= 4 ? ScatterNarrow<kWeighted, 2>
                        : span <= 6 ? ScatterNarrow<kWeighted, 3>
                                    : ScatterNarrow<kWeighted, 4>;
-  return scatter(entries, radius, span, sums);
+  scatter(tile, radius, span, sums);
 }
 #else
 constexpr int kNarrowSpan = 0;
 template <bool kWeighted>
-NodeRange ScatterNarrowOf(const TileEntries&, float, int, NodeSums&) {
-  return kNoNodes;
-}
+void ScatterNarrowOf(const TileParticles&, float, int, NodeSums&) {}
 #endif
 
 template <bool kWeighted>
-NodeRange ScatterKernelsOf(const TileEntries& entries, float radius, int span, NodeSums& sums) {
-  if (span <= kNarrowSpan) return ScatterNarrowOf<kWeighted>(entries, radius, span, sums);
+void ScatterKernelsOf(const TileParticles& tile, float radius, NodeSums& sums) {
+  const int span = static_cast<int>(std::ceil(2 * radius));
+  if (span <= kNarrowSpan) return ScatterNarrowOf<kWeighted>(tile, radius, span, sums);
   const float inverse_square = 1 / (radius * radius);
-  alignas(64) RowTerms row_terms;
-  return ForEachCorner(entries, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
-    SetRowTerms(y, {0, span - 1}, inverse_square, row_terms);
-    const float weight = kWeighted ? entries.weight[k] : 1.0f;
-    for (int v = 0; v < span; v += kLanes) {
-      const Vector column_term = ColumnTermsAt(x, v, span - 1, inverse_square).term;
-      for (int row = 0; row < span; ++row) {
-        AddRow<kWeighted>(hn::Set(Lanes(), row_terms[row]), column_term, weight,
-                          at + row * kSumColumns + v);
-      }
-    }
+  ForEachCorner(tile, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
+    AddKernel<kWeighted>(x, y, span, span, inverse_square, kWeighted ? tile.weight[k] : 1.0f, at);
   });
 }
 
-NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
-  const int span = static_cast<int>(std::ceil(2 * radius));
-  const NodeRange firsts = entries.weight != nullptr
-                               ? ScatterKernelsOf<true>(entries, radius, span, sums)
-                               : ScatterKernelsOf<false>(entries, radius, span, sums);
-  return {firsts.first, firsts.last + span - 1};
+void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums) {
+  tile.weight != nullptr ? ScatterKernelsOf<true>(tile, radius, sums)
+                         : ScatterKernelsOf<false>(tile, radius, sums);
+}
+
+template <bool kWeighted>
+void ScatterNearKernelsOf(const ParticleBlock& near, const float* weight, float radius,
+                          NodeSums& sums) {
+  const float inverse_square = 1 / (radius * radius);
+  for (int p = 0; p < near.count; ++p) {
+    const float x = near.x[p], y = near.y[p];
+    const int column = std::max(NodeAfter(x - radius), 0), row = std::max(NodeAfter(y - radius), 0);
+    const int columns = std::min(NodeAfter(x + radius), kTileSize) - column;
+    const int rows = std::min(NodeAfter(y + radius), kTileSize) - row;
+    AddKernel<kWeighted>(x - static_cast<float>(column), y - static_cast<float>(row), columns, rows,
+                         inverse_square, kWeighted ? weight[near.particle[p]] : 1.0f,
+                         sums.data() + SumIndex(column, row));
+  }
+}
+
+void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
+                        NodeSums& sums) {
+  weight != nullptr ? ScatterNearKernelsOf<true>(near, weight, radius, sums)
+                    : ScatterNearKernelsOf<false>(near, weight, radius, sums);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -167,9 +220,15 @@ HWY_AFTER_NAMESPACE();
 namespace partiemc {
 
 HWY_EXPORT(ScatterKernels);
+HWY_EXPORT(ScatterNearKernels);
 
-NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums) {
-  return HWY_DYNAMIC_DISPATCH(ScatterKernels)(entries, radius, sums);
+void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterKernels)(tile, radius, sums);
+}
+
+void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
+                        NodeSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
 }
 
 }  // namespace partiemc

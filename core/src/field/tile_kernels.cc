@@ -11,40 +11,17 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "field/kernel_rows-inl.h"
 #include "field/level_set_formula.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-// The nodes of `among` that a kernel reaches.
-HWY_INLINE NodeRange NodesReached(float centre, float radius, NodeRange among) {
-  return {std::max(NodeAfter(centre - radius), among.first),
-          std::min(NodeAfter(centre + radius) - 1, among.last)};
-}
+namespace hn = hwy::HWY_NAMESPACE;
 
-template <bool kWeighted>
-void ScatterNearKernelsOf(const NearEntries& near, const float* weight, float radius,
-                          NodeSums& sums) {
-  const float inverse_square = 1 / (radius * radius);
-  for (int e = 0; e < near.count; ++e) {
-    const NodeRange columns = NodesReached(near.x[e], radius, kAllNodes);
-    const NodeRange rows = NodesReached(near.y[e], radius, kAllNodes);
-    const float of = kWeighted ? weight[near.entry[e]] : 1.0f;
-    ForEachVector(
-        near.x[e], near.y[e], columns, rows, inverse_square,
-        [&](int column, int row, const ColumnTerms& terms, Vector, Vector row_term) HWY_ATTR {
-          AddRow<kWeighted>(row_term, terms.term, of, sums.data() + SumIndex(column, row));
-        });
-  }
-}
-
-void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
-                        NodeSums& sums) {
-  weight != nullptr ? ScatterNearKernelsOf<true>(near, weight, radius, sums)
-                    : ScatterNearKernelsOf<false>(near, weight, radius, sums);
-}
+using Lanes = hn::CappedTag<float, NodeBlock::kNodes>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
 template <class D>
 HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
@@ -53,14 +30,14 @@ HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
   return bytes[0] | std::uint32_t{bytes[1]} << 8;
 }
 
-void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside,
                    BitRows& open) {
   const Lanes d;
   const Vector guard = hn::Set(d, static_cast<float>(scale.guard));
   const Vector saturation = hn::Set(d, static_cast<float>(scale.saturation));
   const Vector slope = hn::Set(d, static_cast<float>(scale.guard_slope));
   const Vector void_value = hn::Set(d, static_cast<float>(VoidValue(scale)));
-  for (int j = rows.first; j <= rows.last; ++j) {
+  for (int j = 0; j < kTileSize; ++j) {
     std::uint32_t inside_row = 0, open_row = 0;
     for (int i = 0; i < kTileSize; i += kLanes) {
       const Vector sum = hn::LoadU(d, values + j * kTileSize + i);
@@ -79,13 +56,9 @@ void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* valu
   }
 }
 
-// A block's nodes, or some rows of them.
-using NodeLanes = hn::CappedTag<float, NodeBlock::kNodes>;
-using NodeVector = hn::Vec<NodeLanes>;
-
 // The branches of F that the density decides.
 struct DensityBranches {
-  NodeVector guard, saturation;
+  Vector guard, saturation;
 };
 
 // LevelSetValue in vectors, of what is known of nodes.
@@ -104,67 +77,67 @@ class NodeFormula {
         inverse_square_(Constant(1 / (scale.kernel_radius * scale.kernel_radius))) {}
 
   // F at the nodes of a block from `first` on, which have `value` so far.
-  HWY_INLINE NodeVector operator()(NodeVector value, const BlockSums& sums, int first) const {
+  HWY_INLINE Vector operator()(Vector value, const BlockSums& sums, int first) const {
     const auto load = [&](const BlockSums::Channel& of)
                           HWY_ATTR { return hn::Load(d_, of.data() + first); };
-    const NodeVector k = asked_.has_kernel_sums ? value : load(sums.kernel);
-    const NodeVector inverse = hn::Div(hn::Set(d_, 1.0f), k);
-    const NodeVector mean_x = hn::Mul(load(sums.moment_x), inverse);
-    const NodeVector mean_y = hn::Mul(load(sums.moment_y), inverse);
-    const NodeVector phi = hn::Sub(Length(mean_x, mean_y), reference_radius_);
-    const NodeVector share = hn::Mul(inverse_square_, inverse);
-    const NodeVector xx = hn::Mul(load(sums.xx), share);
-    const NodeVector xy = hn::Mul(load(sums.xy), share);
-    const NodeVector yy = hn::Mul(load(sums.yy), share);
-    const NodeVector half = Constant(0.5);
-    const NodeVector spread =
+    const Vector k = asked_.has_kernel_sums ? value : load(sums.kernel);
+    const Vector inverse = hn::Div(hn::Set(d_, 1.0f), k);
+    const Vector mean_x = hn::Mul(load(sums.moment_x), inverse);
+    const Vector mean_y = hn::Mul(load(sums.moment_y), inverse);
+    const Vector phi = hn::Sub(Length(mean_x, mean_y), reference_radius_);
+    const Vector share = hn::Mul(inverse_square_, inverse);
+    const Vector xx = hn::Mul(load(sums.xx), share);
+    const Vector xy = hn::Mul(load(sums.xy), share);
+    const Vector yy = hn::Mul(load(sums.yy), share);
+    const Vector half = Constant(0.5);
+    const Vector spread =
         hn::Add(hn::Mul(hn::Add(xx, yy), half), Length(hn::Mul(hn::Sub(xx, yy), half), xy));
-    const NodeVector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
+    const Vector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
     const DensityBranches branches = BranchesOf(value);
-    const NodeVector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
+    const Vector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
     // No kernel reaches the node.
     return hn::IfThenElse(hn::Gt(k, hn::Zero(d_)), f, asked_.is_open ? void_value_ : value);
   }
 
  private:
-  static HWY_INLINE NodeVector Constant(double value) {
-    return hn::Set(NodeLanes(), static_cast<float>(value));
+  static HWY_INLINE Vector Constant(double value) {
+    return hn::Set(Lanes(), static_cast<float>(value));
   }
 
-  static HWY_INLINE NodeVector Length(NodeVector x, NodeVector y) {
+  static HWY_INLINE Vector Length(Vector x, Vector y) {
     return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
   }
 
-  HWY_INLINE DensityBranches BranchesOf(NodeVector value) const {
+  HWY_INLINE DensityBranches BranchesOf(Vector value) const {
     if (asked_.is_open) {
-      const NodeVector f = hn::Mul(weight_, value);
+      const Vector f = hn::Mul(weight_, value);
       return {hn::Mul(hn::Sub(guard_, f), slope_), hn::Mul(hn::Sub(saturation_, f), slope_)};
     }
     // The value is the one that has decided the side, which the other then cannot change.
-    const NodeVector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
+    const Vector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
     const auto is_inside = hn::Lt(value, hn::Zero(d_));
     return {hn::IfThenElse(is_inside, hn::Sub(value, between), value),
             hn::IfThenElse(is_inside, value, hn::Add(value, between))};
   }
 
-  const NodeLanes d_;
+  const Lanes d_;
   const AskedNodes& asked_;
-  const NodeVector weight_, guard_, saturation_, slope_, gap_spread_, gap_slope_, reference_radius_,
+  const Vector weight_, guard_, saturation_, slope_, gap_spread_, gap_slope_, reference_radius_,
       void_value_, inverse_square_;
 };
 
 // Sets the asked ones of a block's values to F. Returns which of them are inside.
 HWY_INLINE unsigned EvaluateBlock(const NodeFormula& formula, const BlockSums& sums, unsigned asked,
                                   BlockSums::Channel& values) {
-  const NodeLanes d;
+  const Lanes d;
   unsigned inside = 0;
-  for (int node = 0; node < NodeBlock::kNodes; node += static_cast<int>(hn::MaxLanes(d))) {
+  for (int node = 0; node < NodeBlock::kNodes; node += kLanes) {
     const unsigned bits = asked >> node;
     const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits),
                                    static_cast<std::uint8_t>(bits >> 8)};
     float* const at = values.data() + node;
-    const NodeVector before = hn::Load(d, at);
-    const NodeVector value = formula(before, sums, node);
+    const Vector before = hn::Load(d, at);
+    const Vector value = formula(before, sums, node);
     hn::Store(hn::IfThenElse(hn::LoadMaskBits(d, bytes), value, before), d, at);
     inside |= BitsOf(d, hn::Lt(value, hn::Zero(d))) << node;
   }
@@ -199,18 +172,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
-HWY_EXPORT(ScatterNearKernels);
 HWY_EXPORT(ClassifyNodes);
 HWY_EXPORT(EvaluateNodes);
 
-void ScatterNearKernels(const NearEntries& near, const float* weight, float radius,
-                        NodeSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
-}
-
-void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside,
                    BitRows& open) {
-  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, rows, values, inside, open);
+  HWY_DYNAMIC_DISPATCH(ClassifyNodes)(weight, scale, values, inside, open);
 }
 
 BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,

@@ -12,7 +12,7 @@
 
 #include "bins/bins.h"
 #include "bins/lattice.h"
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 #include "frame/scale.h"
 
 namespace partiemc {
@@ -74,31 +74,30 @@ struct AskedNodes {
 };
 
 /// The list of one tile. `weight` is null where weights are uniform.
-struct TileEntries {
-  const BinEntry* entries;
+struct TileParticles {
+  const BinnedParticle* particles;
   const float* weight;
   std::size_t count;
 };
 
-/// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any:
-/// also beyond the tile's sides. Returns the rows that they reach, those beyond the sides too.
-/// Requires: there are particles, radius <= kSumMargin.
-NodeRange ScatterKernels(const TileEntries& entries, float radius, NodeSums& sums);
+/// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any,
+/// also beyond the tile's sides. Requires: radius <= kSumMargin.
+void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 
 /// The same of particles in and around a tile, to the tile's nodes only, for any radius. `weight`,
-/// by entry of the bins, is null where weights are uniform.
-void ScatterNearKernels(const NearEntries& near, const float* weight, float radius, NodeSums& sums);
+/// by particle of the bins, is null where weights are uniform.
+void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
+                        NodeSums& sums);
 
 /// Adds to the moments at the nodes of blocks, particle after particle. `sum k` is added up unless
 /// it is known.
-void AddNearMoments(const NearEntries& near, float radius, const NodeBlocks& blocks,
+void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums);
 
-/// What the density f = weight * sum says of the nodes in some rows of a tile: those that are
-/// inside, those that it leaves open, and, but for the latter, in place of the sums the branch of F
-/// that decides them; where f = 0, F itself.
-void ClassifyNodes(float weight, const Scale& scale, NodeRange rows, float* values, BitRows& inside,
-                   BitRows& open);
+/// What the density f = weight * sum says of the nodes of a tile: those that are inside, those that
+/// it leaves open, and, but for the latter, in place of the sums the branch of F that decides them;
+/// where f = 0, F itself.
+void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside, BitRows& open);
 
 /// Sets the values of the asked nodes, as ClassifyNodes has left them, to F. Returns those of them
 /// that are inside.

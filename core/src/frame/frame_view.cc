@@ -105,12 +105,17 @@ absl::Status CheckPlanar(const Frame& frame, Plane plane) {
                    ShortestNumber(high[axes.normal]), "]"));
 }
 
+// Whether there are no values of an optional array, or one for each particle.
+absl::Status CheckCount(const Frame& frame, std::string_view field, std::size_t values) {
+  if (values == 0 || values == frame.ParticleCount()) return absl::OkStatus();
+  return InvalidFrame(
+      kReasonCount, std::string(field), absl::StrCat(values, " values"),
+      absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
+}
+
 absl::Status CheckVolumes(const Frame& frame) {
-  if (frame.volumes.empty()) return absl::OkStatus();
-  if (frame.volumes.size() != frame.ParticleCount()) {
-    return InvalidFrame(
-        kReasonCount, "volumes", absl::StrCat(frame.volumes.size(), " values"),
-        absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
+  if (absl::Status status = CheckCount(frame, "volumes", frame.volumes.size()); !status.ok()) {
+    return status;
   }
   for (std::size_t k = 0; k < frame.volumes.size(); ++k) {
     const float volume = frame.volumes[k];
@@ -124,11 +129,8 @@ absl::Status CheckVolumes(const Frame& frame) {
 }
 
 absl::Status CheckIds(const Frame& frame, DistinctIdsScratch& scratch) {
-  if (frame.ids.empty()) return absl::OkStatus();
-  if (frame.ids.size() != frame.ParticleCount()) {
-    return InvalidFrame(
-        kReasonCount, "ids", absl::StrCat(frame.ids.size(), " values"),
-        absl::StrCat("must be empty or one per particle (", frame.ParticleCount(), ")"));
+  if (absl::Status status = CheckCount(frame, "ids", frame.ids.size()); !status.ok()) {
+    return status;
   }
   const auto repeated = FindRepeated(frame.ids, scratch);
   if (!repeated) return absl::OkStatus();
@@ -171,7 +173,7 @@ Axes AxesOf(Plane plane) {
   return {0, 1, 2};
 }
 
-WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle) {
+Point PositionOf(const Frame& frame, Plane plane, std::size_t particle) {
   return VisitPositions(frame, plane, [&](const auto& reader) { return reader[particle]; });
 }
 

@@ -8,17 +8,13 @@
 #include <variant>
 
 #include "absl/status/status.h"
+#include "base/point.h"
 #include "base/prefetch.h"
 #include "frame/distinct_ids.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc {
-
-/// One coordinate pair of a frame, in world units.
-struct WorldPosition {
-  double x, y;
-};
 
 /// Reads the coordinate pairs of a frame whose numbers are of type Real.
 template <typename Real>
@@ -30,7 +26,7 @@ class PositionReader {
         second_(values == nullptr ? nullptr : values + second),
         components_(components) {}
 
-  WorldPosition operator[](std::size_t particle) const {
+  Point operator[](std::size_t particle) const {
     const std::size_t at = particle * components_;
     return {static_cast<double>(first_[at]), static_cast<double>(second_[at])};
   }
@@ -83,7 +79,7 @@ auto VisitPositions(const Frame& frame, Plane plane, Visit visit) {
 }
 
 /// Position of one particle.
-WorldPosition PositionOf(const Frame& frame, Plane plane, std::size_t particle);
+Point PositionOf(const Frame& frame, Plane plane, std::size_t particle);
 
 /// A velocity in the plane. Requires: the frame has velocities.
 struct PlaneVelocity {

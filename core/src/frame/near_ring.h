@@ -1,6 +1,7 @@
 // The positions nearest to one, and what they tell of the spacing.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -40,11 +41,32 @@ class NearRing {
 
  private:
   static constexpr std::size_t kCount = 6;
+  // The square lattice's diagonal is at 1.41, a little noise included.
+  static constexpr double kMaxRatio = 1.6;
+
+  // Two offsets that span less than this (a sine) do not tell that the side between them is taken:
+  // the straight edge of a lattice, bent by noise, has everything on one side.
+  static constexpr double kMinSine = 0.25;
+
   struct Offset {
     double x = 0, y = 0, square = std::numeric_limits<double>::infinity();
   };
   std::array<Offset, kCount> offsets_;  // Nearest first.
 };
+
+inline bool NearRing::IsAround() const {
+  const double farthest = reach_square();
+  if (!std::isfinite(farthest) || farthest > kMaxRatio * kMaxRatio * offsets_[1].square) {
+    return false;
+  }
+  // Seen from each offset, another one comes within half a turn to its left.
+  return std::all_of(offsets_.begin(), offsets_.end(), [&](const Offset& a) {
+    return std::any_of(offsets_.begin(), offsets_.end(), [&](const Offset& b) {
+      const double cross = a.x * b.y - a.y * b.x;
+      return cross > 0 && cross * cross >= kMinSine * kMinSine * (a.square * b.square);
+    });
+  });
+}
 
 /// Whether `surrounded` of `asked` points are enough to believe what they agree on: a dozen, and
 /// three tenths. A strip of four layers has enough of them, ten drops do not.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -25,6 +26,17 @@ absl::Status OutOfRange(std::string_view field, double value, std::string_view r
   return ViolationError(absl::StatusCode::kInvalidArgument,
                         {std::string(kReasonOutOfRange), "parameters." + std::string(field),
                          ShortestNumber(value), std::string(rule)});
+}
+
+// Names by value.
+constexpr std::array<std::string_view, 5> kFillNames = {"none", "grid", "greedy", "conforming",
+                                                        "polygon"};
+constexpr std::array<std::string_view, 3> kPlaneNames = {"xy", "xz", "yz"};
+
+template <std::size_t kCount, typename Enum>
+std::string_view NameOf(const std::array<std::string_view, kCount>& names, Enum value) {
+  const auto k = static_cast<std::size_t>(value);
+  return k < kCount ? names[k] : "";
 }
 
 bool Within(double value, double low, double high) { return value >= low && value <= high; }
@@ -68,37 +80,13 @@ ReconstructionParameters Resolve(ReconstructionParameters parameters) {
 
 std::string_view Name(Placement placement) { return TraitsOf(placement).name; }
 
-std::string_view Name(Fill fill) {
-  switch (fill) {
-    case Fill::kNone:
-      return "none";
-    case Fill::kGrid:
-      return "grid";
-    case Fill::kGreedy:
-      return "greedy";
-    case Fill::kConforming:
-      return "conforming";
-    case Fill::kPolygon:
-      return "polygon";
-  }
-  return "";
-}
+std::string_view Name(Fill fill) { return NameOf(kFillNames, fill); }
 
 std::string_view Name(SpacingRule rule) {
   return rule == SpacingRule::kFirstFrame ? "first-frame" : "every-frame";
 }
 
-std::string_view Name(Plane plane) {
-  switch (plane) {
-    case Plane::kXy:
-      return "xy";
-    case Plane::kXz:
-      return "xz";
-    case Plane::kYz:
-      return "yz";
-  }
-  return "";
-}
+std::string_view Name(Plane plane) { return NameOf(kPlaneNames, plane); }
 
 std::span<const Placement> AllPlacements() { return kAllPlacements; }
 std::span<const Fill> AllFills() { return kFills; }

@@ -42,25 +42,22 @@ constexpr double kQuarterPi = 0.78539816339744830962;
 
 // Where points lie from their particles, in kernel radii: as far as the kernel reaches, so that the
 // particle itself adds nothing and the sums are those of the plane, whatever the arrangement.
-constexpr WorldPosition kDirections[] = {{1, 0},       {0.8, 0.6},  {0.6, 0.8},  {0, 1},
-                                         {-0.6, 0.8},  {-0.8, 0.6}, {-1, 0},     {-0.8, -0.6},
-                                         {-0.6, -0.8}, {0, -1},     {0.6, -0.8}, {0.8, -0.6}};
+constexpr Point kDirections[] = {{1, 0},       {0.8, 0.6},  {0.6, 0.8},  {0, 1},
+                                 {-0.6, 0.8},  {-0.8, 0.6}, {-1, 0},     {-0.8, -0.6},
+                                 {-0.6, -0.8}, {0, -1},     {0.6, -0.8}, {0.8, -0.6}};
 
-double Along(const WorldPosition& position, int axis) {
-  return axis == 0 ? position.x : position.y;
-}
+double Along(const Point& position, int axis) { return axis == 0 ? position.x : position.y; }
 
 // Below so many positions a task would cost more than it saves.
 constexpr std::size_t kMinParallel = 1 << 13;
 
 // Orders positions into an implicit balanced k-d tree: the middle of a range splits it.
-void BuildTree(std::span<WorldPosition> positions, int axis) {
+void BuildTree(std::span<Point> positions, int axis) {
   if (positions.size() < 2) return;
   const std::size_t middle = positions.size() / 2;
-  std::nth_element(positions.begin(), positions.begin() + middle, positions.end(),
-                   [axis](const WorldPosition& a, const WorldPosition& b) {
-                     return Along(a, axis) < Along(b, axis);
-                   });
+  std::nth_element(
+      positions.begin(), positions.begin() + middle, positions.end(),
+      [axis](const Point& a, const Point& b) { return Along(a, axis) < Along(b, axis); });
   const auto build_lower = [=] { BuildTree(positions.first(middle), 1 - axis); };
   const auto build_upper = [=] { BuildTree(positions.subspan(middle + 1), 1 - axis); };
   if (positions.size() >= kMinParallel) {
@@ -71,44 +68,37 @@ void BuildTree(std::span<WorldPosition> positions, int axis) {
   }
 }
 
-// Squared distance from `query` to the nearest other position, at most `best`.
-double NearestSquare(std::span<const WorldPosition> tree, const WorldPosition& query, int axis,
-                     double best) {
-  if (tree.empty()) return best;
-  const std::size_t middle = tree.size() / 2;
-  const double dx = tree[middle].x - query.x;
-  const double dy = tree[middle].y - query.y;
-  const double square = dx * dx + dy * dy;
-  if (square > 0) best = std::min(best, square);
-  const double across = Along(query, axis) - Along(tree[middle], axis);
-  const auto lower = tree.first(middle);
-  const auto upper = tree.subspan(middle + 1);
-  best = NearestSquare(across < 0 ? lower : upper, query, 1 - axis, best);
-  if (across * across < best) {
-    best = NearestSquare(across < 0 ? upper : lower, query, 1 - axis, best);
-  }
-  return best;
-}
+// The nearest other position.
+struct Nearest {
+  double square = std::numeric_limits<double>::infinity();
 
-// Gathers the positions nearest to `query`, the tree's order deciding between equal distances.
-void GatherNearest(std::span<const WorldPosition> tree, const WorldPosition& query, int axis,
-                   NearRing& ring) {
+  void Add(double dx, double dy) {
+    const double next = dx * dx + dy * dy;
+    if (next > 0) square = std::min(square, next);
+  }
+  double reach_square() const { return square; }
+};
+
+// Adds to `near` (Nearest, NearRing) the offsets of positions within its reach of `query`, of which
+// there is less with each. The tree's order decides between equal distances.
+template <typename Near>
+void GatherNearest(std::span<const Point> tree, const Point& query, int axis, Near& near) {
   if (tree.empty()) return;
   const std::size_t middle = tree.size() / 2;
-  ring.Add(tree[middle].x - query.x, tree[middle].y - query.y);
+  near.Add(tree[middle].x - query.x, tree[middle].y - query.y);
   const double across = Along(query, axis) - Along(tree[middle], axis);
   const auto lower = tree.first(middle);
   const auto upper = tree.subspan(middle + 1);
-  GatherNearest(across < 0 ? lower : upper, query, 1 - axis, ring);
-  if (across * across < ring.reach_square()) {
-    GatherNearest(across < 0 ? upper : lower, query, 1 - axis, ring);
+  GatherNearest(across < 0 ? lower : upper, query, 1 - axis, near);
+  if (across * across < near.reach_square()) {
+    GatherNearest(across < 0 ? upper : lower, query, 1 - axis, near);
   }
 }
 
 // Calls visit(dx, dy) for the positions closer than `radius` to a point, in the order of the tree.
 template <typename Visit>
-void ForEachWithin(std::span<const WorldPosition> tree, const WorldPosition& point, int axis,
-                   double radius, const Visit& visit) {
+void ForEachWithin(std::span<const Point> tree, const Point& point, int axis, double radius,
+                   const Visit& visit) {
   if (tree.empty()) return;
   const std::size_t middle = tree.size() / 2;
   const double across = Along(point, axis) - Along(tree[middle], axis);
@@ -120,8 +110,7 @@ void ForEachWithin(std::span<const WorldPosition> tree, const WorldPosition& poi
 }
 
 // Sum of the kernel at a point, 0 where the particles do not surround it.
-double FilledWeight(std::span<const WorldPosition> tree, const WorldPosition& point,
-                    double radius) {
+double FilledWeight(std::span<const Point> tree, const Point& point, double radius) {
   const double inverse = 1 / radius;
   double weight = 0, moment_x = 0, moment_y = 0, spread = 0;  // In radii.
   ForEachWithin(tree, point, 0, radius, [&](double dx, double dy) {
@@ -143,13 +132,12 @@ double FilledWeight(std::span<const WorldPosition> tree, const WorldPosition& po
 
 // The spacing whose square, one for each particle, makes up for the density inside of bodies.
 // Nothing where no point is surrounded by them.
-std::optional<double> SpacingOfDensity(std::span<const WorldPosition> tree,
-                                       std::span<const WorldPosition> asked, double radius,
-                                       std::vector<double>& weights) {
+std::optional<double> SpacingOfDensity(std::span<const Point> tree, std::span<const Point> asked,
+                                       double radius, std::vector<double>& weights) {
   weights.resize(asked.size());
   ParallelFor(asked.size(), [&](std::size_t k) {
-    const WorldPosition& direction = kDirections[k % std::size(kDirections)];
-    const WorldPosition point{asked[k].x + radius * direction.x, asked[k].y + radius * direction.y};
+    const Point& direction = kDirections[k % std::size(kDirections)];
+    const Point point{asked[k].x + radius * direction.x, asked[k].y + radius * direction.y};
     weights[k] = FilledWeight(tree, point, radius);
   });
   std::erase(weights, 0.0);
@@ -160,7 +148,7 @@ std::optional<double> SpacingOfDensity(std::span<const WorldPosition> tree,
   return radius * std::sqrt(kQuarterPi * static_cast<double>(weights.size()) / sum);
 }
 
-std::uint64_t HashOf(const WorldPosition& position) {
+std::uint64_t HashOf(const Point& position) {
   // + 0.0 makes one zero of the two.
   std::uint64_t hash = std::bit_cast<std::uint64_t>(position.x + 0.0) * 0x9e3779b97f4a7c15u;
   hash ^= hash >> 32;
@@ -176,8 +164,7 @@ double MedianOf(std::vector<double>& values) {
 
 // What enough of the particles that are asked are surrounded at, within a factor of two: their
 // median distance. Nothing where they do not agree.
-std::optional<double> AgreedDistance(std::span<const WorldPosition> tree,
-                                     std::span<const WorldPosition> asked,
+std::optional<double> AgreedDistance(std::span<const Point> tree, std::span<const Point> asked,
                                      std::size_t asked_in_company, std::vector<double>& distances) {
   distances.resize(asked.size());
   ParallelFor(asked.size(), [&](std::size_t k) {
@@ -220,25 +207,24 @@ std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
   });
   // Sorted and without duplicates: the tree is the same for any order of the particles, and no
   // query wades through a million copies of itself.
-  ParallelSort(std::span(positions), [](const WorldPosition& a, const WorldPosition& b) {
-    return a.x != b.x ? a.x < b.x : a.y < b.y;
-  });
+  ParallelSort(std::span(positions),
+               [](const Point& a, const Point& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
   const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
   positions.erase(std::unique(positions.begin(), positions.end(), same), positions.end());
   BuildTree(positions, 0);
 
   const std::uint64_t stride = std::max<std::size_t>(1, positions.size() / kSampleSize);
-  const double infinity = std::numeric_limits<double>::infinity();
   asked.clear();
-  for (const WorldPosition& position : positions) {
+  for (const Point& position : positions) {
     if (HashOf(position) % stride == 0) asked.push_back(position);
   }
   distances.resize(asked.size());
   ParallelFor(asked.size(), [&](std::size_t k) {
-    scratch.distances[k] =
-        std::sqrt(NearestSquare(scratch.positions, scratch.asked[k], 0, infinity));
+    Nearest nearest;
+    GatherNearest<Nearest>(scratch.positions, scratch.asked[k], 0, nearest);
+    scratch.distances[k] = std::sqrt(nearest.square);
   });
-  std::erase(distances, infinity);
+  std::erase(distances, std::numeric_limits<double>::infinity());
   if (distances.empty()) return std::nullopt;
   const double median = MedianOf(distances);
   std::erase_if(distances, [&](double distance) { return distance > kLonelyRatio * median; });

@@ -12,8 +12,8 @@ namespace partiemc {
 
 /// Warm buffers of EstimateSpacing.
 struct SpacingScratch {
-  std::vector<WorldPosition> positions;  ///< Distinct, as a k-d tree.
-  std::vector<WorldPosition> asked;      ///< Those asked for their neighbours.
+  std::vector<Point> positions;  ///< Distinct, as a k-d tree.
+  std::vector<Point> asked;      ///< Those asked for their neighbours.
   std::vector<double> distances, weights;
 };
 

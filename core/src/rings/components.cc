@@ -6,7 +6,6 @@
 
 #include "base/bits.h"
 #include "base/parallel.h"
-#include "rings/entry_counts.h"
 
 namespace partiemc {
 namespace {
@@ -139,10 +138,10 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
     cells[j] = rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1];
   }
   TileShare share{component, 0, 0};
-  share.count = CountEntriesIn(cells, bins.particles, bins.offsets[tile], bins.offsets[tile + 1]);
-  if (bins.weight.empty()) return share;
-  for (std::uint32_t e = bins.offsets[tile]; e < bins.offsets[tile + 1]; ++e) {
-    if (LiesIn(bins.particles[e], cells)) share.weight += bins.weight[e];
+  for (std::uint32_t p = bins.offsets[tile]; p < bins.offsets[tile + 1]; ++p) {
+    const bool is_in = LiesIn(bins.particles[p], cells);
+    share.count += is_in;
+    if (is_in && !bins.weight.empty()) share.weight += bins.weight[p];
   }
   return share;
 }

@@ -42,8 +42,8 @@ class Components {
   template <typename Visit>
   void ForEachRun(const Crossings& crossings, Visit visit) const;
 
-  /// Calls visit(tile, entry, component) for each particle that belongs to one (ComponentOf), by
-  /// its entry in the list of its own tile.
+  /// Calls visit(tile, particle, component) for each particle that belongs to one (ComponentOf), by
+  /// its particle in the list of its own tile.
   template <typename Visit>
   void ForEachParticle(const ParticleBins& bins, const Crossings& crossings, Visit visit) const;
   template <typename Visit>
@@ -145,10 +145,10 @@ void Components::ForEachSeenFrom(const TileDirectory& directory, const Crossings
 template <typename Visit>
 void Components::ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings,
                                    std::uint32_t tile, Visit visit) const {
-  for (std::uint32_t particle = bins.offsets[tile]; entry < bins.offsets[tile + 1]; ++entry) {
+  for (std::uint32_t particle = bins.offsets[tile]; particle < bins.offsets[tile + 1]; ++particle) {
     const BinnedParticle& at = bins.particles[particle];
     const std::uint32_t component = ComponentOf(bins.tiles, crossings, tile, at.x, at.y);
-    if (component != kNoComponent) visit(tile, entry, component);
+    if (component != kNoComponent) visit(tile, particle, component);
   }
 }
 

@@ -22,7 +22,7 @@ constexpr std::size_t kSegmentGrain = 512;
 // Rings that a task takes at least.
 constexpr std::size_t kRingGrain = 64;
 
-// How many segments before its turn a cell's values are asked for: as long as memory takes.
+// How many segments before its turn the cache lines of a cell's values are prefetched.
 constexpr std::size_t kFetchedAhead = 16;
 
 // What follows each segment is found in parallel; what is left to do in order is to walk.
@@ -75,6 +75,7 @@ void FetchCorners(const LevelSet& level_set, const ActiveCell& cell) {
   if (cell.j + 1 < kTileSize) hwy::Prefetch(lower + kTileSize);
 }
 
+// Where each segment enters its cell.
 void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
                      const Crossings& crossings, RingTopology& rings) {
   const std::size_t count = rings.segments.size();
@@ -117,16 +118,22 @@ void MeasureAreas(const RingTopology& rings, RingScratch& scratch) {
   });
 }
 
-// Clears the nodes of components without a particle.
-void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopology& rings) {
-  rings.dropped_components = static_cast<std::uint64_t>(
-      std::count(scratch.particle_count.begin(), scratch.particle_count.end(), 0u));
-  if (rings.dropped_components == 0) return;
+// Clears the nodes of the components that are marked.
+void ClearDropped(const RingTopology& rings, const RingScratch& scratch, Crossings& crossings) {
   rings.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
         // ForEachRun has already read this row: clearing its bits does not disturb it.
-        if (scratch.particle_count[component] == 0) crossings.tiles[tile].inside[j] &= ~mask;
+        if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
       });
+}
+
+// Clears the nodes of components without a particle.
+void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopology& rings) {
+  scratch.dropped.clear();
+  for (const std::uint64_t count : scratch.particle_count) scratch.dropped.push_back(count == 0);
+  rings.dropped_components = static_cast<std::uint64_t>(
+      std::count(scratch.dropped.begin(), scratch.dropped.end(), std::uint8_t{1}));
+  if (rings.dropped_components > 0) ClearDropped(rings, scratch, crossings);
 }
 
 // Sets every node that the ring encloses. The ring crosses a row of the lattice in pairs of
@@ -282,10 +289,7 @@ std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spaci
 // Drops the components that are marked.
 void DropMarked(const ParticleBins& bins, Crossings& crossings, RingScratch& scratch,
                 RingTopology& rings) {
-  rings.components.ForEachRun(
-      crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
-        if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
-      });
+  ClearDropped(rings, scratch, crossings);
   KeepSurvivors(bins.tiles, crossings, scratch, rings);
   MarkInteriorCells(bins.tiles, crossings);
   CountComponents(bins, crossings, scratch, rings);

@@ -18,7 +18,7 @@ namespace partiemc {
 /// Rings as sequences of segments, the inside on the left.
 struct RingTopology {
   std::vector<std::uint32_t> segments;        ///< Indices of segments, ring after ring.
-  std::vector<Point> entries;                 ///< Where each of them enters its cell.
+  std::vector<Point> entry_points;            ///< Where each of them enters its cell.
   std::vector<std::uint32_t> offsets;         ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;  ///< Per ring: of its component; 0 for holes.

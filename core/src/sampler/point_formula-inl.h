@@ -68,8 +68,8 @@ class PointFormula {
   }
 
   // The gradient of the gap at a point, from its sums and third sums.
-  LatticePoint GapGradient(const Totals& totals, const double (&third)[kThirdSums],
-                           std::size_t point) const {
+  Point GapGradient(const Totals& totals, const double (&third)[kThirdSums],
+                    std::size_t point) const {
     const auto sum = [&](int channel) { return totals[channel][point]; };
     const double slope = 6 * inverse_square_;
     const double share = inverse_square_ / sum(kKernel);

@@ -11,7 +11,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "sampler/near_lanes-inl.h"
+#include "sampler/neighbour_sums-inl.h"
 #include "sampler/point_formula-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -77,9 +77,10 @@ struct AddThirdSums {
 
 // The sums over a chunk's particles at a point.
 template <typename AddTerms>
-HWY_INLINE PartialSums<AddTerms::kChannels> SumChunk(double inverse_square, const NearRows& near,
-                                                     const NearChunk& chunk,
-                                                     const LatticePoint& point) {
+HWY_INLINE PartialSums<AddTerms::kChannels> SumChunk(double inverse_square,
+                                                     const NeighbourRows& near,
+                                                     const NeighbourChunk& chunk,
+                                                     const Point& point) {
   const Lanes d;
   const Vector x = hn::Set(d, static_cast<float>(point.x - near.origin_x));
   const Vector y = hn::Set(d, static_cast<float>(point.y - near.origin_y));
@@ -94,10 +95,10 @@ HWY_INLINE PartialSums<AddTerms::kChannels> SumChunk(double inverse_square, cons
       });
 }
 
-void SumThird(double inverse_square, const NearRows& near, const LatticePoint& point,
+void SumThird(double inverse_square, const NeighbourRows& near, const Point& point,
               double (&totals)[kThirdSums]) {
-  NearChunk room;
-  ForEachChunk<false>(near, room, [&](const NearChunk& chunk) HWY_ATTR {
+  NeighbourChunk room;
+  ForEachChunk<false>(near, room, [&](const NeighbourChunk& chunk) HWY_ATTR {
     SumChunk<AddThirdSums>(inverse_square, near, chunk, point).AddTo(totals);
   });
 }
@@ -114,7 +115,7 @@ class SumsAtPoints {
       first[q] = count_;
       count_ += queries[q].points.size();
     }
-    const auto visit = [&](std::size_t q, const NearChunk& chunk, bool is_all) HWY_ATTR {
+    const auto visit = [&](std::size_t q, const NeighbourChunk& chunk, bool is_all) HWY_ATTR {
       const PointQuery& query = queries[q];
       for (std::size_t k = 0; k < query.points.size(); ++k) {
         PartialSums<kChannels> sums =
@@ -196,7 +197,7 @@ HWY_INLINE void Sample(const Scale& scale, std::span<const PointQuery> queries,
       if ((gaps >> point & 1) == 0) continue;
       double third[kThirdSums] = {};
       SumThird(inverse_square, query.near, query.points[k], third);
-      const LatticePoint gradient = formula.GapGradient(sums.totals(), third, point);
+      const Point gradient = formula.GapGradient(sums.totals(), third, point);
       samples.gradient_x[point] = gradient.x;
       samples.gradient_y[point] = gradient.y;
     }

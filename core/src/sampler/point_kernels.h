@@ -1,4 +1,4 @@
-// The sums over particles behind PointField::Sample, in the vectors of the processor at hand.
+// The sums over particles behind LevelSetSampler::Sample, in the vectors of the processor at hand.
 #pragma once
 
 #include <algorithm>
@@ -8,15 +8,15 @@
 
 #include "crossings/crossings.h"
 #include "frame/scale.h"
-#include "sampler/near_rows.h"
+#include "sampler/neighbour_query.h"
 
 namespace partiemc {
 
 /// Up to kPointsAtOnce points, in cells relative to the tile, and the particles around them, at
 /// least those within R of each.
 struct PointQuery {
-  NearRows near;
-  std::span<const LatticePoint> points;
+  NeighbourRows near;
+  std::span<const Point> points;
 };
 
 /// What the field is at points (FieldSample), those of one query after those of the other.
@@ -34,7 +34,7 @@ struct PointSamples {
 /// are floats, and so are their sums over up to 128 particles: off by a few 1e-7 of the sum of
 /// their magnitudes. What follows from the sums is in doubles. Same bits for any processor,
 /// whatever is asked at once: a query's particles within reach are dealt to sixteen partial sums by
-/// their place among them, and the sixteen are added up in one order (near_lanes-inl.h).
+/// their place among them, and the sixteen are added up in one order (neighbour_sums-inl.h).
 void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries, PointSamples& samples);
 
 }  // namespace partiemc

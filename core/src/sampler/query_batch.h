@@ -7,32 +7,32 @@
 #include <span>
 
 #include "bins/lattice.h"
-#include "sampler/near_rows.h"
+#include "sampler/neighbour_query.h"
 
 namespace partiemc {
 
 /// Points of a tile, in cells relative to it: neighbours, which look at the same particles.
-template <typename Point>
+template <typename Member>
 struct PointGroup {
   std::uint32_t tile = kNoTile;
   std::size_t count = 0;
-  std::array<Point, kPointsAtOnce> points;
+  std::array<Member, kPointsAtOnce> points;
   std::array<std::size_t, kPointsAtOnce> vertices;  ///< What each belongs to.
 };
 
 /// Collects points of successive vertices of rings in groups, and hands on kQueriesAtOnce groups at
-/// a time to a sink, a function of std::span<const PointGroup<Point>>. Which points share a group
+/// a time to a sink, a function of std::span<const PointGroup<Member>>. Which points share a group
 /// depends on what is added between two calls of Part alone, not on when groups are handed on.
-template <typename Point, typename Sink>
-class PointGroups {
+template <typename Member, typename Sink>
+class QueryBatch {
  public:
-  explicit PointGroups(Sink sink) : sink_(sink) {}
+  explicit QueryBatch(Sink sink) : sink_(sink) {}
 
   /// What comes is in no group with what has come.
   void Part() { is_open_ = false; }
 
   /// A point joins the last group if that is of its tile and has room.
-  void Add(std::size_t vertex, std::uint32_t tile, const Point& point) {
+  void Add(std::size_t vertex, std::uint32_t tile, const Member& point) {
     if (!is_open_ || groups_[count_ - 1].tile != tile ||
         groups_[count_ - 1].count == kPointsAtOnce) {
       if (count_ == groups_.size()) HandOn();
@@ -40,7 +40,7 @@ class PointGroups {
       groups_[count_++].count = 0;
       is_open_ = true;
     }
-    PointGroup<Point>& group = groups_[count_ - 1];
+    PointGroup<Member>& group = groups_[count_ - 1];
     group.vertices[group.count] = vertex;
     group.points[group.count++] = point;
   }
@@ -52,21 +52,21 @@ class PointGroups {
 
  private:
   void HandOn() {
-    sink_(std::span<const PointGroup<Point>>(groups_).first(count_));
+    sink_(std::span<const PointGroup<Member>>(groups_).first(count_));
     count_ = 0;
     is_open_ = false;
   }
 
   Sink sink_;
-  std::array<PointGroup<Point>, kQueriesAtOnce> groups_;
+  std::array<PointGroup<Member>, kQueriesAtOnce> groups_;
   std::size_t count_ = 0;
   bool is_open_ = false;
 };
 
 /// Collects for `sink`.
-template <typename Point, typename Sink>
-PointGroups<Point, Sink> CollectPoints(Sink sink) {
-  return PointGroups<Point, Sink>(sink);
+template <typename Member, typename Sink>
+QueryBatch<Member, Sink> CollectPoints(Sink sink) {
+  return QueryBatch<Member, Sink>(sink);
 }
 
 /// Points of so many successive segments share a group. Those of more would lie so far apart that

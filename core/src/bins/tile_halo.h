@@ -11,13 +11,13 @@
 namespace partiemc {
 
 /// Sets of tiles around one: bit 5 (dy + 2) + dx + 2 stands for the one at (dx, dy) from it.
-class ReachedTiles {
+class TileHalo {
  public:
   /// `reach`: how far from a particle tiles exist, in cells, less than two tiles.
-  explicit ReachedTiles(float reach) : reach_(reach) {}
+  explicit TileHalo(float reach) : reach_(reach) {}
 
-  /// The tiles that entries of a tile reach. Cost: linear. The same for any instruction set.
-  std::uint32_t Of(std::span<const BinEntry> entries) const;
+  /// The tiles that particles of a tile reach. Cost: linear. The same for any instruction set.
+  std::uint32_t Of(std::span<const BinnedParticle> particles) const;
 
   /// Whether they are the eight neighbours at most.
   bool AreNeighbours() const { return reach_ <= kTileSize; }

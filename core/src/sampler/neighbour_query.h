@@ -7,7 +7,7 @@
 
 namespace partiemc {
 
-/// Vectors may read so many entries past the end of a row of buckets.
+/// Vectors may read so many particles past the end of a row of buckets.
 inline constexpr int kRowPadding = 16;
 
 /// A query asks for sums at up to so many points, which look at the same particles: those of four
@@ -20,26 +20,26 @@ inline constexpr std::size_t kQueriesAtOnce = 6;
 inline constexpr float kColumnPeriod = 128;
 
 /// Successive buckets of successive rows, of tiles side by side.
-struct NearBand {
-  const std::uint32_t* offsets;  ///< The first entry of the first bucket, and so on.
+struct NeighbourBand {
+  const std::uint32_t* offsets;  ///< The first particle of the first bucket, and so on.
   int columns, rows;             ///< Buckets to look at.
   int row_stride;                ///< Buckets from one row to the next.
-  float origin_y;                ///< NearRows::origin_y, relative to those tiles.
+  float origin_y;                ///< NeighbourRows::origin_y, relative to those tiles.
 };
 
-/// Entries around points of a tile: row after row of buckets, each row a contiguous span. Not
+/// Particles around points of a tile: row after row of buckets, each row a contiguous span. Not
 /// initialised: most points need one band.
-struct NearRows {
-  const float* x;       ///< By entry, in cells, modulo kColumnPeriod.
-  const float* y;       ///< By entry, in cells relative to the tile that it lies in.
-  const float* weight;  ///< By entry; null where all weigh Scale::uniform_weight.
+struct NeighbourRows {
+  const float* x;       ///< By particle, in cells, modulo kColumnPeriod.
+  const float* y;       ///< By particle, in cells relative to the tile that it lies in.
+  const float* weight;  ///< By particle; null where all weigh Scale::uniform_weight.
   /// The corner of a cell near the points, relative to the tile: sums run in floats, in coordinates
   /// relative to it.
   float origin_x, origin_y;
   float column;  ///< Where it is among `x`.
-  /// Only entries in this disc count, whose centre is relative to the origin.
+  /// Only particles in this disc count, whose centre is relative to the origin.
   float centre_x, centre_y, reach_square;
-  std::array<NearBand, 3> bands;
+  std::array<NeighbourBand, 3> bands;
   int band_count;
 };
 

@@ -1,4 +1,4 @@
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "base/parallel.h"
 #include "base/prefetch.h"
 #include "bins/cell_mask.h"
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 
 namespace partiemc {
 namespace {
@@ -21,7 +21,8 @@ constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) /
 }  // namespace
 
 // Marks the cells of each tile that are asked for, and those that a kernel reaches from them.
-void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander) {
+void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
+                                double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
   tiles_.resize(tiles);
   asked_.resize(tiles);
@@ -61,10 +62,10 @@ void PointField::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
   });
 }
 
-void PointField::Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
-                       double wander, bool tells_sources) {
+void LevelSetSampler::Build(const ParticleBins& bins, const Crossings& crossings,
+                            const Scale& scale, double wander, bool tells_sources) {
   scale_ = scale;
-  grid_ = BucketGrid(scale.kernel_radius);
+  grid_ = NeighbourGrid(scale.kernel_radius);
   MarkTiles(bins, crossings, wander);
   FindRuns(bins, tells_sources);
   ParallelFor(runs_.size(), [&](std::size_t run) { SortRun(bins, runs_[run]); });
@@ -73,10 +74,10 @@ void PointField::Build(const ParticleBins& bins, const Crossings& crossings, con
 }
 
 // Joins wanted tiles to runs, and makes room for what these hold.
-void PointField::FindRuns(const ParticleBins& bins, bool tells_sources) {
+void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   runs_.clear();
   run_of_.assign(tiles_.size(), kNoRun);
-  std::uint32_t entry_count = 0;
+  std::uint32_t particle_count = 0;
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) {
     if (bins.CountOf(tile) == 0 || IsEmpty(wanted_[tile])) continue;
     const TileCoordinate& at = bins.tiles[tile];
@@ -84,12 +85,12 @@ void PointField::FindRuns(const ParticleBins& bins, bool tells_sources) {
       return last.y == at.y && last.x + 2 >= at.x;
     };
     if (runs_.empty() || !goes_on(bins.tiles[runs_.back().last_tile])) {
-      runs_.push_back({.first_tile = tile, .first_column = at.x, .first_entry = entry_count});
+      runs_.push_back({.first_tile = tile, .first_column = at.x, .first_particle = particle_count});
     }
     runs_.back().last_tile = tile;
     run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
     // Room for all particles of the tile: to count those that are wanted takes longer.
-    entry_count += bins.CountOf(tile);
+    particle_count += bins.CountOf(tile);
   }
   std::uint32_t bucket_count = 0;
   for (Run& run : runs_) {
@@ -99,16 +100,16 @@ void PointField::FindRuns(const ParticleBins& bins, bool tells_sources) {
     bucket_count += OffsetCount(run);
   }
   bucket_offsets_.resize(bucket_count);
-  x_.resize(entry_count + kRowPadding);
-  y_.resize(entry_count + kRowPadding);
-  chosen_.resize(entry_count);
+  x_.resize(particle_count + kRowPadding);
+  y_.resize(particle_count + kRowPadding);
+  chosen_.resize(particle_count);
   chosen_end_.resize(tiles_.size());
-  source_.resize(tells_sources ? entry_count : 0);
-  weight_.resize(bins.weight.empty() ? 0 : entry_count + kRowPadding);
+  source_.resize(tells_sources ? particle_count : 0);
+  weight_.resize(bins.weight.empty() ? 0 : particle_count + kRowPadding);
 }
 
 // Tells a tile where the buckets around it are.
-void PointField::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
+void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
   const Neighbourhood& neighbours = directory.neighbours(tile);
   for (int y = 0; y < 3; ++y) {
     RunBeside& beside = tiles_[tile].runs[y];
@@ -129,9 +130,9 @@ void PointField::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
 }
 
 // Sorts the wanted particles of a run by bucket.
-void PointField::SortRun(const ParticleBins& bins, const Run& run) {
-  // The counts of buckets stand two places behind them, then where the next entry of a bucket goes
-  // one place behind it, and in the end is where the next bucket starts.
+void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
+  // The counts of buckets stand two places behind them, then where the next particle of a bucket
+  // goes one place behind it, and in the end is where the next bucket starts.
   const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);
   const auto for_each_tile = [&](auto visit) {
@@ -139,9 +140,9 @@ void PointField::SortRun(const ParticleBins& bins, const Run& run) {
       if (run_of_[tile] != kNoRun) visit(tile);
     }
   };
-  std::uint32_t chosen = run.first_entry;
+  std::uint32_t chosen = run.first_particle;
   // Where those of a tile, if all are wanted, are written: asked for while they are found.
-  std::uint32_t room = run.first_entry;
+  std::uint32_t room = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
     const std::uint32_t count = bins.CountOf(tile);
     const auto ask = [&](const auto& values) {
@@ -153,33 +154,34 @@ void PointField::SortRun(const ParticleBins& bins, const Run& run) {
     room += count;
     const int columns = (bins.tiles[tile].x - run.first_column) * grid_.columns.size();
     const auto first = static_cast<std::uint32_t>(columns);
-    NearWalk(bins, tile, wanted_[tile], NearFields::kAll).ForEachBlock([&](const auto& near) {
+    const CellMask mask = MaskOf(wanted_[tile]);
+    MaskedParticles(bins, tile, &mask).ForEachBlock([&](const ParticleBlock& near) {
       for (int k = 0; k < near.count; ++k) {
         const std::uint32_t bucket =
             grid_.rows.InTile(near.y[k]) * run.row_stride + first + grid_.columns.InTile(near.x[k]);
-        chosen_[chosen++] = {bucket, near.entry[k]};
+        chosen_[chosen++] = {bucket, near.particle[k]};
         ++offsets[bucket + 2];
       }
     });
     chosen_end_[tile] = chosen;
   });
-  std::uint32_t next = run.first_entry;
+  std::uint32_t next = run.first_particle;
   for (std::uint32_t& offset : offsets) offset = next += offset;
-  chosen = run.first_entry;
+  chosen = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
     for (; chosen < chosen_end_[tile]; ++chosen) {
-      const auto& [bucket, entry] = chosen_[chosen];
+      const auto& [bucket, particle] = chosen_[chosen];
       const std::uint32_t to = offsets[bucket + 1]++;
-      x_[to] = tiles_[tile].column + bins.entries[entry].x;
-      y_[to] = bins.entries[entry].y;
-      if (!source_.empty()) source_[to] = bins.entries[entry].source;
-      if (!bins.weight.empty()) weight_[to] = bins.weight[entry];
+      x_[to] = tiles_[tile].column + bins.particles[particle].x;
+      y_[to] = bins.particles[particle].y;
+      if (!source_.empty()) source_[to] = bins.particles[particle].source;
+      if (!bins.weight.empty()) weight_[to] = bins.weight[particle];
     }
   });
 }
 
-FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
-  const LatticePoint point{x, y};
+FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) const {
+  const Point point{x, y};
   PointQuery query;
   query.points = {&point, 1};
   FindNear(tile, query.points, scale_.kernel_radius, query.near);
@@ -198,8 +200,8 @@ FieldSample PointField::Sample(std::uint32_t tile, double x, double y) const {
           .has_support = samples.kernel[0] > 0};
 }
 
-void PointField::Sample(std::span<const FieldPoints> groups,
-                        std::span<FieldSamples> samples) const {
+void LevelSetSampler::Sample(std::span<const FieldPoints> groups,
+                             std::span<FieldSamples> samples) const {
   std::array<PointQuery, kQueriesAtOnce> queries;
   for (std::size_t q = 0; q < groups.size(); ++q) {
     queries[q].points = std::span(groups[q].points).first(groups[q].count);

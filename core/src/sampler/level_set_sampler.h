@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "bins/bins.h"
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 #include "crossings/crossings.h"
 #include "frame/scale.h"
-#include "sampler/bucket_grid.h"
-#include "sampler/point_groups.h"
+#include "sampler/neighbour_grid.h"
 #include "sampler/point_kernels.h"
+#include "sampler/query_batch.h"
 
 namespace partiemc {
 
@@ -41,46 +41,44 @@ struct LevelSetSample {
   double value = 0;
   double gradient_x = 0, gradient_y = 0;
 };
-using FieldPoints = PointGroup<LatticePoint>;
+using FieldPoints = PointGroup<Point>;
 using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 
-/// Particles near the isoline, each once, sorted into rows of buckets (BucketGrid) that run through
-/// tiles side by side: a point looks at the buckets around it, in its tile and its neighbours.
-class PointField {
+/// Particles near the isoline, each once, sorted into rows of buckets (NeighbourGrid) that run
+/// through tiles side by side: a point looks at the buckets around it, in its tile and its
+/// neighbours.
+class LevelSetSampler {
  public:
   /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
-  /// cells away from one, along each axis. Cost: linear in the entries of the tiles around those
-  /// cells; in all entries where kernel and `wander` together reach farther than kMaskMargin.
+  /// cells away from one, along each axis. Cost: linear in the particles of the tiles around those
+  /// cells; in all particles where kernel and `wander` together reach farther than kMaskMargin.
   /// SourceOf can be asked if `tells_sources`.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
              double wander, bool tells_sources);
 
   /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
   /// Requires: the tile is indexed. Particles miss where Covers is false.
-  /// Deterministic: particles are summed in the order of buckets, then of the bins (SumAtPoints).
-  /// Cost: the particles of the rows of buckets within a kernel radius.
+  /// Deterministic: particles are summed in the order of buckets, then of the bins
+  /// (SampleAtPoints). Cost: the particles of the rows of buckets within a kernel radius.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
   /// The same of points of at most kQueriesAtOnce groups, for less than one after the other. Those
   /// of a group look at the same particles: neighbours at best.
   void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
-  /// Whether particles weigh each their own.
-  bool HasWeights() const { return !weight_.empty(); }
-
-  /// Calls visit(x, y, entry) for the particles within `radius` of a point of `tile`, in cells
+  /// Calls visit(x, y, particle) for the particles within `radius` of a point of `tile`, in cells
   /// relative to it, and for some more. Requires: radius <= kernel radius.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
   /// Sets `near` to the particles within `radius` of any of some points, which have x and y, and
   /// some more, for a kernel of vectors. All of `points` in cells relative to the tile.
-  template <typename Point>
-  void FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
-                NearRows& near) const;
+  template <typename Member>
+  void FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
+                NeighbourRows& near) const;
 
-  /// Index in the frame of the particle of an entry. Requires: built to tell it.
-  std::uint32_t SourceOf(std::uint32_t entry) const { return source_[entry]; }
+  /// Index in the frame of a particle that ForEachNear visits. Requires: built to tell it.
+  std::uint32_t SourceOf(std::uint32_t particle) const { return source_[particle]; }
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
 
@@ -98,7 +96,7 @@ class PointField {
     std::int32_t first_column = 0;  // Of tiles.
     std::uint32_t row_stride = 0;   // Buckets of a row.
     std::uint32_t first_bucket = 0;
-    std::uint32_t first_entry = 0;
+    std::uint32_t first_particle = 0;
   };
 
   // The run above, beside or below a tile, as seen from it.
@@ -130,7 +128,7 @@ class PointField {
   void SortRun(const ParticleBins& bins, const Run& run);
 
   Scale scale_;
-  BucketGrid grid_;
+  NeighbourGrid grid_;
   std::vector<Tile> tiles_;
   std::vector<BitRows> asked_;   // By tile: the cells in which points may lie.
   std::vector<BitRows> wanted_;  // By tile: the cells that a kernel reaches from those.
@@ -139,7 +137,7 @@ class PointField {
   std::vector<std::uint32_t> bucket_offsets_;
   // Those of each run as they are found: tile after tile, which end at chosen_end_.
   struct Chosen {
-    std::uint32_t bucket, entry;
+    std::uint32_t bucket, particle;
   };
   std::vector<Chosen> chosen_;
   std::vector<std::uint32_t> chosen_end_;
@@ -147,12 +145,12 @@ class PointField {
   std::vector<std::uint32_t> source_;
 };
 
-template <typename Point>
-void PointField::FindNear(std::uint32_t tile, std::span<const Point> points, double radius,
-                          NearRows& near) const {
-  LatticePoint low{points.front().x, points.front().y};
-  LatticePoint high = low;
-  for (const Point& point : points.subspan(1)) {
+template <typename Member>
+void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
+                               NeighbourRows& near) const {
+  Point low{points.front().x, points.front().y};
+  Point high = low;
+  for (const Member& point : points.subspan(1)) {
     low = {std::min(low.x, point.x), std::min(low.y, point.y)};
     high = {std::max(high.x, point.x), std::max(high.y, point.y)};
   }
@@ -171,7 +169,7 @@ void PointField::FindNear(std::uint32_t tile, std::span<const Point> points, dou
   const double disc = radius + half + kDiscMargin;
   near.reach_square = static_cast<float>(disc * disc);
   // What lies on the rim, or nearer to it than positions are to each other, adds nothing to a sum.
-  const double reach = radius - BucketGrid::kStep / 2;
+  const double reach = radius - NeighbourGrid::kStep / 2;
   const auto& [columns, rows] = grid_;
   const int first_column = columns.Along(low.x - reach) - columns.size();
   const int last_column = columns.Along(high.x + reach) - columns.size();
@@ -194,12 +192,12 @@ void PointField::FindNear(std::uint32_t tile, std::span<const Point> points, dou
 }
 
 template <typename Visit>
-void PointField::ForEachNear(std::uint32_t tile, double x, double y, double radius,
-                             Visit visit) const {
-  const LatticePoint point{x, y};
-  NearRows near;
-  FindNear(tile, std::span(&point, 1), radius + BucketGrid::kStep, near);
-  for (const NearBand& band : std::span(near.bands).first(near.band_count)) {
+void LevelSetSampler::ForEachNear(std::uint32_t tile, double x, double y, double radius,
+                                  Visit visit) const {
+  const Point point{x, y};
+  NeighbourRows near;
+  FindNear(tile, std::span(&point, 1), radius + NeighbourGrid::kStep, near);
+  for (const NeighbourBand& band : std::span(near.bands).first(near.band_count)) {
     for (int row = 0; row < band.rows; ++row) {
       const std::uint32_t* const offsets = band.offsets + row * band.row_stride;
       for (std::uint32_t e = offsets[0]; e < offsets[band.columns]; ++e) {

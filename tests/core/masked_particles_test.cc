@@ -1,4 +1,4 @@
-#include "bins/near_entries.h"
+#include "bins/masked_particles.h"
 
 #include <gtest/gtest.h>
 
@@ -14,9 +14,9 @@
 namespace partiemc {
 namespace {
 
-// An entry as a walk hands it out.
+// An particle as a walk hands it out.
 struct Seen {
-  std::uint32_t entry;
+  std::uint32_t particle;
   float x, y;
 
   bool operator==(const Seen&) const = default;
@@ -24,28 +24,17 @@ struct Seen {
 
 std::vector<Seen> InOrder(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
   std::vector<Seen> seen;
-  NearWalk(bins, tile, mask, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
+  MaskedParticles(bins, tile, mask).ForEachBlock([&](const ParticleBlock& near) {
     EXPECT_GT(near.count, 0);
     for (int k = 0; k < near.count; ++k) {
-      seen.push_back({near.entry[k], near.x[k], near.y[k]});
+      seen.push_back({near.particle[k], near.x[k], near.y[k]});
     }
   });
   return seen;
 }
 
-// Positions alone, of which the walk does not tell whose they are.
-std::vector<std::pair<float, float>> Positions(const ParticleBins& bins, std::uint32_t tile,
-                                               const CellMask* mask) {
-  std::vector<std::pair<float, float>> positions;
-  NearWalk(bins, tile, mask, NearFields::kPositions).ForEachBlock([&](const NearEntries& near) {
-    EXPECT_GT(near.count, 0);
-    for (int k = 0; k < near.count; ++k) positions.push_back({near.x[k], near.y[k]});
-  });
-  return positions;
-}
-
-// All entries of the bins in cells of the mask around a tile, tile after tile: these are sorted by
-// row, then column, and entries of a tile are in the order of the frame.
+// All particles of the bins in cells of the mask around a tile, tile after tile: these are sorted
+// by row, then column, and particles of a tile are in the order of the frame.
 std::vector<Seen> Expected(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask) {
   std::vector<Seen> expected;
   for (std::uint32_t other = 0; other < bins.tiles.size(); ++other) {
@@ -53,8 +42,8 @@ std::vector<Seen> Expected(const ParticleBins& bins, std::uint32_t tile, const C
     const int dy = bins.tiles[other].y - bins.tiles[tile].y;
     if (std::abs(dx) > 1 || std::abs(dy) > 1) continue;
     for (std::uint32_t e = bins.offsets[other]; e < bins.offsets[other + 1]; ++e) {
-      const float x = bins.entries[e].x + static_cast<float>(dx * kTileSize);
-      const float y = bins.entries[e].y + static_cast<float>(dy * kTileSize);
+      const float x = bins.particles[e].x + static_cast<float>(dx * kTileSize);
+      const float y = bins.particles[e].y + static_cast<float>(dy * kTileSize);
       if (mask != nullptr) {
         const int column = static_cast<int>(std::floor(x)) + kMaskMargin;
         const int row = static_cast<int>(std::floor(y)) + kMaskMargin;
@@ -77,11 +66,7 @@ ParticleBins Bin(const support::Particles& particles) {
 
 void ExpectAllSeen(const ParticleBins& bins, const CellMask* mask) {
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    const std::vector<Seen> expected = Expected(bins, tile, mask);
-    EXPECT_EQ(InOrder(bins, tile, mask), expected);
-    std::vector<std::pair<float, float>> positions;
-    for (const Seen& seen : expected) positions.push_back({seen.x, seen.y});
-    EXPECT_EQ(Positions(bins, tile, mask), positions);
+    EXPECT_EQ(InOrder(bins, tile, mask), Expected(bins, tile, mask));
   }
 }
 
@@ -95,7 +80,7 @@ support::Particles CrowdedScene(support::Random& random) {
   return particles;
 }
 
-TEST(NearEntries, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstructionSet) {
+TEST(MaskedParticles, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstructionSet) {
   support::Random random(1);
   const ParticleBins bins = Bin(CrowdedScene(random));
   ASSERT_GE(bins.tiles.size(), 9u);
@@ -109,41 +94,18 @@ TEST(NearEntries, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstr
   EXPECT_GE(sets, 1);
 }
 
-TEST(NearEntries, WithoutAMaskAreAllOfATileAndItsNeighbours) {
+TEST(MaskedParticles, WithoutAMaskAreAllOfATileAndItsNeighbours) {
   support::Random random(2);
   ExpectAllSeen(Bin(CrowdedScene(random)), nullptr);
 }
 
-TEST(NearEntries, OfAnEmptyMaskAreNone) {
+TEST(MaskedParticles, OfAnEmptyMaskAreNone) {
   support::Random random(3);
   const CellMask empty{};
   ExpectAllSeen(Bin(CrowdedScene(random)), &empty);
 }
 
-TEST(NearEntries, OfATileAloneAreThoseOfAMaskThatHasNoCellsElsewhere) {
-  support::Random random(4);
-  const ParticleBins bins = Bin(CrowdedScene(random));
-  BitRows cells;
-  for (std::uint32_t& row : cells) row = static_cast<std::uint32_t>(random.Bits());
-  CellMask mask{};
-  for (int j = 0; j < kTileSize; ++j) {
-    mask[j + kMaskMargin] = std::uint64_t{cells[j]} << kMaskMargin;
-  }
-  std::size_t seen = 0;
-  for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
-    std::vector<Seen> own;
-    NearWalk(bins, tile, cells, NearFields::kAll).ForEachBlock([&](const NearEntries& near) {
-      for (int k = 0; k < near.count; ++k) {
-        own.push_back({near.entry[k], near.x[k], near.y[k]});
-      }
-    });
-    EXPECT_EQ(own, Expected(bins, tile, &mask));
-    seen += own.size();
-  }
-  EXPECT_GT(seen, 1000u);
-}
-
-TEST(NearEntries, OfAnySmallNumberOfParticlesAreRight) {
+TEST(MaskedParticles, OfAnySmallNumberOfParticlesAreRight) {
   // Fewer than a vector, at the end of the bins too.
   for (int count = 1; count <= 40; ++count) {
     support::Random random(static_cast<std::uint64_t>(count));

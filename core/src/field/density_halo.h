@@ -20,7 +20,7 @@ namespace partiemc {
 ///   uuuuuuuuuuuuuu
 ///
 /// A part that no kernel of the tile reaches is left out.
-class SumRims {
+class DensityHalo {
  public:
   /// Makes room for kernels of a radius of at most kSumMargin.
   void Prepare(const ParticleBins& bins, float radius);
@@ -31,17 +31,8 @@ class SumRims {
                                              static_cast<std::size_t>(Size())));
   }
 
-  /// Keeps the margins of a tile's sums, in the rows that are not 0. Requires: the tile holds
-  /// particles.
-  void Keep(std::uint32_t tile, const NodeSums& sums, NodeRange rows);
-
-  /// The rows of a tile that its own particles or those of its neighbours reach.
-  NodeRange RowsReached(const TileDirectory& directory, std::uint32_t tile) const;
-
-  /// The rows of a tile that its own particles reach, as they were kept; none without particles.
-  NodeRange OwnRows(std::uint32_t tile) const {
-    return rim_[tile] == kNoTile ? kNoNodes : own_rows_[rim_[tile]];
-  }
+  /// Keeps the margins of a tile's sums. Requires: the tile holds particles.
+  void Keep(std::uint32_t tile, const NodeSums& sums);
 
   /// Adds what the neighbours of a tile have kept for its 32 x 32 values, neighbour after neighbour
   /// in the order of Neighbourhood.
@@ -54,17 +45,12 @@ class SumRims {
   int RightSide() const { return LeftSide() + kTileSize * kSumMargin; }
   int Size() const { return RightSide() + kTileSize * kSumMargin; }
 
-  // Calls visit(rim, dx, dy) for each neighbour whose rim has a part for the tile.
-  template <typename Visit>
-  void ForEachPart(const TileDirectory& directory, std::uint32_t tile, Visit visit) const;
-
   // Bits of the parts of a rim.
   enum Part : std::uint8_t { kLower = 1, kUpper = 2, kLeft = 4, kRight = 8 };
 
   int rows_ = 0;
   std::vector<std::uint32_t> rim_;   // By tile: which of the rims below, or kNoTile.
-  std::vector<std::uint8_t> parts_;  // By rim: those that are kept.
-  std::vector<NodeRange> own_rows_;  // By rim: within the tile.
+  std::vector<std::uint8_t> parts_;  // By rim: those that are kept, as some of it is not 0.
   std::vector<float> values_;
 };
 

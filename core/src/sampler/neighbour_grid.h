@@ -4,17 +4,17 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "bins/coordinate_block.h"
 #include "bins/lattice.h"
+#include "bins/quantise.h"
 
 namespace partiemc {
 
 /// How a tile is divided along one of its axes, and its neighbours alike: into powers of two of
 /// cells, so that each bucket lies in one tile.
-class BucketAxis {
+class GridAxis {
  public:
   /// As wide as `width` cells, rounded down, but at least one.
-  explicit BucketAxis(double width = 0) {
+  explicit GridAxis(double width = 0) {
     while (shift_ < kTileShift && (2 << shift_) <= width) ++shift_;
   }
 
@@ -41,15 +41,15 @@ class BucketAxis {
 
 /// Rows of buckets, much wider than high: what a row holds beyond the disc of a query is cheaper to
 /// pass over in vectors than more offsets are to look up and to write.
-struct BucketGrid {
+struct NeighbourGrid {
   /// Positions are multiples of it.
   static constexpr double kStep = 1.0 / (1 << kFractionBits);
 
-  BucketGrid() = default;
+  NeighbourGrid() = default;
   /// For queries within `radius` cells of points of the tile, at most a tile.
-  explicit BucketGrid(double radius) : columns(radius * 8 / 3), rows(radius / 4) {}
+  explicit NeighbourGrid(double radius) : columns(radius * 8 / 3), rows(radius / 4) {}
 
-  BucketAxis columns, rows;
+  GridAxis columns, rows;
 };
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-#include "bins/coordinate_block.h"
+#include "bins/quantise.h"
 
 #include <bit>
 #include <cmath>
@@ -8,12 +8,12 @@
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bins/coordinate_block.cc"
+#define HWY_TARGET_INCLUDE "bins/quantise.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#ifndef PARTIEMC_COORDINATE_BLOCK_ONCE
-#define PARTIEMC_COORDINATE_BLOCK_ONCE
+#ifndef PARTIEMC_QUANTISE_ONCE
+#define PARTIEMC_QUANTISE_ONCE
 namespace partiemc {
 namespace {
 

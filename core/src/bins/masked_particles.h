@@ -14,57 +14,51 @@
 namespace partiemc {
 
 /// Particles around a tile, in cells relative to it, one after the other.
-struct NearEntries {
+struct ParticleBlock {
   static constexpr int kCapacity = 512;
   // A vector of chosen lanes is written whole.
   static constexpr int kPadding = 16;
   template <typename Value>
-  using PerEntry = std::array<Value, kCapacity + kPadding>;
+  using PerParticle = std::array<Value, kCapacity + kPadding>;
 
-  PerEntry<float> x, y;
-  PerEntry<std::uint32_t> entry;  ///< Index into ParticleBins::entries.
+  PerParticle<float> x, y;
+  PerParticle<std::uint32_t> particle;  ///< Index into ParticleBins::particles.
   int count = 0;
 };
 
-/// What a walk tells of particles.
-enum class NearFields { kPositions, kAll };
-
 /// A walk over the particles in cells of `mask`, or over all of a tile and its neighbours where it
 /// is null. Cost: linear in the lists of those tiles in which the mask has cells.
-class NearWalk {
+class MaskedParticles {
  public:
-  NearWalk(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask, NearFields fields);
+  /// What is left of a tile's list: of its particles those in `cells`, shifted.
+  struct List {
+    std::uint32_t next, end;
+    BitRows cells;
+    float shift_x, shift_y;
+  };
 
-  /// Over the tile's own particles in `cells` of it alone.
-  NearWalk(const ParticleBins& bins, std::uint32_t tile, const BitRows& cells, NearFields fields);
+  MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask);
 
-  /// Calls visit(const NearEntries&) for all, a block after the other: tile after tile in the order
-  /// of Neighbourhood, those of each in the order of the frame.
+  /// Calls visit(const ParticleBlock&) for all, a block after the other: tile after tile in the
+  /// order of Neighbourhood, those of each in the order of the frame.
   template <typename Visit>
   void ForEachBlock(Visit visit) {
     while (ChooseMore()) visit(std::as_const(chosen_));
   }
 
  private:
-  // What is left of a tile's list.
-  struct List {
-    std::uint32_t next, end;
-    BitRows cells;
-    float shift_x, shift_y;
-  };
   static constexpr int kMaxLists = std::tuple_size_v<Neighbourhood>;
 
-  // A block is full when no more entries than this could be looked at.
+  // A block is full when no more particles than this could be looked at.
   static constexpr int kLeastRoom = 64;
 
   bool ChooseMore();
 
-  std::span<const BinEntry> entries_;
-  NearFields fields_;
+  std::span<const BinnedParticle> particles_;
   std::array<List, kMaxLists> lists_;
   int list_count_ = 0;
-  int list_ = 0;  // The one that the next entries come from.
-  NearEntries chosen_;
+  int list_ = 0;  // The one that the next particles come from.
+  ParticleBlock chosen_;
 };
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-#include "sampler/point_groups.h"
+#include "sampler/query_batch.h"
 
 #include <gtest/gtest.h>
 
@@ -53,7 +53,7 @@ std::vector<Group> GroupsOf(const Points& points, std::size_t first, std::size_t
   return all;
 }
 
-TEST(PointGroups, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
+TEST(QueryBatch, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     support::Random random(seed);
     const Points points(random);
@@ -87,7 +87,7 @@ TEST(PointGroups, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
 }
 
 // Tasks begin anywhere in a ring.
-TEST(PointGroups, AreTheSameWhereverCollectingBegins) {
+TEST(QueryBatch, AreTheSameWhereverCollectingBegins) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     support::Random random(seed);
     const Points points(random);

@@ -1,4 +1,4 @@
-#include "sampler/point_field.h"
+#include "sampler/level_set_sampler.h"
 
 #include <gtest/gtest.h>
 
@@ -86,7 +86,7 @@ TEST_P(PointFieldTest, ValueAndGradientAgreeWithTheEquationsOfThePaper) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, PointFieldTest, testing::Range(1, 13));
 
-TEST(PointField, AgreesWithTheFieldStageAtNodes) {
+TEST(LevelSetSampler, AgreesWithTheFieldStageAtNodes) {
   support::Random random(5);
   Stages stages;
   stages.Run(support::Snapped(support::Blob(random, 8), 1.0), {.spacing = 1.0});
@@ -106,7 +106,7 @@ TEST(PointField, AgreesWithTheFieldStageAtNodes) {
   EXPECT_GT(checked, 10);
 }
 
-TEST(PointField, APointWithoutSupportSaysSoAndHasNoGradient) {
+TEST(LevelSetSampler, APointWithoutSupportSaysSoAndHasNoGradient) {
   support::Particles particles;
   particles.Add(3, 3);
   Stages stages;
@@ -118,7 +118,7 @@ TEST(PointField, APointWithoutSupportSaysSoAndHasNoGradient) {
   EXPECT_EQ(sample.gradient_y, 0);
 }
 
-TEST(PointField, AtTheWeightedMeanItselfTheGradientOfPhiIsZeroAndNotNan) {
+TEST(LevelSetSampler, AtTheWeightedMeanItselfTheGradientOfPhiIsZeroAndNotNan) {
   support::Particles particles;
   particles.Add(3, 3);
   Stages stages;
@@ -131,7 +131,7 @@ TEST(PointField, AtTheWeightedMeanItselfTheGradientOfPhiIsZeroAndNotNan) {
 
 // Particles alone and in bodies, wide kernels and narrow ones, cells of any size: with small cells
 // there are gaps between the tiles that have particles, and runs of more than four of them.
-TEST(PointField, FindsEveryParticleWithinARadiusAndNamesItsPlaceInTheFrame) {
+TEST(LevelSetSampler, FindsEveryParticleWithinARadiusAndNamesItsPlaceInTheFrame) {
   struct Lengths {
     double kernel_radius, cell;
   };
@@ -157,10 +157,12 @@ TEST(PointField, FindsEveryParticleWithinARadiusAndNamesItsPlaceInTheFrame) {
         const double dy = stages.particles.y(p) / cell - 32.0 * stages.bins.tiles[tile].y - y;
         if (dx * dx + dy * dy <= radius * radius) expected.push_back(p);
       }
-      stages.field.ForEachNear(tile, x, y, radius, [&](double px, double py, std::uint32_t entry) {
-        if ((px - x) * (px - x) + (py - y) * (py - y) > radius * radius) return;
-        visited.push_back(stages.field.SourceOf(entry));
-      });
+      stages.field.ForEachNear(tile, x, y, radius,
+                               [&](double px, double py, std::uint32_t particle) {
+                                 if ((px - x) * (px - x) + (py - y) * (py - y) > radius * radius)
+                                   return;
+                                 visited.push_back(stages.field.SourceOf(particle));
+                               });
       std::sort(visited.begin(), visited.end());
       EXPECT_EQ(visited, expected);
       found += static_cast<int>(expected.size());
@@ -196,10 +198,10 @@ std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   while (all.size() < 300) {
     FieldPoints group{
         static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size())), 0, {}, {}};
-    const LatticePoint first{random.Uniform(0, 32), random.Uniform(0, 32)};
+    const Point first{random.Uniform(0, 32), random.Uniform(0, 32)};
     const std::size_t count = 1 + random.Below(kPointsAtOnce);
     for (int tries = 0; group.count < count && tries < 20; ++tries) {
-      const LatticePoint next{first.x + random.Uniform(-1, 1), first.y + random.Uniform(-1, 1)};
+      const Point next{first.x + random.Uniform(-1, 1), first.y + random.Uniform(-1, 1)};
       if (std::min(next.x, next.y) < 0 || std::max(next.x, next.y) >= 32) continue;
       if (stages.field.Covers(group.tile, next.x, next.y)) group.points[group.count++] = next;
     }
@@ -208,7 +210,7 @@ std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   return all;
 }
 
-TEST(PointField, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAtOnce) {
+TEST(LevelSetSampler, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAtOnce) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);
@@ -239,7 +241,7 @@ TEST(PointField, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAt
   }
 }
 
-TEST(PointField, PointsOfAGroupAgreeWithEachAlone) {
+TEST(LevelSetSampler, PointsOfAGroupAgreeWithEachAlone) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);
@@ -266,7 +268,7 @@ TEST(PointField, PointsOfAGroupAgreeWithEachAlone) {
 }
 
 // Sums over particles have the same bits however these were sorted only if their order is one.
-TEST(PointField, ListsParticlesOfABucketInTheOrderOfTheFrame) {
+TEST(LevelSetSampler, ListsParticlesOfABucketInTheOrderOfTheFrame) {
   for (const double radius : {3.0, 2.6}) {
     support::Random random(7);
     support::Particles particles = support::Blob(random, 20);
@@ -280,8 +282,8 @@ TEST(PointField, ListsParticlesOfABucketInTheOrderOfTheFrame) {
       const double y = random.Uniform(0, 32);
       if (!stages.field.Covers(tile, x, y)) continue;
       std::optional<std::uint32_t> last;
-      stages.field.ForEachNear(tile, x, y, 0, [&](double, double, std::uint32_t entry) {
-        const std::uint32_t source = stages.field.SourceOf(entry);
+      stages.field.ForEachNear(tile, x, y, 0, [&](double, double, std::uint32_t particle) {
+        const std::uint32_t source = stages.field.SourceOf(particle);
         if (last) {
           EXPECT_LT(*last, source);
           ++pairs;

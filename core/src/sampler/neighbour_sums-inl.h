@@ -1,13 +1,13 @@
 // Sums over the particles near a point, in vectors of floats. Particles within reach are copied
-// together first, so that the sums of all points of a cell run over one short array. Entry k of
+// together first, so that the sums of all points of a cell run over one short array. Particle k of
 // that array goes to partial sum k modulo sixteen, and the sixteen are added up in one tree,
 // however wide the vectors of the processor are: the bits are the same everywhere. Compiled once
 // for each target, hence the guard that each of them turns.
-#if defined(PARTIEMC_NEAR_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef PARTIEMC_NEAR_LANES_INL_H
-#undef PARTIEMC_NEAR_LANES_INL_H
+#if defined(PARTIEMC_NEIGHBOUR_SUMS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef PARTIEMC_NEIGHBOUR_SUMS_INL_H
+#undef PARTIEMC_NEIGHBOUR_SUMS_INL_H
 #else
-#define PARTIEMC_NEAR_LANES_INL_H
+#define PARTIEMC_NEIGHBOUR_SUMS_INL_H
 #endif
 
 #include <hwy/highway.h>
@@ -19,7 +19,7 @@
 #include <utility>
 
 #include "base/compressor-inl.h"
-#include "sampler/near_rows.h"
+#include "sampler/neighbour_query.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace partiemc {
@@ -34,9 +34,9 @@ using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 constexpr int kParts = kPartialSums / kLanes;
 
-// Particles beside each other, in coordinates relative to NearRows' origin, then at least
+// Particles beside each other, in coordinates relative to NeighbourRows' origin, then at least
 // kPartialSums that are far from everything.
-struct NearChunk {
+struct NeighbourChunk {
   static constexpr int kCapacity = 128;
   static constexpr float kFar = 1e6f;
   static constexpr int kRoom = kCapacity + kPartialSums;
@@ -48,9 +48,9 @@ struct NearChunk {
 };
 
 // Where particles of a query lie, and which of them are within reach, in registers.
-class NearDisc {
+class NeighbourDisc {
  public:
-  HWY_INLINE explicit NearDisc(const NearRows& near)
+  HWY_INLINE explicit NeighbourDisc(const NeighbourRows& near)
       : xs_(near.x),
         ys_(near.y),
         weights_(near.weight),
@@ -59,12 +59,12 @@ class NearDisc {
         centre_y_(hn::Set(Lanes(), near.centre_y)),
         reach_square_(hn::Set(Lanes(), near.reach_square)) {}
 
-  // Writes those of the entries [first, last) of a band, at most kPartialSums, that are within
+  // Writes those of the particles [first, last) of a band, at most kPartialSums, that are within
   // reach behind the first `to` particles of a chunk, which has room for them. Returns how many it
   // has then.
   template <bool kWeighted>
   HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
-                        NearChunk& chunk) const {
+                        NeighbourChunk& chunk) const {
     const Lanes d;
     const Compressor::Bits d_bits;
     const auto period = hn::Set(d, kColumnPeriod);
@@ -78,8 +78,8 @@ class NearDisc {
       const auto square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
       const auto is_near = hn::RebindMask(d_bits, hn::Lt(square, reach_square_));
       const auto place = hn::Add(hn::Iota(d_bits, 0), hn::Set(d_bits, static_cast<int>(first)));
-      const auto is_entry = hn::Lt(place, hn::Set(d_bits, static_cast<int>(last)));
-      const auto is_in = hn::And(is_near, is_entry);
+      const auto is_particle = hn::Lt(place, hn::Set(d_bits, static_cast<int>(last)));
+      const auto is_in = hn::And(is_near, is_particle);
       const Compressor compress(is_in);
       hn::StoreU(compress(d, x), d, chunk.x + to);
       hn::StoreU(compress(d, y), d, chunk.y + to);
@@ -98,12 +98,12 @@ class NearDisc {
 
 // Ends a chunk with particles that are far from everything.
 template <bool kWeighted>
-HWY_INLINE void Close(NearChunk& chunk) {
+HWY_INLINE void Close(NeighbourChunk& chunk) {
   const Lanes d;
   for (int part = 0; part < kParts; ++part) {
     const int to = chunk.count + part * kLanes;
-    hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.x + to);
-    hn::StoreU(hn::Set(d, NearChunk::kFar), d, chunk.y + to);
+    hn::StoreU(hn::Set(d, NeighbourChunk::kFar), d, chunk.x + to);
+    hn::StoreU(hn::Set(d, NeighbourChunk::kFar), d, chunk.y + to);
     if constexpr (kWeighted) hn::StoreU(hn::Zero(d), d, chunk.weight + to);
   }
 }
@@ -111,11 +111,11 @@ HWY_INLINE void Close(NearChunk& chunk) {
 // Collects the particles of `near` in a chunk. Whenever there may be no room for more, make_room()
 // has to use it up, or returns false to give up. Returns false if it did.
 template <bool kWeighted, typename MakeRoom>
-HWY_INLINE bool Collect(const NearRows& near, NearChunk& chunk, MakeRoom make_room) {
-  const NearDisc disc(near);
+HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
+  const NeighbourDisc disc(near);
   int count = 0;
   for (int b = 0; b < near.band_count; ++b) {
-    const NearBand& band = near.bands[b];
+    const NeighbourBand& band = near.bands[b];
     const Vector origin_y = hn::Set(Lanes(), band.origin_y);
     const std::uint32_t* offsets = band.offsets;
     const std::uint32_t* const end = offsets + band.rows * band.row_stride;
@@ -123,7 +123,7 @@ HWY_INLINE bool Collect(const NearRows& near, NearChunk& chunk, MakeRoom make_ro
       std::uint32_t first = offsets[0];
       const std::uint32_t last = offsets[band.columns];
       do {
-        if (HWY_UNLIKELY(count + kPartialSums > NearChunk::kCapacity)) {
+        if (HWY_UNLIKELY(count + kPartialSums > NeighbourChunk::kCapacity)) {
           chunk.count = std::exchange(count, 0);
           if (!make_room()) return false;
         }
@@ -138,7 +138,7 @@ HWY_INLINE bool Collect(const NearRows& near, NearChunk& chunk, MakeRoom make_ro
 
 // Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
 template <bool kWeighted, typename Visit>
-HWY_INLINE void ForEachChunk(const NearRows& near, NearChunk& chunk, Visit visit) {
+HWY_INLINE void ForEachChunk(const NeighbourRows& near, NeighbourChunk& chunk, Visit visit) {
   const auto empty = [&]() HWY_ATTR {
     Close<kWeighted>(chunk);
     visit(std::as_const(chunk));
@@ -150,7 +150,7 @@ HWY_INLINE void ForEachChunk(const NearRows& near, NearChunk& chunk, Visit visit
 
 // The particles of `near` in one chunk. Returns false if they may not fit.
 template <bool kWeighted>
-HWY_INLINE bool Gather(const NearRows& near, NearChunk& chunk) {
+HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
   const bool fits = Collect<kWeighted>(near, chunk, [] { return false; });
   if (fits) Close<kWeighted>(chunk);
   return fits;
@@ -161,7 +161,7 @@ HWY_INLINE bool Gather(const NearRows& near, NearChunk& chunk) {
 // queries, so that the sums of one need not wait for what is looked up for it.
 template <bool kWeighted, typename Query, typename Visit>
 HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
-  NearChunk chunks[kQueriesAtOnce];
+  NeighbourChunk chunks[kQueriesAtOnce];
   bool fits[kQueriesAtOnce];
   for (std::size_t k = 0; k < queries.size(); ++k) {
     fits[k] = Gather<kWeighted>(queries[k].near, chunks[k]);
@@ -171,7 +171,8 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
       visit(k, chunks[k], true);
     } else {
       ForEachChunk<kWeighted>(queries[k].near, chunks[k],
-                              [&](const NearChunk& chunk) HWY_ATTR { visit(k, chunk, false); });
+                              [&](const NeighbourChunk& chunk)
+                                  HWY_ATTR { visit(k, chunk, false); });
     }
   }
 }
@@ -180,9 +181,9 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
 template <int kChannels>
 class PartialSums {
  public:
-  // Calls add(k, sums) for each vector of a chunk, k its first entry and sums its channels.
+  // Calls add(k, sums) for each vector of a chunk, k its first particle and sums its channels.
   template <typename Add>
-  HWY_INLINE PartialSums(const NearChunk& chunk, Add add) {
+  HWY_INLINE PartialSums(const NeighbourChunk& chunk, Add add) {
     for (int part = 0; part < kParts; ++part) {
       Vector sums[kChannels];
       for (Vector& sum : sums) sum = hn::Zero(Lanes());

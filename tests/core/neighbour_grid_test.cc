@@ -1,4 +1,4 @@
-#include "sampler/bucket_grid.h"
+#include "sampler/neighbour_grid.h"
 
 #include <gtest/gtest.h>
 
@@ -10,12 +10,12 @@
 namespace partiemc {
 namespace {
 
-constexpr double kStep = BucketGrid::kStep;
+constexpr double kStep = NeighbourGrid::kStep;
 
-TEST(BucketAxis, DividesATileAndItsNeighboursAlike) {
+TEST(GridAxis, DividesATileAndItsNeighboursAlike) {
   support::Random random(1);
   for (int round = 0; round < 2000; ++round) {
-    const BucketAxis axis(random.Uniform(0, 40));
+    const GridAxis axis(random.Uniform(0, 40));
     // Some on the sides of cells.
     const double at = random.Uniform(-kTileSize, 2 * kTileSize);
     const double coordinate = random.Chance(0.2) ? std::floor(at) : std::floor(at / kStep) * kStep;
@@ -28,17 +28,17 @@ TEST(BucketAxis, DividesATileAndItsNeighboursAlike) {
   }
 }
 
-TEST(BucketAxis, CountsWhatIsFartherOutToTheOutermostBuckets) {
+TEST(GridAxis, CountsWhatIsFartherOutToTheOutermostBuckets) {
   for (const double width : {0.0, 2.0, 7.0, 64.0}) {
-    const BucketAxis axis(width);
+    const GridAxis axis(width);
     EXPECT_EQ(axis.Along(-kTileSize - kStep), 0);
     EXPECT_EQ(axis.Along(2 * kTileSize), 3 * axis.size() - 1);
   }
 }
 
-TEST(BucketAxis, BucketsAreAsWideAsAskedRoundedDownToAPowerOfTwoOfCells) {
+TEST(GridAxis, BucketsAreAsWideAsAskedRoundedDownToAPowerOfTwoOfCells) {
   for (const double width : {0.0, 0.9, 1.0, 1.9, 2.0, 3.9, 4.0, 8.5, 31.9, 32.0, 90.0}) {
-    const BucketAxis axis(width);
+    const GridAxis axis(width);
     const int cells = kTileSize / axis.size();
     EXPECT_EQ(cells * axis.size(), kTileSize);
     EXPECT_LE(cells, std::max(1.0, width));

@@ -1,4 +1,4 @@
-#include "bins/reached_tiles.h"
+#include "bins/tile_halo.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 
 // Highway compiles the rest of this file once for each target.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bins/reached_tiles.cc"
+#define HWY_TARGET_INCLUDE "bins/tile_halo.cc"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -39,26 +39,26 @@ HWY_INLINE hn::Vec<Bits> Along(hn::Vec<Lanes> at, float reach) {
 }
 
 // A box of tiles is the product of its bits along both axes.
-HWY_INLINE hn::Vec<Bits> BoxesOf(const BinEntry* entries, float reach) {
+HWY_INLINE hn::Vec<Bits> BoxesOf(const BinnedParticle* particles, float reach) {
   hn::Vec<Lanes> x, y, source;
-  hn::LoadInterleaved3(Lanes(), &entries->x, x, y, source);
+  hn::LoadInterleaved3(Lanes(), &particles->x, x, y, source);
   return hn::Mul(Along<1>(x, reach), Along<5>(y, reach));
 }
 
-std::uint32_t TilesReached(const BinEntry* entries, std::size_t count, float reach) {
+std::uint32_t TilesReached(const BinnedParticle* particles, std::size_t count, float reach) {
   const Bits d;
   auto reached = hn::Zero(d);
-  std::array<BinEntry, kLanes> few;
+  std::array<BinnedParticle, kLanes> few;
   if (count < kLanes) {
-    std::fill(std::copy_n(entries, count, few.begin()), few.end(), entries[0]);
-    entries = few.data();
+    std::fill(std::copy_n(particles, count, few.begin()), few.end(), particles[0]);
+    particles = few.data();
     count = kLanes;
   }
   for (std::size_t k = 0; k + kLanes <= count; k += kLanes) {
-    reached = hn::Or(reached, BoxesOf(entries + k, reach));
+    reached = hn::Or(reached, BoxesOf(particles + k, reach));
   }
   // Nothing changes if some are looked at twice.
-  reached = hn::Or(reached, BoxesOf(entries + count - kLanes, reach));
+  reached = hn::Or(reached, BoxesOf(particles + count - kLanes, reach));
   std::array<std::uint32_t, kLanes> lanes;
   hn::StoreU(reached, d, lanes.data());
   std::uint32_t any = 0;
@@ -75,9 +75,9 @@ namespace partiemc {
 
 HWY_EXPORT(TilesReached);
 
-std::uint32_t ReachedTiles::Of(std::span<const BinEntry> entries) const {
-  if (entries.empty()) return 0;
-  return HWY_DYNAMIC_DISPATCH(TilesReached)(entries.data(), entries.size(), reach_);
+std::uint32_t TileHalo::Of(std::span<const BinnedParticle> particles) const {
+  if (particles.empty()) return 0;
+  return HWY_DYNAMIC_DISPATCH(TilesReached)(particles.data(), particles.size(), reach_);
 }
 
 }  // namespace partiemc
