@@ -92,6 +92,25 @@ struct PeriodicRing {
   }
 };
 
+/// Memory of one ring that is short enough for the stack: it stays in the cache.
+class ShortRing {
+ public:
+  static bool Holds(const PeriodicRingSize& size) {
+    return std::size_t{size.count} + 2 * std::size_t{size.margin} <= kRoom;
+  }
+  /// Requires: Holds(size). Valid as long as this object; elements have no values yet.
+  PeriodicRing Of(const PeriodicRingSize& size) {
+    return PeriodicRing::In(
+        size, [&](int array) { return units_[array] + size.margin; },
+        [&](int array) { return floats_[array] + size.margin; });
+  }
+
+ private:
+  static constexpr std::size_t kRoom = 768;
+  std::int32_t units_[PeriodicRing::kUnitArrays][kRoom];
+  float floats_[PeriodicRing::kFloatArrays][kRoom];
+};
+
 /// Memory of the rings of a frame, kept warm from frame to frame.
 class PeriodicRings {
  public:

@@ -285,6 +285,15 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   }
 }
 
+// Step 1 of a ring.
+void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
+  const std::size_t begin = input.topology.offsets[ring];
+  ParallelForRanges(input.topology.offsets[ring + 1] - begin, kSegmentsAtOnce,
+                    [&](std::size_t first, std::size_t last) {
+                      for (std::size_t k = first; k < last; ++k) FindRoots(input, begin + k, v);
+                    });
+}
+
 }  // namespace
 
 Point VirtualPlaneVertex(const CellPlane& plane, double max_step) {
@@ -297,15 +306,24 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   vertices.Resize(2 * topology.segments.size());
   PeriodicRings& periodic = vertices.periodic_rings;
   periodic.sizes().assign(topology.RingCount(), {});
-  ParallelForRanges(topology.segments.size(), kSegmentsAtOnce,
-                    [&](std::size_t first, std::size_t last) {
-                      for (std::size_t k = first; k < last; ++k) FindRoots(input, k, vertices);
-                    });
-  ParallelFor(topology.RingCount(),
-              [&](std::size_t ring) { periodic.sizes()[ring] = SizeOf(input, ring, vertices); });
+  // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
+  ParallelFor(topology.RingCount(), [&](std::size_t ring) {
+    FindRingRoots(input, ring, vertices);
+    const PeriodicRings::Size size = SizeOf(input, ring, vertices);
+    if (size.count > 0 && !ShortRing::Holds(size)) {
+      periodic.sizes()[ring] = size;
+      return;
+    }
+    if (size.count > 0) {
+      ShortRing memory;
+      RefineRing(input, ring, memory.Of(size), vertices);
+    }
+    Thin(input, ring, vertices);
+  });
   periodic.Allocate();
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
-    if (periodic.sizes()[ring].count > 0) RefineRing(input, ring, periodic[ring], vertices);
+    if (periodic.sizes()[ring].count == 0) return;
+    RefineRing(input, ring, periodic[ring], vertices);
     Thin(input, ring, vertices);
   });
 }
