@@ -10,7 +10,7 @@ namespace partiemc {
 namespace {
 
 // The number of a ring, given to it now if it has none.
-std::uint32_t NumberOf(std::uint32_t ring, const RingTopology& topology, IdentityScratch& s) {
+std::uint32_t NumberOf(std::uint32_t ring, IdentityScratch& s) {
   if (s.number[ring] == kNoRing) {
     s.number[ring] = static_cast<std::uint32_t>(s.topology_ring.size());
     s.topology_ring.push_back(ring);
@@ -39,7 +39,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
       if (topology.outer_of[ring] == kNoRing) return;
     }
     if (input.placed.kept_as[ring] == kNoRing) return;
-    runs.push_back({edge.row, from.column + 1, edge.column, NumberOf(ring, topology, s)});
+    runs.push_back({edge.row, from.column + 1, edge.column, NumberOf(ring, s)});
   });
 }
 
@@ -91,9 +91,9 @@ void Tell(const RingHistory& previous, std::span<const std::uint32_t> kept_as, I
     if (kept_as[ring] == kNoRing) continue;
     const std::uint32_t number = s.number[ring];
     rings.measures[kept_as[ring]].identity = s.rings[number].identity;
-    for (const RingRelation& relation :
-         std::ranges::equal_range(s.relations, number, {}, &RingRelation::now)) {
-      rings.parents.push_back(previous.rings[relation.before].identity);
+    auto relation = std::ranges::lower_bound(s.relations, number, {}, &RingRelation::now);
+    for (; relation != s.relations.end() && relation->now == number; ++relation) {
+      rings.parents.push_back(previous.rings[relation->before].identity);
     }
     rings.parent_offsets.push_back(static_cast<std::uint32_t>(rings.parents.size()));
   }
