@@ -198,6 +198,24 @@ TEST_F(WatchTest, OfWhatIsPublishedAfterItIsInAWatcherOfEveryMissesNothing) {
   }
 }
 
+// Under ThreadSanitizer: the stream may end on another thread than that which serves its watchers.
+TEST_F(WatchTest, AnEndWhileWatchersAreServedIsNoRace) {
+  for (int round = 0; round < 200; ++round) {
+    broadcaster_ = std::make_shared<ResultBroadcaster>(
+        dispatcher_,
+        ResultBroadcaster::Limits{.mailbox_bytes = kMaxBytes, .kept_bytes = 2 * kFrameBytes});
+    const auto watcher = Join(WatchMode::kLatest, 1000);
+    watcher->WaitUntilOpened();
+    std::thread producer([this] {
+      for (std::uint64_t k = 1; k <= 30; ++k) Publish(k);
+    });
+    EndStream();
+    producer.join();
+    EXPECT_TRUE(watcher->status().ok());
+    EXPECT_EQ(watcher->end_reason(), kReasonFinished);
+  }
+}
+
 TEST_F(WatchTest, AsManyMayWatchAsTheServerAndTheirCallerAllow) {
   WatchRegistry registry(2);
   const auto terms = std::make_shared<const CallerTerms>();
