@@ -72,20 +72,19 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
   return secrets;
 }
 
-// How the process is watched. It may hold what it has begun with, its workers, and the budget, or
-// what was taken of that where it is more: a frame of each stream may be taken beyond it, and what
-// streams hold is no reason to turn away others. Nor are results that watchers have not taken,
-// which those of a stream share as a rule.
+// How the process is watched. It may hold what it has begun with, its workers and the budget.
+// Frames of streams may be taken beyond that, and results that watchers have not taken are outside
+// of it: for either a sixteenth of the budget more, so that they turn nobody away at once.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
-                                    const StreamRegistry& streams, const WatchRegistry& watchers) {
+                                    const WatchRegistry& watchers) {
   const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes;
+  const std::uint64_t planned = budget.bytes(), more = planned / 16;
   return {.resident_bytes = ResidentBytes,
-          .most_bytes = [outside,
-                         &budget] { return outside + std::max(budget.bytes(), budget.held()); },
-          .more_bytes =
-              [most = std::uint64_t{options.limits.max_watcher_bytes}, &streams, &watchers] {
-                return std::min(watchers.held_bytes(), (streams.OpenCount() + 1) * most);
+          .most_bytes =
+              [outside, planned, more, &budget] {
+                return outside + std::clamp(budget.held(), planned, planned + more);
               },
+          .more_bytes = [more, &watchers] { return std::min(watchers.held_bytes(), more); },
           .give_back_freed = GiveBackFreedMemory};
 }
 
@@ -106,7 +105,7 @@ Server::Server(const ServerOptions& options)
       budget_(options.limits.memory_budget),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, WatchedProcess(options, budget_, registry_, watchers_)),
+      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_)),
       service_(std::make_unique<Service>(options_.limits, authentication_, opening_, registry_,
                                          calls_, budget_, pool_, watchers_, dispatcher_,
                                          checkpoint_keys_)),
