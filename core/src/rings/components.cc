@@ -138,10 +138,11 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
     cells[j] = rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1];
   }
   TileShare share{component, 0, 0};
-  for (std::uint32_t p = bins.offsets[tile]; p < bins.offsets[tile + 1]; ++p) {
-    const bool is_in = LiesIn(bins.particles[p], cells);
-    share.count += is_in;
-    if (is_in && !bins.weight.empty()) share.weight += bins.weight[p];
+  const std::uint32_t first = bins.offsets[tile], last = bins.offsets[tile + 1];
+  for (std::uint32_t p = first; p < last; ++p) share.count += LiesIn(bins.particles[p], cells);
+  if (bins.weight.empty()) return share;
+  for (std::uint32_t p = first; p < last; ++p) {
+    if (LiesIn(bins.particles[p], cells)) share.weight += bins.weight[p];
   }
   return share;
 }

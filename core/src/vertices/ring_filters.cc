@@ -103,6 +103,21 @@ HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
   }
 }
 
+// LengthInUnits of the step after each vertex, in place of its arc.
+void MeasureSteps(const PeriodicRing& ring) {
+  const Lanes d;
+  const Units d_units;
+  // May go on into the margin.
+  for (std::ptrdiff_t k = 0; k < ring.count; k += kLanes) {
+    const auto along = [&](const std::int32_t* at) HWY_ATTR {
+      return hn::ConvertTo(d, hn::Sub(hn::LoadU(d_units, at + k + 1), hn::LoadU(d_units, at + k)));
+    };
+    const Vector x = along(ring.x);
+    const Vector y = along(ring.y);
+    hn::StoreU(hn::ConvertTo(d_units, hn::Sqrt(Dot(x, y, x, y))), d_units, ring.arc + k);
+  }
+}
+
 template <bool kByAngle>
 void SumNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach) {
   const Lanes d;
@@ -214,16 +229,18 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
+HWY_EXPORT(MeasureSteps);
 HWY_EXPORT(MeanNormals);
 HWY_EXPORT(MeanCurvature);
 HWY_EXPORT(MeanShift);
 
 void MeasureArc(const PeriodicRing& ring) {
+  HWY_DYNAMIC_DISPATCH(MeasureSteps)(ring);
   std::uint32_t length = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    const auto step = static_cast<std::uint32_t>(ring.arc[k]);
     ring.arc[k] = static_cast<std::int32_t>(length);
-    length += static_cast<std::uint32_t>(LengthInUnits(UnitsBetween(ring.x[k], ring.x[k + 1]),
-                                                       UnitsBetween(ring.y[k], ring.y[k + 1])));
+    length += step;
   }
   const auto moved = [&](std::int32_t arc, std::uint32_t by) {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(arc) + by);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/parallel.h"
+#include "base/prefetch.h"
 #include "sampler/query_batch.h"
 #include "vertices/placement.h"
 #include "vertices/plane_support.h"
@@ -14,6 +15,9 @@
 
 namespace partiemc {
 namespace {
+
+// How many segments before its turn a plane is prefetched.
+constexpr std::size_t kFetchedAhead = 24;
 
 double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
 
@@ -290,7 +294,12 @@ void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) 
   const std::size_t begin = input.topology.offsets[ring];
   ParallelForRanges(input.topology.offsets[ring + 1] - begin, kSegmentsAtOnce,
                     [&](std::size_t first, std::size_t last) {
-                      for (std::size_t k = first; k < last; ++k) FindRoots(input, begin + k, v);
+                      for (std::size_t k = begin + first; k < begin + last; ++k) {
+                        if (k + kFetchedAhead < input.planes.size()) {
+                          PrefetchLines(std::span(input.planes).subspan(k + kFetchedAhead, 1));
+                        }
+                        FindRoots(input, k, v);
+                      }
                     });
 }
 
