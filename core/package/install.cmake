@@ -31,6 +31,11 @@ if(PARTIEMC_SERVICE)
     DESTINATION ${CMAKE_INSTALL_DATADIR}/partiemc/proto/partiemc/v1)
   install(EXPORT partiemcClient NAMESPACE partiemc:: DESTINATION ${package_dir})
 endif()
+if(PARTIEMC_C)
+  list(APPEND PARTIEMC_COMPONENTS c)
+  install(TARGETS partiemc_c EXPORT partiemcC)
+  install(EXPORT partiemcC NAMESPACE partiemc:: DESTINATION ${package_dir})
+endif()
 
 configure_package_config_file(core/package/partiemcConfig.cmake.in partiemcConfig.cmake
   INSTALL_DESTINATION ${package_dir})

@@ -32,6 +32,12 @@ auto InStage(StageObserver* observer, Stage stage, Run run) {
   return run();
 }
 
+// Of a frame that has none; buffers of rings and mesh stay.
+void MakeEmpty(Result& result) {
+  result.Clear();
+  result.attributes.clear();
+}
+
 // What the stages have not told themselves.
 void Summarise(const Workspace::Buffers& b, Result& result) {
   FrameStatistics& statistics = result.statistics;
@@ -65,12 +71,19 @@ absl::Status Reserve(MemoryGuard* guard, const FrameSize& size) {
                     " MiB, which there is no room for: reach fewer tiles, or try again later")});
 }
 
+std::uint64_t AttributeValuesOf(const Frame& frame) {
+  std::uint64_t values = 0;
+  for (const Attribute& attribute : frame.attributes) values += attribute.components;
+  return values;
+}
+
 // As soon as its segments are known.
 FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  const Workspace::Buffers& b) {
   FrameSize size{.particles = frame.ParticleCount(),
                  .tiles = b.bins.tiles.size(),
-                 .segments = b.topology.segments.size()};
+                 .segments = b.topology.segments.size(),
+                 .attribute_values = AttributeValuesOf(frame)};
   if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
   return size;
 }
@@ -163,20 +176,21 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
                                         Result& result, const FrameControl& control) const {
   const CancellationScope scope(control.cancelled);
   result.Clear();
+  result.attributes.resize(frame.attributes.size());
   absl::Status status;
   try {
     status = ReconstructOrThrow(frame, state, workspace.buffers(), result, control);
   } catch (...) {
     // Wherever it was left, there are half-made buffers.
     workspace = Workspace();
-    result.Clear();
+    MakeEmpty(result);
     try {
       throw;
     } catch (const Cancelled&) {
       return absl::CancelledError("the frame was cancelled");
     }
   }
-  if (!status.ok()) result.Clear();
+  if (!status.ok()) MakeEmpty(result);
   return status;
 }
 
@@ -189,8 +203,9 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
     return SortParticles(parameters_, limits_, frame, state, b, lengths, scale, result.statistics);
   });
   if (!status.ok() || !lengths) return status;
-  status =
-      Reserve(control.memory, {.particles = frame.ParticleCount(), .tiles = b.bins.tiles.size()});
+  status = Reserve(control.memory, {.particles = frame.ParticleCount(),
+                                    .tiles = b.bins.tiles.size(),
+                                    .attribute_values = AttributeValuesOf(frame)});
   if (!status.ok()) return status;
   FindRings(parameters_, scale, control.observer, b);
   status = Reserve(control.memory, SizeOf(parameters_, frame, b));
@@ -201,6 +216,12 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
     const auto tangled = Outline(parameters_, frame, scale, state, control.observer, b, result);
     if (tangled.empty()) break;
     DropComponents(b.bins, tangled, b.crossings, b.ring_scratch, b.topology);
+  }
+  if (!frame.attributes.empty()) {
+    InStage(control.observer, Stage::kAttributes, [&] {
+      InterpolateAttributes(frame, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
+                            result.attributes);
+    });
   }
   Summarise(b, result);
   if (lengths->is_provisional) {

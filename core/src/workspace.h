@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "attributes/attributes.h"
 #include "bins/bins.h"
 #include "crossings/crossings.h"
 #include "field/field.h"
@@ -38,6 +39,7 @@ struct Workspace::Buffers {
   IdentityScratch identity_scratch;
   RingHistory next_history;
   MeshScratch mesh_scratch;
+  AttributeScratch attribute_scratch;
   std::vector<std::uint32_t> tangled;  // Outer rings that could not be triangulated.
 };
 

@@ -1,10 +1,14 @@
 #include "wire/codec.h"
 
+#include <algorithm>
 #include <optional>
+#include <set>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "partiemc/printable.h"
 #include "partiemc/status.h"
 #include "wire/bytes.h"
 
@@ -136,6 +140,10 @@ v1::PositionFormat FormatOf(const Frame& frame) {
   return is_float ? v1::POSITION_FORMAT_FLOAT32_2 : v1::POSITION_FORMAT_FLOAT64_2;
 }
 
+std::size_t ComponentsOf(const v1::NamedScalar& scalar) {
+  return std::max<std::size_t>(1, scalar.components());
+}
+
 // `bytes` is empty or has `particle_bytes` for each of `particles`.
 absl::Status CheckOptionalArray(std::string field, const std::string& bytes, std::size_t particles,
                                 std::size_t particle_bytes) {
@@ -160,11 +168,54 @@ absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, const Positio
     return status;
   }
   for (int i = 0; i < message.scalars_size(); ++i) {
-    auto status = CheckOptionalArray(absl::StrCat("scalars[", i, "].values"),
-                                     message.scalars(i).values(), particles, 4);
+    const v1::NamedScalar& scalar = message.scalars(i);
+    if (scalar.components() > 3) {
+      return Invalid(kReasonOutOfRange, absl::StrCat("scalars[", i, "].components"),
+                     absl::StrCat(scalar.components()), "must be 1, 2 or 3");
+    }
+    auto status = CheckOptionalArray(absl::StrCat("scalars[", i, "].values"), scalar.values(),
+                                     particles, ComponentsOf(scalar) * sizeof(float));
     if (!status.ok()) return status;
   }
   return absl::OkStatus();
+}
+
+// A frame without particles may leave out what they would carry.
+bool IsThere(const v1::NamedScalar& scalar, std::size_t particles) {
+  return particles == 0 || !scalar.values().empty();
+}
+
+absl::Status ViewAttributes(const v1::ParticleFrame& message, std::span<const std::string> names,
+                            AttributeViews& views, Frame& frame) {
+  views.carried.clear();
+  for (const v1::NamedScalar& scalar : message.scalars()) {
+    if (!IsThere(scalar, frame.ParticleCount())) continue;
+    views.carried.push_back({.name = scalar.name(),
+                             .components = static_cast<int>(ComponentsOf(scalar)),
+                             .values = ViewBytes<float>(scalar.values())});
+  }
+  frame.attributes = views.carried;
+  auto status = ChooseAttributes(frame, names, views.chosen);
+  frame.attributes = views.chosen;
+  return status;
+}
+
+absl::Status CheckNames(const v1::Outputs& message) {
+  constexpr int kMostNames = 16;
+  if (message.attributes_size() == 0) return absl::OkStatus();
+  if (!message.rings() && !message.mesh()) {
+    return Invalid(kReasonOutOfRange, "outputs.attributes", Printable(message.attributes(0)),
+                   "must come with outputs.rings or outputs.mesh: they are at their vertices");
+  }
+  if (message.attributes_size() > kMostNames) {
+    return Invalid(kReasonOutOfRange, "outputs.attributes",
+                   absl::StrCat(message.attributes_size(), " names"),
+                   absl::StrCat("must be at most ", kMostNames));
+  }
+  const std::set<std::string_view> names(message.attributes().begin(), message.attributes().end());
+  if (static_cast<int>(names.size()) == message.attributes_size()) return absl::OkStatus();
+  return Invalid(kReasonDuplicate, "outputs.attributes",
+                 absl::StrCat(message.attributes_size(), " names"), "must all be different");
 }
 
 }  // namespace
@@ -251,11 +302,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {
   if (!present) return Outputs{};
-  if (message.attributes_size() > 0) {
-    return Invalid(kReasonUnsupported, "outputs.attributes",
-                   absl::StrCat(message.attributes_size(), " names"),
-                   "must be empty: this server lacks the capability \"attributes\"");
-  }
+  if (auto status = CheckNames(message); !status.ok()) return status;
   if (!v1::CoordinateFormat_IsValid(message.coordinate_format())) {
     return UnknownEnum("outputs.coordinate_format", message.coordinate_format());
   }
@@ -274,7 +321,8 @@ absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) 
       .mesh = message.mesh(),
       .normals = message.normals(),
       .relative_float32 = message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE,
-      .echo_particles = message.echo_particles()};
+      .echo_particles = message.echo_particles(),
+      .attributes = {message.attributes().begin(), message.attributes().end()}};
 }
 
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
@@ -287,6 +335,15 @@ void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
                                                            : v1::COORDINATE_FORMAT_FLOAT64);
   }
   message.set_echo_particles(outputs.echo_particles);
+  for (const std::string& name : outputs.attributes) message.add_attributes(name);
+}
+
+absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message,
+                                  std::span<const std::string> names, AttributeViews& views) {
+  auto frame = DecodeFrame(message);
+  if (!frame.ok() || names.empty()) return frame;
+  if (auto status = ViewAttributes(message, names, views, *frame); !status.ok()) return status;
+  return frame;
 }
 
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message) {
@@ -324,6 +381,16 @@ void EncodeFrame(const Frame& frame, v1::ParticleFrame& message) {
   AssignBytes(frame.volumes, *message.mutable_volumes());
   AssignBytes(frame.ids, *message.mutable_ids());
   AssignBytes(frame.velocities, *message.mutable_velocities());
+  auto& scalars = *message.mutable_scalars();
+  while (scalars.size() > static_cast<int>(frame.attributes.size())) scalars.RemoveLast();
+  while (scalars.size() < static_cast<int>(frame.attributes.size())) scalars.Add();
+  for (std::size_t k = 0; k < frame.attributes.size(); ++k) {
+    const Attribute& attribute = frame.attributes[k];
+    v1::NamedScalar& scalar = scalars[static_cast<int>(k)];
+    scalar.set_name(std::string(attribute.name));
+    scalar.set_components(attribute.components == 1 ? 0 : attribute.components);
+    AssignBytes(attribute.values, *scalar.mutable_values());
+  }
   message.set_time(frame.time);
 }
 

@@ -4,8 +4,10 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -28,8 +30,9 @@ struct Outputs {
   bool rings = true;
   bool mesh = true;
   bool normals = false;
-  bool relative_float32 = false;  ///< COORDINATE_FORMAT_FLOAT32_RELATIVE.
-  bool echo_particles = false;    ///< To watchers.
+  bool relative_float32 = false;             ///< COORDINATE_FORMAT_FLOAT32_RELATIVE.
+  bool echo_particles = false;               ///< To watchers.
+  std::vector<std::string> attributes = {};  ///< Names, all different.
 
   friend bool operator==(const Outputs&, const Outputs&) = default;
 };
@@ -60,17 +63,27 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
-/// Errors: INVALID_ARGUMENT with a Violation: attributes (reason UNSUPPORTED until the server
-/// offers the capability), normals without rings, a format for nothing.
+/// Errors: INVALID_ARGUMENT with a Violation: normals without rings, a format or attributes for
+/// nothing, too many attributes or one of them twice.
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 
-/// A view into `message`, which must outlive it unchanged. Checks the format and every byte count
+/// What the views of a frame's attributes lie in; kept from frame to frame.
+struct AttributeViews {
+  std::vector<Attribute> carried, chosen;
+};
+
+/// A view into `message`, which must outlive it unchanged; as `names` and `views` where particles
+/// carry what is named. Checks the format and every byte count
 /// against the number of particles, copies nothing; values are checked by the core. No copy is
 /// needed for alignment either: a std::string keeps its bytes at a multiple of 8 (asserted).
-/// Errors: INVALID_ARGUMENT with a Violation (reasons BYTE_COUNT, UNSUPPORTED).
+/// Errors: INVALID_ARGUMENT with a Violation (reasons BYTE_COUNT, UNSUPPORTED, OUT_OF_RANGE of the
+/// components of a scalar, NO_SUCH_ATTRIBUTE).
+absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message,
+                                  std::span<const std::string> names, AttributeViews& views);
+/// The same where nothing is named.
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message);
-/// Replaces what the core uses of `message` (all but sequence and scalars), reusing its buffers.
+/// Replaces what the core uses of `message` (all but its sequence), reusing its buffers.
 /// Requires: frame.components is 2 or 3.
 void EncodeFrame(const Frame& frame, v1::ParticleFrame& message);
 

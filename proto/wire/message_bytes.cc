@@ -5,6 +5,8 @@
 #include <grpcpp/support/proto_buffer_reader.h>
 #include <grpcpp/support/proto_buffer_writer.h>
 
+#include <algorithm>
+#include <span>
 #include <variant>
 
 #include "wire/codec.h"
@@ -54,11 +56,46 @@ bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& ty
   return true;
 }
 
-// `frame` without its arrays.
+// `frame` without its arrays, but with its attributes, which are messages of their own.
 Frame ScalarsOf(const Frame& frame) {
-  Frame scalars{.positions = frame.positions, .components = frame.components, .time = frame.time};
+  Frame scalars{.positions = frame.positions,
+                .components = frame.components,
+                .attributes = frame.attributes,
+                .time = frame.time};
   std::visit([](auto& view) { view = {}; }, scalars.positions);  // Of the same type.
   return scalars;
+}
+
+template <typename T>
+RowArray RowsOf(std::span<const T> numbers) {
+  const auto bytes = std::as_bytes(numbers);
+  return {.rows = bytes.size(), .row_bytes = 1, .in_place = bytes.data()};
+}
+
+// Gathered rows go straight into the pieces of memory that `out` is made of; one that two of them
+// share goes through `shared`.
+void WriteRows(const RowArray& array, CodedOutputStream& out) {
+  if (array.in_place != nullptr) {
+    out.WriteRaw(array.in_place, static_cast<int>(array.bytes()));
+    return;
+  }
+  for (std::size_t row = 0; row < array.rows;) {
+    void* piece = nullptr;
+    int room = 0;
+    out.GetDirectBufferPointer(&piece, &room);
+    const std::size_t fitting =
+        std::min(static_cast<std::size_t>(room) / array.row_bytes, array.rows - row);
+    if (fitting > 0) {
+      array.write(row, row + fitting, static_cast<std::byte*>(piece));
+      out.Skip(static_cast<int>(fitting * array.row_bytes));
+      row += fitting;
+    } else {
+      std::byte shared[24];
+      array.write(row, row + 1, shared);
+      out.WriteRaw(shared, static_cast<int>(array.row_bytes));
+      ++row;
+    }
+  }
 }
 
 }  // namespace
@@ -101,17 +138,24 @@ grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message) {
   return bytes;
 }
 
-FrameRequest::FrameRequest(const Frame& frame, std::uint64_t sequence)
-    : arrays_{{{v1::ParticleFrame::kPositionsFieldNumber,
-                std::visit([](auto view) { return std::as_bytes(view); }, frame.positions)},
-               {v1::ParticleFrame::kIdsFieldNumber, std::as_bytes(frame.ids)},
-               {v1::ParticleFrame::kVolumesFieldNumber, std::as_bytes(frame.volumes)},
-               {v1::ParticleFrame::kVelocitiesFieldNumber, std::as_bytes(frame.velocities)}}} {
-  EncodeFrame(ScalarsOf(frame), scalars_);
+FrameRows RowsOf(const Frame& frame) {
+  return {.scalars = ScalarsOf(frame),
+          .positions = std::visit([](auto view) { return RowsOf(view); }, frame.positions),
+          .ids = RowsOf(frame.ids),
+          .volumes = RowsOf(frame.volumes),
+          .velocities = RowsOf(frame.velocities)};
+}
+
+FrameRequest::FrameRequest(const FrameRows& frame, std::uint64_t sequence)
+    : arrays_{{{v1::ParticleFrame::kPositionsFieldNumber, frame.positions},
+               {v1::ParticleFrame::kIdsFieldNumber, frame.ids},
+               {v1::ParticleFrame::kVolumesFieldNumber, frame.volumes},
+               {v1::ParticleFrame::kVelocitiesFieldNumber, frame.velocities}}} {
+  EncodeFrame(frame.scalars, scalars_);
   scalars_.set_sequence(sequence);
   frame_bytes_ = scalars_.ByteSizeLong();
   for (const Array& array : arrays_) {
-    if (!array.bytes.empty()) frame_bytes_ += LengthFieldBytes(array.field, array.bytes.size());
+    if (array.rows.rows > 0) frame_bytes_ += LengthFieldBytes(array.field, array.rows.bytes());
   }
 }
 
@@ -126,10 +170,10 @@ grpc::ByteBuffer FrameRequest::ToBytes() const {
     out.WriteVarint64(frame_bytes_);
     scalars_.SerializeToCodedStream(&out);
     for (const Array& array : arrays_) {
-      if (array.bytes.empty()) continue;
+      if (array.rows.rows == 0) continue;
       out.WriteTag(LengthTag(array.field));
-      out.WriteVarint64(array.bytes.size());
-      out.WriteRaw(array.bytes.data(), static_cast<int>(array.bytes.size()));
+      out.WriteVarint64(array.rows.bytes());
+      WriteRows(array.rows, out);
     }
   }  // Whose end gives back what is left of the last piece.
   return bytes;

@@ -9,10 +9,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 
 #include "partiemc/frame.h"
 #include "partiemc/v1/reconstruction.pb.h"
+#include "wire/frame_rows.h"
 
 namespace partiemc::wire {
 
@@ -37,23 +37,30 @@ bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message)
 /// Requires: a message of less than 2 GiB.
 grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message);
 
+/// The arrays of `frame` as they are.
+FrameRows RowsOf(const Frame& frame);
+
 /// A ReconstructRequest that holds a frame, as EncodeFrame and ToBytes would make it, but without a
 /// message between the caller's arrays and the bytes.
 class FrameRequest {
  public:
   /// A view of `frame`. Requires: frame.components is 2 or 3.
-  FrameRequest(const Frame& frame, std::uint64_t sequence);
+  FrameRequest(const Frame& frame, std::uint64_t sequence)
+      : FrameRequest(RowsOf(frame), sequence) {}
+  /// Likewise, of arrays that lie anywhere.
+  FrameRequest(const FrameRows& frame, std::uint64_t sequence);
 
   /// Of its ParticleFrame alone: what Limits.max_frame_bytes counts.
   std::uint64_t frame_bytes() const { return frame_bytes_; }
 
-  /// Copies each array once. Requires: frame_bytes() < 2^31 - 16.
+  /// Copies each array once, from where it is to the memory that is sent, attributes twice.
+  /// Requires: frame_bytes() < 2^31 - 16.
   grpc::ByteBuffer ToBytes() const;
 
  private:
   struct Array {
     int field;
-    std::span<const std::byte> bytes;
+    RowArray rows;
   };
 
   v1::ParticleFrame scalars_;  // All but the arrays.

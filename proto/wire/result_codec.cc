@@ -89,6 +89,25 @@ void EncodeMeasures(const Rings& rings, v1::Rings& message) {
   }
 }
 
+using NamedAttributes = google::protobuf::RepeatedPtrField<v1::NamedAttribute>;
+
+// At the first `points` vertices.
+void EncodeAttributes(std::span<const AttributeValues> attributes, std::size_t points,
+                      NamedAttributes& messages) {
+  while (messages.size() > static_cast<int>(attributes.size())) messages.RemoveLast();
+  while (messages.size() < static_cast<int>(attributes.size())) messages.Add();
+  for (std::size_t k = 0; k < attributes.size(); ++k) {
+    const AttributeValues& from = attributes[k];
+    v1::NamedAttribute& to = messages[static_cast<int>(k)];
+    to.set_name(from.name);
+    to.set_components(static_cast<std::uint32_t>(from.components));
+    // Of an empty frame there are none.
+    AssignBytes(
+        std::span(from.values).first(std::min(from.values.size(), points * from.components)),
+        *to.mutable_values());
+  }
+}
+
 absl::Status EncodeRings(const Result& result, bool with_normals, v1::ReconstructedFrame& message) {
   v1::Rings& rings = *message.mutable_rings();
   AssignBytes(std::span<const std::uint32_t>(result.rings.offsets), *rings.mutable_offsets());
@@ -99,6 +118,7 @@ absl::Status EncodeRings(const Result& result, bool with_normals, v1::Reconstruc
   } else {
     rings.clear_normals();
   }
+  EncodeAttributes(result.attributes, result.rings.PointCount(), *rings.mutable_attributes());
   return EncodePoints(result.rings.points, message, result.statistics.spacing, "rings.points",
                       *rings.mutable_points());
 }
@@ -108,6 +128,7 @@ absl::Status EncodeMesh(const Result& result, v1::ReconstructedFrame& message) {
   AssignBytes(std::span<const std::uint32_t>(result.mesh.triangles), *mesh.mutable_triangles());
   static_assert(sizeof(TriangleClass) == 1);
   AssignBytes(std::span<const TriangleClass>(result.mesh.classes), *mesh.mutable_classes());
+  EncodeAttributes(result.attributes, result.mesh.PointCount(), *mesh.mutable_attributes());
   return EncodePoints(result.mesh.points, message, result.statistics.spacing, "mesh.points",
                       *mesh.mutable_points());
 }
@@ -297,6 +318,29 @@ absl::Status DecodeMesh(const v1::ReconstructedFrame& message, Mesh& mesh) {
   return absl::OkStatus();
 }
 
+absl::Status CheckAttributes(absl::string_view of, const NamedAttributes& messages,
+                             std::size_t points) {
+  for (int k = 0; k < messages.size(); ++k) {
+    const std::uint64_t components = messages[k].components();
+    if (components < 1 || components > 3 ||
+        messages[k].values().size() != points * components * sizeof(float)) {
+      return Lost(absl::StrCat(of, ".attributes[", k, "]"),
+                  absl::StrCat("must have 1 to 3 floats for each of the ", points, " points"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+void DecodeAttributes(const NamedAttributes& messages, std::vector<AttributeValues>& attributes) {
+  attributes.resize(static_cast<std::size_t>(messages.size()));
+  for (std::size_t k = 0; k < attributes.size(); ++k) {
+    const v1::NamedAttribute& from = messages[static_cast<int>(k)];
+    attributes[k].name = from.name();
+    attributes[k].components = static_cast<int>(from.components());
+    CopyBytes(from.values(), attributes[k].values);
+  }
+}
+
 void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& statistics,
                       FrameTimes& times) {
   statistics = {.particles = message.particles(),
@@ -335,7 +379,17 @@ absl::Status DecodeGeometry(const v1::ReconstructedFrame& message, Result& resul
                 absl::StrCat("is ", message.coordinate_format(), ", which this client knows not"));
   }
   if (auto status = DecodeRings(message, result.rings); !status.ok()) return status;
-  return DecodeMesh(message, result.mesh);
+  if (auto status = DecodeMesh(message, result.mesh); !status.ok()) return status;
+  const std::size_t rings = result.rings.PointCount(), mesh = result.mesh.PointCount();
+  if (auto status = CheckAttributes("rings", message.rings().attributes(), rings); !status.ok()) {
+    return status;
+  }
+  if (auto status = CheckAttributes("mesh", message.mesh().attributes(), mesh); !status.ok()) {
+    return status;
+  }
+  DecodeAttributes(mesh > 0 ? message.mesh().attributes() : message.rings().attributes(),
+                   result.attributes);
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -370,7 +424,10 @@ absl::Status DecodeResult(const v1::ReconstructedFrame& message, ReconstructedFr
   frame.mesh_digest = message.mesh_digest();
   DecodeStatistics(message.statistics(), frame.result.statistics, frame.times);
   absl::Status status = DecodeGeometry(message, frame.result);
-  if (!status.ok()) frame.result.Clear();
+  if (!status.ok()) {
+    frame.result.Clear();
+    frame.result.attributes.clear();
+  }
   return status;
 }
 

@@ -92,15 +92,20 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
   });
   slices_.emplace_back(head);
   size_ += head.size();
+  memory_ += head.size();
   Append(request, positions->offset, positions->length);
 }
 
-grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped) const {
+grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped,
+                                          std::uint64_t oldest_sequence) const {
   const std::string frame_head = Written([&](CodedOutputStream& out) {
-    if (dropped != 0) {
-      out.WriteTag(VarintTag(v1::WatchedFrame::kDroppedFieldNumber));
-      out.WriteVarint64(dropped);
-    }
+    const auto write = [&](int field, std::uint64_t value) {
+      if (value == 0) return;
+      out.WriteTag(VarintTag(field));
+      out.WriteVarint64(value);
+    };
+    write(v1::WatchedFrame::kDroppedFieldNumber, dropped);
+    write(v1::WatchedFrame::kOldestSequenceFieldNumber, oldest_sequence);
     out.WriteTag(LengthTag(v1::WatchedFrame::kFrameFieldNumber));
     out.WriteVarint64(size_);
   });
@@ -123,6 +128,7 @@ void WatchedBytes::Append(const grpc::ByteBuffer& whole, std::size_t offset, std
     if (offset < slice.size() && length > 0) {
       const std::size_t end = std::min(slice.size(), offset + length);
       slices_.push_back(slice.sub(offset, end));
+      memory_ += slice.size();
       length -= end - offset;
       offset = end;
     }

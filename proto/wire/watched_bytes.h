@@ -28,15 +28,19 @@ class WatchedBytes {
   /// Of the serialised ReconstructedFrame.
   std::size_t size() const { return size_; }
 
-  /// A serialised WatchStreamResponse with the frame and this WatchedFrame.dropped. Copies nothing
-  /// but a few bytes of its own.
-  grpc::ByteBuffer ToResponse(std::uint64_t dropped) const;
+  /// What keeping it keeps from being freed: pieces of memory that have other parts of an answer or
+  /// a request, too.
+  std::size_t memory() const { return memory_; }
+
+  /// A serialised WatchStreamResponse with the frame and these fields of WatchedFrame. Copies
+  /// nothing but a few bytes of its own.
+  grpc::ByteBuffer ToResponse(std::uint64_t dropped, std::uint64_t oldest_sequence) const;
 
  private:
   void Append(const grpc::ByteBuffer& whole, std::size_t offset, std::size_t length);
 
   std::vector<grpc::Slice> slices_;
-  std::size_t size_ = 0;
+  std::size_t size_ = 0, memory_ = 0;
 };
 
 }  // namespace partiemc::wire

@@ -4,11 +4,24 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <variant>
+#include <vector>
 
 #include "absl/status/status.h"
 
 namespace partiemc {
+
+/// A quantity that particles carry, such as pressure or velocity.
+struct Attribute {
+  std::string_view name;          ///< Of this one alone, 1 to 64 bytes of printable ASCII.
+  int components = 1;             ///< 1 to 3.
+  std::span<const float> values;  ///< `components` per particle, interleaved. Finite.
+};
+
+/// Of all attributes of a frame: the most components together.
+inline constexpr std::size_t kMostAttributeValues = 32;
 
 /// Particles of one instant, each array in the same order. Views must outlive the call only.
 struct Frame {
@@ -28,6 +41,9 @@ struct Frame {
   /// Interleaved as `positions`, in world units per unit of `time`. Finite. Empty: none.
   std::span<const float> velocities = {};
 
+  /// What is wanted at the vertices, too (Result::attributes). Nothing else depends on it.
+  std::span<const Attribute> attributes = {};
+
   /// Simulation time. Velocities count between frames of which the later one has the larger time.
   double time = 0;
 
@@ -39,6 +55,16 @@ struct Frame {
            static_cast<std::size_t>(components);
   }
 };
+
+/// Names the velocities of a frame among its attributes.
+inline constexpr std::string_view kVelocityAttribute = "velocity";
+
+/// Sets `chosen` to those attributes of a frame that have these names, in their order:
+/// kVelocityAttribute are Frame::velocities where there are any. Views, as the frame is.
+/// Errors: INVALID_ARGUMENT with reason NO_SUCH_ATTRIBUTE, and a part of them in `chosen`. A frame
+/// without particles lacks none.
+absl::Status ChooseAttributes(const Frame& frame, std::span<const std::string> names,
+                              std::vector<Attribute>& chosen);
 
 /// What a frame may cost. A frame beyond a limit is refused before anything is allocated for it.
 struct FrameLimits {

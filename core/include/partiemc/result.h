@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "partiemc/doubt.h"
@@ -100,9 +101,21 @@ struct FrameStatistics {
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
+/// An attribute of the frame (Frame::attributes), interpolated.
+struct AttributeValues {
+  std::string name;
+  int components = 1;
+  /// At the points of the rings, and then at those of the mesh that are none of the rings: in the
+  /// order of Mesh::points where there is one. `components` each, interleaved.
+  std::vector<float> values;
+
+  friend bool operator==(const AttributeValues&, const AttributeValues&) = default;
+};
+
 struct Result {
   Rings rings;
-  Mesh mesh;  ///< Empty for Fill::kNone.
+  Mesh mesh;                                ///< Empty for Fill::kNone.
+  std::vector<AttributeValues> attributes;  ///< In the order of the frame's.
   FrameStatistics statistics;
 
   void Clear();

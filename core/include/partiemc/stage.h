@@ -1,4 +1,4 @@
-// The eight stages, under the names that they carry everywhere.
+// The nine stages, under the names that they carry everywhere.
 #pragma once
 
 #include <array>
@@ -16,11 +16,13 @@ enum class Stage : std::uint8_t {
   kVertices,    ///< Vertices placed (paper, sections 3.4-3.5).
   kIdentities,  ///< Rings related to those of the frame before (core/IDENTITIES.md).
   kMesh,        ///< Inside filled with triangles (paper, sections 3.7-3.8).
+  kAttributes,  ///< What particles carry, interpolated at the vertices; only where there is any.
 };
 
-inline constexpr std::size_t kStageCount = 8;
+inline constexpr std::size_t kStageCount = 9;
 inline constexpr std::array<std::string_view, kStageCount> kStageNames = {
-    "bins", "field", "crossings", "rings", "normals", "vertices", "identities", "mesh"};
+    "bins",     "field",      "crossings", "rings",     "normals",
+    "vertices", "identities", "mesh",      "attributes"};
 
 constexpr std::string_view Name(Stage stage) {
   return kStageNames[static_cast<std::size_t>(stage)];

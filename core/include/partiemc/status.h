@@ -24,6 +24,7 @@ struct Violation {
 inline constexpr std::string_view kReasonOutOfRange = "OUT_OF_RANGE";
 inline constexpr std::string_view kReasonNotFinite = "NOT_FINITE";
 inline constexpr std::string_view kReasonCount = "COUNT";
+inline constexpr std::string_view kReasonNoSuchAttribute = "NO_SUCH_ATTRIBUTE";
 inline constexpr std::string_view kReasonDuplicate = "DUPLICATE";
 inline constexpr std::string_view kReasonTooManyParticles = "TOO_MANY_PARTICLES";
 inline constexpr std::string_view kReasonTooManyTiles = "TOO_MANY_TILES";

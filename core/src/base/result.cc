@@ -21,6 +21,7 @@ void Mesh::Clear() {
 void Result::Clear() {
   rings.Clear();
   mesh.Clear();
+  for (AttributeValues& attribute : attributes) attribute.values.clear();
   statistics = {};
 }
 

@@ -1,4 +1,4 @@
-// Stage 1 of 8: particles -> tiles.
+// Stage 1 of 9: particles -> tiles.
 #pragma once
 
 #include <cstddef>

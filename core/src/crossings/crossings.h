@@ -1,4 +1,4 @@
-// Stage 3 of 8: level set -> active cells and the segments of the isoline through them.
+// Stage 3 of 9: level set -> active cells and the segments of the isoline through them.
 //
 //    3--2--2     Corners and edges of a cell. Bit k of a cell's case is set where corner k is
 //    |     |     inside (F < 0). A value of exactly 0 counts as outside, in every stage, so that

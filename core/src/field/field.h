@@ -1,4 +1,4 @@
-// Stage 2 of 8: particles -> level set at every node (paper, Eq. 1-5).
+// Stage 2 of 9: particles -> level set at every node (paper, Eq. 1-5).
 #pragma once
 
 #include <array>

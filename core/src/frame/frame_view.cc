@@ -231,7 +231,8 @@ absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limi
   }
   if (absl::Status status = CheckVolumes(frame); !status.ok()) return status;
   if (absl::Status status = CheckIds(frame, scratch); !status.ok()) return status;
-  return CheckVelocities(frame);
+  if (absl::Status status = CheckVelocities(frame); !status.ok()) return status;
+  return CheckAttributes(frame);
 }
 
 }  // namespace partiemc

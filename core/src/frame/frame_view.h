@@ -94,6 +94,9 @@ std::string CoordinateField(std::string_view array, std::size_t particle, int ax
 absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
                           std::string rule);
 
+/// The same of what its particles carry besides.
+absl::Status CheckAttributes(const Frame& frame);
+
 /// OK if every number of the frame is usable: coordinates finite and in one plane, volumes
 /// positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a Violation that names
 /// the first particle at fault.

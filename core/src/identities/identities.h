@@ -1,4 +1,4 @@
-// Stage 7 of 8: rings of two frames -> identities and parents (core/IDENTITIES.md).
+// Stage 7 of 9: rings of two frames -> identities and parents (core/IDENTITIES.md).
 #pragma once
 
 #include <cstdint>

@@ -27,6 +27,9 @@ class LoopGroups {
     points_.resize(points_.size() + (last - first));
     std::iota(points_.end() - (last - first), points_.end(), first);
   }
+  void AddPoints(std::span<const std::uint32_t> points) {
+    points_.insert(points_.end(), points.begin(), points.end());
+  }
   /// Ends that loop; with `reversed`, its points go the other way round.
   void EndLoop(std::uint32_t group, bool reversed = false);
 

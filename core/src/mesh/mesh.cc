@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <numeric>
 
 #include "base/parallel.h"
 #include "base/predicates.h"
@@ -14,7 +15,8 @@ namespace {
 
 // One mesh in the making. Points of the connectivity: the points of the rings (for
 // `farthest-particle`: the middles of all segments), then the nodes of the lattice that triangles
-// name. While loops are triangulated, the corners of the staircases stand in for these.
+// name. Where these are not known yet when loops are triangulated, the corners of the staircases
+// stand in for them.
 struct Work {
   const MeshInput& input;
   MeshScratch& scratch;
@@ -112,6 +114,13 @@ void AppendCorners(Work& w) {
     const Point point = NodePoint(w.input.directory, corner, w.input.scale.cell_size);
     w.mesh.points.insert(w.mesh.points.end(), {point.x, point.y});
   }
+  w.scratch.corner_numbers.resize(w.scratch.staircases.corners.size());
+  std::iota(w.scratch.corner_numbers.begin(), w.scratch.corner_numbers.end(),
+            static_cast<std::uint32_t>(w.ring_points));
+}
+
+void AppendNodes(Work& w) {
+  w.scratch.nodes.AppendPoints(w.input.directory, w.input.scale.cell_size, w.mesh.points);
 }
 
 // Puts the nodes in the place of the corners of the staircases.
@@ -128,9 +137,7 @@ void PutNodesInPlace(Work& w) {
       point = is_corner ? number : point;
     }
   };
-  ParallelInvoke(renumber, [&] {
-    w.scratch.nodes.AppendPoints(w.input.directory, w.input.scale.cell_size, w.mesh.points);
-  });
+  ParallelInvoke(renumber, [&] { AppendNodes(w); });
 }
 
 // Loops are grouped by components, each named by its outer ring.
@@ -149,10 +156,10 @@ void AddRingLoops(Work& w) {
 void AddStaircaseLoops(Work& w, bool reversed) {
   const Staircases& staircases = w.scratch.staircases;
   const RingTopology& rings = w.input.topology;
-  const auto before = static_cast<std::uint32_t>(w.ring_points);
+  const std::span<const std::uint32_t> numbers = w.scratch.corner_numbers;
   for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
     const std::uint32_t first = staircases.offsets[loop];
-    w.scratch.loops.AddPoints(before + first, before + staircases.offsets[loop + 1]);
+    w.scratch.loops.AddPoints(numbers.subspan(first, staircases.offsets[loop + 1] - first));
     const std::uint32_t component =
         rings.components.At(w.input.crossings, staircases.corners[first]);
     w.scratch.loops.EndLoop(rings.outer_ring[component], reversed);
@@ -178,15 +185,27 @@ void TriangulateByLoops(Work& w) {
 }
 
 // Finds the shapes of the interior and triangulates everything. The rectangles have a thread of
-// their own where there are several: one long ring is swept by one.
+// their own where there are several: one long ring is swept by one. A single thread numbers the
+// nodes first, so that no triangle has to be renumbered. Both make the same triangles.
 void TriangulateAll(Work& w) {
-  const auto sweep = [&] {
+  const auto trace = [&] {
     TraceStaircases(w.input.directory, w.scratch.interior, w.scratch.staircases);
-    AppendCorners(w);
-    TriangulateByLoops(w);
   };
-  ParallelInvoke(sweep, [&] { FillRectangles(w); });
-  PutNodesInPlace(w);
+  if (ThreadCount() == 1) {
+    trace();
+    FillRectangles(w);
+    NumberCorners(w);
+    AppendNodes(w);
+    TriangulateByLoops(w);
+  } else {
+    const auto sweep = [&] {
+      trace();
+      AppendCorners(w);
+      TriangulateByLoops(w);
+    };
+    ParallelInvoke(sweep, [&] { FillRectangles(w); });
+    PutNodesInPlace(w);
+  }
   w.mesh.triangles.insert(w.mesh.triangles.end(), w.scratch.triangles.begin(),
                           w.scratch.triangles.end());
   w.mesh.classes.resize(w.mesh.triangles.size() / 3, TriangleClass::kInterior);

@@ -1,4 +1,4 @@
-// Stage 8 of 8: rings and interior cells -> triangles (paper, sections 3.7-3.8).
+// Stage 8 of 9: rings and interior cells -> triangles (paper, sections 3.7-3.8).
 #pragma once
 
 #include <cstdint>

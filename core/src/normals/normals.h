@@ -1,4 +1,4 @@
-// Stage 5 of 8: segments -> stabilised cell normals (paper, Eq. 9-11).
+// Stage 5 of 9: segments -> stabilised cell normals (paper, Eq. 9-11).
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Stage 4 of 8: segments -> closed rings, nested and cleaned.
+// Stage 4 of 9: segments -> closed rings, nested and cleaned.
 #pragma once
 
 #include <cstdint>

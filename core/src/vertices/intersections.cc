@@ -2,10 +2,11 @@
 // say, does not meet itself, nor the run after it if that goes to the right, too: on contours this
 // leaves hardly any pairs of neighbours, by comparisons of coordinates alone.
 //
-// Runs that are near each other are found in a hierarchical grid: a run lies in the grid whose
-// cells are just larger than its box, in the cell of its lower left corner, and so in one cell of
-// one grid only, however long it is. It is compared with runs of its own grid and of coarser ones,
-// of which few cells can hold runs that reach it.
+// Successive runs of a ring form a block. Blocks that are near each other are found in a
+// hierarchical grid: a block lies in the grid whose cells are just larger than its box, in the cell
+// of its lower left corner, and so in one cell of one grid only, however long it is. It is compared
+// with blocks of its own grid and of coarser ones, of which few cells can hold blocks that reach
+// it. To compare all runs of two blocks costs less than to find each run's neighbours in a grid.
 #include "vertices/intersections.h"
 
 #include <algorithm>
@@ -22,9 +23,13 @@ namespace partiemc {
 namespace {
 
 using Run = TouchingPairsBuffers::Run;
+using Block = TouchingPairsBuffers::Block;
 
 // Segments of a run. Longer ones have larger boxes, of which more overlap.
 constexpr std::uint32_t kRunLength = 8;
+
+// Runs of a block.
+constexpr std::uint32_t kBlockRuns = 8;
 
 // Directions that all segments of a run may have.
 constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
@@ -47,6 +52,9 @@ struct Search {
   TouchingPairsBuffers& buffers;
   std::uint32_t used_levels = 0;
 
+  std::span<Run> RunsOf(const Block& block) const {
+    return std::span(buffers.runs).subspan(block.first_run, block.last_run - block.first_run);
+  }
   Segment SegmentAt(const Run& run, std::uint32_t i) const {
     return {PointAt(points, i), PointAt(points, i + 1 == run.ring_end ? run.ring_begin : i + 1)};
   }
@@ -70,48 +78,65 @@ void Measure(const Search& s, Run& run) {
   run.directions = static_cast<std::uint8_t>(directions);
 }
 
-void CollectRuns(Search& s, std::span<const std::uint32_t> ring_offsets) {
+void Measure(const Search& s, Block& block) {
+  Box box;
+  for (Run& run : s.RunsOf(block)) {
+    Measure(s, run);
+    box.Add({run.box.left, run.box.bottom});
+    box.Add({run.box.right, run.box.top});
+  }
+  block.box = box;
+}
+
+void CollectBlocks(Search& s, std::span<const std::uint32_t> ring_offsets) {
   std::vector<Run>& runs = s.buffers.runs;
+  std::vector<Block>& blocks = s.buffers.blocks;
   runs.clear();
+  blocks.clear();
   for (std::size_t ring = 0; ring + 1 < ring_offsets.size(); ++ring) {
     const std::uint32_t begin = ring_offsets[ring];
     const std::uint32_t end = ring_offsets[ring + 1];
+    const std::size_t first_run = runs.size();
     for (std::uint32_t first = begin; first < end; first += kRunLength) {
+      if ((runs.size() - first_run) % kBlockRuns == 0) {
+        blocks.push_back({.first_run = static_cast<std::uint32_t>(runs.size())});
+      }
       runs.push_back({.first = first,
                       .last = std::min(first + kRunLength, end),
                       .ring_begin = begin,
                       .ring_end = end});
+      blocks.back().last_run = static_cast<std::uint32_t>(runs.size());
     }
   }
-  ParallelFor(runs.size(), [&](std::size_t k) { Measure(s, runs[k]); });
+  ParallelFor(blocks.size(), [&](std::size_t k) { Measure(s, blocks[k]); });
 }
 
 HierarchicalGrid MakeGrid(const Search& s) {
   Box bounds;
   double extents = 0;
-  for (const Run& run : s.buffers.runs) {
-    bounds.Add({run.box.left, run.box.bottom});
-    bounds.Add({run.box.right, run.box.top});
-    extents += run.box.Extent();
+  for (const Block& block : s.buffers.blocks) {
+    bounds.Add({block.box.left, block.box.bottom});
+    bounds.Add({block.box.right, block.box.top});
+    extents += block.box.Extent();
   }
-  return HierarchicalGrid(bounds, extents / static_cast<double>(s.buffers.runs.size()));
+  return HierarchicalGrid(bounds, extents / static_cast<double>(s.buffers.blocks.size()));
 }
 
-/// Puts every run into its cell.
+/// Puts every block into its cell.
 void FillGrid(Search& s, const HierarchicalGrid& grid) {
-  std::vector<Run>& runs = s.buffers.runs;
+  std::vector<Block>& blocks = s.buffers.blocks;
   std::vector<std::uint32_t>& slots = s.buffers.slots;
-  slots.assign(std::bit_ceil(2 * runs.size()), kNoIndex);
+  slots.assign(std::bit_ceil(2 * blocks.size()), kNoIndex);
   s.used_levels = 0;
-  for (std::size_t k = 0; k < runs.size(); ++k) {
-    Run& run = runs[k];
-    const int level = grid.LevelFor(run.box.Extent());
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    Block& block = blocks[k];
+    const int level = grid.LevelFor(block.box.Extent());
     s.used_levels |= 1u << level;
-    run.level = static_cast<std::uint8_t>(level);
-    run.cell = HierarchicalGrid::Key(level, grid.Column(run.box.left, level),
-                                     grid.Row(run.box.bottom, level));
-    std::uint32_t& slot = slots[SlotOf(run.cell, slots.size())];
-    run.next_in_slot = slot;
+    block.level = static_cast<std::uint8_t>(level);
+    block.cell = HierarchicalGrid::Key(level, grid.Column(block.box.left, level),
+                                       grid.Row(block.box.bottom, level));
+    std::uint32_t& slot = slots[SlotOf(block.cell, slots.size())];
+    block.next_in_slot = slot;
     slot = static_cast<std::uint32_t>(k);
   }
 }
@@ -154,45 +179,63 @@ void ForEachPairBetween(const Search& s, const Run& first, const Run& second, Vi
   }
 }
 
-/// Calls visit(i, j) for all pairs that count, of segments of a run and of later ones. What a run
-/// may touch has its lower left corner no farther to the right and above than its box, and less
-/// than a cell to the left and below.
+template <typename Visit>
+void ForEachPairWithin(const Search& s, const Block& block, Visit visit) {
+  const std::span<const Run> runs = s.RunsOf(block);
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    ForEachPairWithin(s, runs[k], visit);
+    for (const Run& later : runs.subspan(k + 1)) ForEachPairBetween(s, runs[k], later, visit);
+  }
+}
+
+template <typename Visit>
+void ForEachPairBetween(const Search& s, const Block& first, const Block& second, Visit visit) {
+  if (!BoxesTouch(first.box, second.box)) return;
+  for (const Run& run : s.RunsOf(first)) {
+    if (!BoxesTouch(run.box, second.box)) continue;
+    for (const Run& other : s.RunsOf(second)) ForEachPairBetween(s, run, other, visit);
+  }
+}
+
+/// Calls visit(i, j) for all pairs that count, of segments of a block and of later ones. What a
+/// block may touch has its lower left corner no farther to the right and above than its box, and
+/// less than a cell to the left and below.
 template <typename Visit>
 void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t index, Visit visit) {
-  const std::span<const Run> runs = s.buffers.runs;
+  const std::span<const Block> blocks = s.buffers.blocks;
   const std::span<const std::uint32_t> slots = s.buffers.slots;
-  const Run& run = runs[index];
-  ForEachPairWithin(s, run, visit);
-  for (int level = run.level; s.used_levels >> level != 0; ++level) {
+  const Block& block = blocks[index];
+  ForEachPairWithin(s, block, visit);
+  for (int level = block.level; s.used_levels >> level != 0; ++level) {
     if ((s.used_levels >> level & 1u) == 0) continue;
     const std::int64_t first_column =
-        std::max<std::int64_t>(grid.Column(run.box.left, level) - 1, 0);
-    const std::int64_t last_column = grid.Column(run.box.right, level);
-    const std::int64_t first_row = std::max<std::int64_t>(grid.Row(run.box.bottom, level) - 1, 0);
-    const std::int64_t last_row = grid.Row(run.box.top, level);
-    // Of two runs of one level, the earlier one finds the pairs.
-    const bool finds_all = run.level < level;
+        std::max<std::int64_t>(grid.Column(block.box.left, level) - 1, 0);
+    const std::int64_t last_column = grid.Column(block.box.right, level);
+    const std::int64_t first_row = std::max<std::int64_t>(grid.Row(block.box.bottom, level) - 1, 0);
+    const std::int64_t last_row = grid.Row(block.box.top, level);
+    // Of two blocks of one level, the earlier one finds the pairs.
+    const bool finds_all = block.level < level;
     for (std::int64_t row = first_row; row <= last_row; ++row) {
       for (std::int64_t column = first_column; column <= last_column; ++column) {
         const std::uint64_t cell = HierarchicalGrid::Key(level, column, row);
         for (std::uint32_t other = slots[SlotOf(cell, slots.size())]; other != kNoIndex;
-             other = runs[other].next_in_slot) {
-          if (runs[other].cell != cell || (!finds_all && other <= index)) continue;
-          ForEachPairBetween(s, run, runs[other], visit);
+             other = blocks[other].next_in_slot) {
+          if (blocks[other].cell != cell || (!finds_all && other <= index)) continue;
+          ForEachPairBetween(s, block, blocks[other], visit);
         }
       }
     }
   }
 }
 
-/// Finds out which runs find pairs; returns whether any does.
+/// Finds out which blocks find pairs; returns whether any does.
 bool FindPairs(Search& s, const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
-  ParallelFor(static_cast<std::uint32_t>(s.buffers.runs.size()), [&](std::uint32_t index) {
-    Run& run = s.buffers.runs[index];
-    run.finds_pair = false;
-    ForEachPair(s, grid, index, [&](std::uint32_t, std::uint32_t) { run.finds_pair = true; });
-    if (run.finds_pair) has_pair.store(true, std::memory_order_relaxed);
+  ParallelFor(static_cast<std::uint32_t>(s.buffers.blocks.size()), [&](std::uint32_t index) {
+    Block& block = s.buffers.blocks[index];
+    block.finds_pair = false;
+    ForEachPair(s, grid, index, [&](std::uint32_t, std::uint32_t) { block.finds_pair = true; });
+    if (block.finds_pair) has_pair.store(true, std::memory_order_relaxed);
   });
   return has_pair;
 }
@@ -203,19 +246,19 @@ std::size_t CountTouchingPairs(std::span<const double> points,
                                std::span<const std::uint32_t> ring_offsets,
                                TouchingPairsBuffers& buffers) {
   Search s{points, buffers};
-  CollectRuns(s, ring_offsets);
+  CollectBlocks(s, ring_offsets);
   buffers.pairs.clear();
-  if (buffers.runs.empty()) return 0;
+  if (buffers.blocks.empty()) return 0;
   const HierarchicalGrid grid = MakeGrid(s);
   FillGrid(s, grid);
-  // Nearly all frames have no pair. Pairs are listed in the order of the runs, whatever the number
-  // of threads.
+  // Nearly all frames have no pair. Pairs are listed in the order of the blocks, whatever the
+  // number of threads.
   if (!FindPairs(s, grid)) return 0;
   std::size_t count = 0;
   const std::size_t max_pairs = points.size() / 2;
-  for (std::uint32_t run = 0; run < buffers.runs.size(); ++run) {
-    if (!buffers.runs[run].finds_pair) continue;
-    ForEachPair(s, grid, run, [&](std::uint32_t i, std::uint32_t j) {
+  for (std::uint32_t block = 0; block < buffers.blocks.size(); ++block) {
+    if (!buffers.blocks[block].finds_pair) continue;
+    ForEachPair(s, grid, block, [&](std::uint32_t i, std::uint32_t j) {
       ++count;
       if (buffers.pairs.size() < max_pairs) buffers.pairs.emplace_back(i, j);
     });

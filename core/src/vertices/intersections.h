@@ -19,13 +19,20 @@ struct TouchingPairsBuffers {
     Box box;                             // Around them.
     std::uint32_t first, last;           // Segments [first, last),
     std::uint32_t ring_begin, ring_end;  // of a ring of [ring_begin, ring_end).
-    std::uint64_t cell = 0;              // Where it lies in the grid of its size.
-    std::uint32_t next_in_slot = 0;      // A list of runs whose cells share a slot.
-    std::uint8_t level = 0;              // Of its grid (intersections.cc).
     std::uint8_t directions = 0;         // In which all of its segments go (intersections.cc).
-    bool finds_pair = false;             // Whether it is the earlier one of a pair that counts.
+  };
+  /// Successive runs of a ring.
+  struct Block {
+    Box box;                      // Around them.
+    std::uint32_t first_run = 0;  // Runs [first_run, last_run).
+    std::uint32_t last_run = 0;
+    std::uint64_t cell = 0;          // Where it lies in the grid of its size.
+    std::uint32_t next_in_slot = 0;  // A list of blocks whose cells share a slot.
+    std::uint8_t level = 0;          // Of its grid (intersections.cc).
+    bool finds_pair = false;         // Whether it is the earlier one of a pair that counts.
   };
   std::vector<Run> runs;
+  std::vector<Block> blocks;
   std::vector<std::uint32_t> slots;
 
   /// Pairs that were counted, each segment named by the point that it begins at. At most as many as

@@ -1,4 +1,4 @@
-// Stage 6 of 8: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
+// Stage 6 of 9: cell planes -> vertices of the rings (paper, sections 3.4-3.5).
 #pragma once
 
 #include <cstdint>

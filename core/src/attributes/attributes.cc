@@ -1,0 +1,246 @@
+#include "attributes/attributes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "base/parallel.h"
+#include "base/point.h"
+#include "bins/lattice.h"
+
+namespace partiemc {
+namespace {
+
+// Of the squares of distances over the kernel radius; around a vertex inside their mean is .1 along
+// each axis, at a straight rim .03 across it.
+constexpr double kSlopeRidge = 1e-3;
+
+constexpr std::size_t kVerticesAtOnce = 256;
+
+constexpr double kLargest = std::numeric_limits<float>::max();
+
+// Points of the rings, and then the others of the mesh: its first ones are those of the rings (M3).
+std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh) {
+  return mesh.points.size() > rings.points.size() ? mesh.points : rings.points;
+}
+
+// How tiles are divided: into powers of two of cells.
+class Buckets {
+ public:
+  explicit Buckets(double radius) {
+    while (shift_ < kTileShift && (2 << shift_) <= radius) ++shift_;
+  }
+  int Along() const { return kTileSize >> shift_; }
+  // And the end of the last one.
+  std::size_t OffsetCount() const { return static_cast<std::size_t>(Along()) * Along() + 1; }
+  int Of(double coordinate) const { return static_cast<int>(coordinate) >> shift_; }
+  std::size_t Of(const BinnedParticle& particle) const {
+    return static_cast<std::size_t>(Of(particle.y)) * Along() + Of(particle.x);
+  }
+
+ private:
+  int shift_ = 0;
+};
+
+// Sums over particles around a vertex, D = x_i - x over the kernel radius, and then the value there
+// of a plane through what they carry.
+class PlaneFit {
+ public:
+  void Add(double weight, double dx, double dy) {
+    sum_ += weight;
+    x_ += weight * dx;
+    y_ += weight * dy;
+    xx_ += weight * dx * dx;
+    xy_ += weight * dx * dy;
+    yy_ += weight * dy * dy;
+  }
+
+  // What the three sums of a carried value, of weight, weight D_x and weight D_y, count: the first
+  // row of the inverse of the moments.
+  std::array<double, 3> Shares() const {
+    if (sum_ == 0) return {};
+    const double xx = xx_ + kSlopeRidge * sum_, yy = yy_ + kSlopeRidge * sum_;
+    const double determinant = xx * yy - xy_ * xy_;
+    const double along_x = (x_ * yy - y_ * xy_) / determinant;
+    const double along_y = (y_ * xx - x_ * xy_) / determinant;
+    const double constant = 1 / (sum_ - x_ * along_x - y_ * along_y);
+    return {constant, -along_x * constant, -along_y * constant};
+  }
+
+ private:
+  double sum_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
+};
+
+class Interpolation {
+ public:
+  Interpolation(const Frame& frame, const ParticleBins& bins, const Scale& scale,
+                AttributeScratch& scratch)
+      : frame_(frame),
+        bins_(bins),
+        scale_(scale),
+        scratch_(scratch),
+        buckets_(scale.kernel_radius) {}
+
+  void FindTiles(std::span<const double> vertices) {
+    const TileDirectory& directory = bins_.tiles;
+    scratch_.tile_of.resize(vertices.size() / 2);
+    scratch_.is_wanted.assign(directory.size(), 0);
+    TileCoordinate last{};
+    std::uint32_t tile = kNoTile;
+    for (std::size_t k = 0; k < scratch_.tile_of.size(); ++k) {
+      const TileCoordinate at{TileAlong(vertices[2 * k + 1]), TileAlong(vertices[2 * k])};
+      if (tile == kNoTile || at != last) tile = directory.Find(last = at);
+      scratch_.tile_of[k] = tile;
+      if (tile != kNoTile) scratch_.is_wanted[tile] |= 1;
+    }
+    for (std::uint32_t t = 0; t < directory.size(); ++t) {
+      if ((scratch_.is_wanted[t] & 1) == 0) continue;
+      for (const std::uint32_t near : directory.neighbours(t)) {
+        if (near != kNoTile) scratch_.is_wanted[near] |= 2;
+      }
+    }
+  }
+
+  // Particles keep the places that their tiles have in the bins.
+  void SortParticles() {
+    scratch_.particles.resize(bins_.particles.size());
+    scratch_.buckets.resize(bins_.tiles.size() * buckets_.OffsetCount());
+    ParallelFor(bins_.tiles.size(), [&](std::size_t tile) {
+      if (scratch_.is_wanted[tile] != 0) SortTile(tile);
+    });
+  }
+
+  void At(std::span<const double> vertices, std::vector<AttributeValues>& values) const {
+    ParallelForRanges(vertices.size() / 2, kVerticesAtOnce,
+                      [&](std::size_t first, std::size_t last) {
+                        for (std::size_t k = first; k < last; ++k) {
+                          AtVertex(k, {vertices[2 * k], vertices[2 * k + 1]}, values);
+                        }
+                      });
+  }
+
+ private:
+  // Of a value of a particle: weighted, and that times D_x and D_y.
+  using Carried = std::array<double, 3>;
+
+  std::int32_t TileAlong(double world) const {
+    return static_cast<std::int32_t>(std::floor(world / scale_.cell_size / kTileSize));
+  }
+
+  const std::uint32_t* OffsetsOf(std::size_t tile) const {
+    return scratch_.buckets.data() + tile * buckets_.OffsetCount();
+  }
+
+  void SortTile(std::size_t tile) {
+    std::uint32_t* const offsets = scratch_.buckets.data() + tile * buckets_.OffsetCount();
+    const std::size_t count = buckets_.OffsetCount() - 1;
+    const std::uint32_t first = bins_.offsets[tile], last = bins_.offsets[tile + 1];
+    std::fill_n(offsets, count + 1, 0);
+    for (std::uint32_t i = first; i < last; ++i) ++offsets[buckets_.Of(bins_.particles[i])];
+    // Ends of buckets; they go down to the beginnings as particles come, last ones first.
+    std::uint32_t end = first;
+    for (std::size_t bucket = 0; bucket <= count; ++bucket) {
+      offsets[bucket] = end += offsets[bucket];
+    }
+    for (std::uint32_t i = last; i-- > first;) {
+      const BinnedParticle& particle = bins_.particles[i];
+      const double weight = bins_.weight.empty() ? scale_.uniform_weight : double{bins_.weight[i]};
+      scratch_.particles[--offsets[buckets_.Of(particle)]] = {
+          particle.x, particle.y, static_cast<float>(weight), particle.source};
+    }
+  }
+
+  // Calls visit(particle, k w, D_x, D_y) for the particles that a kernel at a point reaches.
+  template <typename Visit>
+  void ForEachAround(std::uint32_t tile, Point point, const Visit& visit) const {
+    const double radius = scale_.kernel_radius;
+    for (std::size_t beside = 0; beside < 9; ++beside) {
+      const std::uint32_t near = bins_.tiles.neighbours(tile)[beside];
+      if (near == kNoTile || bins_.CountOf(near) == 0) continue;
+      const double x = point.x - kTileSize * (static_cast<int>(beside % 3) - 1);
+      const double y = point.y - kTileSize * (static_cast<int>(beside / 3) - 1);
+      if (x + radius < 0 || y + radius < 0 || x - radius >= kTileSize || y - radius >= kTileSize) {
+        continue;
+      }
+      const int left = buckets_.Of(std::max(x - radius, 0.0));
+      const int right = std::min(buckets_.Of(x + radius), buckets_.Along() - 1);
+      const int top = std::min(buckets_.Of(y + radius), buckets_.Along() - 1);
+      for (int row = buckets_.Of(std::max(y - radius, 0.0)); row <= top; ++row) {
+        const std::uint32_t* const offsets = OffsetsOf(near) + row * buckets_.Along();
+        for (std::uint32_t i = offsets[left]; i < offsets[right + 1]; ++i) {
+          const CarryingParticle& particle = scratch_.particles[i];
+          const double dx = (particle.x - x) / radius, dy = (particle.y - y) / radius;
+          const double within = 1 - dx * dx - dy * dy;
+          if (within <= 0) continue;
+          visit(particle, particle.weight * within * within * within, dx, dy);
+        }
+      }
+    }
+  }
+
+  void AtVertex(std::size_t vertex, Point world, std::vector<AttributeValues>& values) const {
+    PlaneFit fit;
+    std::array<Carried, kMostAttributeValues> carried;
+    std::size_t count = 0;
+    for (const Attribute& attribute : frame_.attributes) count += attribute.components;
+    std::fill_n(carried.begin(), count, Carried{});
+    if (const std::uint32_t tile = scratch_.tile_of[vertex]; tile != kNoTile) {
+      const TileCoordinate& at = bins_.tiles[tile];
+      const Point point{world.x / scale_.cell_size - double{kTileSize} * at.x,
+                        world.y / scale_.cell_size - double{kTileSize} * at.y};
+      ForEachAround(tile, point,
+                    [&](const CarryingParticle& particle, double weight, double dx, double dy) {
+                      fit.Add(weight, dx, dy);
+                      Carried* sums = carried.data();
+                      for (const Attribute& attribute : frame_.attributes) {
+                        const float* value =
+                            &attribute.values[particle.source * std::size_t(attribute.components)];
+                        for (int c = 0; c < attribute.components; ++c, ++sums) {
+                          const double weighted = weight * value[c];
+                          (*sums)[0] += weighted;
+                          (*sums)[1] += weighted * dx;
+                          (*sums)[2] += weighted * dy;
+                        }
+                      }
+                    });
+    }
+    const auto [constant, along_x, along_y] = fit.Shares();
+    const Carried* sums = carried.data();
+    for (AttributeValues& attribute : values) {
+      for (int c = 0; c < attribute.components; ++c, ++sums) {
+        const double value = constant * (*sums)[0] + along_x * (*sums)[1] + along_y * (*sums)[2];
+        attribute.values[vertex * attribute.components + c] =
+            static_cast<float>(std::clamp(value, -kLargest, kLargest));
+      }
+    }
+  }
+
+  const Frame& frame_;
+  const ParticleBins& bins_;
+  const Scale& scale_;
+  AttributeScratch& scratch_;
+  const Buckets buckets_;
+};
+
+}  // namespace
+
+void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
+                           const Rings& rings, const Mesh& mesh, AttributeScratch& scratch,
+                           std::vector<AttributeValues>& values) {
+  const std::span<const double> vertices = VerticesOf(rings, mesh);
+  values.resize(frame.attributes.size());
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const Attribute& attribute = frame.attributes[k];
+    values[k].name = attribute.name;
+    values[k].components = attribute.components;
+    values[k].values.resize(vertices.size() / 2 * attribute.components);
+  }
+  Interpolation interpolation(frame, bins, scale, scratch);
+  interpolation.FindTiles(vertices);
+  interpolation.SortParticles();
+  interpolation.At(vertices, values);
+}
+
+}  // namespace partiemc
