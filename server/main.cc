@@ -9,8 +9,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <thread>
+#include <tuple>
 
 #include "absl/synchronization/mutex.h"
 #include "server/compute/heap.h"
@@ -43,7 +45,8 @@ void TakeAllDescriptors() {
 }
 
 // Under a temporary name first: who waits for the file must not read half of it.
-absl::Status WritePortFile(const std::string& path, const Address& address) {
+absl::Status WritePortFile(const std::string& flag, const std::string& path,
+                           const Address& address) {
   const std::string temporary = path + ".part";
   std::ofstream file(temporary);
   file << address.ToString() << '\n';
@@ -51,7 +54,7 @@ absl::Status WritePortFile(const std::string& path, const Address& address) {
   std::error_code error;
   if (file.good()) std::filesystem::rename(temporary, path, error);
   if (!file.good() || error) {
-    return absl::UnavailableError("cannot write --port-file " + path +
+    return absl::UnavailableError("cannot write " + flag + " " + path +
                                   ": is its folder there, and may this user write to it?");
   }
   return absl::OkStatus();
@@ -103,10 +106,12 @@ int Serve(const CommandLine& line) {
   RefuseTraces();
   auto server = Server::Start(line.server);
   if (!server.ok()) return Fail(server.status());
-  if (line.port_file) {
-    if (auto status = WritePortFile(*line.port_file, (*server)->address()); !status.ok()) {
-      return Fail(status);
-    }
+  const auto web = (*server)->web_address();
+  for (const auto& [flag, path, address] :
+       {std::tuple("--port-file", line.port_file, std::optional((*server)->address())),
+        std::tuple("--web-port-file", line.web_port_file, web)}) {
+    if (!path || !address) continue;
+    if (auto status = WritePortFile(flag, *path, *address); !status.ok()) return Fail(status);
   }
   const auto metrics = (*server)->metrics_address();
   LogEvent(spdlog::level::info, "listening on " + (*server)->address().ToString(),
@@ -116,6 +121,7 @@ int Serve(const CommandLine& line) {
             {"memory_budget", line.server.limits.memory_budget},
             {"tls", line.server.tls ? "on" : "off"},
             {"tokens", line.server.token_file ? "on" : "off"},
+            {"web", web ? web->ToString() : "off"},
             {"metrics", metrics ? metrics->ToString() : "off"}});
   int signal = 0;
   sigwait(&signals, &signal);

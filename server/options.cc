@@ -50,6 +50,8 @@ struct Raw {
   std::string token_file;
   std::string checkpoint_key_file;
   std::string metrics;
+  std::string web, web_port_file;
+  WebOptions web_options;
   TlsFiles tls;
   std::string log_format = "text";
   CommandLine line;
@@ -162,6 +164,16 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->type_name("BYTES")
       ->envname("PARTIEMC_MAX_WATCHER_BYTES")
       ->group(kGroup);
+  app.add_option("--history-bytes", limits.history_bytes,
+                 "Results of a stream that are kept for watchers who come late or go back, units "
+                 "as in 64MB allowed, the oldest dropped; of all streams at most an eighth of "
+                 "--memory-budget, in equal shares; 0: none")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50))
+      ->capture_default_str()
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_HISTORY_BYTES")
+      ->group(kGroup);
   app.add_option("--max-particles", limits.frame.max_particles, "Particles of one frame")
       ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostParticles))
       ->capture_default_str()
@@ -185,7 +197,8 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->envname("PARTIEMC_MAX_FRAME_BYTES")
       ->group(kGroup);
   app.add_option("--memory-budget", raw.line.server.limits.memory_budget,
-                 "Bytes that requests and answers of all streams hold, units as in 2GB allowed; "
+                 "Bytes that requests, answers and histories of all streams hold, units as in 2GB "
+                 "allowed; "
                  "beyond it a stream has one frame in flight (default: half of the memory that "
                  "this machine or container has)")
       ->transform(CLI::AsSizeValue(false))
@@ -210,6 +223,44 @@ void AddMetrics(CLI::App& app, Raw& raw) {
       ->type_name("ADDRESS")
       ->envname("PARTIEMC_METRICS")
       ->group("Metrics");
+}
+
+void AddWeb(CLI::App& app, Raw& raw) {
+  const char* const kGroup = "Web (off without --web)";
+  CLI::Option* const web =
+      app.add_option("--web", raw.web,
+                     "Serve the viewer's page at http://ADDRESS/, 127.0.0.1:8080 say, and the "
+                     "methods over WebSocket, with the same TLS, tokens and limits")
+          ->type_name("ADDRESS")
+          ->envname("PARTIEMC_WEB")
+          ->group(kGroup);
+  app.add_option("--web-root", raw.web_options.root,
+                 "The folder with the built page (default: share/partiemc/viewer of where this is "
+                 "installed)")
+      ->needs(web)
+      ->type_name("DIR")
+      ->envname("PARTIEMC_WEB_ROOT")
+      ->group(kGroup);
+  app.add_option("--web-origin", raw.web_options.origins,
+                 "Let pages of this origin call too, https://HOST[:PORT]; may come several times. "
+                 "Those that this server serves may always, by the address that it listens on")
+      ->needs(web)
+      ->type_name("ORIGIN")
+      ->envname("PARTIEMC_WEB_ORIGIN")
+      ->group(kGroup);
+  app.add_option("--web-connections", raw.web_options.max_connections,
+                 "Connections at once; of those that make no call the oldest gives way")
+      ->check(CLI::Range(1, 65'536))
+      ->capture_default_str()
+      ->needs(web)
+      ->type_name("N")
+      ->envname("PARTIEMC_WEB_CONNECTIONS")
+      ->group(kGroup);
+  app.add_option("--web-port-file", raw.web_port_file, "As --port-file, for --web")
+      ->needs(web)
+      ->type_name("FILE")
+      ->envname("PARTIEMC_WEB_PORT_FILE")
+      ->group(kGroup);
 }
 
 void AddLogging(CLI::App& app, Raw& raw) {
@@ -253,6 +304,13 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
     if (!metrics.ok()) return Wrong("--metrics: " + std::string(metrics.status().message()));
     raw.line.server.metrics = *metrics;
   }
+  if (!raw.web.empty()) {
+    const auto web = ParseAddress(raw.web);
+    if (!web.ok()) return Wrong("--web: " + std::string(web.status().message()));
+    raw.web_options.address = *web;
+    raw.line.server.web = raw.web_options;
+    if (!raw.web_port_file.empty()) raw.line.web_port_file = raw.web_port_file;
+  }
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
   if (!raw.token_file.empty()) raw.line.server.token_file = raw.token_file;
   if (!raw.checkpoint_key_file.empty()) {
@@ -287,6 +345,7 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   AddServingOptions(app, raw);
   AddSecurity(app, raw);
   AddLimits(app, raw);
+  AddWeb(app, raw);
   AddMetrics(app, raw);
   AddLogging(app, raw);
   app.add_option(

@@ -18,6 +18,8 @@ struct CommandLine {
   std::chrono::milliseconds grace{4000};
   /// Where the address that was bound is written, once the server serves.
   std::optional<std::string> port_file;
+  /// The same of the gateway.
+  std::optional<std::string> web_port_file;
   /// Only ask the server at this address whether it serves.
   std::optional<Address> health_check;
   HealthCheckSecurity health_check_security;

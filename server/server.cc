@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <limits>
 #include <string>
 #include <thread>
 #include <utility>
@@ -13,27 +12,21 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/base/listening.h"
+#include "server/calls/methods.h"
 #include "server/compute/heap.h"
 #include "server/compute/worker_memory.h"
 #include "server/rpc/call_guard.h"
-#include "server/rpc/call_metrics.h"
 #include "server/rpc/health_service.h"
 #include "server/rpc/service.h"
 #include "server/security/tls_credentials.h"
 #include "server/telemetry/logging.h"
+#include "server/web/web_gateway.h"
 
 namespace partiemc::server {
 namespace {
 
 // What clients may do to find out that a connection is dead; gRPC's own 5 minutes are too long.
 constexpr int kShortestPingIntervalMs = 500;
-
-// gRPC ends a stream whose message is larger than it may receive, so it may receive somewhat more
-// than was announced: a frame that is slightly too large is answered by a FrameError instead.
-int ReceiveLimit(std::uint64_t max_frame_bytes) {
-  const std::uint64_t limit = max_frame_bytes + max_frame_bytes / 4;
-  return static_cast<int>(std::min<std::uint64_t>(limit, std::numeric_limits<int>::max()));
-}
 
 // Of one call, in its connection.
 constexpr int kUnreadBytes = 256 << 10;
@@ -49,10 +42,10 @@ constexpr std::chrono::milliseconds kTimeToClose(500);
 // Several times as long as a call takes to come in.
 constexpr std::chrono::milliseconds kQuiet(50);
 
-absl::Status CheckSecurity(const ServerOptions& options) {
-  if (options.tls || options.insecure || options.address.IsLocal()) return absl::OkStatus();
+absl::Status CheckSecurity(const ServerOptions& options, const Address& address) {
+  if (options.tls || options.insecure || address.IsLocal()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
-      "address ", options.address.ToString(), " can be reached from other machines, and ",
+      "address ", address.ToString(), " can be reached from other machines, and ",
       options.token_file ? "tokens" : "everything",
       " would travel in the clear; give --tls-cert and --tls-key, listen on 127.0.0.1, or add "
       "--insecure if the network is trusted"));
@@ -72,12 +65,14 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
   return secrets;
 }
 
-// How the process is watched. It may hold what it has begun with, its workers and the budget.
-// Frames of streams may be taken beyond that, and results that watchers have not taken are outside
-// of it: for either a sixteenth of the budget more, so that they turn nobody away at once.
+// How the process is watched. It may hold what it has begun with, its workers and the budget, of
+// which histories have a part. Frames of streams may be taken beyond that, and results that
+// watchers have not taken are outside of it: for either a sixteenth of the budget more, so that
+// they turn nobody away at once.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const WatchRegistry& watchers) {
-  const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes;
+  const std::uint64_t outside =
+      ResidentBytes() + options.threads * kWorkerBytes + options.limits.AllHistoryBytes();
   const std::uint64_t planned = budget.bytes(), more = planned / 16;
   return {.resident_bytes = ResidentBytes,
           .most_bytes =
@@ -99,24 +94,32 @@ Server::Server(const ServerOptions& options)
       authentication_(CallerQuota{.calls = options.limits.CallsOfOneCaller()}),
       tls_identity_(std::make_unique<CurrentTlsIdentity>()),
       opening_(options.limits.MaxOpeningCalls()),
+      history_(options.limits.history_bytes, options.limits.AllHistoryBytes()),
       watchers_(options.limits.max_watchers),
-      registry_(options.limits.max_streams),
+      registry_(options.limits.max_streams, options.limits.history_bytes > 0 ? &history_ : nullptr),
       calls_(options.limits.max_streams),
-      budget_(options.limits.memory_budget),
+      budget_(options.limits.FrameBudget()),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       idle_timer_(registry_, watchers_, calls_, options.limits),
       intake_guard_(opening_, WatchedProcess(options, budget_, watchers_)),
-      service_(std::make_unique<Service>(options_.limits, authentication_, opening_, registry_,
-                                         calls_, budget_, pool_, watchers_, dispatcher_,
-                                         checkpoint_keys_)),
+      methods_(std::make_unique<Methods>(options_.limits, authentication_, opening_, registry_,
+                                         calls_, budget_, pool_, watchers_, dispatcher_, history_,
+                                         checkpoint_keys_, *metrics_)),
+      service_(std::make_unique<Service>(*methods_)),
       health_(std::make_unique<HealthService>(authentication_, opening_, calls_, budget_)) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
-  if (auto status = CheckSecurity(options); !status.ok()) return status;
+  if (auto status = CheckSecurity(options, options.address); !status.ok()) return status;
+  if (options.web) {
+    if (auto status = CheckSecurity(options, options.web->address); !status.ok()) return status;
+  }
   if (auto status = CheckCanListen(options.address); !status.ok()) return status;
   std::unique_ptr<Server> server(new Server(options));
   if (auto status = server->LoadFiles(); !status.ok()) return status;
   if (auto status = server->Listen(); !status.ok()) return status;
+  if (options.web) {
+    if (auto status = server->OpenGateway(); !status.ok()) return status;
+  }
   server->reloader_.Start(options.reload_interval);
   if (options.metrics) {
     server->AddGauges();
@@ -184,6 +187,9 @@ void Server::AddGauges() {
       "Results that watchers have not taken yet, counted for each although they share them; "
       "outside of the budget.",
       [this] { return watchers_.held_bytes(); });
+  add("partiemc_history_bytes",
+      "Results that watchers can go back to, of all streams; a part of --memory-budget of its own.",
+      [this] { return history_.held(); });
   const auto count = [this](const char* name, const char* help, std::uint64_t LogLosses::*value) {
     metrics_->AddCounter(name, help, [value] { return static_cast<double>(LossesOfLog().*value); });
   };
@@ -209,11 +215,10 @@ absl::Status Server::Listen() {
   if (authentication_.required()) {
     interceptors.push_back(MakeGuardOfForeignServices(authentication_));
   }
-  if (options_.metrics) interceptors.push_back(MakeCallMetrics(*metrics_));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   builder.RegisterService(service_.get());
   builder.RegisterService(health_.get());
-  builder.SetMaxReceiveMessageSize(ReceiveLimit(options_.limits.max_frame_bytes));
+  builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.MaxMessageBytes()));
   // Clients ask a connection for a sign of life this often at most, whether it carries data or not.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                              kShortestPingIntervalMs);
@@ -250,7 +255,27 @@ absl::Status Server::Listen() {
   return absl::OkStatus();
 }
 
+absl::Status Server::OpenGateway() {
+  auto web = WebGateway::Start(*options_.web, {.methods = *methods_,
+                                               .limits = options_.limits,
+                                               .tls = options_.tls ? tls_identity_.get() : nullptr,
+                                               .metrics = *metrics_,
+                                               .draining = [this] { return registry_.draining(); },
+                                               .ping_interval = options_.keepalive.interval,
+                                               .ping_timeout = options_.keepalive.timeout});
+  if (!web.ok()) return web.status();
+  web_ = *std::move(web);
+  return absl::OkStatus();
+}
+
+std::optional<Address> Server::web_address() const {
+  if (web_ == nullptr) return std::nullopt;
+  return web_->address();
+}
+
 Server::~Server() {
+  // All of its calls end while what they use is there.
+  if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now());
   if (server_ == nullptr) return;
   server_->Shutdown(std::chrono::system_clock::now());
   server_->Wait();
@@ -289,7 +314,9 @@ void Server::Drain(std::chrono::milliseconds grace) {
   const auto left = std::clamp<std::chrono::steady_clock::duration>(
       deadline - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration::zero(),
       kTimeToClose);
-  server_->Shutdown(std::chrono::system_clock::now() + left);
+  const auto closed = std::chrono::system_clock::now() + left;
+  if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + left);
+  server_->Shutdown(closed);
   server_->Wait();
   metrics_endpoint_.reset();  // Last, so that the drain can be watched.
 }

@@ -1,4 +1,5 @@
-// The running server: gRPC's server with the service, health and reflection, and its drain.
+// The running server: gRPC's server with the service, health and reflection, its gateway, and its
+// drain.
 #pragma once
 
 #include <chrono>
@@ -22,8 +23,10 @@
 #include "server/stream/unary_registry.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_endpoint.h"
+#include "server/watch/result_history.h"
 #include "server/watch/watch_dispatcher.h"
 #include "server/watch/watch_registry.h"
+#include "server/web/web_options.h"
 
 namespace grpc {
 class Channel;
@@ -33,9 +36,10 @@ class ServerCredentials;
 
 namespace partiemc::server {
 
-class CurrentTlsIdentity;
 class HealthService;
+class Methods;
 class Service;
+class WebGateway;
 
 /// How a server finds out that a connection is dead although nobody closed it. The name of a
 /// producer that vanished is free after both times.
@@ -61,6 +65,9 @@ struct ServerOptions {
   std::chrono::milliseconds reload_interval{1000};
   /// Where metrics are served over HTTP; they hold no names and no data of streams.
   std::optional<Address> metrics;
+  /// Where the viewer's page and the methods are served over HTTP and WebSocket, with the same
+  /// identity, tokens and limits.
+  std::optional<WebOptions> web;
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
@@ -84,6 +91,8 @@ class Server {
   const Address& address() const { return address_; }
   /// Where metrics are served, if they are.
   std::optional<Address> metrics_address() const;
+  /// Where the gateway is, if there is one.
+  std::optional<Address> web_address() const;
 
   /// To this server without a socket, for tests and embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
@@ -98,6 +107,7 @@ class Server {
 
   absl::Status LoadFiles();
   absl::Status Listen();
+  absl::Status OpenGateway();
   void AddGauges();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
@@ -109,6 +119,7 @@ class Server {
   std::unique_ptr<CurrentTlsIdentity> tls_identity_;
   std::shared_ptr<grpc::ServerCredentials> credentials_;
   OpeningCalls opening_;
+  HistoryRoom history_;
   WatchDispatcher dispatcher_;
   WatchRegistry watchers_;
   StreamRegistry registry_;
@@ -117,9 +128,11 @@ class Server {
   ComputePool pool_;
   IdleTimer idle_timer_;
   IntakeGuard intake_guard_;
+  std::unique_ptr<Methods> methods_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<HealthService> health_;
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<WebGateway> web_;
   // The last two stop before what they load into and read from goes.
   FileReloader reloader_;
   std::unique_ptr<MetricsEndpoint> metrics_endpoint_;

@@ -1,4 +1,4 @@
-// A service of gRPC whose methods are all streams of bytes (server/rpc/byte_call.h).
+// A service of gRPC whose methods are all streams of bytes (server/calls/byte_call.h).
 #pragma once
 
 #include <grpcpp/impl/codegen/service_type.h>

@@ -2,35 +2,22 @@
 
 #include <grpc/grpc.h>
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
-#include "server/rpc/unary_requests.h"
+#include "server/calls/requests.h"
+#include "server/rpc/grpc_call.h"
 #include "server/telemetry/logging.h"
 
 namespace partiemc::server {
 namespace {
-
-constexpr char kHeader[] = "authorization";
 
 using grpc::experimental::InterceptionHookPoints;
 using grpc::experimental::Interceptor;
 using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerInterceptorFactoryInterface;
 using grpc::experimental::ServerRpcInfo;
-
-absl::StatusOr<Caller> Authenticate(const Authentication& authentication,
-                                    const grpc::ServerContextBase& context) {
-  const auto [begin, end] = context.client_metadata().equal_range(kHeader);
-  std::optional<std::string_view> authorization;
-  // Of several headers none counts: who is meant would depend on their order.
-  if (begin != end && std::next(begin) == end) {
-    authorization.emplace(begin->second.data(), begin->second.size());
-  }
-  return authentication.Authenticate(authorization, context.peer());
-}
 
 // Ends a refused call before its method has read anything.
 class Guard final : public Interceptor {
@@ -40,9 +27,10 @@ class Guard final : public Interceptor {
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
-      const auto client = Authenticate(authentication_, context_);
+      const CallOrigin origin = OriginOf(context_);
+      const auto client = authentication_.Authenticate(origin.authorization, origin.peer);
       if (!client.ok()) {
-        LogRefusal("call refused", context_.peer(), client.status());
+        LogRefusal("call refused", origin.peer, client.status());
         grpc_call_cancel_with_status(context_.c_call(), GRPC_STATUS_UNAUTHENTICATED,
                                      std::string(client.status().message()).c_str(), nullptr);
       }
@@ -72,28 +60,7 @@ class GuardFactory final : public ServerInterceptorFactoryInterface {
   const Authentication& authentication_;
 };
 
-absl::StatusOr<AdmittedCall> WithPlace(Caller caller) {
-  auto place = caller.account()->Take(CallerAccount::Kind::kCall);
-  if (!place.ok()) return place.status();
-  return AdmittedCall{std::move(caller), *std::move(place)};
-}
-
 }  // namespace
-
-absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication,
-                                   const grpc::ServerContextBase& context, Permission permission) {
-  auto caller = Authenticate(authentication, context);
-  if (!caller.ok()) return caller.status();
-  if (permission != nullptr) {
-    if (auto status = ((*caller).*permission)(); !status.ok()) return status;
-  }
-  return WithPlace(*std::move(caller));
-}
-
-absl::StatusOr<AdmittedCall> AdmitAnybody(const Authentication& authentication,
-                                          const grpc::ServerContextBase& context) {
-  return WithPlace(authentication.Anybody(context.peer()));
-}
 
 std::unique_ptr<ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(
     const Authentication& authentication) {

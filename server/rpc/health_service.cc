@@ -1,13 +1,15 @@
 #include "server/rpc/health_service.h"
 
+#include <memory>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "grpc/health/v1/health.pb.h"
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/rpc/unary_reactor.h"
-#include "server/rpc/unary_requests.h"
+#include "server/calls/requests.h"
+#include "server/calls/unary_call.h"
+#include "server/rpc/grpc_call.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {
@@ -34,10 +36,12 @@ absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
 HealthService::HealthService(const Authentication& authentication, OpeningCalls& opening,
                              UnaryRegistry& calls, MemoryBudget& budget) {
   Serve("/grpc.health.v1.Health/Check", [&, this](grpc::CallbackServerContext* context) {
-    return new UnaryReactor(
-        *context, AdmitAnybody(authentication, *context), UnaryKind::kInformation, opening, calls,
-        budget, nullptr,
-        [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
+    return new GrpcCall(*context, [&, this](CallChannel& channel, const CallOrigin& origin) {
+      return std::make_unique<UnaryCall>(
+          channel, /*meters=*/nullptr, AdmitAnybody(authentication, origin),
+          UnaryKind::kInformation, opening, calls, budget, /*pool=*/nullptr,
+          [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
+    });
   });
 }
 

@@ -5,7 +5,7 @@
 
 #include "server/compute/memory_budget.h"
 #include "server/rpc/byte_service.h"
-#include "server/rpc/call_guard.h"
+#include "server/security/authentication.h"
 #include "server/stream/opening_calls.h"
 #include "server/stream/unary_registry.h"
 

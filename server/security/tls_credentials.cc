@@ -3,6 +3,7 @@
 #include <grpc/grpc.h>
 #include <grpc/grpc_security.h>
 
+#include <cstdint>
 #include <string>
 
 namespace partiemc::server {

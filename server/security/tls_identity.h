@@ -2,7 +2,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -24,6 +28,29 @@ struct TlsFiles {
 struct TlsIdentity {
   std::string certificate, key, client_ca;
   std::chrono::system_clock::time_point not_after;  ///< Of the server's own certificate.
+};
+
+/// The identity in force. Safe from any thread.
+class CurrentTlsIdentity {
+ public:
+  struct Version {
+    std::uint64_t number = 0;  ///< One more for each change; 0: none yet.
+    std::shared_ptr<const TlsIdentity> identity;
+  };
+
+  void Set(TlsIdentity identity) {
+    auto next = std::make_shared<const TlsIdentity>(std::move(identity));
+    const std::lock_guard lock(mutex_);
+    version_ = {version_.number + 1, std::move(next)};
+  }
+  Version Get() const {
+    const std::lock_guard lock(mutex_);
+    return version_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  Version version_;
 };
 
 /// Reads the files and checks that they fit: a certificate, the key that belongs to it, and at

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 
 #include "partiemc/frame.h"
 #include "server/stream/stream_state_machine.h"
@@ -11,10 +12,11 @@
 
 namespace partiemc::server {
 
-/// At the worst, requests, answers and the buffers of compute threads hold `memory_budget`, and one
-/// frame for each stream. Outside of it each thread has 16 MiB for its buffers, and may take up to
-/// 500 bytes for each particle of a frame where the budget is used up (worker_memory.h): 50 are
-/// usual. A frame whose tiles need more than that is refused unless the budget has room for them.
+/// At the worst, requests, answers, the buffers of compute threads and the histories of streams
+/// hold `memory_budget`, and one frame for each stream. Outside of it each thread has 16 MiB for
+/// its buffers, and may take up to 500 bytes for each particle of a frame where the budget is used
+/// up (worker_memory.h): 50 are usual. A frame whose tiles need more than that is refused unless
+/// the budget has room for them.
 struct ServerLimits {
   /// Of one frame. More suits larger simulations; memory grows with it as said above.
   FrameLimits frame{.max_particles = 4'000'000, .max_tiles = 131'072};
@@ -22,6 +24,14 @@ struct ServerLimits {
   /// Of one serialised ParticleFrame; by default DefaultFrameBytes(frame.max_particles), and of a
   /// server's command line at most an eighth of its memory budget.
   std::uint64_t max_frame_bytes = DefaultFrameBytes(4'000'000);
+
+  /// Of one message of a client. A stream ends whose message is larger than that, so it is somewhat
+  /// more than was announced: a frame that is slightly too large is answered by a FrameError
+  /// instead.
+  std::uint64_t MaxMessageBytes() const {
+    return std::min<std::uint64_t>(max_frame_bytes + max_frame_bytes / 4,
+                                   std::numeric_limits<std::int32_t>::max());
+  }
 
   /// Of one checkpoint, sent or taken. A state has a byte or two for each particle of a body, 370
   /// or more for each that lies alone; what tiles and particles bound it to is far beyond any
@@ -35,9 +45,21 @@ struct ServerLimits {
   /// large frames flowing, four small ones; more only costs memory.
   std::uint32_t frames_in_flight = 4;
 
-  /// Bytes that requests, answers and compute threads hold together. While it is used up, a stream
-  /// is read from only when nothing of it is in flight. More suits many large streams.
+  /// Bytes that requests, answers, compute threads and histories hold together. While it is used
+  /// up, a stream is read from only when nothing of it is in flight. More suits many large streams.
   std::uint64_t memory_budget = std::uint64_t{1} << 30;
+
+  /// Results of one stream that watchers can go back to, with 512 bytes for each of them; 0: none.
+  std::uint64_t history_bytes = std::uint64_t{64} << 20;
+
+  /// Of all streams, in equal shares: an eighth of the budget at most, set apart for them so that
+  /// no frame ever waits for what somebody might want to see again.
+  std::uint64_t AllHistoryBytes() const {
+    const std::uint64_t most = memory_budget / 8;
+    return history_bytes <= most / std::max(1u, max_streams) ? history_bytes * max_streams : most;
+  }
+  /// What is left of the budget for everything else.
+  std::uint64_t FrameBudget() const { return memory_budget - AllHistoryBytes(); }
 
   /// A stream costs next to nothing while it waits, but it keeps its name and its place.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};

@@ -64,8 +64,9 @@ absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
 
 }  // namespace
 
-StreamRegistry::StreamRegistry(std::uint32_t max_streams)
+StreamRegistry::StreamRegistry(std::uint32_t max_streams, HistoryRoom* history)
     : max_streams_(max_streams),
+      history_(history),
       id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
 
 absl::Status StreamRegistry::Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller) {
@@ -100,6 +101,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
     return status;
   }
   if (auto status = TakePlace(entry, former); !status.ok()) return status;
+  BeginHistory(description, former);
   entry.stream.emplace();
   entry.stream->number = ++opened_;
   entry.stream->id = id;
@@ -144,6 +146,18 @@ absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
   auto place = account.Take(CallerAccount::Kind::kStream);
   if (place.ok()) entry.place = *std::move(place);
   return place.status();
+}
+
+// Before anybody can find the stream to watch it.
+void StreamRegistry::BeginHistory(const StreamDescription& description, const Entry* former) {
+  if (history_ == nullptr || description.broadcaster == nullptr) return;
+  ResultBroadcaster* const before =
+      former != nullptr ? former->stream->description.broadcaster.get() : nullptr;
+  description.broadcaster->BeginHistory(*history_, before, description.next_sequence);
+  if (!history_->is_scarce()) return;
+  for (const auto& [machine, entry] : entries_) {
+    if (entry.IsOpen()) entry.stream->description.broadcaster->ShareRoom();
+  }
 }
 
 StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {

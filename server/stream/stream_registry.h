@@ -35,6 +35,7 @@ struct StreamDescription {
   std::map<std::string, std::string> labels;
   ReconstructionParameters parameters;             ///< As resolved.
   std::shared_ptr<ResultBroadcaster> broadcaster;  ///< Shows its results to watchers.
+  std::uint64_t next_sequence = 1;                 ///< Of the first frame that will come.
 };
 
 struct StreamSummary {
@@ -49,14 +50,17 @@ struct StreamSummary {
 /// Safe from any thread.
 class StreamRegistry {
  public:
-  explicit StreamRegistry(std::uint32_t max_streams);
+  /// Watchers of the streams can go back as far as `history`, which lives longer, has room; null:
+  /// not at all.
+  explicit StreamRegistry(std::uint32_t max_streams, HistoryRoom* history = nullptr);
 
   /// A call of `caller` comes in, not open yet: those are counted elsewhere (OpeningCalls).
   /// Errors: UNAVAILABLE (DRAINING).
   absl::Status Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller = {});
 
   /// Opens the stream of a machine that has entered. Where an open stream has the same `token`, the
-  /// new one takes over from it: its place, its name if none is given, and its machine ends.
+  /// new one takes over from it: its place, its name if none is given, its history, and its machine
+  /// ends.
   /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN),
   /// PERMISSION_DENIED (NOT_PERMITTED: the name is not one of the caller's), ALREADY_EXISTS
   /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS), UNAVAILABLE (DRAINING).
@@ -113,8 +117,10 @@ class StreamRegistry {
   static absl::Status TakePlace(Entry& entry, Entry* former);
   std::vector<std::shared_ptr<StreamStateMachine>> Machines() const;
   Entry* FindOpen(std::string_view token);
+  void BeginHistory(const StreamDescription& description, const Entry* former);
 
   const std::uint32_t max_streams_;
+  HistoryRoom* const history_;
   const std::string id_prefix_;  // Tells the ids of one run of a server from those of another.
 
   mutable std::mutex mutex_;  // Guards everything below.

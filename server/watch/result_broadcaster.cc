@@ -3,7 +3,6 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 
 namespace partiemc::server {
@@ -28,19 +27,44 @@ void ResultBroadcaster::CountWaits(Action action) {
   if (Sleeps() != sleeps) ++producer_waits_;
 }
 
-bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame) {
-  ++published_;
-  if (watcher_count_ == 0) {
-    if (frame->bytes() <= limits_.kept_bytes) {
-      mailbox_.Put({std::move(frame), published_}, /*keep_older=*/false);
-    } else {
-      mailbox_.Clear();
-    }
-    // Who has joined meanwhile may have found the mailbox empty.
-    return watcher_count_ != 0;
+void ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* former,
+                                     std::uint64_t next_sequence) {
+  std::vector<Published> frames;
+  if (former != nullptr) frames = former->HandOver();
+  const std::lock_guard lock(mutex_);
+  history_.emplace(room);
+  for (Published& published : frames) {
+    if (published.sequence >= next_sequence) break;
+    published.number = ++published_;
+    history_->Add(published);
   }
-  CountWaits([&] { mailbox_.Put({std::move(frame), published_}, /*keep_older=*/true); });
-  return true;
+  collected_ = published_;
+  if (!history_->empty()) newest_ = history_->at(history_->size() - 1);
+  NoteOldest();
+}
+
+std::vector<Published> ResultBroadcaster::HandOver() {
+  std::vector<Published> frames;
+  const std::lock_guard lock(mutex_);
+  Collect();
+  if (!history_) return frames;
+  frames.reserve(history_->size());
+  for (std::size_t k = 0; k < history_->size(); ++k) frames.push_back(history_->at(k));
+  if (watchers_.empty()) history_.reset();  // Else they may still have to read it.
+  return frames;
+}
+
+bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence) {
+  Published published{std::move(frame), ++published_, sequence};
+  if (watcher_count_ != 0) {
+    CountWaits([&] { mailbox_.Put(std::move(published)); });
+    return true;
+  }
+  mailbox_.Put(std::move(published));
+  // Otherwise whoever has the lock has come to watch, or the next frame takes this one along.
+  if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) Collect();
+  // Who has joined meanwhile may have found the mailbox empty.
+  return watcher_count_ != 0;
 }
 
 void ResultBroadcaster::Announce() {
@@ -55,61 +79,101 @@ void ResultBroadcaster::End(WatchEnd end) {
   dispatcher_.Wake(*this);
 }
 
-void ResultBroadcaster::Join(std::shared_ptr<WatchStateMachine> watcher) {
+ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMachine> watcher,
+                                                  std::optional<std::uint64_t> from) {
+  Joined joined;
   {
     const std::lock_guard lock(mutex_);
-    // From here on the mailbox keeps everything.
+    // From here on all that is published is offered.
     ++watcher_count_;
-    TakeNews();
-    watchers_.push_back({.machine = std::move(watcher), .first = newest_});
+    watchers_.push_back(std::move(watcher));
+    Collect();
+    joined.last_number = collected_;
+    if (newest_.frame != nullptr) {
+      joined.held = {.any = true, .oldest = oldest_sequence_, .newest = newest_.sequence};
+    }
+    const Published* const held = from && history_ ? history_->FromSequence(*from) : nullptr;
+    if (held != nullptr) {
+      joined.next_held = held->number;
+    } else if (!from || newest_.sequence >= *from) {
+      joined.first = newest_;
+    }
   }
   dispatcher_.Wake(*this);
+  return joined;
 }
 
 void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
-  Entry left;  // Given up without the lock, and so are the frames.
+  std::shared_ptr<WatchStateMachine> left;  // Given up without the lock, and so are the frames.
   std::vector<Published> news;
   Published newest;
   const std::lock_guard lock(mutex_);
   const auto found = std::ranges::find_if(
-      watchers_, [&](const Entry& entry) { return entry.machine.get() == &watcher; });
+      watchers_, [&](const auto& machine) { return machine.get() == &watcher; });
   if (found == watchers_.end()) return;
   left = std::move(*found);
   watchers_.erase(found);
   if (--watcher_count_ != 0) return;
   news = std::exchange(news_, {});
-  newest = std::exchange(newest_, {});
-  if (newest.frame != nullptr && newest.frame->bytes() <= limits_.kept_bytes) {
-    mailbox_.PutBack(std::move(newest));
-  }
+  newest = newest_;
+  Collect();
 }
 
-void ResultBroadcaster::TakeNews() {
-  std::vector<Published> news = mailbox_.Take();
-  if (news.empty()) return;
-  newest_ = news.back();
-  news_.insert(news_.end(), std::make_move_iterator(news.begin()),
-               std::make_move_iterator(news.end()));
+Published ResultBroadcaster::Held(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  if (number > collected_) Collect();  // The dispatcher may not have come to it yet.
+  const Published* const held = history_ ? history_->FromNumber(number) : nullptr;
+  return held != nullptr ? *held : Published();
+}
+
+void ResultBroadcaster::Collect() {
+  mailbox_.Take([this](Published published) {
+    collected_ = published.number;
+    if (history_) history_->Add(published);
+    if (!watchers_.empty()) news_.push_back(published);
+    newest_ = std::move(published);
+  });
+  const bool is_in_history = history_ && !history_->empty();
+  if (watchers_.empty() && !is_in_history && newest_.frame != nullptr &&
+      newest_.frame->bytes() > limits_.kept_bytes) {
+    newest_ = {};
+  }
+  NoteOldest();
+}
+
+void ResultBroadcaster::NoteOldest() {
+  oldest_sequence_ = history_ && !history_->empty() ? history_->at(0).sequence : newest_.sequence;
 }
 
 void ResultBroadcaster::Serve() {
   std::vector<Published> news;
-  std::vector<Entry> watchers;
+  std::vector<std::shared_ptr<WatchStateMachine>> watchers;
   std::optional<WatchEnd> end;
   {
     const std::lock_guard lock(mutex_);
-    if (watchers_.empty()) return;
-    TakeNews();
+    if (history_) history_->Shrink();
+    Collect();
     news = std::exchange(news_, {});
     watchers = watchers_;
-    for (Entry& entry : watchers_) entry.first = {};
     end = end_;
   }
-  for (const Entry& entry : watchers) {
-    if (entry.first.frame != nullptr) entry.machine->Offer({&entry.first, 1});
-    entry.machine->Offer(news);
-    if (end) entry.machine->StreamEnded(*end);
+  for (const auto& machine : watchers) {
+    machine->Offer(news);
+    if (end) machine->StreamEnded(*end);
   }
+  if (end) DropHistoryOf(watchers);
+}
+
+// The stream is over: unless one of them still reads the history, nobody ever will.
+void ResultBroadcaster::DropHistoryOf(
+    const std::vector<std::shared_ptr<WatchStateMachine>>& watchers) {
+  if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  if (watchers_ != watchers) return;
+  history_.reset();
+  NoteOldest();
 }
 
 }  // namespace partiemc::server

@@ -1,43 +1,36 @@
 #include "server/watch/result_mailbox.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace partiemc::server {
 
-void ResultMailbox::Put(Published published, bool keep_older) {
+void ResultMailbox::Put(Published published) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   auto* const post = new Post{std::move(published), nullptr, bytes};
-  // Taken back first, so that nobody else is at them while they are linked. Only PutBack can come
-  // between the two exchanges, and what it puts is older than this frame.
+  // Taken back first, so that nobody else is at them while they are linked. Nothing can come
+  // between the two exchanges: there is one who puts.
   Post* const older = posts_.exchange(nullptr);
   if (older != nullptr) {
-    if (keep_older && older->bytes + bytes <= max_bytes_) {
+    if (older->bytes + bytes <= max_bytes_) {
       post->older = older;
       post->bytes += older->bytes;
     } else {
       Delete(older);
     }
   }
-  Delete(posts_.exchange(post));
+  posts_ = post;
 }
 
-std::vector<Published> ResultMailbox::Take() {
-  std::vector<Published> taken;
-  Post* const newest = posts_.exchange(nullptr);
-  for (const Post* post = newest; post != nullptr; post = post->older) {
-    taken.push_back(post->published);
+void ResultMailbox::Take(absl::FunctionRef<void(Published)> taker) {
+  Post* oldest = nullptr;  // The list turned round: each leads to the newer one.
+  for (Post* post = posts_.exchange(nullptr); post != nullptr;) {
+    Post* const older = std::exchange(post->older, oldest);
+    oldest = std::exchange(post, older);
   }
-  Delete(newest);
-  std::reverse(taken.begin(), taken.end());
-  return taken;
-}
-
-void ResultMailbox::PutBack(Published published) {
-  const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
-  auto* const post = new Post{std::move(published), nullptr, bytes};
-  Post* nothing = nullptr;
-  if (!posts_.compare_exchange_strong(nothing, post)) delete post;
+  for (Post* post = oldest; post != nullptr;) {
+    taker(std::move(post->published));
+    delete std::exchange(post, post->older);
+  }
 }
 
 void ResultMailbox::Delete(Post* newest) {

@@ -6,34 +6,40 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
+
+#include "absl/functional/function_ref.h"
 
 namespace partiemc::server {
 
 /// A result as its transport made it for watchers: immutable, one for all of them.
 class WatchFrame {
  public:
-  explicit WatchFrame(std::size_t bytes) : bytes_(bytes) {}
+  explicit WatchFrame(std::size_t bytes) : WatchFrame(bytes, bytes) {}
+  WatchFrame(std::size_t bytes, std::size_t memory) : bytes_(bytes), memory_(memory) {}
   virtual ~WatchFrame() = default;
 
-  /// Memory that is kept by whoever keeps the frame.
+  /// Of the message.
   std::size_t bytes() const { return bytes_; }
+  /// That is kept by whoever keeps the frame: with what its answer has beside it, a checkpoint say.
+  std::size_t memory() const { return memory_; }
 
  private:
-  const std::size_t bytes_;
+  const std::size_t bytes_, memory_;
 };
 
-/// A result of a stream and its number: 1 for the first, then one more each.
+/// A result of a stream and its number: 1 for the first, then one more each. Refused frames use up
+/// sequence numbers, but none of these.
 struct Published {
   std::shared_ptr<const WatchFrame> frame;
   std::uint64_t number = 0;
+  std::uint64_t sequence = 0;  ///< Of the producer's frame.
 };
 
 /// What a published frame costs beside its bytes, roughly: so many small ones count as what they
 /// are.
 inline constexpr std::size_t kPublishedBytes = 512;
 
-/// Put and Clear come from one thread at a time, the others from any thread.
+/// Put comes from one thread at a time, Take from any thread.
 class ResultMailbox {
  public:
   /// Holds at most `max_bytes`, or one frame.
@@ -43,15 +49,11 @@ class ResultMailbox {
   ResultMailbox& operator=(const ResultMailbox&) = delete;
 
   /// Wait-free: two exchanges, whatever the other side does. What has not been taken yet stays
-  /// before it if `keep_older`, unless that would be too much.
-  void Put(Published published, bool keep_older);
-  /// Wait-free. Drops what has not been taken.
-  void Clear() { Delete(posts_.exchange(nullptr)); }
+  /// before it, unless that would be too much.
+  void Put(Published published);
 
-  /// What has come since, the oldest first.
-  std::vector<Published> Take();
-  /// Puts back what was taken, unless something newer is there.
-  void PutBack(Published published);
+  /// Hands over what has come since, the oldest first. Allocates nothing.
+  void Take(absl::FunctionRef<void(Published)> taker);
 
  private:
   struct Post {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/base/call_errors.h"
 #include "server/watch/result_broadcaster.h"
@@ -11,47 +10,9 @@
 namespace partiemc::server {
 namespace {
 
-// A watch that ends with an error says the same in its last message.
-WatchEnd EndWith(absl::Status status) {
-  const auto violation = FindViolation(status);
-  return {.reason = violation ? violation->reason : absl::StatusCodeToString(status.code()),
-          .message = std::string(status.message()),
-          .status = std::move(status)};
-}
-
-WatchEnd FellBehind(std::size_t frames, std::size_t bytes, std::size_t max_bytes) {
-  return EndWith(ViolationError(
-      absl::StatusCode::kResourceExhausted,
-      {std::string(kReasonFellBehind), "watcher",
-       absl::StrCat(frames, " frames of ", bytes, " bytes behind"),
-       absl::StrCat("must be at most ", max_bytes,
-                    " bytes behind in mode `every`; give credit sooner, or watch in mode "
-                    "`latest`")}));
-}
-
-WatchEnd TooLarge(std::size_t bytes, std::size_t max_bytes) {
-  return EndWith(ViolationError(
-      absl::StatusCode::kResourceExhausted,
-      {std::string(kReasonWatchedBytes), "frame", absl::StrCat(bytes, " bytes"),
-       absl::StrCat("must be at most ", max_bytes,
-                    " to be watched; have the producer ask for less, or start the server with a "
-                    "larger --max-watcher-bytes")}));
-}
-
 absl::Status WatcherGone() { return absl::CancelledError("the watcher went away"); }
 
 }  // namespace
-
-WatchEnd WatchEnd::OfStream(const absl::Status& status) {
-  if (status.ok()) return {std::string(kReasonFinished), "the producer has finished", {}};
-  if (absl::IsCancelled(status)) {
-    return {std::string(kReasonProducerLost), "the producer's connection is gone", {}};
-  }
-  WatchEnd end = EndWith(status);
-  // It is the producer that broke a rule, not the watcher.
-  if (!absl::IsUnavailable(status)) end.status = absl::OkStatus();
-  return end;
-}
 
 // Lets something happen to the state and does what follows from it.
 template <typename Event>
@@ -89,10 +50,10 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
   } else if (phase_ != Phase::kWatching && phase_ != Phase::kEnding) {
     return;
   } else if (request.kind != Kind::kCredit) {
-    End(EndWith(ProtocolError(request.kind == Kind::kOpen ? "open" : "no `credit`",
-                              "after the first every request must be `credit`")));
+    End(WatchEnd::With(ProtocolError(request.kind == Kind::kOpen ? "open" : "no `credit`",
+                                     "after the first every request must be `credit`")));
   } else if (request.credit == 0) {
-    End(EndWith(ViolationError(
+    End(WatchEnd::With(ViolationError(
         absl::StatusCode::kInvalidArgument,
         {std::string(kReasonOutOfRange), "credit.frames", "0", "must be at least 1"})));
   } else {
@@ -103,10 +64,9 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
 // The watcher joins before it is told that it is in, so that it misses nothing that is published
 // after that. Nothing is written, and nothing ends, until then.
 void WatchStateMachine::Open() {
-  absl::StatusOr<WatchTerms> terms = transport_.Open();
-  std::shared_ptr<ResultBroadcaster> broadcaster;
-  {
-    const std::lock_guard lock(mutex_);
+  const absl::StatusOr<WatchTerms> terms = transport_.Open();
+  On([&] {
+    opening_ = false;
     if (!terms.ok()) {
       Refuse(terms.status());
     } else if (phase_ == Phase::kOpening) {
@@ -114,11 +74,19 @@ void WatchStateMachine::Open() {
       owes_opened_ = true;
       mode_ = terms->mode;
       credit_ = terms->credit;
-      broadcaster = broadcaster_ = terms->broadcaster;
+      Join(*terms);
     }
-  }
-  if (broadcaster != nullptr) broadcaster->Join(shared_from_this());
-  On([&] { opening_ = false; });
+  });
+}
+
+void WatchStateMachine::Join(const WatchTerms& terms) {
+  broadcaster_ = terms.broadcaster;
+  const auto joined = broadcaster_->Join(shared_from_this(), terms.from_sequence);
+  held_ = joined.held;
+  if (joined.first.frame != nullptr) return Take(joined.first);
+  offered_ = joined.last_number;
+  next_held_ = joined.next_held;
+  next_told_ = next_held_ != 0 ? next_held_ : offered_ + 1;
 }
 
 void WatchStateMachine::ReadEnded() {
@@ -149,7 +117,14 @@ void WatchStateMachine::Offer(std::span<const Published> frames) {
   On([&] {
     for (const Published& published : frames) {
       if (phase_ != Phase::kWatching) return;
-      if (published.number > offered_) Take(published);
+      if (published.number <= offered_) continue;
+      // A frame that the history has no room for comes here alone, in its turn.
+      if (published.number == next_held_ && !IsHeld(next_held_)) CatchUp();
+      if (next_held_ == 0) {
+        Take(published);
+      } else {
+        offered_ = published.number;
+      }
     }
   });
 }
@@ -162,17 +137,65 @@ void WatchStateMachine::Take(const Published& published) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   if (bytes > max_bytes_) {
     ++counts_.dropped;
-    return End(TooLarge(published.frame->bytes(), max_bytes_));
+    return End(WatchEnd::TooLarge(published.frame->bytes(), max_bytes_));
   }
   if (mode_ == WatchMode::kLatest) {
     DropPending();
   } else if (missed > 0 || held_bytes_ + bytes > max_bytes_) {
+    if (missed == 0 && LeaveToHistory(published)) return;
     ++counts_.dropped;
-    return End(FellBehind(pending_.size() + missed + 1, held_bytes_ + bytes, max_bytes_));
+    return End(WatchEnd::FellBehind(pending_.size() + missed + 1, held_bytes_ + bytes, max_bytes_));
   }
   pending_.push_back(published);
   held_bytes_ += bytes;
   counts_.most_held_bytes = std::max(counts_.most_held_bytes, held_bytes_);
+}
+
+bool WatchStateMachine::IsHeld(std::uint64_t number) const {
+  return broadcaster_->Held(number).number == number;
+}
+
+// Instead of holding it, and what waits before it, where the history has all of it.
+bool WatchStateMachine::LeaveToHistory(const Published& published) {
+  const std::uint64_t first = pending_.empty() ? published.number : pending_.front().number;
+  if (!IsHeld(first)) return false;
+  for (const Published& left : pending_) held_bytes_ -= left.frame->bytes() + kPublishedBytes;
+  pending_.clear();
+  next_held_ = first;
+  return true;
+}
+
+// With credit, the next frame of the history is then pending.
+void WatchStateMachine::TakeHeld() {
+  Published held = broadcaster_->Held(next_held_);
+  if (held.number != next_held_) {
+    if (next_held_ > offered_) return CatchUp();  // It is about to be offered.
+    // Before its first frame a watcher has missed nothing: it begins with what is left.
+    if (mode_ == WatchMode::kEvery && counts_.frames > 0) {
+      return End(WatchEnd::NoLongerHeld(offered_ + 1 - next_held_));
+    }
+    MissUntil(held.frame != nullptr ? held.number : offered_ + 1);
+    if (held.frame == nullptr) return CatchUp();
+  }
+  if (held.frame->bytes() + kPublishedBytes > max_bytes_) {
+    return End(WatchEnd::TooLarge(held.frame->bytes(), max_bytes_));
+  }
+  if (credit_ == 0) return;
+  ++next_held_;
+  held_bytes_ += held.frame->bytes() + kPublishedBytes;
+  counts_.most_held_bytes = std::max(counts_.most_held_bytes, held_bytes_);
+  pending_.push_back(std::move(held));
+}
+
+// All before the next one has been taken out of the history: that one will be offered.
+void WatchStateMachine::CatchUp() {
+  offered_ = std::max(offered_, next_held_ - 1);
+  next_held_ = 0;
+}
+
+void WatchStateMachine::MissUntil(std::uint64_t number) {
+  counts_.dropped += number - next_held_;
+  next_held_ = number;
 }
 
 void WatchStateMachine::StreamEnded(const WatchEnd& end) {
@@ -191,7 +214,8 @@ void WatchStateMachine::StreamEnded(const WatchEnd& end) {
 void WatchStateMachine::Drain() {
   On([&] {
     if (phase_ == Phase::kOpening) Refuse(DrainingError());
-    if (phase_ == Phase::kWatching || phase_ == Phase::kEnding) End(EndWith(DrainingError()));
+    if (phase_ == Phase::kWatching || phase_ == Phase::kEnding)
+      End(WatchEnd::With(DrainingError()));
   });
 }
 
@@ -248,10 +272,18 @@ std::size_t WatchStateMachine::held_bytes() const {
   return held_bytes_;
 }
 
+bool WatchStateMachine::goes_back() const {
+  const std::lock_guard lock(mutex_);
+  return next_held_ != 0;
+}
+
 void WatchStateMachine::DropPending() {
   counts_.dropped += pending_.size();
   for (const Published& dropped : pending_) held_bytes_ -= dropped.frame->bytes() + kPublishedBytes;
   pending_.clear();
+  if (next_held_ == 0) return;
+  MissUntil(std::max(next_held_, offered_ + 1));
+  CatchUp();
 }
 
 // What is held is given up: there is no time to wait for credit, or no sense in it.
@@ -267,7 +299,7 @@ void WatchStateMachine::End(WatchEnd end) {
 void WatchStateMachine::Refuse(absl::Status status) {
   if (phase_ != Phase::kOpening) return;
   phase_ = Phase::kEnding;
-  end_ = EndWith(std::move(status));
+  end_ = WatchEnd::With(std::move(status));
 }
 
 void WatchStateMachine::Abandon(absl::Status status) {
@@ -301,9 +333,11 @@ WatchStateMachine::Actions WatchStateMachine::Decide() {
 }
 
 void WatchStateMachine::DecideWrite(Actions& actions) {
+  if (!owes_opened_ && next_held_ != 0) TakeHeld();
   if (owes_opened_) {
     owes_opened_ = false;
     actions.write = Write::kOpened;
+    actions.held = held_;
   } else if (!pending_.empty() && credit_ > 0) {
     --credit_;
     ++counts_.frames;
@@ -312,8 +346,9 @@ void WatchStateMachine::DecideWrite(Actions& actions) {
     pending_.pop_front();
     actions.frame = in_write_;
     actions.dropped = in_write_.number - next_told_;
+    actions.oldest_sequence = broadcaster_->oldest_sequence();
     next_told_ = in_write_.number + 1;
-  } else if (owes_ended_ && pending_.empty()) {
+  } else if (owes_ended_ && pending_.empty() && next_held_ == 0) {
     owes_ended_ = false;
     actions.write = Write::kEnded;
     actions.end = end_;
@@ -330,10 +365,10 @@ void WatchStateMachine::Perform(Actions actions) {
     if (actions.write) {
       switch (*actions.write) {
         case Write::kOpened:
-          transport_.WriteOpened();
+          transport_.WriteOpened(actions.held);
           break;
         case Write::kFrame:
-          transport_.WriteFrame(*actions.frame.frame, actions.dropped);
+          transport_.WriteFrame(*actions.frame.frame, actions.dropped, actions.oldest_sequence);
           break;
         case Write::kEnded:
           transport_.WriteEnded(actions.end, actions.dropped);

@@ -15,36 +15,23 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "server/watch/result_history.h"
 #include "server/watch/result_mailbox.h"
+#include "server/watch/watch_end.h"
 
 namespace partiemc::server {
 
 class ResultBroadcaster;
 
-/// The reasons for which a watch ends, beside those of StreamStateMachine (proto/PROTOCOL.md).
-inline constexpr std::string_view kReasonFellBehind = "FELL_BEHIND";
-inline constexpr std::string_view kReasonWatchedBytes = "WATCHED_BYTES";
-inline constexpr std::string_view kReasonFinished = "FINISHED";
-inline constexpr std::string_view kReasonProducerLost = "PRODUCER_LOST";
-inline constexpr std::string_view kReasonCreditUsed = "CREDIT_USED";
-
 enum class WatchMode { kLatest, kEvery };
-
-/// Why a watch ends, told to its watcher.
-struct WatchEnd {
-  std::string reason;
-  std::string message;  ///< For a person.
-  absl::Status status;  ///< Of the call.
-
-  /// For the watchers of a stream that ended with `status`.
-  static WatchEnd OfStream(const absl::Status& status);
-};
 
 /// What a watcher asked for when it came.
 struct WatchTerms {
   std::shared_ptr<ResultBroadcaster> broadcaster;  ///< Of the stream.
   WatchMode mode = WatchMode::kLatest;
   std::uint64_t credit = 1;
+  /// The frames that are held from this sequence number on come first; else the newest one.
+  std::optional<std::uint64_t> from_sequence = {};
 };
 
 /// What a request turned out to be.
@@ -67,8 +54,10 @@ class WatchTransport {
   virtual absl::StatusOr<WatchTerms> Open() = 0;
 
   /// Each begins to write; ends in WatchStateMachine::WriteDone.
-  virtual void WriteOpened() = 0;
-  virtual void WriteFrame(const WatchFrame& frame, std::uint64_t dropped) = 0;
+  virtual void WriteOpened(const HeldFrames& held) = 0;
+  /// `oldest_sequence`: what can be asked for now.
+  virtual void WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+                          std::uint64_t oldest_sequence) = 0;
   virtual void WriteEnded(const WatchEnd& end, std::uint64_t dropped) = 0;
 
   /// Has reads and writes that go on fail soon, whatever the other side does.
@@ -93,8 +82,14 @@ struct WatchCounts {
 ///
 /// A frame is written when there is credit and no other write goes on. Until then `latest` holds
 /// the newest one only; `every` holds all of them, at most `max_bytes`, the one being written
-/// included, and the watch ends when there would be more. Ending because the stream did, what is
-/// held is still written as credit comes. Safe from any thread.
+/// included; what there would be more waits in the stream's history, and where that does not have
+/// it either, the watch ends. Ending because the stream did, what is held is still written as
+/// credit comes. Safe from any thread.
+///
+/// A watcher that goes back takes frame after frame out of the history, in both modes, and holds
+/// none but the one being written. From the first that is not in the history yet it goes on with
+/// what is offered. What the history has dropped meanwhile, `latest` misses; `every` ends, unless
+/// it has not had a frame yet.
 class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine> {
  public:
   /// `transport` lives until its Finish returns. Held by shared_ptr only. A frame of more than
@@ -136,6 +131,8 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   WatchCounts counts() const;
   /// Of the frames that the watcher has not taken yet.
   std::size_t held_bytes() const;
+  /// Whether it still takes frames out of the stream's history.
+  bool goes_back() const;
 
  private:
   enum class Phase { kOpening, kWatching, kEnding, kAbandoned, kFinished };
@@ -145,9 +142,10 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   struct Actions {
     bool read = false;
     std::optional<Write> write;
+    HeldFrames held;
     Published frame;
     WatchEnd end;
-    std::uint64_t dropped = 0;
+    std::uint64_t dropped = 0, oldest_sequence = 0;
     std::optional<absl::Status> finish;
     std::shared_ptr<ResultBroadcaster> leave;
   };
@@ -156,7 +154,13 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   Actions Decide();
   void DecideWrite(Actions& actions);
   void TakeRequest(const WatchRequest& request);
+  void Join(const WatchTerms& terms);
   void Take(const Published& published);
+  bool IsHeld(std::uint64_t number) const;
+  bool LeaveToHistory(const Published& published);
+  void TakeHeld();
+  void CatchUp();
+  void MissUntil(std::uint64_t number);
   void End(WatchEnd end);
   void Refuse(absl::Status status);
   void Abandon(absl::Status status);
@@ -182,7 +186,9 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   std::deque<Published> pending_;  // Not yet written.
   Published in_write_;             // Its memory is the connection's for now.
   std::size_t held_bytes_ = 0;     // Of both.
+  HeldFrames held_;                // When it joined.
   std::uint64_t offered_ = 0;      // The number of the last frame offered; 0: none yet.
+  std::uint64_t next_held_ = 0;    // Of the next one to take out of the history; 0: goes on live.
   std::uint64_t next_told_ = 0;    // The number that the next frame has if none is dropped.
   bool reading_ = false, writing_ = false, opening_ = false;
   // Between the decision and the return of the transport's call: the transport has to stay.

@@ -1,4 +1,4 @@
-#include "server/rpc/reconstruct_reactor.h"
+#include "server/calls/reconstruct_call.h"
 
 #include <chrono>
 #include <optional>
@@ -32,15 +32,15 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
 
 }  // namespace
 
-ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
-                                       absl::StatusOr<AdmittedCall> admission,
-                                       const ServerLimits& limits, OpeningCalls& opening,
-                                       StreamRegistry& registry, MemoryBudget& budget,
-                                       ComputePool& pool, WatchDispatcher& dispatcher,
-                                       const CurrentCheckpointKeys& checkpoint_keys)
-    : ByteCall(context, std::move(admission)),
+ReconstructCall::ReconstructCall(CallChannel& channel, const MethodMeters* meters,
+                                 absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
+                                 OpeningCalls& opening, StreamRegistry& registry,
+                                 MemoryBudget& budget, ComputePool& pool,
+                                 WatchDispatcher& dispatcher,
+                                 const CurrentCheckpointKeys& checkpoint_keys)
+    : ByteCall(channel, meters, std::move(admission)),
       registry_(registry),
-      messages_(limits, registry, dispatcher, checkpoint_keys, {peer(), this->caller().name()}),
+      messages_(limits, registry, dispatcher, checkpoint_keys, {channel.peer(), caller().name()}),
       machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), messages_,
                                                     pool, budget, limits.frames_in_flight,
                                                     caller().account())) {
@@ -50,43 +50,42 @@ ReconstructReactor::ReconstructReactor(grpc::CallbackServerContext& context,
   machine_->Start(std::move(status));
 }
 
-void ReconstructReactor::OnReadDone(bool ok) {
-  RequestCame();
+void ReconstructCall::ReadDone(bool ok) {
   if (ok) {
     machine_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
   } else {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (IsCancelled()) machine_->Cancelled();
+    if (channel().IsCancelled()) machine_->Cancelled();
     machine_->ReadEnded();
   }
 }
 
-void ReconstructReactor::OnWriteDone(bool ok) {
+void ReconstructCall::WriteDone(bool ok) {
   messages_.Written(written_, written_slot_);
   machine_->WriteDone(ok);
 }
 
-void ReconstructReactor::OnCancel() { machine_->Cancelled(); }
+void ReconstructCall::OnCancel() { machine_->Cancelled(); }
 
-void ReconstructReactor::Left() { registry_.Leave(*machine_); }
+void ReconstructCall::OnDone() { registry_.Leave(*machine_); }
 
-void ReconstructReactor::StartRead(std::size_t slot) {
+void ReconstructCall::StartRead(std::size_t slot) {
   read_slot_ = slot;
-  ServerBidiReactor::StartRead(&messages_.request(slot));
+  channel().StartRead(&messages_.request(slot));
 }
 
-void ReconstructReactor::StartWrite(Outgoing what, std::size_t slot) {
+void ReconstructCall::StartWrite(Outgoing what, std::size_t slot) {
   written_ = what;
   written_slot_ = slot;
-  ServerBidiReactor::StartWrite(&messages_.response(what, slot));
+  channel().StartWrite(&messages_.response(what, slot));
 }
 
-void ReconstructReactor::Cut() { CancelCall(); }
+void ReconstructCall::Cut() { channel().Cancel(); }
 
-void ReconstructReactor::Finish(const absl::Status& status) {
+void ReconstructCall::Finish(const absl::Status& status) {
   // Closed first: a client that sees the end may open the same name again at once.
   const auto stream = registry_.Close(*machine_);
-  LogEnd(stream, peer(), status);
+  LogEnd(stream, channel().peer(), status);
   if (stream) stream->description.broadcaster->End(WatchEnd::OfStream(status));
   End(status);
 }

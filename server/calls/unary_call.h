@@ -1,5 +1,4 @@
-// The gRPC transport of a call of one request and one answer: translates between gRPC's callbacks
-// and a UnaryStateMachine.
+// A call of one request and one answer: translates between its channel and a UnaryStateMachine.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -11,35 +10,35 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/rpc/byte_call.h"
+#include "server/calls/byte_call.h"
 #include "server/stream/unary_registry.h"
 #include "server/stream/unary_state_machine.h"
 
 namespace partiemc::server {
 
-class UnaryReactor final : public ByteCall, private UnaryTransport {
+class UnaryCall final : public ByteCall, private UnaryTransport {
  public:
   /// Turns a request into an answer, as UnaryTransport::Answer, unless `cancelled`. The request may
   /// be cleared.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
 
-  /// The references outlive the call; without a pool the method is run by gRPC's own thread.
-  UnaryReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
-               UnaryKind kind, OpeningCalls& opening, UnaryRegistry& calls, MemoryBudget& budget,
-               ComputePool* pool, Method method);
+  /// The references outlive the call; without a pool the method is run by the channel's own thread.
+  UnaryCall(CallChannel& channel, const MethodMeters* meters,
+            absl::StatusOr<AdmittedCall> admission, UnaryKind kind, OpeningCalls& opening,
+            UnaryRegistry& calls, MemoryBudget& budget, ComputePool* pool, Method method);
 
-  void OnReadDone(bool ok) override;
-  void OnWriteDone(bool ok) override;
   void OnCancel() override;
+  void OnDone() override;
 
  private:
+  void ReadDone(bool ok) override;
+  void WriteDone(bool ok) override;
   void StartRead() override;
   absl::StatusOr<std::uint64_t> Answer(Worker* worker) override;
   void StartWrite() override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
-  void Left() override;
 
   UnaryRegistry& calls_;
   const Method method_;

@@ -1,4 +1,4 @@
-#include "server/rpc/unary_requests.h"
+#include "server/calls/requests.h"
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"

@@ -13,7 +13,7 @@
 
 #include "absl/status/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/rpc/resume.h"
+#include "server/calls/resume.h"
 #include "server/stream/limits.h"
 #include "server/stream/session.h"
 #include "server/stream/stream_registry.h"
@@ -31,7 +31,8 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
 
 /// As wire::DecodeFrame. Errors: those of it; FRAME_BYTES for a frame that is larger than was
 /// announced.
-absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits);
+absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits,
+                                        const wire::Outputs& outputs, wire::AttributeViews& views);
 
 /// Has `session` answer `frame`, taken to have the given sequence number, and writes the result
 /// into `message`. Errors: those of Session::Answer.

@@ -1,10 +1,11 @@
-#include "server/rpc/watch_reactor.h"
+#include "server/calls/watch_call.h"
 
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/rpc/unary_requests.h"
+#include "server/calls/requests.h"
+#include "server/calls/watched_result.h"
 #include "server/telemetry/logging.h"
 #include "server/watch/result_broadcaster.h"
 #include "wire/codec.h"
@@ -29,10 +30,10 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
 
 }  // namespace
 
-WatchReactor::WatchReactor(grpc::CallbackServerContext& context,
-                           absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
-                           OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers)
-    : ByteCall(context, std::move(admission)),
+WatchCall::WatchCall(CallChannel& channel, const MethodMeters* meters,
+                     absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
+                     OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers)
+    : ByteCall(channel, meters, std::move(admission)),
       opening_calls_(opening),
       streams_(streams),
       watchers_(watchers),
@@ -45,11 +46,10 @@ WatchReactor::WatchReactor(grpc::CallbackServerContext& context,
   machine_->Start(std::move(status));
 }
 
-void WatchReactor::OnReadDone(bool ok) {
-  RequestCame();
+void WatchCall::ReadDone(bool ok) {
   if (!ok) {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (IsCancelled()) machine_->Cancelled();
+    if (channel().IsCancelled()) machine_->Cancelled();
     return machine_->ReadEnded();
   }
   WatchRequest request;
@@ -65,21 +65,21 @@ void WatchReactor::OnReadDone(bool ok) {
   machine_->ReadDone(request);
 }
 
-void WatchReactor::OnWriteDone(bool ok) {
+void WatchCall::WriteDone(bool ok) {
   response_.Clear();
   machine_->WriteDone(ok);
 }
 
-void WatchReactor::OnCancel() { machine_->Cancelled(); }
+void WatchCall::OnCancel() { machine_->Cancelled(); }
 
-void WatchReactor::Left() { watchers_.Leave(*machine_); }
+void WatchCall::OnDone() { watchers_.Leave(*machine_); }
 
-void WatchReactor::StartRead() {
+void WatchCall::StartRead() {
   if (!stream_name_.empty()) MayGiveUp(opening_calls_, machine_);
-  ServerBidiReactor::StartRead(&request_);
+  channel().StartRead(&request_);
 }
 
-absl::StatusOr<WatchTerms> WatchReactor::Open() {
+absl::StatusOr<WatchTerms> WatchCall::Open() {
   const v1::OpenWatch& open = parsed_.open();
   const auto mode = DecodeMode(open.mode());
   if (!mode.ok()) return mode.status();
@@ -102,19 +102,27 @@ absl::StatusOr<WatchTerms> WatchReactor::Open() {
            {{"stream", stream->id},
             {"name", stream_name_},
             {"mode", *mode == WatchMode::kEvery ? "every" : "latest"},
-            {"peer", peer()},
+            {"peer", channel().peer()},
             {"client", caller().name()}});
-  return WatchTerms{
-      .broadcaster = description.broadcaster, .mode = *mode, .credit = open.credits()};
+  WatchTerms terms{.broadcaster = description.broadcaster, .mode = *mode, .credit = open.credits()};
+  if (open.has_from_sequence()) terms.from_sequence = open.from_sequence();
+  return terms;
 }
 
-void WatchReactor::WriteOpened() { Write(wire::ToBytes(opened_)); }
-
-void WatchReactor::WriteFrame(const WatchFrame& frame, std::uint64_t dropped) {
-  Write(static_cast<const WatchedResult&>(frame).bytes.ToResponse(dropped));
+void WatchCall::WriteOpened(const HeldFrames& held) {
+  v1::WatchOpened& opened = *opened_.mutable_opened();
+  opened.set_oldest_sequence(held.oldest);
+  opened.set_newest_sequence(held.newest);
+  opened.set_has_frames(held.any);
+  Write(wire::ToBytes(opened_));
 }
 
-void WatchReactor::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
+void WatchCall::WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+                           std::uint64_t oldest_sequence) {
+  Write(static_cast<const WatchedResult&>(frame).bytes.ToResponse(dropped, oldest_sequence));
+}
+
+void WatchCall::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
   end_reason_ = end.reason;
   v1::WatchStreamResponse response;
   response.mutable_ended()->set_reason(end.reason);
@@ -123,22 +131,22 @@ void WatchReactor::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
   Write(wire::ToBytes(response));
 }
 
-void WatchReactor::Write(grpc::ByteBuffer response) {
+void WatchCall::Write(grpc::ByteBuffer response) {
   response_.Swap(&response);
-  StartWrite(&response_);
+  channel().StartWrite(&response_);
 }
 
-void WatchReactor::Cut() { CancelCall(); }
+void WatchCall::Cut() { channel().Cancel(); }
 
-void WatchReactor::Finish(const absl::Status& status) {
+void WatchCall::Finish(const absl::Status& status) {
   watchers_.Close(*machine_);  // Who hears of the end may come again at once.
   LogEnd(status);
   End(status);
 }
 
-void WatchReactor::LogEnd(const absl::Status& status) const {
+void WatchCall::LogEnd(const absl::Status& status) const {
   if (stream_name_.empty()) {
-    LogRefusal("watch refused", peer(), status);
+    LogRefusal("watch refused", channel().peer(), status);
     return;
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;

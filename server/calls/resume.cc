@@ -1,5 +1,7 @@
-#include "server/rpc/resume.h"
+#include "server/calls/resume.h"
 
+#include <map>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -11,12 +13,15 @@ namespace {
 
 std::uint32_t NumberOf(const wire::Outputs& outputs) {
   // Names each part, so that a new one does not compile until it is bound, too.
-  const auto& [rings, mesh, normals, relative_float32, echo_particles] = outputs;
+  const auto& [rings, mesh, normals, relative_float32, echo_particles, attributes] = outputs;
   std::uint32_t number = 0;
   for (const bool part : {rings, mesh, normals, relative_float32, echo_particles}) {
     number = number << 1 | std::uint32_t{part};
   }
-  return number;
+  if (attributes.empty()) return number;
+  std::map<std::string, std::string> names;
+  for (const std::string& name : attributes) names.emplace(absl::StrCat(names.size()), name);
+  return number | static_cast<std::uint32_t>(FingerprintOf(names)) << 5;
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "server/rpc/unary_reactor.h"
+#include "server/calls/unary_call.h"
 
 #include <utility>
 
@@ -6,11 +6,10 @@
 
 namespace partiemc::server {
 
-UnaryReactor::UnaryReactor(grpc::CallbackServerContext& context,
-                           absl::StatusOr<AdmittedCall> admission, UnaryKind kind,
-                           OpeningCalls& opening, UnaryRegistry& calls, MemoryBudget& budget,
-                           ComputePool* pool, Method method)
-    : ByteCall(context, std::move(admission)),
+UnaryCall::UnaryCall(CallChannel& channel, const MethodMeters* meters,
+                     absl::StatusOr<AdmittedCall> admission, UnaryKind kind, OpeningCalls& opening,
+                     UnaryRegistry& calls, MemoryBudget& budget, ComputePool* pool, Method method)
+    : ByteCall(channel, meters, std::move(admission)),
       calls_(calls),
       method_(std::move(method)),
       machine_(std::make_shared<UnaryStateMachine>(static_cast<UnaryTransport&>(*this), budget,
@@ -21,8 +20,7 @@ UnaryReactor::UnaryReactor(grpc::CallbackServerContext& context,
   machine_->Start(std::move(status));
 }
 
-void UnaryReactor::OnReadDone(bool ok) {
-  RequestCame();
+void UnaryCall::ReadDone(bool ok) {
   if (ok) {
     if (auto status = calls_.TakePlace(*machine_, *caller().account()); !status.ok()) {
       return machine_->GiveWay(status);
@@ -30,23 +28,23 @@ void UnaryReactor::OnReadDone(bool ok) {
     machine_->ReadDone(request_.Length());
   } else {
     // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (IsCancelled()) machine_->Cancelled();
+    if (channel().IsCancelled()) machine_->Cancelled();
     machine_->ReadEnded();
   }
 }
 
-void UnaryReactor::OnWriteDone(bool ok) {
+void UnaryCall::WriteDone(bool ok) {
   answer_.Clear();
   machine_->WriteDone(ok);
 }
 
-void UnaryReactor::OnCancel() { machine_->Cancelled(); }
+void UnaryCall::OnCancel() { machine_->Cancelled(); }
 
-void UnaryReactor::Left() { calls_.Leave(*machine_); }
+void UnaryCall::OnDone() { calls_.Leave(*machine_); }
 
-void UnaryReactor::StartRead() { ServerBidiReactor::StartRead(&request_); }
+void UnaryCall::StartRead() { channel().StartRead(&request_); }
 
-absl::StatusOr<std::uint64_t> UnaryReactor::Answer(Worker* worker) {
+absl::StatusOr<std::uint64_t> UnaryCall::Answer(Worker* worker) {
   auto answer = method_(request_, worker, machine_->cancelled());
   request_.Clear();
   if (!answer.ok()) return answer.status();
@@ -54,14 +52,15 @@ absl::StatusOr<std::uint64_t> UnaryReactor::Answer(Worker* worker) {
   return answer_.Length();
 }
 
-void UnaryReactor::StartWrite() { ServerBidiReactor::StartWrite(&answer_); }
+void UnaryCall::StartWrite() { channel().StartWrite(&answer_); }
 
-void UnaryReactor::Cut() { CancelCall(); }
+void UnaryCall::Cut() { channel().Cancel(); }
 
-void UnaryReactor::Finish(const absl::Status& status) {
+void UnaryCall::Finish(const absl::Status& status) {
   answer_.Clear();                  // One that was not sent.
   calls_.GiveBackPlace(*machine_);  // Who hears of the end may come again at once.
-  if (!status.ok() && !absl::IsCancelled(status)) LogRefusal("call refused", peer(), status);
+  if (!status.ok() && !absl::IsCancelled(status))
+    LogRefusal("call refused", channel().peer(), status);
   End(status);
 }
 

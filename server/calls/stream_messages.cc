@@ -1,4 +1,4 @@
-#include "server/rpc/stream_messages.h"
+#include "server/calls/stream_messages.h"
 
 #include <chrono>
 #include <memory>
@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/rpc/watch_reactor.h"
+#include "server/calls/watched_result.h"
 #include "server/stream/stream_token.h"
 #include "server/telemetry/logging.h"
 #include "wire/message_bytes.h"
@@ -21,7 +21,8 @@ constexpr std::size_t kSmallBuffers = std::size_t{4} << 20;
 // What a worker keeps warm of messages: a frame's arrays are views into `request`.
 struct FrameMessages final : MessageBuffers {
   v1::ReconstructRequest request;
-  v1::ReconstructResponse result;  // Never an error, whose coming would drop its buffers.
+  v1::ReconstructResponse result;   // Never an error, whose coming would drop its buffers.
+  wire::AttributeViews attributes;  // Into `request`.
 };
 
 // Taken from the worker for as long as they are used: a session that has run out of memory drops
@@ -98,14 +99,14 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
   message.set_max_watchers(limits.max_watchers);
 }
 
-absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame,
-                                        const ServerLimits& limits) {
+absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits,
+                                        const wire::Outputs& outputs, wire::AttributeViews& views) {
   if (const std::size_t bytes = frame.ByteSizeLong(); bytes > limits.max_frame_bytes) {
     return ViolationError(absl::StatusCode::kResourceExhausted,
                           {std::string(kReasonFrameBytes), "frame", absl::StrCat(bytes, " bytes"),
                            absl::StrCat("must be at most ", limits.max_frame_bytes, " bytes")});
   }
-  return wire::DecodeFrame(frame);
+  return wire::DecodeFrame(frame, outputs.attributes, views);
 }
 
 absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
@@ -186,7 +187,8 @@ absl::Status StreamMessages::Open(std::size_t slot, const StreamStateMachine& st
                                {.name = terms.name,
                                 .labels = {open.labels().begin(), open.labels().end()},
                                 .parameters = session->parameters(),
-                                .broadcaster = broadcaster_},
+                                .broadcaster = broadcaster_,
+                                .next_sequence = session->next_sequence()},
                                token);
   if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
@@ -223,9 +225,9 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
   const v1::ParticleFrame& request = messages->request.frame();
   v1::ReconstructedFrame& result = *messages->result.mutable_frame();
   const std::uint64_t next_sequence = session_->next_sequence();
-  const absl::Status status =
-      AnswerFrame(parsed.ok() ? DecodeFrameWithin(request, limits_) : parsed, request.sequence(),
-                  outputs_, *session_, worker, cancelled, result);
+  const absl::Status status = AnswerFrame(
+      parsed.ok() ? DecodeFrameWithin(request, limits_, outputs_, messages->attributes) : parsed,
+      request.sequence(), outputs_, *session_, worker, cancelled, result);
   std::string checkpoint =
       CheckpointAfter(next_sequence, *session_, terms_, limits_, checkpoint_keys_);
   if (status.ok()) {
@@ -255,7 +257,8 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
 bool StreamMessages::ShowWatchers(std::size_t slot, const v1::ParticleFrame& request) {
   wire::WatchedBytes bytes(answers_[slot]);
   if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
-  return broadcaster_->Publish(std::make_shared<WatchedResult>(std::move(bytes)));
+  return broadcaster_->Publish(std::make_shared<WatchedResult>(std::move(bytes)),
+                               request.sequence());
 }
 
 }  // namespace partiemc::server

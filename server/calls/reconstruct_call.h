@@ -1,6 +1,5 @@
-// The gRPC transport of a producer's stream: translates between gRPC's callbacks and a
-// StreamStateMachine. Messages pass as bytes: a frame is parsed where it is computed, into memory
-// that is warm.
+// A producer's stream: translates between its channel and a StreamStateMachine. Messages pass as
+// bytes: a frame is parsed where it is computed, into memory that is warm.
 #pragma once
 
 #include <cstddef>
@@ -9,34 +8,35 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "server/calls/byte_call.h"
+#include "server/calls/stream_messages.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
-#include "server/rpc/byte_call.h"
-#include "server/rpc/stream_messages.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
 #include "server/stream/stream_state_machine.h"
 
 namespace partiemc::server {
 
-class ReconstructReactor final : public ByteCall, private StreamTransport {
+class ReconstructCall final : public ByteCall, private StreamTransport {
  public:
   /// What is passed by reference outlives the call.
-  ReconstructReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
-                     const ServerLimits& limits, OpeningCalls& opening, StreamRegistry& registry,
-                     MemoryBudget& budget, ComputePool& pool, WatchDispatcher& dispatcher,
-                     const CurrentCheckpointKeys& checkpoint_keys);
+  ReconstructCall(CallChannel& channel, const MethodMeters* meters,
+                  absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
+                  OpeningCalls& opening, StreamRegistry& registry, MemoryBudget& budget,
+                  ComputePool& pool, WatchDispatcher& dispatcher,
+                  const CurrentCheckpointKeys& checkpoint_keys);
 
-  void OnReadDone(bool ok) override;
-  void OnWriteDone(bool ok) override;
   void OnCancel() override;
+  void OnDone() override;
 
  private:
+  void ReadDone(bool ok) override;
+  void WriteDone(bool ok) override;
   void StartRead(std::size_t slot) override;
   void StartWrite(Outgoing what, std::size_t slot) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
-  void Left() override;
 
   StreamRegistry& registry_;
   StreamMessages messages_;

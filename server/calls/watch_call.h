@@ -1,4 +1,4 @@
-// The gRPC transport of a watcher: translates between gRPC's callbacks and a WatchStateMachine.
+// A watcher: translates between its channel and a WatchStateMachine.
 // Frames pass as bytes that all watchers of a stream share.
 #pragma once
 
@@ -10,44 +10,35 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/rpc/byte_call.h"
+#include "server/calls/byte_call.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
 #include "server/watch/watch_registry.h"
 #include "server/watch/watch_state_machine.h"
-#include "wire/watched_bytes.h"
 
 namespace partiemc::server {
 
-/// A result as this transport hands it to watchers.
-class WatchedResult final : public WatchFrame {
- public:
-  explicit WatchedResult(wire::WatchedBytes result)
-      : WatchFrame(result.size()), bytes(std::move(result)) {}
-
-  const wire::WatchedBytes bytes;
-};
-
-class WatchReactor final : public ByteCall, private WatchTransport {
+class WatchCall final : public ByteCall, private WatchTransport {
  public:
   /// What is passed by reference outlives the call.
-  WatchReactor(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission,
-               const ServerLimits& limits, OpeningCalls& opening, StreamRegistry& streams,
-               WatchRegistry& watchers);
+  WatchCall(CallChannel& channel, const MethodMeters* meters,
+            absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
+            OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers);
 
-  void OnReadDone(bool ok) override;
-  void OnWriteDone(bool ok) override;
   void OnCancel() override;
+  void OnDone() override;
 
  private:
+  void ReadDone(bool ok) override;
+  void WriteDone(bool ok) override;
   void StartRead() override;
   absl::StatusOr<WatchTerms> Open() override;
-  void WriteOpened() override;
-  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped) override;
+  void WriteOpened(const HeldFrames& held) override;
+  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+                  std::uint64_t oldest_sequence) override;
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
-  void Left() override;
 
   void Write(grpc::ByteBuffer response);
   void LogEnd(const absl::Status& status) const;

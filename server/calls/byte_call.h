@@ -1,49 +1,56 @@
-// The server's end of a call of gRPC. Every method is served as a stream of bytes, those of one
-// request and one answer too: the caller is known before anything of a request is read, and nothing
-// is parsed before its size is known and counted.
+// The server's end of a call, whatever carries its messages. Every method is served as a stream of
+// bytes, those of one request and one answer too: the caller is known before anything of a request
+// is read, and nothing is parsed before its size is known and counted.
 #pragma once
 
-#include <grpcpp/server_context.h>
 #include <grpcpp/support/byte_buffer.h>
-#include <grpcpp/support/server_callback.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/rpc/call_guard.h"
+#include "server/calls/admission.h"
+#include "server/calls/call_channel.h"
+#include "server/calls/call_meters.h"
 #include "server/stream/opening_calls.h"
 
 namespace partiemc::server {
 
-/// Reads, writes and ends one call. At most one read and one write go on at once, and End comes
-/// once, after the last write: the state machines (StreamStateMachine, WatchStateMachine,
-/// UnaryStateMachine) see to that, whatever the client does. Deletes itself when gRPC is done with
-/// it. No callback of it blocks.
-class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
+/// Translates between a CallChannel and a state machine (StreamStateMachine, WatchStateMachine,
+/// UnaryStateMachine), which keeps the channel's rules, whatever the client does. No function of it
+/// blocks.
+class ByteCall {
  public:
-  /// `admission`: the caller and its place, or why it is not let in.
-  ByteCall(grpc::CallbackServerContext& context, absl::StatusOr<AdmittedCall> admission)
-      : context_(context), admission_(admission.status()) {
-    if (admission.ok()) call_ = *std::move(admission);
-  }
+  /// The channel and the meters live longer. `admission`: the caller and its place, or why it is
+  /// not let in. Without meters the call is not counted.
+  ByteCall(CallChannel& channel, const MethodMeters* meters,
+           absl::StatusOr<AdmittedCall> admission);
+  virtual ~ByteCall() = default;
+  ByteCall(const ByteCall&) = delete;
+  ByteCall& operator=(const ByteCall&) = delete;
 
-  void OnDone() final {
-    Left();
-    delete this;
-  }
+  /// Of the channel: the read has brought a message, or none will come any more.
+  void OnReadDone(bool ok);
+  /// Of the channel: the write is over, and what it wrote may be freed.
+  void OnWriteDone(bool ok);
+  /// Of the channel: nobody is there any more. At any time until OnDone.
+  virtual void OnCancel() = 0;
+  /// Of the channel: it calls nothing else after this, and the call may be deleted.
+  virtual void OnDone() = 0;
 
  protected:
-  /// Has the read and the write that are going on fail soon.
-  void CancelCall() { context_.TryCancel(); }
+  virtual void ReadDone(bool ok) = 0;
+  virtual void WriteDone(bool ok) = 0;
+
+  CallChannel& channel() { return channel_; }
+  const CallChannel& channel() const { return channel_; }
   /// Ends the call; the only place that does. A second end is a bug of a state machine: it is
   /// logged and changes nothing.
   void End(const absl::Status& status);
-  /// Nothing of the call is left.
-  virtual void Left() = 0;
 
   /// Whether the caller was let in.
   const absl::Status& admission() const { return admission_; }
@@ -64,10 +71,6 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
   }
   void RequestCame() { opening_ = {}; }
 
-  /// A read that failed did so because nobody is there any more, and not for a half-close.
-  bool IsCancelled() const { return context_.IsCancelled(); }
-  std::string peer() const { return context_.peer(); }
-
  private:
   template <typename Machine>
   static OpeningCalls::GiveWay Ending(std::weak_ptr<Machine> machine,
@@ -76,9 +79,10 @@ class ByteCall : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuff
       if (const auto alive = machine.lock()) (*alive.*end)(status);
     };
   }
-  using grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>::Finish;
 
-  grpc::CallbackServerContext& context_;
+  CallChannel& channel_;
+  const MethodMeters* const meters_;
+  const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
   const absl::Status admission_;
   AdmittedCall call_;
   OpeningCalls::Place opening_;  // Goes before the account.

@@ -1,0 +1,31 @@
+#include "server/calls/admission.h"
+
+#include <utility>
+
+namespace partiemc::server {
+namespace {
+
+absl::StatusOr<AdmittedCall> WithPlace(Caller caller) {
+  auto place = caller.account()->Take(CallerAccount::Kind::kCall);
+  if (!place.ok()) return place.status();
+  return AdmittedCall{std::move(caller), *std::move(place)};
+}
+
+}  // namespace
+
+absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const CallOrigin& origin,
+                                   Permission permission) {
+  auto caller = authentication.Authenticate(origin.authorization, origin.peer);
+  if (!caller.ok()) return caller.status();
+  if (permission != nullptr) {
+    if (auto status = ((*caller).*permission)(); !status.ok()) return status;
+  }
+  return WithPlace(*std::move(caller));
+}
+
+absl::StatusOr<AdmittedCall> AdmitAnybody(const Authentication& authentication,
+                                          const CallOrigin& origin) {
+  return WithPlace(authentication.Anybody(origin.peer));
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,19 @@
+// A result as it is handed to watchers: bytes that all of them share.
+#pragma once
+
+#include <utility>
+
+#include "server/watch/result_mailbox.h"
+#include "wire/watched_bytes.h"
+
+namespace partiemc::server {
+
+class WatchedResult final : public WatchFrame {
+ public:
+  explicit WatchedResult(wire::WatchedBytes result)
+      : WatchFrame(result.size(), result.memory()), bytes(std::move(result)) {}
+
+  const wire::WatchedBytes bytes;
+};
+
+}  // namespace partiemc::server

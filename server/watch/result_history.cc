@@ -1,0 +1,91 @@
+#include "server/watch/result_history.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::size_t kFirstRoom = 16;
+
+std::uint64_t BytesOf(const Published& published) {
+  return published.frame->memory() + kPublishedBytes;
+}
+
+}  // namespace
+
+bool HistoryRoom::TryTake(std::uint64_t bytes) {
+  std::uint64_t held = held_;
+  do {
+    if (bytes > bytes_of_all_ || held > bytes_of_all_ - bytes) return false;
+  } while (!held_.compare_exchange_weak(held, held + bytes));
+  return true;
+}
+
+ResultHistory::ResultHistory(HistoryRoom& room) : room_(room) { ++room_.histories_; }
+
+ResultHistory::~ResultHistory() {
+  room_.GiveBack(bytes_);
+  --room_.histories_;
+}
+
+void ResultHistory::Add(const Published& published) {
+  const std::uint64_t bytes = BytesOf(published);
+  // After a hole nothing before it may stay.
+  while (size_ > 0 && at(size_ - 1).number + 1 != published.number) DropOldest();
+  DropUntilFits(bytes);
+  bool has_room = bytes <= room_.share();
+  // Others may hold more than their share until they hear that it has become smaller.
+  while (has_room && !room_.TryTake(bytes)) {
+    has_room = size_ > 0;
+    if (has_room) DropOldest();
+  }
+  if (!has_room) return;
+  if (size_ == ring_.size()) Grow();
+  ring_[(first_ + size_) % ring_.size()] = published;
+  ++size_;
+  bytes_ += bytes;
+}
+
+void ResultHistory::DropUntilFits(std::uint64_t bytes) {
+  const std::uint64_t share = room_.share();
+  while (size_ > 0 && bytes_ + bytes > share) DropOldest();
+}
+
+void ResultHistory::DropOldest() {
+  Published& oldest = ring_[first_];
+  const std::uint64_t bytes = BytesOf(oldest);
+  oldest = {};
+  first_ = (first_ + 1) % ring_.size();
+  --size_;
+  bytes_ -= bytes;
+  room_.GiveBack(bytes);
+}
+
+void ResultHistory::Grow() {
+  std::vector<Published> larger(std::max(kFirstRoom, 2 * ring_.size()));
+  for (std::size_t k = 0; k < size_; ++k) larger[k] = std::move(ring_[(first_ + k) % ring_.size()]);
+  ring_ = std::move(larger);
+  first_ = 0;
+}
+
+const Published* ResultHistory::FromNumber(std::uint64_t number) const {
+  if (empty() || at(size_ - 1).number < number) return nullptr;
+  const std::uint64_t oldest = at(0).number;
+  return &at(number <= oldest ? 0 : number - oldest);
+}
+
+const Published* ResultHistory::FromSequence(std::uint64_t sequence) const {
+  std::size_t older = 0, end = size_;  // Those before `older` are; those from `end` on are not.
+  while (older < end) {
+    const std::size_t middle = older + (end - older) / 2;
+    if (at(middle).sequence < sequence) {
+      older = middle + 1;
+    } else {
+      end = middle;
+    }
+  }
+  return end == size_ ? nullptr : &at(end);
+}
+
+}  // namespace partiemc::server

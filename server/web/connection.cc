@@ -1,0 +1,81 @@
+#include "server/web/connection.h"
+
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "server/telemetry/logging.h"
+
+namespace partiemc::server {
+
+WebRefusals::WebRefusals(Metrics& metrics) {
+  auto& family =
+      prometheus::BuildCounter()
+          .Name("partiemc_web_refusals_total")
+          .Help("Connections, requests and messages that the gateway did not take, by reason.")
+          .Register(metrics.registry());
+  for (std::size_t i = 0; i < kWebRefusals; ++i) {
+    counters_[i] = &family.Add({{"reason", std::string(Name(static_cast<WebRefusal>(i)))}});
+  }
+}
+
+void WebContext::Refuse(WebRefusal refusal, const std::string& peer, const absl::Status& why) {
+  refusals.Count(refusal);
+  LogRefusal("web request refused", peer, why);
+}
+
+std::string PeerOf(const boost::asio::ip::tcp::endpoint& endpoint) {
+  auto address = endpoint.address();
+  if (address.is_v6() && address.to_v6().is_v4_mapped()) {
+    address = boost::asio::ip::make_address_v4(boost::asio::ip::v4_mapped, address.to_v6());
+  }
+  if (address.is_v4()) return absl::StrCat("ipv4:", address.to_string(), ":", endpoint.port());
+  std::string text = address.to_string();
+  if (const auto zone = text.find('%'); zone != std::string::npos) text.replace(zone, 1, "%25");
+  return absl::StrCat("ipv6:%5B", text, "%5D:", endpoint.port());
+}
+
+void WebConnection::Close() {
+  if (std::exchange(is_closed_, true)) return;
+  error_code ignored;
+  socket().close(ignored);
+  deadline_.cancel();
+  if (closed_) std::exchange(closed_, nullptr)();
+}
+
+void WebConnection::CloseAfter(std::chrono::milliseconds time) {
+  if (is_closed_) return;
+  deadline_.expires_after(time);
+  deadline_.async_wait([weak = weak_from_this()](error_code error) {
+    const auto self = weak.lock();
+    // It may have been moved while this was on its way.
+    if (error || self == nullptr || self->deadline_.expiry() > std::chrono::steady_clock::now()) {
+      return;
+    }
+    self->context.refusals.Count(WebRefusal::kTimeout);
+    self->Close();
+  });
+}
+
+// A socket that is closed with something unread takes back what was written last.
+void WebConnection::CloseGently() {
+  error_code error;
+  socket().shutdown(WebSocket::shutdown_send, error);
+  if (error) return Close();
+  deadline_.expires_after(kWebCloseTime);
+  deadline_.async_wait([weak = weak_from_this()](error_code aborted) {
+    const auto self = weak.lock();
+    if (!aborted && self != nullptr) self->Close();
+  });
+  Discard();
+}
+
+void WebConnection::Discard() {
+  auto nowhere = std::make_shared<std::array<char, 4096>>();
+  socket().async_read_some(boost::asio::buffer(*nowhere),
+                           [self = shared_from_this(), nowhere](error_code error, std::size_t) {
+                             if (error) return self->Close();
+                             self->Discard();
+                           });
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,97 @@
+// One connection of the gateway, in the clear or with TLS, whatever is spoken over it.
+#pragma once
+
+#include <boost/asio/basic_stream_socket.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/beast/core/error.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/stream_traits.hpp>
+#include <boost/beast/ssl/ssl_stream.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "server/web/context.h"
+#include "server/web/http_request.h"
+
+namespace partiemc::server {
+
+using boost::beast::error_code;
+
+/// Everything that happens to a connection happens on its strand.
+using WebExecutor = boost::asio::strand<boost::asio::io_context::executor_type>;
+using WebSocket = boost::asio::basic_stream_socket<boost::asio::ip::tcp, WebExecutor>;
+using TlsWebSocket = boost::beast::ssl_stream<WebSocket>;
+
+/// As gRPC writes it: "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234".
+std::string PeerOf(const boost::asio::ip::tcp::endpoint& endpoint);
+
+/// What does not depend on whether there is TLS. Held by shared_ptr only; but for Abort on the
+/// strand only.
+class WebConnection : public std::enable_shared_from_this<WebConnection> {
+ public:
+  WebConnection(WebContext& context_in, WebExecutor executor, std::string peer_in)
+      : context(context_in), peer(std::move(peer_in)), executor_(executor), deadline_(executor) {}
+  virtual ~WebConnection() = default;
+  WebConnection(const WebConnection&) = delete;
+  WebConnection& operator=(const WebConnection&) = delete;
+
+  /// Closes the connection, whatever goes on, which fails then. From any thread.
+  void Abort() {
+    boost::asio::post(executor_, [self = shared_from_this()] { self->Close(); });
+  }
+  /// The same at once.
+  void Close();
+  /// Called once when the connection is closed by this side: what goes on may be waiting for
+  /// something else than the connection.
+  void WhenClosed(std::function<void()> closed) { closed_ = std::move(closed); }
+
+  /// Closes the connection after `time`, unless this is called again before.
+  void CloseAfter(std::chrono::milliseconds time);
+  void CloseNever() { deadline_.expires_at(std::chrono::steady_clock::time_point::max()); }
+
+  /// What was written arrives before the end, although there may be more to read.
+  void CloseGently();
+
+  const WebExecutor& executor() const { return executor_; }
+
+  WebContext& context;
+  const std::string peer;
+  ConnectionPlaces::Place place;
+  /// What has come and is not used up.
+  boost::beast::flat_buffer buffer{kMaxHeaderBytes};
+
+ protected:
+  virtual WebSocket& socket() = 0;
+
+ private:
+  void Discard();
+
+  const WebExecutor executor_;
+  boost::asio::steady_timer deadline_;
+  std::function<void()> closed_;
+  bool is_closed_ = false;
+};
+
+template <typename Stream>
+class WebConnectionOver final : public WebConnection {
+ public:
+  template <typename... Arguments>
+  WebConnectionOver(WebContext& context_in, WebExecutor executor, std::string peer_in,
+                    Arguments&&... arguments)
+      : WebConnection(context_in, executor, std::move(peer_in)),
+        stream(std::forward<Arguments>(arguments)...) {}
+
+  Stream stream;
+
+ private:
+  WebSocket& socket() override { return boost::beast::get_lowest_layer(stream); }
+};
+
+}  // namespace partiemc::server

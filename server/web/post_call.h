@@ -1,0 +1,169 @@
+// A call of one request and one answer as an HTTP POST.
+#pragma once
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/string.hpp>
+#include <boost/beast/http/error.hpp>
+#include <boost/beast/http/field.hpp>
+#include <boost/beast/http/read.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/web/gathered_message.h"
+#include "server/web/responses.h"
+#include "server/web/web_channel.h"
+
+namespace partiemc::server {
+
+/// The body of the request is read when its call asks for it, so not before its caller is let in.
+template <typename Stream>
+class PostCall final : public WebChannel {
+ public:
+  /// `next` reads the next request of the connection.
+  PostCall(std::shared_ptr<WebConnectionOver<Stream>> connection,
+           std::unique_ptr<HttpParser> parser, std::string allowed_origin,
+           std::function<void()> next)
+      : WebChannel(connection),
+        stream_(connection->stream),
+        parser_(std::move(parser)),
+        allowed_origin_(std::move(allowed_origin)),
+        next_(std::move(next)) {
+    connection_->CloseNever();  // The call's own state machine knows how long it may take.
+  }
+
+ private:
+  std::shared_ptr<PostCall> Self() {
+    return std::static_pointer_cast<PostCall>(this->shared_from_this());
+  }
+
+  void Read() override {
+    const auto length = parser_->content_length();
+    if (length && *length > message_limit()) {
+      return Break(WebRefusal::kTooLarge, TooLarge(*length));
+    }
+    const auto expect = parser_->get()[boost::beast::http::field::expect];
+    if (!boost::beast::iequals(expect, "100-continue")) return ReadMore();
+    static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+    boost::asio::async_write(stream_, boost::asio::buffer(kContinue),
+                             [self = Self()](error_code error, std::size_t) {
+                               if (error) return self->Gone();
+                               self->ReadMore();
+                             });
+  }
+
+  void ReadMore() {
+    if (!wanted()) return;  // It has ended meanwhile.
+    if (parser_->is_done()) return BodyCame();
+    const auto left = parser_->content_length_remaining();
+    // Chunks announce no sum: one byte more tells that it is too much.
+    const auto expected = left ? *left : message_limit() + 1 - gathered_.size();
+    const auto room = gathered_.Room(expected);
+    auto& body = parser_->get().body();
+    body.data = room.data();
+    body.size = room.size();
+    body.more = true;
+    boost::beast::http::async_read(
+        stream_, connection_->buffer, *parser_,
+        [self = Self(), bytes = room.size()](error_code error, std::size_t) {
+          self->OnBody(error, bytes);
+        });
+  }
+
+  void OnBody(error_code error, std::size_t room) {
+    if (error == boost::beast::http::error::need_buffer) error = {};
+    if (error) return Gone();
+    gathered_.Filled(room - parser_->get().body().size);
+    if (gathered_.size() > message_limit()) {
+      return Break(WebRefusal::kTooLarge, TooLarge(gathered_.size()));
+    }
+    ReadMore();
+  }
+
+  void BodyCame() {
+    Deliver(gathered_.Take());
+    WatchForEnd();
+  }
+
+  // A client that goes away while its answer is made is noticed only by reading on.
+  void WatchForEnd() {
+    if (connection_->buffer.size() > 0) return;
+    watching_ = true;
+    stream_.async_read_some(connection_->buffer.prepare(512),
+                            [self = Self()](error_code error, std::size_t bytes) {
+                              self->watching_ = false;
+                              if (error) return self->OnEnd();
+                              self->connection_->buffer.commit(bytes);
+                              if (self->goes_on_) self->next_();
+                            });
+  }
+  void OnEnd() {
+    if (goes_on_) return connection_->Close();
+    Gone();
+  }
+
+  void Write(const grpc::ByteBuffer& message) override {
+    message.Dump(&slices_);
+    WebResponse response = ResponseOfCall(message.Length());
+    Dress(response);
+    head_ = response.Text();
+    std::vector<boost::asio::const_buffer> buffers = {boost::asio::buffer(head_)};
+    for (const grpc::Slice& slice : slices_) buffers.emplace_back(slice.begin(), slice.size());
+    answered_ = true;
+    boost::asio::async_write(stream_, std::move(buffers),
+                             [self = Self()](error_code error, std::size_t) {
+                               self->slices_.clear();
+                               self->Written(!error);
+                               if (error) self->Gone();
+                             });
+  }
+
+  void Tell(const absl::Status& status) override {
+    if (is_gone()) {
+      Over();
+      return connection_->Close();
+    }
+    if (answered_) return GoOn();
+    WebResponse response = ResponseTo(status);
+    if (is_broken() && absl::IsResourceExhausted(status)) response.status = 413;
+    Dress(response);
+    head_ = response.Text();
+    connection_->CloseAfter(kWebCloseTime);
+    boost::asio::async_write(stream_, boost::asio::buffer(head_),
+                             [self = Self()](error_code error, std::size_t) {
+                               if (error) self->Gone();
+                               self->GoOn();
+                             });
+  }
+
+  // One that has not read all of a request cannot read the next one.
+  void Dress(WebResponse& response) {
+    response.close = !parser_->is_done() || !parser_->keep_alive();
+    if (!allowed_origin_.empty()) AllowOrigin(allowed_origin_, response);
+  }
+
+  void GoOn() {
+    const bool keeps = !is_gone() && parser_->is_done() && parser_->keep_alive();
+    Over();
+    if (!keeps) return connection_->CloseGently();
+    connection_->place.SetWaiting(true);
+    goes_on_ = true;
+    connection_->CloseAfter(kWebHeaderTime);
+    if (!watching_) next_();
+  }
+
+  Stream& stream_;
+  const std::unique_ptr<HttpParser> parser_;
+  const std::string allowed_origin_;
+  const std::function<void()> next_;
+  GatheredMessage gathered_;
+  std::string head_;
+  std::vector<grpc::Slice> slices_;  // Of the answer.
+  bool answered_ = false, watching_ = false, goes_on_ = false;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,303 @@
+#include "server/web/requests.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "common/address.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr char kMessageType[] = "application/x-protobuf";
+constexpr std::string_view kCalls = "/v1/";
+constexpr std::size_t kMostPathBytes = 1024;
+
+struct Route {
+  std::string_view path;
+  WebMethod method;
+  bool is_socket;
+};
+constexpr std::array kRoutes = {
+    Route{"/v1/info", WebMethod::kInfo, false}, Route{"/v1/streams", WebMethod::kStreams, false},
+    Route{"/v1/frame", WebMethod::kFrame, false}, Route{"/v1/watch", WebMethod::kWatch, true},
+    Route{"/v1/reconstruct", WebMethod::kReconstruct, true}};
+
+std::vector<std::string_view> Split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+std::string_view Trim(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t");
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(" \t") + 1 - begin);
+}
+
+std::string Lower(std::string_view text) { return absl::AsciiStrToLower(std::string(text)); }
+
+bool ConsumePrefix(std::string_view& text, std::string_view prefix) {
+  const bool has = text.starts_with(prefix);
+  if (has) text.remove_prefix(prefix.size());
+  return has;
+}
+
+WebAnswer RefusedAs(WebRefusal refusal, unsigned status, std::string rule, std::string allow = {}) {
+  return {.what = WebRefused{refusal, status, std::move(rule), std::move(allow)}};
+}
+
+// Only the first of several would be seen by some.
+std::optional<std::string> OnlyOne(const std::vector<std::string_view>& values) {
+  if (values.size() != 1) return std::nullopt;
+  return std::string(values.front());
+}
+
+int ValueOfDigit(char c, bool hexadecimal) {
+  if (absl::ascii_isdigit(static_cast<unsigned char>(c))) return c - '0';
+  if (!hexadecimal) return -1;
+  const char lower = absl::ascii_tolower(static_cast<unsigned char>(c));
+  return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10 : -1;
+}
+
+std::optional<std::string> DecodePercent(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    if (text.front() != '%') {
+      out += text.front();
+      text.remove_prefix(1);
+      continue;
+    }
+    if (text.size() < 3) return std::nullopt;
+    const int high = ValueOfDigit(text[1], true), low = ValueOfDigit(text[2], true);
+    if (high < 0 || low < 0) return std::nullopt;
+    out += static_cast<char>(16 * high + low);
+    text.remove_prefix(3);
+  }
+  return out;
+}
+
+bool IsFileCharacter(char c) {
+  return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
+         std::string_view("-_.~+@").find(c) != std::string_view::npos;
+}
+
+// "Host" or what stands behind "://" of an origin, without the port that is usual.
+std::optional<std::string> NormalHost(std::string_view text, std::string_view usual_port) {
+  std::string host = Lower(text);
+  if (host.empty() || host.size() > 300) return std::nullopt;
+  const std::size_t colon = host.rfind(':');
+  const bool has_port = colon != std::string::npos && host.find(']', colon) == std::string::npos &&
+                        (host.front() == '[' || host.find(':') == colon);
+  const std::string_view port = has_port ? std::string_view(host).substr(colon + 1) : "";
+  const std::string_view name = std::string_view(host).substr(0, has_port ? colon : host.size());
+  if (name.empty() || (has_port && port.empty()) || port.size() > 5) return std::nullopt;
+  if (!std::ranges::all_of(port, [](unsigned char c) { return absl::ascii_isdigit(c); })) {
+    return std::nullopt;
+  }
+  const bool is_number = name.front() == '[';
+  if (is_number != (name.back() == ']')) return std::nullopt;
+  const std::string_view inner = is_number ? name.substr(1, name.size() - 2) : name;
+  if (inner.empty() || !std::ranges::all_of(inner, [&](char c) {
+        return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '.' ||
+               c == '_' || (is_number && c == ':');
+      })) {
+    return std::nullopt;
+  }
+  if (has_port && port == usual_port) host.resize(colon);
+  return host;
+}
+
+std::string_view UsualPort(std::string_view scheme) { return scheme == "https" ? "443" : "80"; }
+
+bool IsLocalHost(std::string_view host) {
+  const std::size_t end = host.front() == '[' ? host.find(']') : host.find(':');
+  std::string_view name = host.substr(0, end);
+  ConsumePrefix(name, "[");
+  return name == "localhost" || name.ends_with(".localhost") ||
+         Address{.host = std::string(name), .port = 1, .unix_path = {}}.IsLocal();
+}
+
+WebAnswer SocketCallOf(const WebRequest& request, WebMethod method, bool from_page) {
+  if (request.method != "GET") {
+    return RefusedAs(WebRefusal::kMalformed, 405, "is called by GET, as a WebSocket", "GET");
+  }
+  if (!request.is_upgrade || request.has_body) {
+    return RefusedAs(WebRefusal::kMalformed, 426, "is a WebSocket");
+  }
+  OfferedProtocols offered = ParseProtocols(request.protocols);
+  if (!offered.ours || offered.is_malformed) {
+    return RefusedAs(
+        WebRefusal::kMalformed, 400,
+        "must offer the subprotocol partiemc.v1, and at most one bearer.TOKEN beside it, TOKEN in "
+        "base64url without padding");
+  }
+  WebCall call{.method = method, .authorization = {}, .from_page = from_page};
+  if (request.authorizations.size() + offered.tokens.size() == 1) {
+    call.authorization = offered.tokens.empty() ? std::string(request.authorizations.front())
+                                                : "Bearer " + offered.tokens.front();
+  }
+  return {.what = std::move(call)};
+}
+
+WebAnswer PostCallOf(const WebRequest& request, WebMethod method, bool from_page) {
+  if (request.method == "OPTIONS" && from_page) return {.what = WebPreflight{}};
+  if (request.method != "POST") {
+    return RefusedAs(WebRefusal::kMalformed, 405, "is called by POST", "POST");
+  }
+  const std::string_view type =
+      request.content_type.substr(0, request.content_type.find_first_of("; \t"));
+  if (Lower(type) != kMessageType) {
+    return RefusedAs(WebRefusal::kMalformed, 415, "takes Content-Type application/x-protobuf");
+  }
+  return {.what = WebCall{.method = method,
+                          .authorization = OnlyOne(request.authorizations),
+                          .from_page = from_page}};
+}
+
+}  // namespace
+
+std::string_view Name(WebRefusal refusal) {
+  static constexpr std::array<std::string_view, kWebRefusals> kNames = {
+      "full", "timeout", "malformed", "origin", "call", "too_large", "bad_message"};
+  return kNames[static_cast<std::size_t>(refusal)];
+}
+
+WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  const bool head_only = request.method == "HEAD";
+  const bool is_get = request.method == "GET" || head_only;
+  if (request.hosts.size() != 1) {
+    return RefusedAs(WebRefusal::kMalformed, 400, "must have one header Host");
+  }
+  if (path == "/v1/healthz") {
+    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, "is asked by GET", "GET, HEAD");
+    return {.what = WebHealth{.head_only = head_only}};
+  }
+  if (!path.starts_with(kCalls)) {
+    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, "is asked by GET", "GET, HEAD");
+    auto file = FilePathOf(request.target);
+    if (!file) return RefusedAs(WebRefusal::kMalformed, 404, "there is no such page");
+    return {.what = WebFile{.path = *std::move(file),
+                            .head_only = head_only,
+                            .takes_gzip = AcceptsGzip(request.accept_encoding)}};
+  }
+  const auto route = std::ranges::find(kRoutes, path, &Route::path);
+  if (route == kRoutes.end()) {
+    return RefusedAs(WebRefusal::kMalformed, 404, "there is no such method");
+  }
+  const bool from_page = !request.origins.empty();
+  if (from_page && (request.origins.size() > 1 ||
+                    !IsOriginAllowed(request.origins.front(), request.hosts.front(), rules))) {
+    return RefusedAs(
+        WebRefusal::kOrigin, 403,
+        "must be called by a page of this server, or of an origin of its --web-origin");
+  }
+  WebAnswer answer = route->is_socket ? SocketCallOf(request, route->method, from_page)
+                                      : PostCallOf(request, route->method, from_page);
+  if (from_page && !route->is_socket) answer.allowed_origin = std::string(request.origins.front());
+  return answer;
+}
+
+absl::StatusOr<std::string> NormalOrigin(std::string_view text) {
+  const auto wrong = [&] {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\"", std::string(text.substr(0, 100)),
+                     "\" is no origin: must be http://HOST[:PORT] or https://HOST[:PORT]"));
+  };
+  for (const std::string scheme : {"https", "http"}) {
+    const std::string before = scheme + "://";
+    if (Lower(text.substr(0, before.size())) != before) continue;
+    const auto host = NormalHost(text.substr(before.size()), UsualPort(scheme));
+    if (!host) return wrong();
+    return before + *host;
+  }
+  return wrong();
+}
+
+bool IsOriginAllowed(std::string_view origin, std::string_view host, const WebRules& rules) {
+  const auto normal = NormalOrigin(origin);
+  if (!normal.ok()) return false;
+  const auto allows = [&](const std::string& asked) {
+    return std::ranges::find(rules.origins, asked) != rules.origins.end();
+  };
+  if (allows(*normal)) return true;
+  const std::string scheme = normal->substr(0, normal->find(':'));
+  const auto own = NormalHost(host, UsualPort(scheme));
+  if (!own || *normal != scheme + "://" + *own) return false;
+  return !rules.is_local || IsLocalHost(*own);
+}
+
+std::optional<std::string> FilePathOf(std::string_view target) {
+  target = target.substr(0, target.find_first_of("?#"));
+  if (target.empty() || target.front() != '/' || target.size() > kMostPathBytes)
+    return std::nullopt;
+  if (target == "/") return "index.html";
+  auto path = DecodePercent(target.substr(1));
+  if (!path) return std::nullopt;
+  // Names are split after decoding, so that an encoded '/' or '..' is one like any other.
+  for (const std::string_view name : Split(*path, '/')) {
+    if (name.empty() || name.front() == '.' || !std::ranges::all_of(name, IsFileCharacter)) {
+      return std::nullopt;
+    }
+  }
+  return path;
+}
+
+OfferedProtocols ParseProtocols(const std::vector<std::string_view>& headers) {
+  OfferedProtocols offered;
+  for (const std::string_view header : headers) {
+    for (std::string_view name : Split(header, ',')) {
+      name = Trim(name);
+      if (name == kWebProtocol) offered.ours = true;
+      if (!ConsumePrefix(name, kBearerProtocol)) continue;
+      auto token = DecodeBase64Url(name);
+      offered.is_malformed |= !token || token->empty() || !offered.tokens.empty();
+      if (token) offered.tokens.push_back(*std::move(token));
+    }
+  }
+  return offered;
+}
+
+std::optional<std::string> DecodeBase64Url(std::string_view text) {
+  if (text.size() % 4 == 1) return std::nullopt;
+  std::string out;
+  unsigned bits = 0;
+  int count = 0;
+  for (const char c : text) {
+    const auto value = [&]() -> int {
+      if (c >= 'A' && c <= 'Z') return c - 'A';
+      if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+      if (c >= '0' && c <= '9') return c - '0' + 52;
+      return c == '-' ? 62 : c == '_' ? 63 : -1;
+    }();
+    if (value < 0) return std::nullopt;
+    bits = bits << 6 | static_cast<unsigned>(value);
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    out += static_cast<char>(bits >> count & 0xFF);
+    bits &= (1u << count) - 1;
+  }
+  if (bits != 0) return std::nullopt;
+  return out;
+}
+
+bool AcceptsGzip(std::string_view accept_encoding) {
+  for (const std::string_view item : Split(accept_encoding, ',')) {
+    const auto parts = Split(item, ';');
+    if (Lower(Trim(parts.front())) != "gzip") continue;
+    if (parts.size() == 1) return true;
+    // "q=0", "q=0.000".
+    return parts[1].find_first_of("123456789") != std::string_view::npos;
+  }
+  return false;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,57 @@
+// Whether the other end of a WebSocket is still there.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+
+#include "server/web/context.h"
+
+namespace partiemc::server {
+
+/// Decides when to ask for a sign of life, and when to give up. A sign is whatever comes in, and
+/// that the client's machine takes what was sent.
+class SignsOfLife {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+  enum class Next { kWait, kPing, kGiveUp };
+
+  /// `write` is what the writing of one message may take.
+  SignsOfLife(WebPings pings, std::chrono::milliseconds write, TimePoint now)
+      : pings_(pings), write_(write), last_(now) {}
+
+  /// How often to ask Look.
+  std::chrono::milliseconds interval() const {
+    return std::max(std::min(pings_.interval, pings_.timeout) / 4, std::chrono::milliseconds(10));
+  }
+
+  void Heard(TimePoint now) {
+    last_ = now;
+    pinged_ = false;
+  }
+  void WriteBegan(TimePoint now) { write_began_ = now; }
+
+  /// `unsent`: bytes that the client's machine has not confirmed. Nobody hears anything where
+  /// nothing is read, and a ping waits behind what is being written.
+  Next Look(TimePoint now, bool reading, bool writing, long unsent) {
+    if (writing && write_.count() > 0 && now - write_began_ > write_) return Next::kGiveUp;
+    if (unsent != unsent_ || !reading || writing) {
+      unsent_ = unsent;
+      last_ = now;
+    }
+    if (now - last_ < pings_.interval) return Next::kWait;
+    if (!pinged_) {
+      pinged_ = true;
+      return Next::kPing;
+    }
+    return now - last_ < pings_.interval + pings_.timeout ? Next::kWait : Next::kGiveUp;
+  }
+
+ private:
+  const WebPings pings_;
+  const std::chrono::milliseconds write_;
+  TimePoint last_, write_began_;
+  bool pinged_ = false;
+  long unsent_ = 0;
+};
+
+}  // namespace partiemc::server

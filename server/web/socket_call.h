@@ -1,0 +1,264 @@
+// A call over a WebSocket: one binary message is one request or answer.
+#pragma once
+
+#include <sys/ioctl.h>
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/websocket/error.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "partiemc/status.h"
+#include "server/base/call_errors.h"
+#include "server/stream/stream_state_machine.h"
+#include "server/web/gathered_message.h"
+#include "server/web/responses.h"
+#include "server/web/signs_of_life.h"
+#include "server/web/status_text.h"
+#include "server/web/web_channel.h"
+
+namespace partiemc::server {
+
+/// The WebSocket begins when the call asks for its first request, so when its caller is let in. One
+/// that is not is told by HTTP, or, where a browser would not show that, in a WebSocket after all.
+template <typename Stream>
+class SocketCall final : public WebChannel {
+ public:
+  SocketCall(std::shared_ptr<WebConnectionOver<Stream>> connection,
+             std::unique_ptr<HttpParser> parser, bool from_page)
+      : WebChannel(connection),
+        socket_(connection->stream),
+        parser_(std::move(parser)),
+        from_page_(from_page),
+        clock_(connection->executor()) {
+    connection_->CloseAfter(kWebHeaderTime);
+  }
+
+ private:
+  using Now = std::chrono::steady_clock;
+  enum Phase { kHttp, kUpgrading, kOpen };
+
+  // What is read ahead while the call wants nothing: so that a client that goes is noticed, and
+  // pings are answered.
+  static constexpr std::size_t kReadAhead = 64 << 10;
+  static constexpr std::size_t kLongestText = 3;  // "end".
+
+  std::shared_ptr<SocketCall> Self() {
+    return std::static_pointer_cast<SocketCall>(this->shared_from_this());
+  }
+
+  void Read() override {
+    if (phase_ == kHttp) Upgrade();
+    if (phase_ == kOpen) Pump();
+  }
+
+  void Upgrade() {
+    namespace websocket = boost::beast::websocket;
+    phase_ = kUpgrading;
+    socket_.set_option(
+        websocket::stream_base::timeout{kWebHeaderTime, websocket::stream_base::none(), false});
+    socket_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+      response.set(boost::beast::http::field::server, "partiemc");
+      response.set(boost::beast::http::field::sec_websocket_protocol,
+                   boost::beast::string_view(kWebProtocol.data(), kWebProtocol.size()));
+    }));
+    socket_.auto_fragment(false);
+    socket_.read_message_max(0);  // Looked at here, where the client can be told.
+    socket_.control_callback([this](websocket::frame_type kind, auto) {
+      signs_.Heard(Now::now());
+      if (kind == websocket::frame_type::close) Leaves();
+    });
+    socket_.async_accept(parser_->get(),
+                         [self = Self()](error_code error) { self->OnUpgraded(error); });
+  }
+
+  void OnUpgraded(error_code error) {
+    parser_.reset();
+    phase_ = kOpen;
+    if (error) {
+      Gone();
+      if (is_finished()) LastWord();
+      return;
+    }
+    connection_->CloseNever();
+    if (is_finished()) return Say();
+    signs_.Heard(Now::now());
+    LookForLife();
+    Pump();
+  }
+
+  // The client has said goodbye without `end`: it hears the same, and its call ends at once,
+  // however long the client takes for the rest.
+  void Leaves() {
+    if (is_finished()) return;
+    leaves_ = true;
+    connection_->CloseAfter(kWebCloseTime);
+    TellCancelled();
+  }
+
+  // Reads as long as somebody wants a message, or there is little of it.
+  void Pump() {
+    if (reading_ || is_gone() || is_finished() || is_broken()) return;
+    if (half_closed_) {
+      ReadEnded();
+    } else if (complete_) {
+      if (!wanted()) return;
+      complete_ = false;
+      Deliver(gathered_.Take());
+    }
+    if (!wanted() && gathered_.size() >= kReadAhead) return;
+    reading_ = true;
+    const auto room = gathered_.Room(socket_.read_size_hint(kFirstGuess));
+    socket_.async_read_some(boost::asio::buffer(room.data(), room.size()),
+                            [self = Self()](error_code error, std::size_t bytes) {
+                              self->reading_ = false;
+                              self->OnSome(error, bytes);
+                            });
+  }
+
+  void OnSome(error_code error, std::size_t bytes) {
+    if (leaves_) return connection_->Close();
+    if (is_finished()) return;
+    if (error) {
+      if (error != boost::beast::websocket::error::closed && IsProtocolError(error)) {
+        connection_->context.refusals.Count(WebRefusal::kBadMessage);
+      }
+      return Gone();
+    }
+    signs_.Heard(Now::now());
+    gathered_.Filled(bytes);
+    complete_ = socket_.is_message_done();
+    if (half_closed_) return Misspoken("a message after `end`");
+    if (socket_.got_text()) return TakeText();
+    const std::uint64_t announced = gathered_.size() + (complete_ ? 0 : socket_.read_size_hint(1));
+    if (announced > message_limit()) return Break(WebRefusal::kTooLarge, TooLarge(announced));
+    Pump();
+  }
+
+  void TakeText() {
+    if (gathered_.size() > kLongestText) return Misspoken("a text message");
+    if (complete_) {
+      std::vector<grpc::Slice> slices;
+      const grpc::ByteBuffer message = gathered_.Take();
+      message.Dump(&slices);
+      std::string text;
+      for (const auto& slice : slices) text.append(slice.begin(), slice.end());
+      if (text != "end") return Misspoken("a text message");
+      complete_ = false;
+      half_closed_ = true;
+    }
+    Pump();
+  }
+
+  void Misspoken(std::string value) {
+    Break(WebRefusal::kBadMessage,
+          ViolationError(absl::StatusCode::kInvalidArgument,
+                         {std::string(kReasonMalformed), "message", std::move(value),
+                          "must be binary, or at last the text `end`"}));
+  }
+
+  static bool IsProtocolError(error_code error) {
+    return error.category() ==
+           make_error_code(boost::beast::websocket::error::bad_opcode).category();
+  }
+
+  void Write(const grpc::ByteBuffer& message) override {
+    if (leaves_) return Written(false);
+    message.Dump(&slices_);
+    std::vector<boost::asio::const_buffer> buffers;
+    for (const grpc::Slice& slice : slices_) buffers.emplace_back(slice.begin(), slice.size());
+    signs_.WriteBegan(Now::now());
+    socket_.binary(true);
+    socket_.async_write(std::move(buffers), [self = Self()](error_code error, std::size_t) {
+      self->slices_.clear();
+      self->Written(!error);
+      if (error) self->Gone();
+    });
+  }
+
+  // Every few seconds, or less.
+  void LookForLife() {
+    clock_.expires_after(signs_.interval());
+    clock_.async_wait([weak = this->weak_from_this(), this](error_code error) {
+      const auto self = weak.lock();
+      if (error || self == nullptr || is_gone() || is_finished()) return;
+      int unsent = 0;
+      ioctl(boost::beast::get_lowest_layer(socket_).native_handle(), TIOCOUTQ, &unsent);
+      const auto next = signs_.Look(Now::now(), reading_, is_writing(), unsent);
+      if (next == SignsOfLife::Next::kGiveUp) {
+        connection_->context.refusals.Count(WebRefusal::kTimeout);
+        return connection_->Close();
+      }
+      if (next == SignsOfLife::Next::kPing) {
+        socket_.async_ping({}, [self](error_code) {});
+      }
+      LookForLife();
+    });
+  }
+
+  void Tell(const absl::Status& status) override {
+    last_status_ = status;
+    if (is_gone()) return LastWord();
+    if (leaves_) return Over();
+    if (phase_ == kOpen) return Say();
+    if (phase_ == kUpgrading) return;  // OnUpgraded goes on.
+    if (from_page_) return Upgrade();
+    WebResponse response = ResponseTo(status);
+    response.close = true;
+    text_ = response.Text();
+    boost::asio::async_write(socket_.next_layer(), boost::asio::buffer(text_),
+                             [self = Self()](error_code, std::size_t) {
+                               self->Over();
+                               self->connection_->CloseGently();
+                             });
+  }
+
+  void Say() {
+    connection_->CloseAfter(kWebCloseTime);
+    text_ = StatusJson(last_status_);
+    socket_.text(true);
+    socket_.async_write(boost::asio::buffer(text_), [self = Self()](error_code error, std::size_t) {
+      if (error) return self->LastWord();
+      self->Over();
+      self->SayGoodbye();
+    });
+  }
+
+  void SayGoodbye() {
+    const boost::beast::websocket::close_reason reason(
+        static_cast<boost::beast::websocket::close_code>(CloseCodeOf(last_status_)),
+        CloseReasonOf(last_status_));
+    socket_.async_close(reason, [self = Self()](error_code) { self->connection_->Close(); });
+  }
+
+  void LastWord() {
+    Over();
+    connection_->Close();
+  }
+
+  // Of a message of which nothing is known.
+  static constexpr std::size_t kFirstGuess = 4096;
+
+  boost::beast::websocket::stream<Stream&, false> socket_;
+  std::unique_ptr<HttpParser> parser_;  // Of the request that this has begun with.
+  const bool from_page_;
+  boost::asio::steady_timer clock_;
+  SignsOfLife signs_{connection_->context.pings, connection_->context.limits.unary.answer,
+                     Now::now()};
+  Phase phase_ = kHttp;
+  GatheredMessage gathered_;
+  bool reading_ = false, complete_ = false, half_closed_ = false, leaves_ = false;
+  std::vector<grpc::Slice> slices_;  // Of the message that is being written.
+  std::string text_;
+  absl::Status last_status_;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,242 @@
+#include "server/web/web_gateway.h"
+
+#include <pthread.h>
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <list>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "server/security/peer_accounts.h"
+#include "server/web/connection.h"
+#include "server/web/context.h"
+#include "server/web/http_session.h"
+#include "server/web/tls_contexts.h"
+
+namespace partiemc::server {
+namespace {
+
+using boost::asio::ip::tcp;
+
+constexpr int kThreads = 2;
+// Without a free descriptor each attempt fails at once.
+constexpr std::chrono::milliseconds kRestAfterFailure(100);
+constexpr int kBacklog = 1024;
+
+absl::Status CannotListen(const Address& address, const error_code& error) {
+  return absl::UnavailableError(absl::StrCat("cannot listen on --web ", address.ToString(), ": ",
+                                             error.message(), "; choose another"));
+}
+
+void Converse(const std::shared_ptr<WebConnectionOver<WebSocket>>& connection) {
+  std::make_shared<HttpSession<WebSocket>>(connection)->ReadRequest();
+}
+
+void Converse(const std::shared_ptr<WebConnectionOver<TlsWebSocket>>& connection) {
+  connection->CloseAfter(kWebHeaderTime);
+  connection->stream.async_handshake(
+      boost::asio::ssl::stream_base::server, [connection](error_code error) {
+        if (error) {
+          connection->context.refusals.Count(WebRefusal::kMalformed);
+          return connection->Close();
+        }
+        std::make_shared<HttpSession<TlsWebSocket>>(connection)->ReadRequest();
+      });
+}
+
+}  // namespace
+
+class WebGateway::Implementation {
+ public:
+  Implementation(const WebOptions& options, const Setup& setup, WebRules rules)
+      : context_{.methods = setup.methods,
+                 .limits = setup.limits,
+                 .pings = {setup.ping_interval, setup.ping_timeout},
+                 .rules = std::move(rules),
+                 .files = PageFiles(options.root.empty() ? DefaultPageRoot() : options.root),
+                 .draining = setup.draining,
+                 .refusals = WebRefusals(setup.metrics),
+                 .places = ConnectionPlaces(options.max_connections)},
+        address_(options.address) {
+    if (setup.tls != nullptr) tls_.emplace(*setup.tls);
+    setup.metrics.AddGauge("partiemc_web_connections", "Connections of the gateway.",
+                           [this] { return static_cast<double>(context_.places.count()); });
+  }
+
+  ~Implementation() { Stop(std::chrono::steady_clock::now()); }
+
+  // All addresses that a name has: which one of them a browser takes is not known.
+  absl::Status Listen() {
+    error_code error;
+    tcp::resolver resolver(io_);
+    const auto found =
+        resolver.resolve(address_.host, absl::StrCat(address_.port),
+                         tcp::resolver::passive | tcp::resolver::numeric_service, error);
+    if (error) return CannotListen(address_, error);
+    error_code first_error;
+    for (const auto& entry : found) {
+      auto endpoint = entry.endpoint();
+      endpoint.port(address_.port);
+      const error_code failed = ListenOn(endpoint);
+      if (failed && (!first_error || failed == boost::asio::error::address_in_use)) {
+        first_error = failed;
+      }
+    }
+    if (listeners_.empty() || first_error == boost::asio::error::address_in_use) {
+      return CannotListen(address_, first_error);
+    }
+    for (auto& listener : listeners_) Accept(listener);
+    for (int i = 0; i < kThreads; ++i) {
+      threads_.emplace_back([this] { io_.run(); });
+      pthread_setname_np(threads_.back().native_handle(), "web");
+    }
+    return absl::OkStatus();
+  }
+
+  const Address& address() const { return address_; }
+
+  void Stop(std::chrono::steady_clock::time_point deadline) {
+    if (threads_.empty()) return;
+    boost::asio::post(accepting_, [this] {
+      stopped_ = true;
+      error_code ignored;
+      for (auto& listener : listeners_) listener.acceptor.close(ignored);
+      for (auto& listener : listeners_) listener.rest.cancel();
+    });
+    context_.places.EndWaiting();
+    if (!context_.places.WaitUntilEmpty(deadline)) {
+      // Some may have come in meanwhile, but none after this.
+      boost::asio::post(accepting_, [this] { context_.places.EndAll(); });
+      context_.places.WaitUntilEmpty();
+    }
+    work_.reset();
+    for (auto& thread : threads_) thread.join();
+    threads_.clear();
+  }
+
+ private:
+  struct Acceptor {
+    Acceptor(const WebExecutor& executor) : acceptor(executor), rest(executor) {}
+    boost::asio::basic_socket_acceptor<tcp, WebExecutor> acceptor;
+    boost::asio::steady_timer rest;
+  };
+
+  error_code ListenOn(const tcp::endpoint& endpoint) {
+    error_code error;
+    Acceptor& listener = listeners_.emplace_back(accepting_);
+    auto& acceptor = listener.acceptor;
+    acceptor.open(endpoint.protocol(), error);
+    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error && endpoint.address().is_v6()) {
+      acceptor.set_option(boost::asio::ip::v6_only(!endpoint.address().is_unspecified()), error);
+    }
+    if (!error) acceptor.bind(endpoint, error);
+    if (!error) acceptor.listen(kBacklog, error);
+    if (error) {
+      listeners_.pop_back();
+    } else {
+      address_.port = acceptor.local_endpoint(error).port();
+    }
+    return error;
+  }
+
+  void Accept(Acceptor& listener) {
+    listener.acceptor.async_accept(
+        boost::asio::make_strand(io_), [this, &listener](error_code error, WebSocket socket) {
+          if (stopped_) return;
+          if (!error) {
+            Enter(std::move(socket));
+          } else if (error == boost::asio::error::no_descriptors ||
+                     error == boost::asio::error::no_buffer_space ||
+                     error == boost::asio::error::no_memory) {
+            listener.rest.expires_after(kRestAfterFailure);
+            return listener.rest.async_wait([this, &listener](error_code) {
+              if (!stopped_) Accept(listener);
+            });
+          }
+          Accept(listener);
+        });
+  }
+
+  void Enter(WebSocket socket) {
+    error_code error;
+    const auto endpoint = socket.remote_endpoint(error);
+    if (error) return;  // It has gone already.
+    socket.set_option(tcp::no_delay(true), error);
+    const WebExecutor executor = socket.get_executor();
+    if (!tls_) {
+      return Enter<WebSocket>(executor, PeerOf(endpoint), std::move(socket));
+    }
+    // The connection keeps what its identity needs; the context itself may go.
+    const auto context = tls_->Get();
+    if (context == nullptr) return context_.refusals.Count(WebRefusal::kMalformed);
+    Enter<TlsWebSocket>(executor, PeerOf(endpoint), std::move(socket), *context);
+  }
+
+  template <typename Stream, typename... Arguments>
+  void Enter(const WebExecutor& executor, std::string peer, Arguments&&... arguments) {
+    auto connection = std::make_shared<WebConnectionOver<Stream>>(
+        context_, executor, std::move(peer), std::forward<Arguments>(arguments)...);
+    bool gave_way = false;
+    auto place = context_.places.Enter(
+        HostOfPeer(connection->peer),
+        [weak = std::weak_ptr<WebConnection>(connection)] {
+          if (const auto alive = weak.lock()) alive->Abort();
+        },
+        gave_way);
+    if (gave_way || !place) context_.refusals.Count(WebRefusal::kFull);
+    if (!place) return;  // Closed.
+    connection->place = *std::move(place);
+    boost::asio::post(executor, [connection] { Converse(connection); });
+  }
+
+  boost::asio::io_context io_{kThreads};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_{
+      io_.get_executor()};
+  const WebExecutor accepting_ = boost::asio::make_strand(io_);
+  WebContext context_;
+  Address address_;
+  std::optional<TlsContexts> tls_;
+  std::list<Acceptor> listeners_;
+  bool stopped_ = false;  // On accepting_.
+  std::vector<std::thread> threads_;
+};
+
+WebGateway::WebGateway(std::unique_ptr<Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
+
+WebGateway::~WebGateway() = default;
+
+const Address& WebGateway::address() const { return implementation_->address(); }
+
+void WebGateway::Stop(std::chrono::steady_clock::time_point deadline) {
+  implementation_->Stop(deadline);
+}
+
+absl::StatusOr<std::unique_ptr<WebGateway>> WebGateway::Start(const WebOptions& options,
+                                                              const Setup& setup) {
+  if (!options.address.unix_path.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--web ", options.address.ToString(), ": must be HOST:PORT or [IPV6]:PORT"));
+  }
+  WebRules rules{.origins = {}, .is_local = options.address.IsLocal()};
+  for (const std::string& origin : options.origins) {
+    auto normal = NormalOrigin(origin);
+    if (!normal.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--web-origin ", normal.status().message()));
+    }
+    rules.origins.push_back(*std::move(normal));
+  }
+  auto implementation = std::make_unique<Implementation>(options, setup, std::move(rules));
+  if (auto status = implementation->Listen(); !status.ok()) return status;
+  return std::unique_ptr<WebGateway>(new WebGateway(std::move(implementation)));
+}
+
+}  // namespace partiemc::server
