@@ -1,0 +1,57 @@
+import { type Frame, NO_RING, type Rings } from '../protocol/frame';
+import { RingIndex } from './pick';
+
+/** Points of a ring by which its place is told. */
+const SAMPLES = 16;
+
+/**
+ * Outer rings of a later frame that continue the `chosen` ones of an earlier frame under another
+ * identity, told by place where the frames between them, and thus the parents, were not seen. A
+ * ring that has vanished goes on in the one that covers its place; a ring that is new comes out of
+ * the one on whose place it lies. At least half of a ring's points have to agree.
+ */
+export function continuations(before: Frame, chosen: readonly number[], after: Frame): number[] {
+  const surviving = new Set(after.rings.identities);
+  const vanished = chosen.filter((ring) => isOuter(before.rings, ring) &&
+    !surviving.has(before.rings.identities[ring]));
+  const known = new Set(before.rings.identities);
+  const fresh = [...after.rings.identities.keys()].filter((ring) =>
+    isOuter(after.rings, ring) && !known.has(after.rings.identities[ring]));
+  const found = new Set<number>();
+  if (vanished.length > 0) {
+    const index = new RingIndex(after.rings);
+    for (const ring of vanished) {
+      const cover = placeOf(before, ring, after, index);
+      if (cover !== null) found.add(cover);
+    }
+  }
+  if (fresh.length > 0) {
+    const index = new RingIndex(before.rings);
+    for (const ring of fresh) {
+      const origin = placeOf(after, ring, before, index);
+      if (origin !== null && chosen.includes(origin)) found.add(ring);
+    }
+  }
+  return [...found];
+}
+
+/** The ring of the other frame in which at least half of this one's points lie. */
+function placeOf(own: Frame, ring: number, other: Frame, index: RingIndex): number | null {
+  const { points, offsets } = own.rings;
+  const count = offsets[ring + 1] - offsets[ring];
+  const [right, up] = [own.origin[0] - other.origin[0], own.origin[1] - other.origin[1]];
+  const votes = new Map<number, number>();
+  for (let sample = 0; sample < SAMPLES; ++sample) {
+    const k = offsets[ring] + Math.floor((sample * count) / SAMPLES);
+    const at = index.ringAt(points[2 * k] + right, points[2 * k + 1] + up, 0);
+    if (at === null) continue;
+    const votesNow = (votes.get(at) ?? 0) + 1;
+    if (votesNow >= SAMPLES / 2) return at;
+    votes.set(at, votesNow);
+  }
+  return null;
+}
+
+function isOuter(rings: Rings, ring: number): boolean {
+  return rings.outerOf[ring] === NO_RING && rings.identities[ring] !== 0n;
+}

@@ -1,0 +1,61 @@
+import { type Mesh, NO_RING, type Rings } from '../protocol/frame';
+import { RingIndex } from './pick';
+
+/**
+ * The colour of the outer ring for each point of the mesh. Triangles that share a point belong to
+ * the same component, thus one point of an outline tells the component of a whole piece; a piece
+ * without one is found by the place of its first triangle. Some 3 ms for 100,000 points.
+ */
+export function pieceTints(
+  mesh: Mesh, rings: Rings, colourOf: (ring: number) => number,
+): Uint32Array {
+  const { points, triangles } = mesh;
+  const pieces = piecesOf(points.length / 2, triangles);
+  const colours = new Uint32Array(rings.outerOf.length);
+  for (let ring = 0; ring < colours.length; ++ring) colours[ring] = colourOf(ring);
+  const ringOfPiece = new Uint32Array(pieces.length).fill(NO_RING);
+  for (let ring = 0; ring < colours.length; ++ring) {
+    const outer = rings.outerOf[ring] === NO_RING ? ring : rings.outerOf[ring];
+    for (let k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+      ringOfPiece[pieces[k]] = outer;
+    }
+  }
+  let index: RingIndex | null = null;
+  for (let k = 0; k < triangles.length && colours.length > 0; k += 3) {
+    const piece = pieces[triangles[k]];
+    if (ringOfPiece[piece] !== NO_RING) continue;
+    index ??= new RingIndex(rings);
+    const [a, b, c] = [2 * triangles[k], 2 * triangles[k + 1], 2 * triangles[k + 2]];
+    const x = (points[a] + points[b] + points[c]) / 3;
+    const y = (points[a + 1] + points[b + 1] + points[c + 1]) / 3;
+    ringOfPiece[piece] = index.innermost(x, y) ?? 0; // Null by rounding at most.
+  }
+  for (let k = 0; k < pieces.length; ++k) pieces[k] = colours[ringOfPiece[pieces[k]]];
+  return pieces;
+}
+
+/** For each point the smallest point that triangles join it with. */
+function piecesOf(count: number, triangles: Uint32Array): Uint32Array {
+  const parent = new Uint32Array(count);
+  for (let k = 0; k < count; ++k) parent[k] = k;
+  for (let k = 0; k < triangles.length; k += 3) {
+    const a = root(parent, triangles[k]);
+    const b = root(parent, triangles[k + 1]);
+    const c = root(parent, triangles[k + 2]);
+    const smallest = Math.min(a, b, c);
+    parent[a] = parent[b] = parent[c] = smallest;
+  }
+  // A parent is never larger than its child, thus it has come to its own root before.
+  for (let k = 0; k < count; ++k) parent[k] = parent[parent[k]];
+  return parent;
+}
+
+/** The smallest point of the set so far, halving the path to it. */
+function root(parent: Uint32Array, point: number): number {
+  let k = point;
+  while (parent[k] !== k) {
+    parent[k] = parent[parent[k]];
+    k = parent[k];
+  }
+  return k;
+}

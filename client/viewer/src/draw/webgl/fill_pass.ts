@@ -1,0 +1,103 @@
+import { theme } from '../colours';
+import type { FrameTextures } from './frame_textures';
+import type { Look } from '../look';
+import { fillTones } from '../look_colours';
+import { type Camera, Program } from './program';
+import { BAND_TINT, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT } from '../style';
+
+const VERTEX = `
+uniform sampler2D points;
+uniform usampler2D triangles;
+uniform usampler2D classes;
+uniform usampler2D tints;
+uniform bool tinted, edged;
+uniform vec4 ground, band, interior, edge;
+uniform vec3 tintShares;  // Of band, interior, edges.
+flat out vec4 inside;
+flat out vec4 edgeColour;
+out vec3 heights;  // Distances to the three edges, device pixels.
+
+void main() {
+  int triangle = gl_VertexID / 3;
+  int corner = gl_VertexID - 3 * triangle;
+  int vertex = int(texelFetch(triangles, at(gl_VertexID), 0).r);
+  vec2 a = pixel(texelFetch(points, at(vertex), 0).rg);
+  gl_Position = position(a);
+
+  bool merged = texelFetch(classes, at(triangle), 0).r != 0u;
+  inside = merged ? interior : band;
+  edgeColour = edge;
+  if (tinted) {
+    vec4 tint = unpacked(texelFetch(tints, at(vertex), 0).r);
+    inside = inside.a * mix(ground, tint, merged ? tintShares.y : tintShares.x);
+    edgeColour.rgb = mix(ground, tint, tintShares.z).rgb;
+  }
+
+  heights = vec3(0.0);
+  if (!edged) return;
+  int second = int(texelFetch(triangles, at(3 * triangle + (corner + 1) % 3), 0).r);
+  int third = int(texelFetch(triangles, at(3 * triangle + (corner + 2) % 3), 0).r);
+  vec2 b = pixel(texelFetch(points, at(second), 0).rg) - a;
+  vec2 c = pixel(texelFetch(points, at(third), 0).rg) - a;
+  float doubled = abs(b.x * c.y - b.y * c.x);
+  float opposite = distance(b, c);
+  heights[corner] = doubled / max(opposite, 1e-6);
+  // Where triangles are hardly wider than their edges, the edges would cover all: they fade by the
+  // radius of the inscribed circle.
+  edgeColour.a *= smoothstep(0.4, 3.0, doubled / max(opposite + length(b) + length(c), 1e-6));
+}
+`;
+
+const FRAGMENT = `
+uniform bool edged;
+uniform float halfWidth;  // Device pixels.
+flat in vec4 inside;
+flat in vec4 edgeColour;
+in vec3 heights;
+out vec4 colour;
+
+void main() {
+  colour = inside;
+  if (!edged) return;
+  float near = min(heights.x, min(heights.y, heights.z));
+  float cover = edgeColour.a * clamp(halfWidth + 0.5 - near, 0.0, 1.0);
+  colour = mix(inside, vec4(edgeColour.rgb, 1.0), cover);
+}
+`;
+
+/**
+ * The triangles of the mesh and their edges in one draw: each edge is drawn half by either of its
+ * triangles, by the distance from it.
+ */
+export class FillPass {
+  private readonly program: Program;
+
+  constructor(private readonly gl: WebGL2RenderingContext) {
+    this.program = new Program(gl, VERTEX, FRAGMENT);
+  }
+
+  draw(textures: FrameTextures, camera: Camera, look: Look, ratio: number): void {
+    const { program } = this;
+    const colours = theme(look.dark);
+    const { band, interior } = fillTones(look);
+    const opacity = look.fill ? 1 : 0;
+    program.use(camera);
+    program.texture('points', textures.points);
+    program.texture('triangles', textures.triangles);
+    program.texture('classes', textures.classes);
+    program.texture('tints', textures.tints);
+    program.integer('tinted', look.colour === 'identity' ? 1 : 0);
+    program.vector3('tintShares', [BAND_TINT, INTERIOR_TINT, EDGE_TINT]);
+    program.integer('edged', look.edges ? 1 : 0);
+    program.colour('ground', colours.background);
+    program.colour('band', look.fill ? band : [0, 0, 0], opacity);
+    program.colour('interior', look.fill ? interior : [0, 0, 0], opacity);
+    program.colour('edge', colours.edge, EDGE_ALPHA);
+    program.number('halfWidth', (EDGE_WIDTH * ratio) / 2);
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3 * textures.triangleCount);
+  }
+
+  destroy(): void {
+    this.program.destroy();
+  }
+}

@@ -1,0 +1,6 @@
+/** What is seen, as files. */
+export { clip, type Clip } from './clip';
+export { download } from './download';
+export { geojson } from './geojson';
+export { png } from './png';
+export { svg } from './svg';

@@ -1,0 +1,140 @@
+import { hex, mix, type Rgb, theme, unpacked } from '../draw/colours';
+import { attributeOf, type Look } from '../draw/look';
+import { pieceTints } from '../draw/pieces';
+import { type Range, rampColour, rangeOf } from '../draw/ramp';
+import { fillTones, ringColours } from '../draw/look_colours';
+import {
+  BAND_TINT, dotDiameter, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT, NORMAL_WIDTH,
+  normalLength, normalStride, PARTICLE_ALPHA,
+} from '../draw/style';
+import type { Size, View } from '../draw/view';
+import { type Frame, type Mesh, NO_RING, type Rings, TRIANGLE_CLASS } from '../protocol/frame';
+import {
+  dotPath, edgePaths, normalPath, Projection, ringPath, segmentPaths, short, trianglePaths,
+} from './paths';
+
+/** Steps of colour along an outline that is coloured by an attribute. */
+const RAMP_STEPS = 64;
+
+/**
+ * What is seen, as a picture of lines and areas, in CSS pixels. `range` is that of the attribute
+ * which the look colours by; without it, the frame's own.
+ */
+export function svg(
+  frame: Frame, look: Look, view: View, size: Size, range: Range | null = null,
+): string {
+  const at = new Projection(view, size, frame.origin);
+  const colours = theme(look.dark);
+  const parts = [
+    `<svg xmlns="http://www.w3.org/2000/svg" width="${short(size.width)}" ` +
+      `height="${short(size.height)}" viewBox="0 0 ${short(size.width)} ${short(size.height)}">`,
+    `<title>Frame ${frame.sequence}, time ${frame.time}</title>`,
+    '<style>path{stroke-linecap:round;stroke-linejoin:round}</style>',
+    `<rect width="100%" height="100%" fill="${hex(colours.background)}"/>`,
+  ];
+  const { rings, mesh, statistics } = frame;
+  const ringColour = ringColours(rings, look);
+  if (look.fill) parts.push(...areas(frame, look, ringColour, at));
+  if (look.edges && mesh) parts.push(...edges(mesh, rings, look, ringColour, at));
+  if (look.particles && frame.particles) {
+    parts.push(line(dotPath(frame.particles, at), colours.particle,
+      dotDiameter(statistics.spacing * view.scale), PARTICLE_ALPHA));
+  }
+  if (look.normals && rings.normals) {
+    const count = rings.points.length / 2;
+    const length = normalLength(statistics.spacing * view.scale);
+    const stride = normalStride((statistics.perimeter * view.scale) / Math.max(count, 1), count);
+    parts.push(line(normalPath(rings.points, rings.normals, stride, length, at),
+      colours.normal, NORMAL_WIDTH));
+  }
+  if (look.outline) parts.push(...outline(rings, look, ringColour, range, at));
+  return [...parts.filter((part) => part !== ''), '</svg>', ''].join('\n');
+}
+
+/**
+ * The inside in the colour of the band, with the merged triangles on top: as one figure, so that no
+ * seams show between triangles.
+ */
+function areas(
+  frame: Frame, look: Look, ringColour: (ring: number) => number, at: Projection,
+): string[] {
+  const { rings, mesh } = frame;
+  const { background } = theme(look.dark);
+  const { band, interior } = fillTones(look);
+  const tinted = look.colour === 'identity';
+  const groups = grouped(rings, (ring) => {
+    const outer = rings.outerOf[ring];
+    return tinted ? ringColour(outer === NO_RING ? ring : outer) : 0;
+  });
+  const inTone = (colour: number, plain: Rgb, share: number): Rgb =>
+    tinted ? mix(background, unpacked(colour), share) : plain;
+  const parts = Array.from(groups, ([colour, group]) =>
+    area(ringPath(rings, group, at), inTone(colour, band, BAND_TINT)));
+  if (!mesh) return parts;
+  const tints = tinted ? pieceTints(mesh, rings, ringColour) : null;
+  const merged = trianglePaths(mesh, (triangle) => {
+    if (mesh.classes[triangle] !== TRIANGLE_CLASS.interior) return null;
+    return tints ? tints[mesh.triangles[3 * triangle]] : 0;
+  }, at);
+  for (const [colour, path] of merged) {
+    parts.push(area(path, inTone(colour, interior, INTERIOR_TINT)));
+  }
+  return parts;
+}
+
+function edges(
+  mesh: Mesh, rings: Rings, look: Look, ringColour: (ring: number) => number, at: Projection,
+): string[] {
+  const { background, edge } = theme(look.dark);
+  const tints = look.colour === 'identity' ? pieceTints(mesh, rings, ringColour) : null;
+  const paths = edgePaths(mesh, (point) => (tints ? tints[point] : 0), at);
+  return Array.from(paths, ([colour, path]) =>
+    line(path, tints ? mix(background, unpacked(colour), EDGE_TINT) : edge,
+      EDGE_WIDTH, EDGE_ALPHA));
+}
+
+function outline(
+  rings: Rings, look: Look, ringColour: (ring: number) => number, range: Range | null,
+  at: Projection,
+): string[] {
+  const name = attributeOf(look);
+  const values = name === null ? undefined : rings.attributes.get(name);
+  if (!values) {
+    return Array.from(grouped(rings, ringColour), ([colour, group]) =>
+      line(ringPath(rings, group, at), unpacked(colour), look.lineWidth));
+  }
+  const { min, max } = range ?? rangeOf(values) ?? { min: 0, max: 1 };
+  const colourOf = (point: number, next: number): string => {
+    const share = max > min ? ((values[point] + values[next]) / 2 - min) / (max - min) : 0;
+    if (!Number.isFinite(share)) return hex(theme(look.dark).missing);
+    return hex(rampColour(Math.round(share * RAMP_STEPS) / RAMP_STEPS, look.dark));
+  };
+  return Array.from(segmentPaths(rings, colourOf, at), ([colour, path]) =>
+    stroke(path, colour, look.lineWidth, 1));
+}
+
+/** Rings by colour. */
+function grouped(rings: Rings, colourOf: (ring: number) => number): Map<number, number[]> {
+  const groups = new Map<number, number[]>();
+  for (let ring = 0; ring < rings.outerOf.length; ++ring) {
+    const colour = colourOf(ring);
+    const group = groups.get(colour);
+    if (group) group.push(ring);
+    else groups.set(colour, [ring]);
+  }
+  return groups;
+}
+
+function area(path: string, colour: Rgb): string {
+  return path && `<path fill="${hex(colour)}" fill-rule="evenodd" d="${path}"/>`;
+}
+
+function line(path: string, colour: Rgb, width: number, opacity = 1): string {
+  return stroke(path, hex(colour), width, opacity);
+}
+
+function stroke(path: string, colour: string, width: number, opacity: number): string {
+  const thin = opacity < 1 ? ` stroke-opacity="${opacity}"` : '';
+  return path &&
+    `<path fill="none" stroke="${colour}" stroke-width="${short(width)}"${thin} d="${path}"/>`;
+}

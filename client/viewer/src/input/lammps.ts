@@ -1,0 +1,110 @@
+// LAMMPS text dumps ("dump atom" and "dump custom"): frames of sections that begin with "ITEM:".
+import type { Particles } from '../protocol/particles';
+import { planNamedColumns } from './columns';
+import { particlesOf, type Unscale } from './particles';
+import { InputError, type FrameSource } from './source';
+import { splitAtBlanks } from './table';
+
+/** A point of the box is origin + sum over axes of (fraction * edge). */
+interface Box { origin: number[]; edges: number[][] }
+
+/** Lower and upper bounds, and for a triclinic box the tilts xy xz yz, which widen its bounds. */
+function boxOf(lines: string[]): Box {
+  const numbers = lines.map((line) => splitAtBlanks(line).map(Number));
+  const low = numbers.map((line) => line[0]);
+  const high = numbers.map((line) => line[1]);
+  const [xy, xz, yz] = numbers.map((line) => line[2] ?? 0);
+  low[0] -= Math.min(0, xy, xz, xy + xz);
+  high[0] -= Math.max(0, xy, xz, xy + xz);
+  low[1] -= Math.min(0, yz);
+  high[1] -= Math.max(0, yz);
+  return {
+    origin: low,
+    edges: [[high[0] - low[0], 0, 0], [xy, high[1] - low[1], 0], [xz, yz, high[2] - low[2]]],
+  };
+}
+
+function unscaleIn(box: Box): Unscale {
+  return (axes) => {
+    const count = axes.find((axis) => axis)?.length ?? 0;
+    for (let i = 0; i < count; ++i) {
+      const point = [...box.origin];
+      axes.forEach((axis, a) => {
+        if (axis) box.edges[a].forEach((edge, k) => { if (edge !== 0) point[k] += axis[i] * edge; });
+      });
+      axes.forEach((axis, a) => { if (axis) axis[i] = point[a]; });
+    }
+  };
+}
+
+/** One frame's lines. Throws InputError. */
+export function parseLammpsFrame(text: string, index: number, name: string): Particles {
+  const where = `${name}, frame ${index + 1}`;
+  const lines = text.split(/\r?\n/);
+  let time: number | null = null;
+  let atoms = -1;
+  let box: Box | null = null;
+  for (let k = 0; k < lines.length; ++k) {
+    const line = lines[k];
+    if (line.startsWith('ITEM: NUMBER OF ATOMS')) {
+      atoms = Number(lines[++k]);
+    } else if (line.startsWith('ITEM: BOX BOUNDS')) {
+      box = boxOf(lines.slice(k + 1, k + 4));
+      k += 3;
+    } else if (line.startsWith('ITEM: TIMESTEP')) {
+      ++k;
+    } else if (line.startsWith('ITEM: TIME')) {
+      time = Number(lines[++k]);
+    } else if (line.startsWith('ITEM: ATOMS')) {
+      const plan = planNamedColumns(splitAtBlanks(line.slice('ITEM: ATOMS'.length)));
+      const rows = lines.slice(k + 1, k + 1 + atoms).filter((row) => row !== '').map(splitAtBlanks);
+      if (rows.length !== atoms) {
+        throw new InputError(`${where} has ${rows.length} of ${atoms} atoms. It is truncated.`);
+      }
+      if (plan.scaled && !box) throw new InputError(`${where}: scaled positions without a box.`);
+      const unscale = plan.scaled && box ? unscaleIn(box) : undefined;
+      return particlesOf(rows, plan, time, index, where, unscale);
+    }
+  }
+  throw new InputError(`${where} has no atoms. Only text dumps of style atom and custom are read.`);
+}
+
+const FRAME_MARK = 'ITEM: TIMESTEP';
+const CHUNK_BYTES = 4 << 20;
+
+/** A dump of many frames, cut at its marks and read where needed. */
+export class LammpsSource implements FrameSource {
+  readonly spacing = null;
+
+  private constructor(private readonly file: Blob, readonly title: string,
+                      private readonly offsets: number[], readonly scalars: string[]) {}
+
+  static async open(file: Blob, title: string): Promise<LammpsSource> {
+    const offsets = await marksOf(file);
+    if (offsets.length === 0) throw new InputError(`${title} holds no frame of a LAMMPS dump.`);
+    const source = new LammpsSource(file, title, [...offsets, file.size], []);
+    const first = await source.frame(0);
+    source.scalars.push(...(first.scalars ?? []).map(({ name }) => name));
+    return source;
+  }
+
+  get count(): number { return this.offsets.length - 1; }
+
+  async frame(index: number): Promise<Particles> {
+    const text = await this.file.slice(this.offsets[index], this.offsets[index + 1]).text();
+    return parseLammpsFrame(text, index, this.title);
+  }
+}
+
+/** Where the frames of a dump begin. Reads the file once, a piece at a time. */
+async function marksOf(file: Blob): Promise<number[]> {
+  const offsets: number[] = [];
+  for (let at = 0; at < file.size; at += CHUNK_BYTES) {
+    const piece = file.slice(at, at + CHUNK_BYTES + FRAME_MARK.length - 1);
+    const text = new TextDecoder('latin1').decode(await piece.arrayBuffer());
+    for (let k = text.indexOf(FRAME_MARK); k >= 0; k = text.indexOf(FRAME_MARK, k + 1)) {
+      offsets.push(at + k);
+    }
+  }
+  return offsets;
+}

@@ -1,0 +1,111 @@
+// The project's own recordings (client/recording/recording.h): marks and zstd blocks, each of some
+// messages behind their lengths.
+import { fromBinary } from '@bufbuild/protobuf';
+import { BinaryReader } from '@bufbuild/protobuf/wire';
+import { RecordingHeaderSchema } from '@proto/recording/v1/recording_pb';
+import { ParticleFrameSchema } from '@proto/v1/reconstruction_pb';
+import { decompress } from 'fzstd';
+import { arrayOf } from '../protocol/arrays';
+import type { Particles } from '../protocol/particles';
+import { InputError, type FrameSource } from './source';
+
+const MARK_BYTES = 24;
+const SKIPPABLE_MAGIC = 0x184d2a50;
+const FILE_TAG = 'PEMCFILE';
+
+export function isRecording(head: Uint8Array): boolean {
+  return head.length >= 16 && new TextDecoder('latin1').decode(head.subarray(8, 16)) === FILE_TAG;
+}
+
+/** The end of the zstd frame that begins at `at`, by the sizes of its blocks (RFC 8878, 3.1.1);
+ * null where the file ends before. */
+function frameEnd(bytes: Uint8Array, at: number): number | null {
+  const descriptor = bytes[at + 4];
+  const single = (descriptor >> 5) & 1;
+  const sizeFlag = descriptor >> 6;
+  const contentSize = sizeFlag === 0 ? single : 1 << sizeFlag;
+  const dictionary = [0, 1, 2, 4][descriptor & 3];
+  let next = at + 5 + (1 - single) + dictionary + contentSize;
+  for (let last = false; !last;) {
+    if (next + 3 > bytes.length) return null;
+    const header = bytes[next] | (bytes[next + 1] << 8) | (bytes[next + 2] << 16);
+    last = (header & 1) === 1;
+    const isRun = ((header >> 1) & 3) === 1;
+    next += 3 + (isRun ? 1 : header >> 3);
+  }
+  next += descriptor & 4 ? 4 : 0;
+  return next <= bytes.length ? next : null;
+}
+
+/** The messages of a block: each behind its length. */
+function messagesOf(block: Uint8Array): Uint8Array[] {
+  const reader = new BinaryReader(block);
+  const messages: Uint8Array[] = [];
+  while (reader.pos < block.length) messages.push(reader.bytes());
+  return messages;
+}
+
+/** Where a frame is: which block, and which of its messages. */
+interface Place { block: number; message: number }
+
+/** Keeps the file as it is, packed, and unpacks a block where one of its frames is needed. A file
+ * that was cut off ends after its last whole block. */
+export class RecordingSource implements FrameSource {
+  readonly scalars: string[] = [];
+  private readonly places: Place[] = [];
+  private unpacked: { block: number; messages: Uint8Array[] } | null = null;
+
+  private constructor(private readonly bytes: Uint8Array, private readonly blocks: number[],
+                      readonly title: string, readonly spacing: number | null) {}
+
+  /** Throws InputError. */
+  static open(bytes: Uint8Array, name: string): RecordingSource {
+    if (!isRecording(bytes)) throw new InputError(`${name} is no recording.`);
+    const blocks = blocksOf(bytes);
+    const header = fromBinary(RecordingHeaderSchema, messagesOf(unpack(bytes, blocks, 0, name))[0]);
+    const source = new RecordingSource(bytes, blocks, header.title || name, header.spacing ?? null);
+    for (let block = 1; block + 1 < blocks.length; ++block) {
+      const messages = messagesOf(unpack(bytes, blocks, block, name));
+      messages.forEach((_, message) => source.places.push({ block, message }));
+    }
+    if (source.count === 0) throw new InputError(`${name} holds no frame.`);
+    return source;
+  }
+
+  get count(): number { return this.places.length; }
+
+  async frame(index: number): Promise<Particles> {
+    const { block, message } = this.places[index];
+    if (this.unpacked?.block !== block) {
+      const messages = messagesOf(unpack(this.bytes, this.blocks, block, this.title));
+      this.unpacked = { block, messages };
+    }
+    const recorded = fromBinary(ParticleFrameSchema, this.unpacked.messages[message]);
+    const { time, positionFormat, positions, ids, volumes, velocities } = recorded;
+    const frame: Particles = { time, positionFormat, positions, ids, volumes };
+    if (arrayOf(Float32Array, velocities).every(Number.isFinite)) frame.velocities = velocities;
+    return frame;
+  }
+}
+
+/** Where the blocks begin, and at last where the last whole one ends. */
+function blocksOf(bytes: Uint8Array): number[] {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const blocks = [MARK_BYTES];
+  let at = MARK_BYTES;
+  while (at + 8 < bytes.length && view.getUint32(at, true) !== SKIPPABLE_MAGIC) {
+    const end = frameEnd(bytes, at);
+    if (end === null) break;
+    blocks.push(end);
+    at = end;
+  }
+  return blocks;
+}
+
+function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string): Uint8Array {
+  try {
+    return decompress(bytes.subarray(blocks[block], blocks[block + 1]));
+  } catch {
+    throw new InputError(`${name} is damaged. Only the frames before can be read by the command line.`);
+  }
+}

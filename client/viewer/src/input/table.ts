@@ -1,0 +1,69 @@
+// Text tables: CSV and its relatives, as client/input/base/text_table.h reads them.
+import { InputError } from './source';
+
+export interface Table {
+  /** Empty where the table does not name its columns. */
+  names: string[];
+  columnCount: number;
+  rows: string[][];
+}
+
+const isComment = (line: string) => line.startsWith('#') || line.startsWith('%');
+const isNumber = (cell: string) => cell !== '' && !Number.isNaN(Number(cell)) ||
+  /^[+-]?nan$/i.test(cell);
+
+export const splitAtBlanks = (line: string) => line.split(/[ \t]+/).filter((cell) => cell !== '');
+
+function unquoted(cell: string): string {
+  const bare = cell.trim();
+  return bare.length >= 2 && bare.startsWith('"') && bare.endsWith('"')
+    ? bare.slice(1, -1).trim() : bare;
+}
+
+/** A line's cells; a separator within quotes separates nothing. */
+function splitAt(line: string, separator: string): string[] {
+  const cells = line.includes('"')
+    ? line.match(new RegExp(`("[^"]*"|[^${separator}])+|(?<=${separator})(?=${separator})`, 'g')) ?? []
+    : line.split(separator);
+  const bare = cells.map(unquoted);
+  if (bare.length > 1 && bare[bare.length - 1] === '') bare.pop();
+  return bare;
+}
+
+function splitter(line: string): (line: string) => string[] {
+  if (!splitAtBlanks(line).every(isNumber)) {
+    for (const separator of [';', '\t', ',']) {
+      if (line.includes(separator)) return (other) => splitAt(other, separator);
+    }
+  }
+  return (other) => splitAtBlanks(other).map(unquoted);
+}
+
+/** Throws InputError where a row has fewer cells than the first one. */
+export function parseTable(text: string, name: string): Table {
+  const lines = text.split(/\r?\n|\r/);
+  const first = lines.findIndex((line) => line.trim() !== '' && !isComment(line.trim()));
+  if (first < 0) {
+    throw new InputError(`${name} is empty. A frame without particles is a header without rows.`);
+  }
+  const split = splitter(lines[first]);
+  const head = split(lines[first]);
+  const named = !head.every(isNumber);
+  let names = named ? head : [];
+  if (!named && first > 0) {
+    const comment = splitAtBlanks(lines[first - 1].trim().replace(/^[#%]/, '').replaceAll(',', ' '));
+    if (comment.length === head.length && !comment.every(isNumber)) names = comment;
+  }
+  const rows: string[][] = [];
+  for (let k = named ? first + 1 : first; k < lines.length; ++k) {
+    const line = lines[k];
+    if (line.trim() === '' || isComment(line.trim())) continue;
+    const cells = split(line);
+    if (cells.length < head.length) {
+      throw new InputError(`${name}, line ${k + 1}: ${cells.length} cells where the first row has ` +
+                           `${head.length}. The file may be truncated.`);
+    }
+    rows.push(cells);
+  }
+  return { names, columnCount: head.length, rows };
+}

@@ -1,0 +1,17 @@
+import { decompress } from 'fzstd';
+
+/** Text of a file, unpacked where its name says that it is packed. */
+export async function textOf(file: File): Promise<string> {
+  if (file.name.endsWith('.gz')) {
+    return new Response(file.stream().pipeThrough(new DecompressionStream('gzip'))).text();
+  }
+  if (file.name.endsWith('.zst')) {
+    return new TextDecoder().decode(decompress(new Uint8Array(await file.arrayBuffer())));
+  }
+  return file.text();
+}
+
+/** The name without what tells how it is packed, in lower case. */
+export function plainName(file: File): string {
+  return file.name.toLowerCase().replace(/\.(gz|zst)$/, '');
+}

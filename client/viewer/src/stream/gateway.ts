@@ -1,0 +1,123 @@
+import { create, fromBinary, toBinary, type DescMessage, type MessageInitShape, type MessageShape }
+  from '@bufbuild/protobuf';
+import {
+  GetServerInfoRequestSchema, GetServerInfoResponseSchema, type GetServerInfoResponse,
+} from '@proto/v1/reconstruction_pb';
+import { CallError, parseStatus, UNAVAILABLE, type CallStatus } from './status';
+
+const PROTOCOL = 'partiemc.v1';
+
+const LOST: CallStatus = {
+  code: UNAVAILABLE, reason: '', message: 'The server does not answer',
+};
+
+/** What happens on a channel. After `ended`, nothing more does. */
+export interface ChannelEvents {
+  opened(): void;
+  message(bytes: Uint8Array): void;
+  ended(status: CallStatus): void;
+}
+
+/** A call that streams: one binary message is one serialised request or response. */
+export class Channel {
+  private readonly socket: WebSocket;
+  private over = false;
+  private told: CallStatus | null = null;
+
+  constructor(url: URL, protocols: string[], private readonly events: ChannelEvents) {
+    this.socket = new WebSocket(url, protocols);
+    this.socket.binaryType = 'arraybuffer';
+    this.socket.onopen = () => { if (!this.over) events.opened(); };
+    this.socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => this.receive(event.data);
+    this.socket.onclose = (event) => this.closed(event);
+  }
+
+  send<T extends DescMessage>(schema: T, request: MessageInitShape<T>): void {
+    if (this.socket.readyState !== WebSocket.OPEN) return;
+    this.socket.send(toBinary(schema, create(schema, request)) as Uint8Array<ArrayBuffer>);
+  }
+
+  /** Bytes that were sent and have not left this machine yet. */
+  get unsentBytes(): number { return this.socket.bufferedAmount; }
+
+  /** Nothing more will be sent; answers still come. */
+  halfClose(): void {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send('end');
+  }
+
+  /** Gives the call up; `ended` is not called. */
+  close(): void {
+    this.over = true;
+    this.socket.close();
+  }
+
+  private receive(data: ArrayBuffer | string): void {
+    if (this.over) return;
+    if (typeof data === 'string') this.told = parseStatus(data);
+    else this.events.message(new Uint8Array(data));
+  }
+
+  private closed(event: CloseEvent): void {
+    if (this.over) return;
+    this.over = true;
+    const code = event.code >= 4000 ? event.code - 4000 : event.code === 1000 ? 0 : UNAVAILABLE;
+    this.events.ended(this.told ?? (code === UNAVAILABLE ? LOST : { ...LOST, code, message: '' }));
+  }
+}
+
+/** base64url without padding, of the token's UTF-8. */
+function base64Url(text: string): string {
+  const bytes = new TextEncoder().encode(text);
+  return btoa(String.fromCharCode(...bytes))
+    .replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', '');
+}
+
+/** The server's gateway: unary methods by POST, streams by WebSocket. */
+export class Gateway {
+  token = '';
+  private known: Promise<GetServerInfoResponse> | null = null;
+
+  /** `base`: the address of the page's server. */
+  constructor(private readonly base: URL) {}
+
+  open(path: '/v1/watch' | '/v1/reconstruct', events: ChannelEvents): Channel {
+    const url = new URL(path, this.base);
+    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+    const bearer = this.token ? [`bearer.${base64Url(this.token)}`] : [];
+    return new Channel(url, [PROTOCOL, ...bearer], events);
+  }
+
+  /** What the server is and can do; asked for once. Throws CallError. */
+  info(): Promise<GetServerInfoResponse> {
+    this.known ??= this.call('/v1/info', GetServerInfoRequestSchema, GetServerInfoResponseSchema, {})
+      .catch((error: unknown) => {
+        this.known = null;
+        throw error;
+      });
+    return this.known;
+  }
+
+  /** Calls a unary method. Throws CallError. */
+  async call<Q extends DescMessage, R extends DescMessage>(
+    path: '/v1/info' | '/v1/streams' | '/v1/frame', requestSchema: Q, responseSchema: R,
+    request: MessageInitShape<Q>,
+  ): Promise<MessageShape<R>> {
+    const response = await this.post(path, toBinary(requestSchema, create(requestSchema, request)));
+    const body = new Uint8Array(await response.arrayBuffer());
+    if (response.ok) return fromBinary(responseSchema, body);
+    const status = parseStatus(new TextDecoder().decode(body));
+    throw new CallError(status ?? { ...LOST, message: `The server answers ${response.status}` });
+  }
+
+  private async post(path: string, body: Uint8Array): Promise<Response> {
+    const headers: Record<string, string> = { 'Content-Type': 'application/x-protobuf' };
+    if (this.token) headers.Authorization = `Bearer ${this.token}`;
+    try {
+      return await fetch(new URL(path, this.base), {
+        method: 'POST', headers, body: body as Uint8Array<ArrayBuffer>,
+      });
+    } catch {
+      throw new CallError(LOST);
+    }
+  }
+}

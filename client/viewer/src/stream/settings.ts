@@ -1,0 +1,120 @@
+import { create } from '@bufbuild/protobuf';
+import {
+  CoordinateFormat, Fill, OutputsSchema, Placement, ReconstructionParametersSchema,
+  type ReconstructionParameters,
+} from '@proto/v1/reconstruction_pb';
+
+/** The paper's switches. Null and UNSPECIFIED: as the stream has it. Lengths are in spacings. */
+export interface Settings {
+  placement: Placement;
+  fill: Fill;
+  kernelRadius: number | null;
+  referenceRadius: number | null;
+  cellSize: number | null;
+  surfaceOffset: number | null;
+  /** Percent of the particles. */
+  share: number;
+}
+
+export const AS_STREAMED: Readonly<Settings> = {
+  placement: Placement.UNSPECIFIED, fill: Fill.UNSPECIFIED, kernelRadius: null,
+  referenceRadius: null, cellSize: null, surfaceOffset: null, share: 100,
+};
+
+export const SHARES = [100, 80, 50, 30];
+
+export const PLACEMENTS: Record<string, Placement> = {
+  'marching-squares': Placement.MARCHING_SQUARES,
+  qef: Placement.QEF,
+  'farthest-particle': Placement.FARTHEST_PARTICLE,
+  'virtual-plane': Placement.VIRTUAL_PLANE,
+};
+
+export const FILLS: Record<string, Fill> = {
+  none: Fill.NONE,
+  grid: Fill.GRID,
+  greedy: Fill.GREEDY,
+  conforming: Fill.CONFORMING,
+  polygon: Fill.POLYGON,
+};
+
+/** The name of a placement or fill, as the command line has it. */
+export function nameOf(names: Record<string, number>, value: number): string {
+  return Object.keys(names).find((name) => names[name] === value) ?? '';
+}
+
+export function isAsStreamed(settings: Settings): boolean {
+  return settingsText(settings) === '';
+}
+
+/** Settings as the page's address has them: `placement:qef;fill:none`. */
+export function settingsText(settings: Settings): string {
+  const parts: [string, string | number | null][] = [
+    ['placement', nameOf(PLACEMENTS, settings.placement)],
+    ['fill', nameOf(FILLS, settings.fill)],
+    ['kernel', settings.kernelRadius],
+    ['reference', settings.referenceRadius],
+    ['cell', settings.cellSize],
+    ['offset', settings.surfaceOffset],
+    ['share', settings.share === 100 ? null : settings.share],
+  ];
+  return parts.filter(([, value]) => value !== null && value !== '')
+    .map(([name, value]) => `${name}:${value}`).join(';');
+}
+
+function numberOf(text: string | undefined): number | null {
+  const value = text ? Number(text) : NaN;
+  return Number.isFinite(value) ? value : null;
+}
+
+/** The inverse of settingsText; what it does not know is as streamed. */
+export function parseSettings(text: string): Settings {
+  const values = new Map(text.split(';').map((part) => {
+    const at = part.indexOf(':');
+    return [part.slice(0, at), part.slice(at + 1)] as const;
+  }));
+  const share = numberOf(values.get('share'));
+  return {
+    placement: PLACEMENTS[values.get('placement') ?? ''] ?? Placement.UNSPECIFIED,
+    fill: FILLS[values.get('fill') ?? ''] ?? Fill.UNSPECIFIED,
+    kernelRadius: numberOf(values.get('kernel')),
+    referenceRadius: numberOf(values.get('reference')),
+    cellSize: numberOf(values.get('cell')),
+    surfaceOffset: numberOf(values.get('offset')),
+    share: share !== null && SHARES.includes(share) ? share : 100,
+  };
+}
+
+/** Parameters of a stream or frame: those of `base` where the settings say nothing. `spacing` is
+ * what `base` used where it does not name one. */
+export function parametersOf(settings: Settings, base: ReconstructionParameters | null,
+                             spacing: number | null): ReconstructionParameters {
+  const placement = settings.placement || (base?.placement ?? Placement.UNSPECIFIED);
+  const sameField = (settings.placement === 0 || settings.placement === base?.placement) &&
+    settings.kernelRadius === null;
+  const farthest = placement === Placement.FARTHEST_PARTICLE;
+  return create(ReconstructionParametersSchema, {
+    placement,
+    fill: settings.fill || (base?.fill ?? Fill.UNSPECIFIED),
+    spacing: base?.spacing ?? (spacing || undefined),
+    spacingRule: base?.spacingRule,
+    kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
+    cellSize: settings.cellSize ?? base?.cellSize,
+    // Calibrated, and chosen, for a placement and a kernel: another one gets its own.
+    referenceRadius: settings.referenceRadius ?? (sameField ? base?.referenceRadius : undefined),
+    clean: sameField ? base?.clean : undefined,
+    surfaceOffset: farthest ? settings.surfaceOffset ?? base?.surfaceOffset : undefined,
+    normalMemory: base?.normalMemory,
+    plane: base?.plane,
+    minComponentArea: base?.minComponentArea,
+    minComponentParticles: base?.minComponentParticles,
+  });
+}
+
+/** All that can be drawn. */
+export function outputsFor(attributes: string[]) {
+  return create(OutputsSchema, {
+    rings: true, mesh: true, normals: true, attributes,
+    coordinateFormat: CoordinateFormat.FLOAT32_RELATIVE,
+  });
+}

@@ -1,0 +1,27 @@
+import type { ReconstructedFrame } from '@proto/v1/reconstruction_pb';
+import type { Summary } from './history';
+
+/** Names of the stages, as statistics give them. */
+export const STAGES = [
+  'bins', 'field', 'crossings', 'rings', 'normals', 'vertices', 'identities', 'mesh',
+] as const;
+
+/** Counts of a track, from its beginning. */
+export interface Counts { received: number; drawn: number; dropped: number }
+
+/** `counts`: null for a frame of history, whose coming says nothing of the stream. */
+export function summarise(frame: ReconstructedFrame, counts: Counts | null): Summary {
+  const statistics = frame.statistics;
+  const stages = STAGES.map(
+    (name) => statistics?.stages.find(({ stage }) => stage === name)?.milliseconds ?? 0);
+  return {
+    area: statistics?.area ?? 0,
+    rings: frame.rings?.measures.length ?? 0,
+    triangles: Number(statistics?.triangles ?? 0),
+    trianglesGrid: Number(statistics?.trianglesGrid ?? 0),
+    milliseconds: statistics?.milliseconds ?? 0,
+    stages,
+    ...counts ?? { received: NaN, drawn: NaN, dropped: NaN },
+    latency: NaN,
+  };
+}

@@ -1,0 +1,59 @@
+import type { View } from '../draw';
+import { parseSettings, settingsText, type Settings } from '../stream/settings';
+
+/** What one pane shows. An empty stream: the same as the first pane's. */
+export interface PaneAddress { stream: string; settings: Settings }
+
+/** What the address of the page holds, so that a link shows the same. */
+export interface Address {
+  panes: PaneAddress[];
+  /** Null: the newest. */
+  frame: number | null;
+  view: View | null;
+  look: string;
+}
+
+/** `#stream=dam&frame=12&view=1,2,300&set=placement:qef&beside=~fill:none&look=...` */
+export function addressText(address: Address): string {
+  const parts: string[] = [];
+  const add = (name: string, value: string) => {
+    if (value) parts.push(`${name}=${escaped(value)}`);
+  };
+  const [first, ...others] = address.panes;
+  add('stream', first?.stream ?? '');
+  add('frame', address.frame === null ? '' : String(address.frame));
+  const view = address.view;
+  add('view', view ? [view.x, view.y, view.scale].map((v) => Number(v.toPrecision(6))).join(',') : '');
+  add('set', first ? settingsText(first.settings) : '');
+  for (const pane of others) add('beside', `${pane.stream}~${settingsText(pane.settings)}`);
+  add('look', address.look);
+  return parts.length > 0 ? `#${parts.join('&')}` : '';
+}
+
+/** Commas, colons and semicolons may stand as they are, for whoever reads the address. */
+function escaped(value: string): string {
+  return encodeURIComponent(value).replace(/%(2C|3A|3B)/g, decodeURIComponent);
+}
+
+function parseView(text: string | null): View | null {
+  const [x, y, scale] = (text ?? '').split(',').map(Number);
+  return [x, y, scale].every(Number.isFinite) && scale > 0 ? { x, y, scale } : null;
+}
+
+/** The inverse of addressText. What it does not know is left out. */
+export function parseAddress(hash: string): Address {
+  const values = new URLSearchParams(hash.replace(/^#/, ''));
+  const frame = Number(values.get('frame') || NaN);
+  const stream = values.get('stream') ?? '';
+  const first = stream ? [{ stream, settings: parseSettings(values.get('set') ?? '') }] : [];
+  const others = values.getAll('beside').map((text) => {
+    const at = text.indexOf('~');
+    return { stream: text.slice(0, at), settings: parseSettings(text.slice(at + 1)) };
+  });
+  return {
+    panes: [...first, ...first.length > 0 ? others : []],
+    frame: Number.isInteger(frame) ? frame : null,
+    view: parseView(values.get('view')),
+    look: values.get('look') ?? '',
+  };
+}

@@ -1,0 +1,273 @@
+import { Gateway } from '../stream/gateway';
+import { FileTrack } from '../stream/file_track';
+import { AS_STREAMED, type Settings } from '../stream/settings';
+import type { Track } from '../stream/track';
+import { WatchTrack } from '../stream/watch_track';
+import { addressText, parseAddress, type Address } from './address';
+import { CurvesPanel } from './curves_panel';
+import { button } from './dom';
+import { ExportPanel } from './export_panel';
+import { FilesPanel } from './files_panel';
+import { LookPanel } from './look_panel';
+import type { Pane } from './pane';
+import { SettingsPanel } from './settings_panel';
+import { Stage } from './stage';
+import { StatusLine } from './status_line';
+import { StreamsPanel } from './streams_panel';
+import { Theme } from './theme';
+import { TimePanel } from './time_panel';
+
+const TOKEN_KEY = 'partiemc-token';
+
+/** The page: which streams are on the stage, and what the controls do to them. */
+export class App {
+  private readonly gateway = new Gateway(new URL(location.origin));
+  private readonly status = new StatusLine();
+  private readonly look: LookPanel;
+  private readonly settings: SettingsPanel;
+  private readonly stage: Stage;
+  private readonly streams: StreamsPanel;
+  private readonly time: TimePanel;
+  private readonly curves: CurvesPanel;
+  private ownAddress = '';
+  /** Before, the address is that of the link and must not be written. */
+  private isReady = false;
+  /** Of the link that the page was opened by, until it is shown. */
+  private wantedFrame: number | null = null;
+
+  constructor() {
+    this.gateway.token = sessionStorage.getItem(TOKEN_KEY) ?? '';
+    this.look = new LookPanel(() => this.lookChanged());
+    this.stage = new Stage(this.gateway, this.look.look, {
+      chosen: () => this.chosenChanged(),
+      moved: () => this.writeAddress(),
+    });
+    this.settings = new SettingsPanel((settings) => this.settingsChanged(settings));
+    this.time = new TimePanel(() => this.track, () => {
+      this.wantedFrame = null;
+      this.writeAddress();
+    });
+    this.curves = new CurvesPanel((sequence) => this.goTo(sequence));
+    new Theme((dark) => {
+      this.look.setDark(dark);
+      this.curves.setDark(dark);
+    });
+    new ExportPanel(() => this.stage.chosen, () => this.look.look,
+                    (words, isError) => this.status.say(words, isError));
+    new FilesPanel((source) => this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED })),
+                   (words, isError) => this.status.say(words, isError));
+    button('side-by-side').addEventListener('click', () => this.addBeside());
+    button('fit').addEventListener('click', () => this.fit());
+    this.listenForKeys();
+    this.streams = this.openStreams();
+    this.readAddress();
+    this.isReady = true;
+    addEventListener('hashchange', () => {
+      if (location.hash !== this.ownAddress) this.readAddress();
+    });
+    this.chosenChanged();
+    requestAnimationFrame((now) => this.refresh(now));
+  }
+
+  private get track(): Track | null { return this.stage.chosen?.track ?? null; }
+
+  private openStreams(): StreamsPanel {
+    return new StreamsPanel(this.gateway, (id) => this.isOwn(id), {
+      watch: (stream) => this.watch(stream),
+      beside: (stream) => this.watchBeside(stream),
+      first: (streams) => {
+        const only = streams.length === 1 ? streams[0].streamName : null;
+        if (only !== null && this.stage.panes.length === 0) this.watch(only);
+      },
+      failed: (words) => { this.status.server = words; },
+      token: (token) => this.useToken(token),
+    });
+  }
+
+  private isOwn(streamId: string): boolean {
+    return this.stage.tracks.some((track) => track instanceof FileTrack && track.streamId === streamId);
+  }
+
+  private useToken(token: string): void {
+    this.gateway.token = token;
+    sessionStorage.setItem(TOKEN_KEY, token);
+    for (const track of this.stage.tracks) {
+      if (track.state.kind !== 'failed') continue;
+      if (track instanceof FileTrack) track.reopen(track.settings);
+      else this.replaceTrack(track, new WatchTrack(this.gateway, track.title));
+    }
+  }
+
+  private replaceTrack(old: Track, track: Track): void {
+    for (const pane of this.stage.panes.filter((one) => one.track === old)) this.stage.replace(pane, track);
+  }
+
+  /** A track of a stream that is already on the stage, or a new one. */
+  private watchTrack(stream: string): Track {
+    const there = this.stage.tracks.find((track) => track.kind === 'watch' && track.title === stream);
+    return there ?? new WatchTrack(this.gateway, stream);
+  }
+
+  private watch(stream: string): void {
+    const track = this.watchTrack(stream);
+    if (track === this.track) track.player.follow();
+    else this.show(track);
+    this.writeAddress();
+  }
+
+  private watchBeside(stream: string): void {
+    if (this.stage.isFull) this.status.say('Four pictures are the most. Close one of them.', true);
+    else this.stage.add(this.watchTrack(stream), { ...AS_STREAMED });
+    this.writeAddress();
+  }
+
+  /** In the chosen pane, or in the first one. */
+  private show(track: Track): void {
+    const pane = this.stage.chosen;
+    if (!pane) {
+      this.stage.add(track, { ...AS_STREAMED });
+    } else {
+      pane.setSettings({ ...AS_STREAMED });
+      this.stage.replace(pane, track);
+    }
+    this.chosenChanged();
+    this.writeAddress();
+  }
+
+  private addBeside(): void {
+    const pane = this.stage.chosen;
+    if (!pane) this.status.say('There is no picture yet. Choose a stream, or drop files.', true);
+    else if (this.stage.isFull) this.status.say('Four pictures are the most. Close one of them.', true);
+    else this.stage.add(pane.track, { ...pane.settings });
+    this.writeAddress();
+  }
+
+  private settingsChanged(settings: Settings): void {
+    const pane = this.stage.chosen;
+    if (!pane) return;
+    this.status.say('', false);
+    // The first picture of dropped files is their stream itself; others are single frames of it.
+    const isFirst = this.stage.panes.find(({ track }) => track === pane.track) === pane;
+    if (isFirst) pane.track.reopen?.(settings);
+    pane.setSettings(settings);
+    this.writeAddress();
+  }
+
+  private chosenChanged(): void {
+    const pane = this.stage.chosen;
+    const place = pane ? this.stage.panes.indexOf(pane) + 1 : 0;
+    const name = this.stage.panes.length > 1 ? `of picture ${place}` : '';
+    this.settings.show(pane?.settings ?? AS_STREAMED, name);
+    this.time.refresh();
+    this.streams?.setShown(this.stage.tracks.filter(({ kind }) => kind === 'watch').map(({ title }) => title));
+    this.writeAddress();
+  }
+
+  private lookChanged(): void {
+    this.stage?.setLook(this.look.look);
+    this.writeAddress();
+  }
+
+  private fit(): void {
+    const pane = this.stage.chosen;
+    if (!pane) return;
+    pane.fit();
+  }
+
+  private goTo(sequence: number): void {
+    this.wantedFrame = null;
+    this.track?.player.seek(sequence);
+    this.writeAddress();
+  }
+
+  private listenForKeys(): void {
+    const acts: Record<string, () => void> = {
+      ' ': () => this.time.toggle(),
+      ',': () => this.time.step(-1),
+      '.': () => this.time.step(1),
+      l: () => this.time.follow(),
+      f: () => this.fit(),
+    };
+    addEventListener('keydown', (event) => {
+      const target = event.target as HTMLElement;
+      const isControl = /^(INPUT|SELECT|BUTTON|TEXTAREA|SUMMARY)$/.test(target.tagName);
+      const isScrub = target.id === 'scrub' && event.key !== ' ';
+      if ((isControl && !isScrub) || event.ctrlKey || event.metaKey || event.altKey) return;
+      const act = acts[event.key];
+      if (!act) return;
+      event.preventDefault();
+      act();
+    });
+  }
+
+  private readAddress(): void {
+    const address = parseAddress(location.hash);
+    this.look.text = address.look;
+    if (address.panes.length === 0) return;
+    while (this.stage.panes.length > 0) this.stage.close(this.stage.panes[0]);
+    for (const { stream, settings } of address.panes) {
+      const pane = this.stage.add(this.watchTrack(stream || address.panes[0].stream), settings);
+      if (address.view) pane.setView(address.view);
+    }
+    this.stage.choose(this.stage.panes[0]);
+    this.wantedFrame = address.frame;
+    const track = this.stage.panes[0].track;
+    if (address.frame !== null && track instanceof WatchTrack) track.want(address.frame);
+  }
+
+  private writeAddress(): void {
+    if (!this.isReady || this.wantedFrame !== null) return;
+    const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch');
+    const first = panes[0];
+    const player = first?.track.player;
+    const isPaused = player?.mode === 'paused';
+    const address: Address = {
+      panes: panes.map(({ track, settings }, k) => ({
+        stream: k > 0 && track === first.track ? '' : track.title, settings,
+      })),
+      frame: isPaused ? player.sequence : null,
+      view: first?.frame && (isPaused || !first.isFree) ? first.scene.view : null,
+      look: this.look.text,
+    };
+    this.ownAddress = addressText(address);
+    if (location.hash !== this.ownAddress) {
+      history.replaceState(null, '', this.ownAddress || location.pathname);
+    }
+  }
+
+  /** Goes to the frame that the link names, as soon as it is here. */
+  private followLink(): void {
+    const wanted = this.wantedFrame;
+    const track = this.stage.panes[0]?.track;
+    if (wanted === null || !track) return;
+    if (track.history.get(wanted)) {
+      track.player.seek(wanted);
+      this.wantedFrame = null;
+    } else if (track instanceof WatchTrack && track.isGone(wanted)) {
+      this.status.say(`Frame ${wanted} is no longer held by the server.`, true);
+      this.wantedFrame = null;
+    }
+  }
+
+  private refresh(now: number): void {
+    for (const track of this.stage.tracks) {
+      const before = track.player.mode;
+      track.player.tick(now);
+      track.moved();
+      if (track.player.mode !== before) this.writeAddress();
+    }
+    this.followLink();
+    for (const pane of this.stage.panes) pane.refresh(now);
+    this.refreshPanels(now);
+    requestAnimationFrame((next) => this.refresh(next));
+  }
+
+  private refreshPanels(now: number): void {
+    const pane: Pane | null = this.stage.chosen;
+    this.look.setAttributes([...pane?.frame?.rings.attributes.keys() ?? []]);
+    this.look.setLegend(pane?.scene.legend() ?? null);
+    this.time.refresh();
+    this.curves.refresh(this.track, now);
+    this.status.refresh(this.track, pane?.problem ?? '', now);
+  }
+}

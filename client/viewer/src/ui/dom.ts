@@ -1,0 +1,25 @@
+/** The element of the page with this id. Throws where the page has none of this kind. */
+export function byId<T extends HTMLElement>(id: string, type: new () => T): T {
+  const element = document.getElementById(id);
+  if (!(element instanceof type)) throw new Error(`the page has no ${type.name} #${id}`);
+  return element;
+}
+
+export const button = (id: string) => byId(id, HTMLButtonElement);
+export const input = (id: string) => byId(id, HTMLInputElement);
+export const select = (id: string) => byId(id, HTMLSelectElement);
+
+/** A new element with attributes and children. */
+export function make<K extends keyof HTMLElementTagNameMap>(
+  tag: K, attributes: Record<string, string> = {}, ...children: (Node | string)[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+/** Sets text only where it changes, so that nothing is laid out again and nothing is read twice. */
+export function setText(element: HTMLElement, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,15 @@
+/** A number for a person: `digits` significant ones, without trailing zeros. */
+export function number(value: number, digits = 5): string {
+  if (!Number.isFinite(value)) return '–';
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-4) return value.toExponential(digits - 1).replace(/\.?0+e/, 'e');
+  return String(Number(value.toPrecision(digits)));
+}
+
+const thousands = new Intl.NumberFormat('en', { useGrouping: true });
+
+/** A count for a person: 12,345. */
+export function count(value: number): string {
+  return thousands.format(value);
+}

@@ -1,0 +1,58 @@
+import { Placement } from '@proto/v1/reconstruction_pb';
+import { AS_STREAMED, FILLS, nameOf, PLACEMENTS, SHARES, type Settings } from '../stream/settings';
+import { byId, button, input, select, setText } from './dom';
+
+const NUMBERS = {
+  kernelRadius: 'kernel', referenceRadius: 'reference', cellSize: 'cell', surfaceOffset: 'offset',
+} as const;
+type NumberName = keyof typeof NUMBERS;
+
+/** The paper's switches, of the pane that is chosen. */
+export class SettingsPanel {
+  constructor(private readonly changed: (settings: Settings) => void) {
+    for (const name of Object.keys(PLACEMENTS)) select('placement').add(new Option(name, name));
+    for (const name of Object.keys(FILLS)) select('fill').add(new Option(name, name));
+    for (const share of SHARES) select('share').add(new Option(`${share} %`, String(share)));
+    const form = byId('settings', HTMLFormElement);
+    form.addEventListener('submit', (event) => event.preventDefault());
+    form.addEventListener('change', () => this.read());
+    button('reset-settings').addEventListener('click', () => {
+      this.show(AS_STREAMED, '');
+      this.changed({ ...AS_STREAMED });
+    });
+  }
+
+  show(settings: Settings, pane: string): void {
+    select('placement').value = nameOf(PLACEMENTS, settings.placement);
+    select('fill').value = nameOf(FILLS, settings.fill);
+    for (const name of Object.keys(NUMBERS) as NumberName[]) {
+      input(NUMBERS[name]).value = settings[name] === null ? '' : String(settings[name]);
+    }
+    select('share').value = String(settings.share);
+    setText(byId('settings-of', HTMLElement), pane);
+    this.offerOffset();
+  }
+
+  private read(): void {
+    if (!byId('settings', HTMLFormElement).reportValidity()) return;
+    this.offerOffset();
+    const numberIn = (name: NumberName) => {
+      const value = input(NUMBERS[name]).valueAsNumber;
+      return Number.isNaN(value) ? null : value;
+    };
+    this.changed({
+      placement: PLACEMENTS[select('placement').value] ?? 0,
+      fill: FILLS[select('fill').value] ?? 0,
+      kernelRadius: numberIn('kernelRadius'),
+      referenceRadius: numberIn('referenceRadius'),
+      cellSize: numberIn('cellSize'),
+      surfaceOffset: numberIn('surfaceOffset'),
+      share: Number(select('share').value),
+    });
+  }
+
+  /** The offset is a length of one placement only. */
+  private offerOffset(): void {
+    input('offset').disabled = PLACEMENTS[select('placement').value] !== Placement.FARTHEST_PARTICLE;
+  }
+}

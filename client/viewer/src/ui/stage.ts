@@ -1,0 +1,82 @@
+import type { Look } from '../draw';
+import type { Gateway } from '../stream/gateway';
+import type { Settings } from '../stream/settings';
+import type { Track } from '../stream/track';
+import { byId } from './dom';
+import { Pane } from './pane';
+
+/** More pictures than this are too small to compare. */
+const MOST_PANES = 4;
+
+/** The pictures, one to four side by side, and which of them is chosen. */
+export class Stage {
+  readonly panes: Pane[] = [];
+  chosen: Pane | null = null;
+  private readonly element = byId('stage', HTMLElement);
+
+  constructor(private readonly gateway: Gateway, private look: Look, private readonly events: {
+    chosen(): void;
+    moved(pane: Pane): void;
+  }) {}
+
+  get isFull(): boolean { return this.panes.length >= MOST_PANES; }
+
+  get tracks(): Track[] { return [...new Set(this.panes.map(({ track }) => track))]; }
+
+  add(track: Track, settings: Settings): Pane {
+    const pane = new Pane(this.gateway, track, settings, {
+      chosen: (chosen) => this.choose(chosen),
+      closed: (closed) => this.close(closed),
+      moved: (moved) => this.linkViews(moved),
+    });
+    pane.setLook(this.look);
+    this.panes.push(pane);
+    this.element.append(pane.element);
+    const sibling = this.panes.find((other) => other.track === track && other.frame);
+    if (sibling) pane.setView(sibling.scene.view);
+    this.choose(pane);
+    return pane;
+  }
+
+  close(pane: Pane): void {
+    const at = this.panes.indexOf(pane);
+    this.panes.splice(at, 1);
+    pane.destroy();
+    this.release(pane.track);
+    this.choose(this.panes[Math.max(0, at - 1)] ?? null);
+  }
+
+  /** Gives a pane another track; the old one ends where nobody shows it. */
+  replace(pane: Pane, track: Track): void {
+    const old = pane.track;
+    pane.showTrack(track);
+    this.release(old);
+    this.choose(pane);
+  }
+
+  choose(pane: Pane | null): void {
+    const isOther = pane !== this.chosen;
+    this.chosen = pane;
+    this.element.dataset.panes = String(this.panes.length);
+    byId('welcome', HTMLElement).hidden = this.panes.length > 0;
+    this.panes.forEach((one, k) => one.setPlace(k, this.panes.length, one === pane));
+    if (isOther) this.events.chosen();
+  }
+
+  setLook(look: Look): void {
+    this.look = look;
+    for (const pane of this.panes) pane.setLook(look);
+  }
+
+  /** Pictures of the same frames are looked at from the same place. */
+  linkViews(moved: Pane): void {
+    for (const pane of this.panes) {
+      if (pane !== moved && pane.track === moved.track) pane.setView(moved.scene.view);
+    }
+    this.events.moved(moved);
+  }
+
+  private release(track: Track): void {
+    if (!this.tracks.includes(track)) track.close();
+  }
+}

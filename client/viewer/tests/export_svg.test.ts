@@ -1,0 +1,107 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { hex, theme } from '../src/draw/colours';
+import { DEFAULT_LOOK, type Look } from '../src/draw/look';
+import { rampStops } from '../src/draw/ramp';
+import { svg } from '../src/export/svg';
+import type { Frame } from '../src/protocol/frame';
+import { makeFrame } from './draw_frames';
+
+const SIZE = { width: 850, height: 550 };
+const VIEW = { x: 8.5, y: 5.5, scale: 50 };
+const FRAME = makeFrame();
+const NOTHING: Look = { ...DEFAULT_LOOK, outline: false, fill: false };
+
+function draw(look: Partial<Look>, frame: Frame = FRAME, view = VIEW): string {
+  return svg(frame, { ...NOTHING, ...look }, view, SIZE);
+}
+
+function count(text: string, pattern: RegExp): number {
+  return text.match(pattern)?.length ?? 0;
+}
+
+test('Nothing but the ground is drawn of a look that shows nothing', () => {
+  const text = draw({});
+  assert.match(text, /^<svg [^>]*width="850" height="550" viewBox="0 0 850 550">/);
+  assert.equal(count(text, /<path/g), 0);
+  assert.ok(text.includes(`fill="${hex(theme(false).background)}"`));
+  assert.ok(draw({ dark: true }).includes(hex(theme(true).background)));
+});
+
+test('The outline has all points of all rings, each where the screen has it', () => {
+  const text = draw({ outline: true, lineWidth: 3 });
+  assert.equal(count(text, /[ML][\d.-]+ [\d.-]+/g), FRAME.rings.points.length / 2);
+  assert.equal(count(text, /Z/g), FRAME.rings.outerOf.length);
+  assert.equal(count(text, /stroke-width="3"/g), 2, 'outer rings and holes');
+  const x = Math.round(100 * (425 + (FRAME.rings.points[0] - 8.5) * 50)) / 100;
+  const y = Math.round(100 * (275 - (FRAME.rings.points[1] - 5.5) * 50)) / 100;
+  assert.ok(text.includes(`M${x} ${y}L`));
+});
+
+test('What is out of sight is left out', () => {
+  const drop = { x: 14.6, y: 3.1, scale: 250 };
+  assert.equal(count(draw({ outline: true }, FRAME, drop), /Z/g), 1);
+  const away = { x: 1e6, y: 0, scale: 50 };
+  const all = { outline: true, fill: true, edges: true, particles: true, normals: true };
+  assert.equal(count(draw(all, FRAME, away), /<path/g), 0);
+});
+
+test('Merged triangles are one figure on top of the inside', () => {
+  const text = draw({ fill: true });
+  const { band, interior } = theme(false);
+  assert.ok(text.indexOf(hex(band)) < text.indexOf(hex(interior)));
+  assert.equal(count(text, /<path/g), 2);
+  const merged = FRAME.mesh?.classes.reduce((sum, one) => sum + one, 0) ?? 0;
+  assert.equal(count(text, /Z/g), FRAME.rings.outerOf.length + merged);
+});
+
+test('Rings are filled without a mesh, too', () => {
+  const text = draw({ fill: true, edges: true }, { ...FRAME, mesh: null });
+  assert.equal(count(text, /<path/g), 1);
+  assert.match(text, /fill-rule="evenodd"/);
+});
+
+test('Every edge is drawn once', () => {
+  const edges = new Set<string>();
+  const { triangles } = FRAME.mesh ?? { triangles: new Uint32Array(0) };
+  for (let k = 0; k < triangles.length; ++k) {
+    const pair = [triangles[k], triangles[k % 3 === 2 ? k - 2 : k + 1]];
+    edges.add(pair.sort((a, b) => a - b).join());
+  }
+  assert.equal(count(draw({ edges: true }), /M/g), edges.size);
+});
+
+test('Particles are dots, normals are lines out of the vertices', () => {
+  assert.equal(count(draw({ particles: true }), /h0/g), (FRAME.particles?.length ?? 0) / 2);
+  assert.equal(count(draw({ normals: true }), /l/g) > 0, true);
+  const zoomed = { ...VIEW, scale: 5 };
+  assert.ok(count(draw({ normals: true }, FRAME, zoomed), /M/g) <
+    count(draw({ normals: true }), /M/g), 'every n-th where they are too close');
+});
+
+test('Each identity has its colours', () => {
+  const text = draw({ outline: true, fill: true, colour: 'identity' });
+  const strokes = new Set([...text.matchAll(/stroke="(#\w+)"/g)].map(([, colour]) => colour));
+  assert.equal(strokes.size, FRAME.rings.outerOf.length);
+  const fills = new Set([...text.matchAll(/<path fill="(#\w+)"/g)].map(([, colour]) => colour));
+  assert.equal(fills.size, 2 * 6, 'band and interior of six outer rings');
+});
+
+test('An attribute colours the outline along its range, and what is no number is grey', () => {
+  const stops = rampStops(false);
+  const values = Float32Array.from(FRAME.rings.points, (one) => one).filter((_, k) => k % 2 === 0);
+  const rings = { ...FRAME.rings, attributes: new Map([['x', values]]) };
+  const text = draw({ outline: true, colour: 'x' }, { ...FRAME, rings });
+  assert.ok(text.includes(stops[0]) && text.includes(stops[stops.length - 1]));
+  const range = { min: 1e9, max: 2e9 };
+  const below = svg({ ...FRAME, rings }, { ...NOTHING, outline: true, colour: 'x' }, VIEW, SIZE,
+    range);
+  assert.equal(count(below, /<path/g), 1);
+  const unknown = { ...FRAME.rings, attributes: new Map([['x', values.map(() => NaN)]]) };
+  assert.ok(draw({ outline: true, colour: 'x' }, { ...FRAME, rings: unknown })
+    .includes(`stroke="${hex(theme(false).missing)}"`));
+});
+
+test('An attribute that the frame lacks leaves the outline plain', () => {
+  assert.ok(draw({ outline: true, colour: 'nowhere' }).includes(hex(theme(false).outline)));
+});

@@ -1,0 +1,218 @@
+import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
+import {
+  CoordinateFormat, Plane, WatchStreamResponseSchema,
+} from '@proto/v1/reconstruction_pb';
+import { attachNavigation, DEFAULT_LOOK, Scene, type Look } from '../../src/draw/index';
+import { rgb, theme } from '../../src/draw/colours';
+import { rampStops } from '../../src/draw/ramp';
+import { toCss } from '../../src/draw/view';
+import { clip, png } from '../../src/export/index';
+import { bytesOf } from '../../src/protocol/arrays';
+import { decodeFrame } from '../../src/protocol/decode';
+import { type Frame, NO_RING } from '../../src/protocol/frame';
+import { blobs, makeFrame, type FrameOptions } from '../draw_frames';
+
+/** What draw.mjs calls in the page. */
+const canvas = document.querySelector('canvas') as HTMLCanvasElement;
+const scene = new Scene(canvas);
+let changes = 0;
+let clicks = 0;
+attachNavigation(canvas, scene, () => ++changes);
+canvas.addEventListener('click', () => ++clicks);
+
+/** Draws a frame in one look, all of it seen. */
+function picture(look: Partial<Look>, frame: Frame = makeFrame()): void {
+  scene.resize();
+  scene.setLook({ ...DEFAULT_LOOK, ...look });
+  scene.show(frame);
+  scene.fit();
+  scene.draw();
+}
+
+/** Red, green, blue, alpha of every pixel, the lowest row first, of what is drawn now. */
+function pixels(): Uint8Array {
+  const gl = canvas.getContext('webgl2') as WebGL2RenderingContext;
+  scene.draw();
+  const read = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, read);
+  return read;
+}
+
+/** The colours of places in the world, as they are drawn now. */
+function coloursAt(places: [number, number][]): number[][] {
+  const read = pixels();
+  const ratio = canvas.width / scene.size.width;
+  return places.map(([x, y]) => {
+    const [cssX, cssY] = toCss(scene.view, scene.size, x, y);
+    const column = Math.floor(cssX * ratio);
+    const row = canvas.height - 1 - Math.floor(cssY * ratio);
+    const at = 4 * (row * canvas.width + column);
+    return Array.from(read.subarray(at, at + 3));
+  });
+}
+
+/** How much of the picture is covered by a colour on the ground, in device pixels. */
+function ink(colour: readonly number[], dark = false): number {
+  const read = pixels();
+  const ground = theme(dark).background.map((part) => 255 * part);
+  // The part of the colour that differs most from the ground tells the cover best.
+  const apart = colour.map((part, k) => Math.abs(part - ground[k]));
+  const k = apart.indexOf(Math.max(...apart));
+  let sum = 0;
+  for (let at = k; at < read.length; at += 4) sum += read[at] - ground[k];
+  return sum / (colour[k] - ground[k]);
+}
+
+/** A ring of corners, without a mesh. */
+function polygon(corners: [number, number][]): Frame {
+  const frame = makeFrame({ cell: 1 });
+  const perimeter = corners.reduce((sum, [x, y], k) => {
+    const [nextX, nextY] = corners[(k + 1) % corners.length];
+    return sum + Math.hypot(nextX - x, nextY - y);
+  }, 0);
+  return {
+    ...frame,
+    mesh: null,
+    particles: null,
+    rings: {
+      points: Float32Array.from(corners.flat()),
+      offsets: Uint32Array.of(0, corners.length),
+      outerOf: Uint32Array.of(NO_RING),
+      identities: BigUint64Array.of(1n),
+      area: Float64Array.of(1),
+      perimeter: Float64Array.of(perimeter),
+      particles: Float64Array.of(1),
+      parents: [[]],
+      normals: null,
+      attributes: new Map(),
+    },
+  };
+}
+
+/** The frame as the server sends it to who watches. */
+function message(frame: Frame): Uint8Array {
+  const { rings, mesh } = frame;
+  return toBinary(WatchStreamResponseSchema, create(WatchStreamResponseSchema, {
+    response: {
+      case: 'frame',
+      value: {
+        frame: {
+          sequence: frame.sequence,
+          coordinateFormat: CoordinateFormat.FLOAT32_RELATIVE,
+          rings: {
+            points: bytesOf(rings.points),
+            offsets: bytesOf(rings.offsets),
+            outerOf: bytesOf(rings.outerOf),
+            identities: bytesOf(rings.identities),
+            measures: Array.from(rings.area, (area, ring) => ({
+              area, perimeter: rings.perimeter[ring], parentIdentities: rings.parents[ring],
+            })),
+          },
+          mesh: mesh
+            ? {
+              points: bytesOf(mesh.points),
+              triangles: bytesOf(mesh.triangles),
+              classes: mesh.classes,
+            }
+            : undefined,
+        },
+      },
+    },
+  }));
+}
+
+function decoded(bytes: Uint8Array): Frame {
+  const { response } = fromBinary(WatchStreamResponseSchema, bytes);
+  if (response.case !== 'frame' || !response.value.frame) throw new Error('no frame');
+  return decodeFrame(response.value.frame, bytes.length, performance.now(), Plane.XY);
+}
+
+/** The frame after a message whose first byte lies so far into its buffer. */
+function sent(frame: Frame, shift: number): Frame {
+  const bytes = message(frame);
+  const buffer = new Uint8Array(bytes.length + shift);
+  buffer.set(bytes, shift);
+  return decoded(buffer.subarray(shift));
+}
+
+/** What a mesh is and how long it takes, milliseconds of the main thread by frame. */
+interface Times {
+  points: number;
+  triangles: number;
+  bytes: number;
+  decode: number[];
+  show: number[];
+  draw: number[];
+}
+
+/** Decodes, shows and draws a frame at each refresh of the screen. */
+async function times(look: Partial<Look>, options: FrameOptions, count: number): Promise<Times> {
+  const frames = [0, 1, 2, 3].map((k) => makeFrame({ ...options, level: blobs(0.1 * k) }));
+  const messages = frames.map(message);
+  const result: Times = {
+    points: (frames[0].mesh?.points.length ?? 0) / 2,
+    triangles: (frames[0].mesh?.triangles.length ?? 0) / 3,
+    bytes: messages[0].length,
+    decode: [],
+    show: [],
+    draw: [],
+  };
+  picture(look, frames[0]);
+  for (let k = 0; k < count; ++k) {
+    await new Promise(requestAnimationFrame);
+    const begin = performance.now();
+    const frame = decoded(messages[k % messages.length]);
+    const decodedAt = performance.now();
+    scene.show(frame);
+    const shownAt = performance.now();
+    scene.draw();
+    result.draw.push(performance.now() - shownAt);
+    result.show.push(shownAt - decodedAt);
+    result.decode.push(decodedAt - begin);
+  }
+  return result;
+}
+
+/** The first bytes of what is exported. */
+async function head(blob: Promise<Blob>): Promise<{ type: string; size: number; bytes: number[] }> {
+  const one = await blob;
+  const bytes = new Uint8Array(await one.slice(0, 4).arrayBuffer());
+  return { type: one.type, size: one.size, bytes: Array.from(bytes) };
+}
+
+/** A film of some refreshes of the screen, in each of which the view moves on. */
+async function film(refreshes: number): Promise<Blob> {
+  const recording = clip(canvas);
+  recording.start();
+  for (let k = 0; k < refreshes; ++k) {
+    await new Promise(requestAnimationFrame);
+    scene.view = { ...scene.view, x: scene.view.x + 0.05 };
+    scene.draw();
+  }
+  return recording.stop();
+}
+
+/** The drawing context is lost, as when a graphics driver restarts, and comes back. */
+async function loseContext(): Promise<void> {
+  const gl = canvas.getContext('webgl2') as WebGL2RenderingContext;
+  const extension = gl.getExtension('WEBGL_lose_context');
+  const event = (name: string): Promise<Event> =>
+    new Promise((resolve) => canvas.addEventListener(name, resolve, { once: true }));
+  const lost = event('webglcontextlost');
+  extension?.loseContext();
+  await lost;
+  scene.show(makeFrame());
+  scene.draw();
+  const restored = event('webglcontextrestored');
+  // Only once the event of the loss has been handled may it be given back.
+  setTimeout(() => extension?.restoreContext());
+  await restored;
+}
+
+const bench = {
+  scene, canvas, picture, pixels, coloursAt, ink, polygon, sent, times, head, film, loseContext,
+  makeFrame, theme, rgb, rampStops, png: () => png(scene),
+  changes: () => changes, clicks: () => clicks,
+};
+export type Bench = typeof bench;
+Object.assign(window, { bench });

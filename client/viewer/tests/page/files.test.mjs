@@ -1,0 +1,155 @@
+// Files that are dropped on the page.
+import assert from 'node:assert/strict';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import path from 'node:path';
+import { after, afterEach, before, test } from 'node:test';
+import { launch, recording, until, Viewer, World } from './support.mjs';
+
+const FRAMES = 12;
+let world, browser, viewer, folder;
+
+/** Two drops of particles that move towards each other. */
+function drops(frame) {
+  const lines = ['id,x,y,pressure'];
+  const spacing = 0.05;
+  let id = 0;
+  for (let i = -8; i <= 8; ++i) {
+    for (let j = -8; j <= 8; ++j) {
+      if (i * i + j * j > 64) continue;
+      for (const side of [-1, 1]) {
+        const x = i * spacing + side * (0.7 - 0.02 * frame);
+        lines.push([++id, x, j * spacing + 0.3, (j + 8 + frame) / 10].join(','));
+      }
+    }
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+before(async () => {
+  world = await World.start();
+  browser = await launch();
+  folder = path.join(world.folder, 'drops');
+  mkdirSync(folder);
+  const times = ['frame,t'];
+  for (let k = 0; k < FRAMES; ++k) {
+    writeFileSync(path.join(folder, `drops_${k}.csv`), drops(k));
+    times.push(`${k},${k * 0.25}`);
+  }
+  writeFileSync(path.join(folder, 'times.csv'), `${times.join('\n')}\n`);
+});
+after(async () => {
+  await browser?.close();
+  await world?.close();
+});
+afterEach(async () => {
+  const errors = viewer?.errors;
+  await viewer?.close();
+  viewer = null;
+  assert.deepEqual(errors, [], 'the console has no errors');
+});
+
+/** Lets go of files and folders over the page, as a hand does. */
+async function drop(...paths) {
+  const session = await viewer.page.context().newCDPSession(viewer.page);
+  const data = { items: [], files: paths, dragOperationsMask: 1 };
+  for (const type of ['dragEnter', 'dragOver', 'drop']) {
+    await session.send('Input.dispatchDragEvent', { type, x: 700, y: 300, data });
+  }
+}
+
+const isAll = () => until('all frames are here', async () => await viewer.status() === 'All frames are here');
+
+test('a folder of CSV files plays, with the numbers of the command line', async () => {
+  const truth = await world.statistics(folder);
+  viewer = await Viewer.open(browser, world.url);
+  await drop(folder);
+  await viewer.shows();
+  await isAll();
+  for (const sequence of [1, 6, FRAMES]) {
+    await viewer.scrubTo(sequence);
+    const row = truth[sequence - 1];
+    const numbers = await viewer.numbers();
+    assert.equal(numbers['rings-digest'], row.rings_digest);
+    assert.equal(numbers['mesh-digest'], row.mesh_digest);
+    assert.equal(Number(numbers.time), row.time);
+  }
+  const { capabilities } = await world.information();
+  const colours = await viewer.page.getByLabel('Colour').locator('option').allTextContents();
+  assert.equal(colours.includes('by pressure'), capabilities.includes('attributes'));
+});
+
+test('it plays to its end and stands there, and begins anew', async () => {
+  viewer = await Viewer.open(browser, world.url);
+  await drop(folder);
+  await until('the end', async () => await viewer.frame() === FRAMES && await viewer.button('Play').count() === 1);
+  await viewer.button('Play').click();
+  await until('anew', async () => await viewer.frame() < FRAMES);
+});
+
+test('another placement streams the files again; the numbers are those of the command line', async () => {
+  const truth = await world.statistics(folder, '--placement', 'qef', '--fill', 'conforming');
+  viewer = await Viewer.open(browser, world.url);
+  await drop(folder);
+  await isAll();
+  await viewer.scrubTo(7);
+  await viewer.page.getByLabel('Placement', { exact: true }).selectOption('qef');
+  await viewer.page.getByLabel('Fill', { exact: true }).selectOption('conforming');
+  await until('the numbers are those of qef', async () =>
+    await viewer.value('rings-digest') === truth[6].rings_digest &&
+    await viewer.value('mesh-digest') === truth[6].mesh_digest);
+  assert.equal(await viewer.frame(), 7);
+});
+
+test('two settings stand side by side on the files', async () => {
+  viewer = await Viewer.open(browser, world.url);
+  await drop(folder);
+  await isAll();
+  await viewer.scrubTo(3);
+  await viewer.button('Side by side').click();
+  await viewer.page.getByLabel('Particles used').selectOption('50');
+  await until('half of the particles', async () => {
+    const [all, half] = await Promise.all([0, 1].map(async (k) => Number(await viewer.value('particles', k))));
+    return half > 0.3 * all && half < 0.7 * all;
+  });
+  assert.equal(await viewer.frame(0), await viewer.frame(1));
+});
+
+test('a recording plays, and its particles are drawn', async () => {
+  const truth = await world.statistics(recording);
+  viewer = await Viewer.open(browser, world.url);
+  await drop(recording);
+  await isAll();
+  await viewer.scrubTo(75);
+  assert.equal(await viewer.value('rings-digest'), truth[74].rings_digest);
+  const before = await viewer.picture();
+  await viewer.page.getByLabel('Particles', { exact: true }).check();
+  await until('particles are drawn', async () => await viewer.picture() !== before);
+});
+
+test('a LAMMPS dump plays', async () => {
+  const dump = path.join(world.folder, 'dump.lammpstrj');
+  const frames = Array.from({ length: 3 }, (_, k) => {
+    const rows = drops(k).trim().split('\n').slice(1).map((row) => row.split(',').slice(0, 3).join(' '));
+    return ['ITEM: TIMESTEP', k * 100, 'ITEM: NUMBER OF ATOMS', rows.length,
+      'ITEM: BOX BOUNDS pp pp pp', '-2 2', '-2 2', '-0.1 0.1', 'ITEM: ATOMS id x y', ...rows].join('\n');
+  });
+  writeFileSync(dump, `${frames.join('\n')}\n`);
+  const truth = await world.statistics(dump);
+  viewer = await Viewer.open(browser, world.url);
+  await drop(dump);
+  await isAll();
+  await viewer.scrubTo(3);
+  assert.equal(await viewer.value('rings-digest'), truth[2].rings_digest);
+});
+
+test('what cannot be read is told in words', async () => {
+  const bad = path.join(world.folder, 'water.vtp');
+  writeFileSync(bad, '<VTKFile/>');
+  viewer = await Viewer.open(browser, world.url);
+  await drop(bad);
+  await until('it is told', async () => /water\.vtp cannot be read here.*convert/.test(await viewer.status()));
+  const broken = path.join(world.folder, 'broken.csv');
+  writeFileSync(broken, 'x,y\n1,2\n3\n');
+  await drop(broken);
+  await until('the line is told', async () => /broken\.csv, line 3/.test(await viewer.status()));
+});

@@ -1,0 +1,289 @@
+// A stream that runs, in the page: seen, gone back in, paused, compared.
+import assert from 'node:assert/strict';
+import { after, afterEach, before, test } from 'node:test';
+import { launch, recording, until, Viewer, World } from './support.mjs';
+
+let world, browser, viewer, truth;
+
+before(async () => {
+  // A minute of the stream: what each page fetches when it opens.
+  world = await World.start('--history-bytes', '24MiB');
+  browser = await launch();
+  truth = await world.statistics(recording);
+  world.loop('dam');
+});
+after(async () => {
+  await browser?.close();
+  await world?.close();
+});
+afterEach(async () => {
+  const errors = viewer?.errors;
+  await viewer?.close();
+  viewer = null;
+  assert.deepEqual(errors, [], 'the console has no errors');
+});
+
+const open = async (hash = '#stream=dam') => { viewer = await Viewer.open(browser, world.url, { hash }); };
+
+let streams = 0;
+/** The page with a stream of its own, whose first 75 frames are those of the recording. */
+async function openAnew() {
+  const name = `dam_${++streams}`;
+  const producer = world.loop(name);
+  await open(`#stream=${name}`);
+  await viewer.shows();
+  const slider = viewer.page.getByLabel('Frame', { exact: true });
+  await until('all of the recording', async () => Number(await slider.getAttribute('max')) >= 75);
+  await until('the history', async () => await slider.getAttribute('min') === '1');
+  return producer;
+}
+
+/** What the page tells of a frame against what the command line tells of the same. */
+async function agrees(sequence) {
+  const row = truth[sequence - 1];
+  const numbers = await viewer.numbers();
+  assert.equal(numbers.frame, String(sequence));
+  assert.equal(numbers['rings-digest'], row.rings_digest);
+  assert.equal(numbers['mesh-digest'], row.mesh_digest);
+  assert.equal(numbers.triangles, row.triangles.toLocaleString('en'));
+  assert.equal(numbers.grid, row.triangles_grid.toLocaleString('en'));
+  assert.equal(numbers.particles, row.particles.toLocaleString('en'));
+  assert.equal(Number(numbers.area), Number(row.area.toPrecision(7)));
+  assert.equal(Number(numbers.perimeter), Number(row.perimeter.toPrecision(7)));
+}
+
+test('the only stream is shown at once, and its picture moves', async () => {
+  await open('');
+  const first = await viewer.shows();
+  const picture = await viewer.picture();
+  await viewer.shows(first + 10);
+  assert.notEqual(await viewer.picture(), picture);
+  assert.equal(await viewer.status(), 'Live');
+  assert.equal(await viewer.button('Live').getAttribute('aria-pressed'), 'true');
+});
+
+test('who comes late can go back to the beginning, and its numbers are those of the command line', async () => {
+  const producer = await openAnew();
+  for (const sequence of [1, 40, 75]) {
+    await viewer.scrubTo(sequence);
+    await agrees(sequence);
+  }
+  await producer.stop();
+});
+
+test('a stream that is paused stands still, goes on where it was paused, and catches up', async () => {
+  await open();
+  await viewer.shows(20);
+  await viewer.button('Pause').click();
+  const at = await viewer.frame();
+  const picture = await viewer.picture();
+  const last = viewer.page.locator('#place');
+  await until('the stream goes on behind', async () =>
+    Number((await last.textContent()).split(' of ')[1]) > at + 30);
+  assert.equal(await viewer.frame(), at);
+  assert.equal(await viewer.picture(), picture);
+  const seen = watchFrames();
+  await viewer.button('Play').click();
+  await viewer.shows(at + 15);
+  const frames = (await seen).filter((frame) => frame > at);
+  assert.ok(frames[0] <= at + 10, `goes on from ${at} and not from ${frames[0]}`);
+  await viewer.button('Live').click();
+  await until('the newest is followed', async () => {
+    const [place, newest] = (await last.textContent()).split(' of ').map(Number);
+    return newest - place < 15;
+  });
+});
+
+/** The frames that are shown until fifteen more have been. */
+function watchFrames() {
+  return viewer.page.evaluate(() => new Promise((resolve) => {
+    const cell = document.querySelector('[data-key="frame"]');
+    const seen = [];
+    const observer = new MutationObserver(() => {
+      seen.push(Number(cell.textContent));
+      if (seen.length < 8) return;
+      observer.disconnect();
+      resolve(seen);
+    });
+    observer.observe(cell, { childList: true, characterData: true, subtree: true });
+  }));
+}
+
+test('steps go to the next frame and back, by button and by key', async () => {
+  await open();
+  await viewer.shows(20);
+  await viewer.button('Pause').click();
+  const at = await viewer.frame();
+  await viewer.button('A frame back').click();
+  await until('one back', async () => await viewer.frame() === at - 1);
+  await viewer.button('A frame forward').click();
+  await until('one forward', async () => await viewer.frame() === at);
+  await viewer.page.locator('canvas').first().focus();
+  await viewer.page.keyboard.press(',');
+  await until('one back by key', async () => await viewer.frame() === at - 1);
+});
+
+test('every switch changes picture and numbers of a paused frame', async () => {
+  const producer = await openAnew();
+  await viewer.scrubTo(60);
+  await viewer.page.getByLabel('Mesh edges').check();
+  const set = async (label, value) => {
+    const control = viewer.page.getByLabel(label, { exact: true });
+    if (await control.evaluate((element) => element.tagName) === 'SELECT') await control.selectOption(value);
+    else {
+      await control.fill(value);
+      await control.blur();
+    }
+  };
+  const digests = async () => {
+    const { 'rings-digest': rings, 'mesh-digest': mesh } = await viewer.numbers();
+    return `${rings} ${mesh}`;
+  };
+  const seen = new Set([await digests()]);
+  const pictures = new Set([await viewer.picture()]);
+  const changes = async (what) => {
+    await until(`${what} changes the numbers`, async () => !seen.has(await digests()));
+    seen.add(await digests());
+    await until(`${what} changes the picture`, async () => !pictures.has(await viewer.picture()));
+    pictures.add(await viewer.picture());
+  };
+  const switches = [
+    ['Placement', 'qef'], ['Placement', 'marching-squares'], ['Placement', 'farthest-particle'],
+    ['Surface offset', '0.5'], ['Fill', 'grid'], ['Fill', 'conforming'], ['Fill', 'polygon'],
+    ['Fill', 'none'], ['Kernel radius', '4'], ['Reference radius', '1.2'], ['Cell size', '1.5'],
+    ['Particles used', '80'], ['Particles used', '50'], ['Particles used', '30'],
+  ];
+  for (const [label, value] of switches) {
+    await set(label, value);
+    await changes(`${label} ${value}`);
+  }
+  assert.ok(Number((await viewer.value('particles')).replace(',', '')) < 1000);
+  await viewer.button('As streamed').click();
+  await until('as it was', async () => await viewer.value('rings-digest') === truth[59].rings_digest);
+  await producer.stop();
+});
+
+test('two placements stand side by side on the same frame, with their numbers', async () => {
+  await open();
+  await viewer.shows(20);
+  await viewer.button('Pause').click();
+  const at = await viewer.frame();
+  await viewer.button('Side by side').click();
+  await viewer.page.getByLabel('Placement', { exact: true }).selectOption('marching-squares');
+  await viewer.page.getByLabel('Fill', { exact: true }).selectOption('grid');
+  await until('both are shown', async () =>
+    await viewer.frame(0) === at && await viewer.frame(1) === at &&
+    await viewer.value('placement', 1) === 'marching-squares' &&
+    await viewer.value('fill', 1) === 'grid');
+  const [left, right] = [await viewer.numbers(0), await viewer.numbers(1)];
+  assert.equal(left.placement, 'virtual-plane');
+  assert.notEqual(left['rings-digest'], right['rings-digest']);
+  assert.equal(right.triangles, right.grid, 'fill grid merges nothing');
+  assert.notEqual(left.triangles, right.triangles);
+  assert.ok(Number(left.area) > 0 && Number(right.area) > 0);
+  assert.notEqual(await viewer.picture(0), await viewer.picture(1));
+  await viewer.button('Close picture 2').click();
+  assert.equal(await viewer.page.locator('.pane').count(), 1);
+});
+
+test('a link shows the same frame, view and settings', async () => {
+  const producer = await openAnew();
+  await viewer.button('Pause').click();
+  await viewer.page.getByLabel('Placement', { exact: true }).selectOption('qef');
+  await viewer.page.locator('canvas').first().focus();
+  await viewer.page.keyboard.press('+');
+  await until('settings are shown', async () => await viewer.value('placement') === 'qef');
+  const digest = async (of) => (await of.numbers())['rings-digest'];
+  const first = await until('the picture is there', async () => {
+    const before = await digest(viewer);
+    return before === await digest(viewer) && before;
+  });
+  const hash = new URL(viewer.page.url()).hash;
+  const other = await Viewer.open(browser, world.url, { hash });
+  await until('the link shows the same', async () =>
+    await other.frame() === await viewer.frame() && await digest(other) === first);
+  assert.equal(new URL(other.page.url()).hash, hash);
+  await other.close();
+  await producer.stop();
+});
+
+test('the ring under the pointer is told, and one that is clicked stays selected', async () => {
+  await open();
+  await viewer.shows(5);
+  await viewer.button('Pause').click();
+  const canvas = viewer.page.locator('canvas').first();
+  await canvas.focus();
+  const box = await canvas.boundingBox();
+  const readout = viewer.pane().locator('.readout');
+  const found = await until('a ring is under the pointer', async () => {
+    for (let y = 0.9; y > 0.3; y -= 0.1) {
+      for (let x = 0.35; x < 0.7; x += 0.05) {
+        await viewer.page.mouse.move(box.x + x * box.width, box.y + y * box.height);
+        await viewer.page.waitForTimeout(30);
+        if (/ring \d+: area .* perimeter .* particles/.test(await readout.textContent())) return true;
+      }
+    }
+    return false;
+  });
+  assert.ok(found);
+  await viewer.page.mouse.down();
+  await viewer.page.mouse.up();
+  await until('it is selected', async () => (await readout.textContent()).includes('Selected: ring'));
+  await viewer.button('Play').click();
+  const at = await viewer.frame();
+  await viewer.shows(at + 5);
+  assert.match(await readout.textContent(), /Selected: (ring|hole) \d+: area/);
+  await canvas.focus();
+  await viewer.page.keyboard.press('Escape');
+  await until('none is selected', async () => !(await readout.textContent()).includes('Selected'));
+});
+
+test('a click in a curve goes to that moment', async () => {
+  await open();
+  await viewer.shows(60);
+  const plot = viewer.page.locator('.curve .u-over').first();
+  const box = await plot.boundingBox();
+  await viewer.page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await until('it stands in the middle', async () => {
+    const [place, newest] = (await viewer.page.locator('#place').textContent()).split(' of ').map(Number);
+    const shown = await viewer.frame();
+    return await viewer.button('Play').count() === 1 && shown === place && newest - place > 20;
+  });
+});
+
+test('what is seen is exported as PNG, SVG and GeoJSON', async () => {
+  await open();
+  await viewer.shows(20);
+  await viewer.button('Pause').click();
+  const saved = async (name) => {
+    const [download] = await Promise.all([viewer.page.waitForEvent('download'), viewer.button(name).click()]);
+    const chunks = [];
+    for await (const chunk of await download.createReadStream()) chunks.push(chunk);
+    return { name: download.suggestedFilename(), bytes: Buffer.concat(chunks) };
+  };
+  const at = await viewer.frame();
+  const png = await saved('PNG');
+  assert.equal(png.name, `dam_${at}.png`);
+  assert.equal(png.bytes.subarray(1, 4).toString(), 'PNG');
+  const svg = await saved('SVG');
+  assert.match(svg.bytes.toString(), /^(<\?xml[^>]*>\s*)?<svg[\s\S]*<path/);
+  const { features } = JSON.parse((await saved('GeoJSON')).bytes.toString());
+  const area = features.reduce((sum, { properties }) => sum + properties.area, 0);
+  assert.ok(features.length > 0);
+  assert.ok(Math.abs(area - Number(await viewer.value('area'))) < 0.2, `${area}`);
+});
+
+test('a clip is recorded', async () => {
+  await open();
+  await viewer.shows(5);
+  await viewer.button('Record clip').click();
+  await viewer.shows(await viewer.frame() + 20);
+  const [download] = await Promise.all([
+    viewer.page.waitForEvent('download'), viewer.button('Stop and save').click()]);
+  assert.match(download.suggestedFilename(), /\.webm$/);
+  const chunks = [];
+  for await (const chunk of await download.createReadStream()) chunks.push(chunk);
+  const bytes = Buffer.concat(chunks);
+  assert.equal(bytes.readUInt32BE(0), 0x1a45dfa3, 'the magic number of EBML');
+  assert.ok(bytes.length > 5000, `${bytes.length} bytes`);
+});

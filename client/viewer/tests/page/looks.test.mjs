@@ -1,0 +1,104 @@
+// How the page looks, and whether everybody can use it: no violation of level serious or above, in
+// dark and light, wide and narrow. Screenshots are left in build/screenshots to be looked at.
+import assert from 'node:assert/strict';
+import { mkdirSync, readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
+import { launch, screenshots, until, Viewer, World } from './support.mjs';
+
+const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+let world, browser;
+
+before(async () => {
+  mkdirSync(screenshots, { recursive: true });
+  world = await World.start();
+  browser = await launch();
+  world.loop('dam_break');
+});
+after(async () => {
+  await browser?.close();
+  await world?.close();
+});
+
+/** Serious and critical violations, one line each. */
+async function violations(page) {
+  await page.evaluate(axe);
+  const results = await page.evaluate(
+    () => window.axe.run(document, { resultTypes: ['violations'] }));
+  return results.violations.filter(({ impact }) => impact === 'serious' || impact === 'critical')
+    .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' | ')}`);
+}
+
+for (const colorScheme of ['light', 'dark']) {
+  for (const width of [1600, 800]) {
+    test(`${colorScheme}, ${width} pixels wide: usable by everybody, nothing cut off`, async () => {
+      const viewer = await Viewer.open(browser, world.url, { colorScheme, width, height: width === 800 ? 720 : 900 });
+      const shot = (name) => viewer.page.screenshot({
+        path: path.join(screenshots, `${name}_${colorScheme}_${width}.png`),
+      });
+      try {
+        await viewer.shows(60);
+        await until('its history', async () =>
+          await viewer.page.getByLabel('Frame', { exact: true }).getAttribute('min') === '1');
+        assert.deepEqual(await violations(viewer.page), []);
+        await viewer.scrubTo(45);
+        await shot('one');
+        await viewer.button('Side by side').click();
+        await viewer.page.getByLabel('Placement', { exact: true }).selectOption('marching-squares');
+        await viewer.page.getByLabel('Fill', { exact: true }).selectOption('grid');
+        await viewer.page.getByLabel('Mesh edges').check();
+        await viewer.page.getByLabel('Particles', { exact: true }).check();
+        await viewer.page.getByLabel('Colour').selectOption('identity');
+        await until('the other fill', async () => await viewer.value('fill', 1) === 'grid' &&
+          await viewer.value('triangles', 1) === await viewer.value('grid', 1));
+        await viewer.page.mouse.move(width * 0.45, 300);
+        await shot('two');
+        assert.deepEqual(await violations(viewer.page), []);
+        const wide = await viewer.page.evaluate(() => document.documentElement.scrollWidth);
+        assert.ok(wide <= width, `the page is ${wide} pixels wide`);
+        assert.deepEqual(viewer.errors, []);
+      } finally {
+        await viewer.close();
+      }
+    });
+  }
+}
+
+test('the first page, before there is any stream', async () => {
+  const empty = await World.start();
+  const viewer = await Viewer.open(browser, empty.url, { colorScheme: 'light' });
+  try {
+    await viewer.page.getByText('No stream is open').waitFor();
+    await viewer.page.screenshot({ path: path.join(screenshots, 'empty_light_1600.png') });
+    assert.deepEqual(await violations(viewer.page), []);
+    assert.deepEqual(viewer.errors, []);
+  } finally {
+    await viewer.close();
+    await empty.close();
+  }
+});
+
+test('every control can be reached and has a name', async () => {
+  const viewer = await Viewer.open(browser, world.url);
+  try {
+    await viewer.shows();
+    const unnamed = await viewer.page.evaluate(() => [...document.querySelectorAll('button, select, input, canvas')]
+      .filter((element) => !element.hidden && element.tabIndex >= 0)
+      .filter((element) => !(element.getAttribute('aria-label') || element.textContent?.trim() ||
+                             element.labels?.length))
+      .map((element) => element.outerHTML));
+    assert.deepEqual(unnamed, []);
+    const seen = new Set();
+    for (let k = 0; k < 60; ++k) {
+      await viewer.page.keyboard.press('Tab');
+      seen.add(await viewer.page.evaluate(() => document.activeElement?.id || document.activeElement?.tagName));
+    }
+    for (const id of ['theme', 'choose-files', 'placement', 'share', 'side-by-side', 'outline', 'colour',
+      'export-png', 'CANVAS', 'live', 'play', 'scrub', 'speed', 'fit', 'curves']) {
+      assert.ok(seen.has(id), `${id} is reached by Tab`);
+    }
+  } finally {
+    await viewer.close();
+  }
+});

@@ -1,0 +1,209 @@
+// What the tests of the page share: a server, streams, Chromium, and the page in it.
+import { spawn } from 'node:child_process';
+import { once } from 'node:events';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import { setTimeout as sleep } from 'node:timers/promises';
+import { fileURLToPath } from 'node:url';
+import { chromium } from 'playwright-core';
+
+export const viewer = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../..');
+export const root = path.resolve(viewer, '../..');
+export const recording = path.join(root, 'client/recordings/dam_break.pemc');
+export const screenshots = path.join(viewer, 'build/screenshots');
+/** Where partiemc and partiemc-server are. */
+const bin = path.resolve(process.env.PARTIEMC_BIN ?? path.join(root, 'build/release/bin'));
+const chromiumPath = process.env.CHROMIUM ?? '/usr/bin/chromium';
+
+/** Drawing without a graphics card. */
+export const CHROMIUM_FLAGS = [
+  '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+];
+
+/** How long something may take that takes a moment: long, as tests share their machine. */
+export const PATIENCE_MS = 60_000;
+
+/** Waits until `value()` is truthy and gives it. */
+export async function until(what, value, patienceMs = PATIENCE_MS) {
+  const end = Date.now() + patienceMs;
+  while (true) {
+    const result = await value();
+    if (result) return result;
+    if (Date.now() > end) throw new Error(`${what}: not within ${patienceMs} ms`);
+    await sleep(20);
+  }
+}
+
+function start(program, args, log) {
+  const child = spawn(path.join(bin, program), args, { stdio: ['ignore', 'pipe', 'pipe'] });
+  for (const stream of [child.stdout, child.stderr]) {
+    stream.setEncoding('utf8');
+    stream.on('data', (text) => log.push(text));
+  }
+  return child;
+}
+
+async function stop(child, signal = 'SIGTERM') {
+  if (!child || child.exitCode !== null || child.signalCode !== null) return;
+  child.kill(signal);
+  await once(child, 'exit');
+}
+
+/** A server with its page, and what streams to it. */
+export class World {
+  folder = mkdtempSync(path.join(tmpdir(), 'partiemc-page-'));
+  log = [];
+  #server = null;
+  #producers = [];
+  #address = '127.0.0.1:0';
+  #web = '127.0.0.1:0';
+  #options;
+
+  constructor(...options) { this.#options = options; }
+
+  static async start(...options) {
+    const world = new World(...options);
+    await world.startServer();
+    return world;
+  }
+
+  /** The page's address. */
+  get url() { return `http://${this.#web}/`; }
+
+  /** Starts the server; again at the same addresses, where it has been there before. */
+  async startServer() {
+    const file = (name) => path.join(this.folder, name);
+    rmSync(file('address'), { force: true });
+    rmSync(file('web'), { force: true });
+    this.#server = start('partiemc-server', [
+      '--address', this.#address, '--port-file', file('address'),
+      '--web', this.#web, '--web-port-file', file('web'),
+      '--web-root', path.join(viewer, 'build/page'), ...this.#options,
+    ], this.log);
+    const read = (name) => existsSync(file(name)) && readFileSync(file(name), 'utf8').trim();
+    await until(`the server starts; it says ${this.log.join('')}`, () => {
+      if (this.#server.exitCode !== null) throw new Error(`the server ended: ${this.log.join('')}`);
+      return read('address') && read('web');
+    });
+    this.#address = read('address');
+    this.#web = read('web');
+  }
+
+  async killServer() { await stop(this.#server, 'SIGKILL'); }
+
+  /** Streams a file. */
+  replayOf(file, name, ...options) {
+    const child = start('partiemc', [
+      'replay', file, '--server', this.#address, '--name', name, '--quiet', ...options,
+    ], this.log);
+    this.#producers.push(child);
+    return { stop: () => stop(child) };
+  }
+
+  /** The bundled dam break over and over, as a live stream; slowly, as browser and server may share two cores. */
+  loop(name, ...options) {
+    const rate = options.includes('--rate') ? [] : ['--rate', '15'];
+    return this.replayOf(recording, name, '--loop', ...rate, '--echo-particles', ...options);
+  }
+
+  /** Makes a recording of other files. */
+  async convert(input, output, ...options) {
+    const child = start('partiemc', ['convert', input, output, '--quiet', ...options], this.log);
+    const [code] = await once(child, 'exit');
+    if (code !== 0) throw new Error(`partiemc convert: ${this.log.join('')}`);
+  }
+
+  /** Numbers of every frame, as `partiemc replay --stats` has them. */
+  async statistics(input, ...options) {
+    const file = path.join(this.folder, 'statistics.json');
+    const child = start('partiemc', [
+      'replay', input, '--local', '--quiet', '--stats', file, ...options,
+    ], this.log);
+    const [code] = await once(child, 'exit');
+    if (code !== 0) throw new Error(`partiemc replay: ${this.log.join('')}`);
+    return JSON.parse(readFileSync(file, 'utf8'));
+  }
+
+  /** What the server says of itself. */
+  async information() {
+    const child = start('partiemc', ['info', '--server', this.#address, '--json'], this.log);
+    let text = '';
+    child.stdout.on('data', (piece) => { text += piece; });
+    await once(child, 'close');
+    return JSON.parse(text);
+  }
+
+  async close() {
+    for (const child of this.#producers) await stop(child);
+    await stop(this.#server);
+    rmSync(this.folder, { recursive: true, force: true });
+  }
+}
+
+export const launch = () => chromium.launch({ executablePath: chromiumPath, args: CHROMIUM_FLAGS });
+
+/** The page in a tab of its own, and what a person does with it. */
+export class Viewer {
+  /** Errors of the console, and those that nobody caught. */
+  errors = [];
+
+  static async open(browser, url, options = {}) {
+    const { width = 1600, height = 900, colorScheme = 'light', hash = '' } = options;
+    const context = await browser.newContext({
+      viewport: { width, height }, colorScheme, acceptDownloads: true,
+    });
+    const it = new Viewer();
+    it.page = await context.newPage();
+    it.page.setDefaultTimeout(PATIENCE_MS);
+    it.page.on('console', (message) => {
+      if (message.type() === 'error') it.errors.push(message.text());
+    });
+    it.page.on('pageerror', (error) => it.errors.push(String(error.stack)));
+    await it.page.goto(url + hash);
+    return it;
+  }
+
+  pane(k = 0) { return this.page.locator('.pane').nth(k); }
+  button(name) { return this.page.getByRole('button', { name, exact: true }); }
+
+  /** A number under a picture, as it is written there. */
+  async value(key, k = 0) {
+    const cell = this.pane(k).locator(`[data-key="${key}"]`);
+    return await cell.count() ? (await cell.textContent()).trim() : '';
+  }
+
+  async frame(k = 0) { return Number(await this.value('frame', k)) || 0; }
+
+  async numbers(k = 0) {
+    const cells = await this.pane(k).locator('[data-key]').evaluateAll(
+      (all) => all.map((cell) => [cell.dataset.key, cell.textContent.trim()]));
+    return Object.fromEntries(cells);
+  }
+
+  /** The pixels of a picture, as one string. */
+  async picture(k = 0) {
+    const image = await this.pane(k).locator('.picture').screenshot();
+    return image.toString('base64');
+  }
+
+  status() { return this.page.getByRole('status').textContent(); }
+
+  /** Until a frame above `sequence` is shown. */
+  async shows(sequence = 0, k = 0) {
+    return until(`a frame above ${sequence} is shown`, async () => {
+      const frame = await this.frame(k);
+      return frame > sequence && frame;
+    });
+  }
+
+  async scrubTo(sequence) {
+    await this.page.getByLabel('Frame', { exact: true }).evaluate((slider, value) => {
+      slider.value = String(value);
+      slider.dispatchEvent(new Event('input', { bubbles: true }));
+    }, sequence);
+    await until(`frame ${sequence} is shown`, async () => await this.frame() === sequence);
+  }
+
+  async close() { await this.page.context().close(); }
+}

@@ -1,0 +1,90 @@
+import { create } from '@bufbuild/protobuf';
+import { Fill, Placement, ReconstructionParametersSchema } from '@proto/v1/reconstruction_pb';
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { digestText } from '../src/protocol/digest';
+import { Backoff } from '../src/stream/backoff';
+import { Credit, FIRST_CREDITS } from '../src/stream/credit';
+import { AS_STREAMED, isAsStreamed, parametersOf, parseSettings, settingsText } from '../src/stream/settings';
+import { inWords, mayTryAgain, parseStatus } from '../src/stream/status';
+import { addressText, parseAddress } from '../src/ui/address';
+import { count, number } from '../src/ui/format';
+
+test('settings survive the address', () => {
+  const settings = { ...AS_STREAMED, placement: Placement.QEF, fill: Fill.NONE, kernelRadius: 2.5, share: 50 };
+  assert.equal(settingsText(settings), 'placement:qef;fill:none;kernel:2.5;share:50');
+  assert.deepEqual(parseSettings(settingsText(settings)), settings);
+  assert.ok(isAsStreamed(parseSettings('')));
+  assert.deepEqual(parseSettings('placement:nonsense;share:7;kernel:x'), AS_STREAMED);
+});
+
+test('an address holds streams, frame, view, settings and look', () => {
+  const address = {
+    panes: [{ stream: 'dam', settings: { ...AS_STREAMED } },
+            { stream: '', settings: { ...AS_STREAMED, fill: Fill.GRID } },
+            { stream: 'other~1', settings: { ...AS_STREAMED } }],
+    frame: 12, view: { x: 1.5, y: -2, scale: 300 }, look: 'outline,colour:p & q,width:2',
+  };
+  const text = addressText(address);
+  assert.match(text, /^#stream=dam&frame=12&view=1\.5,-2,300&beside=~fill:grid&/);
+  const back = parseAddress(text);
+  assert.deepEqual([back.frame, back.view, back.look], [12, address.view, address.look]);
+  assert.deepEqual(back.panes.slice(0, 2), address.panes.slice(0, 2));
+});
+
+test('an address that says nothing, or nonsense, shows nothing', () => {
+  for (const hash of ['', '#', '#frame=x&view=1,2', '#beside=~fill:grid']) {
+    const address = parseAddress(hash);
+    assert.deepEqual([address.panes, address.frame, address.view], [[], null, null]);
+  }
+});
+
+test('another placement gets a reference radius of its own, the same one keeps it', () => {
+  const base = create(ReconstructionParametersSchema, {
+    placement: Placement.VIRTUAL_PLANE, kernelRadius: 3, referenceRadius: 0.7, cellSize: 1, clean: true,
+  });
+  const other = parametersOf({ ...AS_STREAMED, placement: Placement.QEF }, base, 0.1);
+  assert.deepEqual([other.placement, other.referenceRadius, other.clean, other.spacing],
+                   [Placement.QEF, undefined, undefined, 0.1]);
+  const same = parametersOf({ ...AS_STREAMED, cellSize: 2 }, base, null);
+  assert.deepEqual([same.referenceRadius, same.cellSize, same.kernelRadius], [0.7, 2, 3]);
+  assert.equal(parametersOf({ ...AS_STREAMED, surfaceOffset: 0.5 }, base, null).surfaceOffset, undefined);
+});
+
+test('statuses are told in words with what to do', () => {
+  const status = parseStatus('{"code": 5, "reason": "NO_SUCH_STREAM", "message": "stream_name: dam; no open stream has it"}');
+  assert.ok(status);
+  assert.match(inWords(status), /^stream_name: dam; no open stream has it\. .*waits for it\.$/);
+  assert.ok(mayTryAgain(status));
+  assert.equal(parseStatus('<html>'), null);
+  assert.equal(parseStatus('{}'), null);
+  assert.ok(!mayTryAgain({ code: 16, reason: 'TOKEN_UNKNOWN', message: '' }));
+});
+
+test('pauses between tries grow to their longest and begin anew after a success', () => {
+  const backoff = new Backoff(200, 1000);
+  assert.deepEqual([1, 2, 3, 4].map(() => backoff.take()), [200, 400, 800, 1000]);
+  backoff.reset();
+  assert.equal(backoff.take(), 200);
+});
+
+/** Frames under way after `frames` of this size, as the server sees them. */
+function underWay(bytes: number, frames: number): number {
+  const credit = new Credit();
+  let allowed = FIRST_CREDITS;
+  for (let k = 0; k < frames; ++k) allowed += credit.taken(bytes) - 1;
+  return allowed;
+}
+
+test('small frames get more credit, large ones less', () => {
+  assert.equal(underWay(1000, 100), 64);
+  assert.equal(underWay(1 << 20, 100), 8);
+  assert.equal(underWay(50 << 20, 100), 4);
+});
+
+test('numbers are short and digests have sixteen digits', () => {
+  assert.deepEqual([number(1.23456789), number(0), number(NaN), number(1e9), number(12345678, 3)],
+                   ['1.2346', '0', '–', '1e+9', '1.23e+7']);
+  assert.equal(count(1234567), '1,234,567');
+  assert.equal(digestText(0xabn), '00000000000000ab');
+});
