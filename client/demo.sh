@@ -1,6 +1,7 @@
 #!/bin/bash
 # Shows PartiEMC at work, from a fresh clone on Debian 12: installs what is missing, builds, starts
-# a server and replays the bundled dam break through it. What comes out is left in build/demo.
+# a server and replays the bundled dam break through it. What comes out is left in build/demo. Then
+# the dam break plays on a loop, to be watched in a browser, until Ctrl-C.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -13,12 +14,16 @@ fail() {
   exit 1
 }
 
+browser=true
 case ${1:-} in
   '') ;;
+  --no-browser) browser=false ;;
   -h | --help)
-    echo "usage: client/demo.sh"
+    echo "usage: client/demo.sh [--no-browser]"
     echo "Installs the Debian packages that are missing, builds in $build, replays the bundled"
-    echo "recording through a server of its own and leaves the results in $output."
+    echo "recording through a server of its own and leaves the results in $output. Then plays it"
+    echo "on a loop for a browser, whose address it prints, until Ctrl-C."
+    echo "  --no-browser  end after the replay; the page and what builds it are left out"
     exit 0
     ;;
   *)
@@ -37,18 +42,19 @@ build_jobs() {
 }
 
 work=$(mktemp -d)
-server=
-stop_server() {
-  if [[ -n $server ]]; then
-    kill "$server" 2>/dev/null || true
-    wait "$server" 2>/dev/null || true
-    server=
-  fi
+server= player=
+stop() {
+  local process
+  for process in $player $server; do
+    kill "$process" 2>/dev/null || true
+    wait "$process" 2>/dev/null || true
+  done
+  server= player=
 }
 cleanup() {
   local code=$?
   trap - EXIT
-  stop_server
+  stop
   rm -rf "$work"
   exit "$code"
 }
@@ -56,9 +62,9 @@ trap cleanup EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-# The server writes the address that it got to a file once it serves.
+# The server writes the addresses that it got to files once it serves.
 start_server() {
-  "$build/bin/partiemc-server" --address 127.0.0.1:0 --port-file "$work/address" \
+  "$build/bin/partiemc-server" --address 127.0.0.1:0 --port-file "$work/address" "$@" \
     >"$work/server.log" 2>&1 &
   server=$!
   local attempt
@@ -71,31 +77,59 @@ start_server() {
   fail "the server did not start; its log is above"
 }
 
+# The page needs npm, and npm its registry: where there is none, everything else works.
+build_page() {
+  docker/install.sh viewer && cmake --build "$build" --target partiemc_viewer
+}
+
+# Until Ctrl-C.
+play() {
+  "$build/bin/partiemc" replay "$recording" --server "$address" --name dam-break --loop --rate 25 \
+    --echo-particles --quiet >"$work/player.log" 2>&1 &
+  player=$!
+  echo
+  echo "The dam break plays, until Ctrl-C:"
+  echo "  http://$(<"$work/web")/#stream=dam-break"
+  wait "$player" || {
+    cat "$work/player.log" >&2
+    fail "the replay ended; its words are above"
+  }
+}
+
 echo "== 1 of 3: packages (those of docker/packages/demo.txt that are missing)"
 docker/install.sh demo
 
 echo
 echo "== 2 of 3: build in $build (some minutes for the first time)"
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_TESTS=OFF \
-  -DPARTIEMC_VTK=OFF -DPARTIEMC_EVALUATION=OFF >"$work/cmake.log" 2>&1 || {
+  -DPARTIEMC_VTK=OFF -DPARTIEMC_EVALUATION=OFF -DPARTIEMC_VIEWER="$browser" \
+  >"$work/cmake.log" 2>&1 || {
   cat "$work/cmake.log" >&2
   fail "CMake could not configure the build; its words are above"
 }
 cmake --build "$build" -j "$(build_jobs)" --target partiemc partiemc-server ||
   fail "the build failed; the first error above says where"
+if $browser && ! build_page; then
+  echo "demo.sh: the page for the browser could not be built (its words are above): left out" >&2
+  browser=false
+fi
 
 echo
-start_server
+if $browser; then
+  start_server --web 127.0.0.1:0 --web-port-file "$work/web"
+else
+  start_server
+fi
 address=$(<"$work/address")
 echo "== 3 of 3: $recording through the server at $address"
 rm -rf "$output"
 "$build/bin/partiemc" replay "$recording" --server "$address" --check \
   --output-dir "$output/frames" --format geojson,svg,obj \
   --stats "$output/statistics.csv" --report "$output/report.html"
-stop_server
 
 echo
 echo "The results are in $PWD/$output:"
 echo "  report.html       the whole replay to look at: open it in a browser"
 echo "  statistics.csv    numbers of every frame"
 echo "  frames/           GeoJSON, SVG and OBJ of every frame"
+! $browser || play

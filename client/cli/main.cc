@@ -6,7 +6,7 @@
 #include "client/cli/convert.h"
 #include "client/cli/evaluate.h"
 #include "client/cli/info.h"
-#include "client/cli/replay.h"
+#include "client/cli/replay/replay.h"
 #include "client/cli/replay_flags.h"
 #include "client/cli/streams.h"
 #include "client/cli/watch.h"

@@ -17,6 +17,14 @@ absl::Status CheckCombinations(const CLI::App& app) {
   if (app.count("--format") > 0 && app.count("--output-dir") == 0) {
     return absl::InvalidArgumentError("--format: goes with --output-dir, the place of the files");
   }
+  if (app.count("--loop") > 0) {
+    for (const char* output : {"--output-dir", "--stats", "--report"}) {
+      if (app.count(output) > 0) {
+        return absl::InvalidArgumentError(
+            Concat("--loop: has no end, hence no ", output, "; leave one of them out"));
+      }
+    }
+  }
   return absl::OkStatus();
 }
 
@@ -49,6 +57,9 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       ->check(CLI::IsMember({"block", "latest"}))
       ->type_name("WHICH")
       ->capture_default_str()
+      ->group(kGroup);
+  app.add_flag("--loop", flags.loop,
+               "Begin anew when the input ends, until Ctrl-C, for others to watch; writes no files")
       ->group(kGroup);
 }
 
@@ -186,7 +197,9 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
       "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
       "--rate 25\n"
-      "  partiemc replay dam_break.pemc --name dam --rate 25   and elsewhere: partiemc watch dam\n"
+      "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "
+      "watch "
+      "dam\n"
       "However it ends, --stats and --report have the frames that came through, and the report "
       "tells "
       "why\nit ended early.\n"

@@ -42,6 +42,7 @@ struct ReplayFlags {
 
   std::string rate = "max";
   std::string policy = "block";
+  bool loop = false;
   bool check = false;
   bool keep_going = false;
   bool quiet = false;

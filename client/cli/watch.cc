@@ -1,8 +1,11 @@
 #include "client/cli/watch.h"
 
+#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include "CLI/CLI.hpp"
@@ -35,6 +38,20 @@ FrameRecord RecordOf(const WatchedFrame& frame) {
           .total_ms = frame.frame.times.total_ms,
           .rings_digest = frame.frame.rings_digest,
           .mesh_digest = frame.frame.mesh_digest};
+}
+
+constexpr std::string_view kOldest = "oldest";
+
+std::optional<std::uint64_t> ParseFrom(std::string_view text) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || number == 0) return std::nullopt;
+  return number;
+}
+
+// What WatcherOptions::from_sequence is to be.
+std::optional<std::uint64_t> FromSequence(std::string_view from) {
+  return from == kOldest ? std::optional<std::uint64_t>(0) : ParseFrom(from);
 }
 
 // How a watch ended.
@@ -108,6 +125,14 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->check(CLI::IsMember({"latest", "every"}))
       ->type_name("MODE")
       ->capture_default_str();
+  verb->add_option("--from", flags.from,
+                   "Go back: begin with frame N, or with the oldest that the server still holds, "
+                   "and follow from there; frames are numbered from 1")
+      ->check([](const std::string& text) -> std::string {
+        if (text == kOldest || ParseFrom(text)) return {};
+        return "--from: " + text + "; must be a frame number or `oldest`";
+      })
+      ->type_name("N|oldest");
   verb->add_option("--frames", flags.frames, "Leave after as many; by default when the stream ends")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62))
       ->type_name("N");
@@ -139,11 +164,15 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->type_name("FILE");
   verb->add_flag("--quiet", flags.quiet, "No progress and no table");
   verb->footer(
-      "A watcher never slows the stream. One that joins late gets the newest frame at once.\n"
+      "A watcher never slows the stream. One that joins late gets the newest frame at once, or\n"
+      "with --from what the server still holds (its --history-bytes); one that lost its "
+      "connection\n"
+      "in mode every, or with --from, goes on where it was.\n"
       "Examples:\n"
       "  partiemc streams --server simulator:50051\n"
       "  partiemc watch dam-break --server simulator:50051\n"
       "  partiemc watch dam-break --mode every --output-dir out --format geojson,svg\n"
+      "  partiemc watch dam-break --from oldest --mode every --stats dam.csv\n"
       "  partiemc watch dam-break --frames 1 --quiet --output-dir now\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 4 server or its stream, 130 interrupted.");
   return verb;
@@ -162,6 +191,7 @@ int Watch(const WatchFlags& flags) {
       Watcher::Open(servers.front(), flags.stream,
                     {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
                      .credits = flags.credits,
+                     .from_sequence = FromSequence(flags.from),
                      .credentials = flags.server.credentials,
                      .fallback_addresses = {servers.begin() + 1, servers.end()},
                      .rejoin = {.give_up_after = Milliseconds(flags.rejoin_seconds)},
@@ -172,6 +202,12 @@ int Watch(const WatchFlags& flags) {
   progress_options.quiet = flags.quiet;
   if (flags.frames > 0) progress_options.total = flags.frames;
   Progress progress(std::move(progress_options));
+  const auto from = ParseFrom(flags.from);
+  const auto& held = (*watcher)->stream().held;
+  if (from && held && held->oldest_sequence > *from) {
+    progress.Note(Concat("partiemc: frames before ", held->oldest_sequence,
+                         " are no longer held; begins there"));
+  }
   const Clock::time_point start = Clock::now();
   const Ended ended = ReceiveAll(flags, **watcher, *outputs, progress);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();

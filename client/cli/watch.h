@@ -16,6 +16,7 @@ struct WatchFlags {
   std::string stream;
   ServerFlags server;
   std::string mode = "latest";
+  std::string from;  ///< A sequence number or "oldest"; empty: the newest frame.
   std::uint32_t credits = 2;
   std::uint64_t frames = 0;  ///< 0: until the stream ends.
   double deadline_seconds = 30;

@@ -15,24 +15,20 @@ constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max(
 
 }  // namespace
 
-absl::Status CheckParticleCount(const Frame& frame, const StreamLimits& limits) {
+absl::Status CheckParticleCount(std::size_t particles, const StreamLimits& limits) {
   const std::uint64_t limit = limits.max_particles_per_frame;
-  if (frame.components < 1 || limit == 0 || frame.ParticleCount() <= limit) {
-    return absl::OkStatus();
-  }
+  if (limit == 0 || particles <= limit) return absl::OkStatus();
   return ViolationError(absl::StatusCode::kResourceExhausted,
                         {.reason = std::string(kReasonTooManyParticles),
                          .field = "positions",
-                         .value = absl::StrCat(frame.ParticleCount(), " particles"),
+                         .value = absl::StrCat(particles, " particles"),
                          .rule = absl::StrCat("the server takes at most ", limit)});
 }
 
-absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const Frame& frame, double time,
+absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const wire::FrameRows& frame,
                                                     std::uint64_t sequence,
                                                     const StreamLimits& limits) {
-  Frame timed = frame;
-  timed.time = time;
-  const wire::FrameRequest request(timed, sequence);
+  const wire::FrameRequest request(frame, sequence);
   const std::uint64_t bytes = request.frame_bytes();
   const std::uint64_t announced = limits.max_frame_bytes;
   const std::uint64_t limit = announced == 0 ? kMaxFrameBytes : std::min(announced, kMaxFrameBytes);

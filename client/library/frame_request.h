@@ -3,21 +3,22 @@
 
 #include <grpcpp/support/byte_buffer.h>
 
+#include <cstddef>
 #include <cstdint>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "partiemc/client/frame_stream.h"
-#include "partiemc/frame.h"
+#include "wire/frame_rows.h"
 
 namespace partiemc::client {
 
 /// Errors: RESOURCE_EXHAUSTED with a Violation for more particles than the server takes.
-absl::Status CheckParticleCount(const Frame& frame, const StreamLimits& limits);
+absl::Status CheckParticleCount(std::size_t particles, const StreamLimits& limits);
 
-/// `frame` at `time` as a request. Copies each array once.
+/// `frame` as a request. Copies each array once.
 /// Errors: RESOURCE_EXHAUSTED with a Violation for more bytes than the server takes.
-absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const Frame& frame, double time,
+absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const wire::FrameRows& frame,
                                                     std::uint64_t sequence,
                                                     const StreamLimits& limits);
 

@@ -5,6 +5,7 @@
 #include <thread>
 #include <utility>
 
+#include "client/library/gather.h"
 #include "client/library/owned_frame.h"
 #include "partiemc/status.h"
 
@@ -24,7 +25,8 @@ class LatestSender::Sending {
     thread_.join();
   }
 
-  absl::Status Offer(const Frame& frame, double time) {
+  template <typename Particles>  // A frame or its rows.
+  absl::Status Offer(const Particles& frame, double time) {
     const std::scoped_lock lock(mutex_);
     if (finishing_) return absl::FailedPreconditionError("frame: offered after Finish");
     if (!status_.ok()) return status_;
@@ -103,6 +105,10 @@ LatestSender::~LatestSender() = default;
 
 absl::Status LatestSender::Offer(const Frame& frame, double time) {
   return sending_->Offer(frame, time);
+}
+absl::Status LatestSender::OfferArrays(const ParticleArrays& particles, double time) {
+  const auto rows = RowsOf(particles, time);
+  return rows.ok() ? sending_->Offer(*rows, time) : rows.status();
 }
 absl::Status LatestSender::Finish() { return sending_->Finish(); }
 OfferCounts LatestSender::counts() const { return sending_->counts(); }

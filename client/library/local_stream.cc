@@ -4,10 +4,12 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "client/library/gather.h"
 #include "client/library/owned_frame.h"
 #include "common/stage_clock.h"
 #include "partiemc/arena.h"
@@ -21,6 +23,7 @@ class Worker final : public LocalStream {
  public:
   Worker(Reconstructor reconstructor, const LocalStreamOptions& options)
       : reconstructor_(std::move(reconstructor)),
+        attributes_(options.attributes),
         arena_(static_cast<unsigned>(std::max(options.threads, 0))) {
     info_ = {.parameters = reconstructor_.parameters(),
              .frames_in_flight = std::max<std::size_t>(1, options.frames_in_flight),
@@ -35,7 +38,14 @@ class Worker final : public LocalStream {
   }
 
   const StreamInfo& info() const override { return info_; }
-  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
+  absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override {
+    return Submit(frame, time);
+  }
+  absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles, double time) override {
+    const auto rows = RowsOf(particles, time);
+    if (!rows.ok()) return rows.status();
+    return Submit(*rows, time);
+  }
   absl::Status FinishSending() override;
   absl::StatusOr<Received> Receive(Event& event,
                                    std::optional<std::chrono::milliseconds> wait) override;
@@ -43,14 +53,18 @@ class Worker final : public LocalStream {
   void Cancel() override;
 
  private:
+  template <typename Particles>  // A frame or its rows.
+  absl::StatusOr<std::uint64_t> Submit(const Particles& frame, double time);
   void Run();
   void Process(const OwnedFrame& frame, Event& event);
 
   const Reconstructor reconstructor_;
+  const std::vector<std::string> attributes_;
   StreamInfo info_;
   Arena arena_;
-  State state_;          // Of the worker's thread alone.
-  Workspace workspace_;  // Likewise.
+  State state_;                    // Of the worker's thread alone.
+  Workspace workspace_;            // Likewise.
+  std::vector<Attribute> chosen_;  // Likewise.
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
@@ -64,7 +78,8 @@ class Worker final : public LocalStream {
   std::thread thread_;
 };
 
-absl::StatusOr<std::uint64_t> Worker::Send(const Frame& frame, double time) {
+template <typename Particles>
+absl::StatusOr<std::uint64_t> Worker::Submit(const Particles& frame, double time) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock,
                 [this] { return cancelled_ || finished_ || in_flight_ < info_.frames_in_flight; });
@@ -150,11 +165,15 @@ void Worker::Process(const OwnedFrame& frame, Event& event) {
   event.sequence = frame.number();
   event.time = frame.time();
   StageClock clock;
-  absl::Status status;
-  arena_.Execute([&] {
-    status = reconstructor_.Reconstruct(frame.frame(), state_, workspace_, event.frame.result,
-                                        {.observer = &clock});
-  });
+  Frame wanted = frame.frame();
+  absl::Status status = ChooseAttributes(frame.frame(), attributes_, chosen_);
+  wanted.attributes = chosen_;
+  if (status.ok()) {
+    arena_.Execute([&] {
+      status = reconstructor_.Reconstruct(wanted, state_, workspace_, event.frame.result,
+                                          {.observer = &clock});
+    });
+  }
   event.frame.times = {.stages_ms = clock.stages_ms(), .total_ms = clock.TotalMs()};
   if (!status.ok()) {
     event.kind = Event::Kind::kRefusal;

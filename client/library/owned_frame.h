@@ -1,12 +1,15 @@
 // A frame that owns its arrays.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <variant>
 #include <vector>
 
 #include "partiemc/frame.h"
+#include "wire/frame_rows.h"
 
 namespace partiemc::client {
 
@@ -30,6 +33,19 @@ class OwnedFrame {
     frame_.volumes = Copy(frame.volumes, volumes_);
     frame_.ids = Copy(frame.ids, ids_);
     frame_.velocities = Copy(frame.velocities, velocities_);
+    CopyAttributes(frame.attributes);
+  }
+
+  /// Likewise, of arrays that lie anywhere.
+  void Assign(const wire::FrameRows& rows, double time, std::uint64_t number) {
+    Take(rows, time, number, [](const std::byte*, std::size_t) { return false; });
+  }
+
+  /// A frame that owns those arrays only that do not lie as frames have them; the others must stay.
+  void Adopt(const wire::FrameRows& rows) {
+    Take(rows, rows.scalars.time, 0, [](const std::byte* place, std::size_t alignment) {
+      return place != nullptr && reinterpret_cast<std::uintptr_t>(place) % alignment == 0;
+    });
   }
 
   const Frame& frame() const { return frame_; }
@@ -43,11 +59,55 @@ class OwnedFrame {
     return to;
   }
 
+  void CopyAttributes(std::span<const Attribute> from) {
+    carried_.resize(from.size());
+    attributes_.assign(from.begin(), from.end());
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      carried_[k].name = from[k].name;
+      attributes_[k].name = carried_[k].name;
+      attributes_[k].values = Copy(from[k].values, carried_[k].values);
+    }
+    frame_.attributes = attributes_;
+  }
+
+  struct Carried {
+    std::string name;
+    std::vector<float> values;
+  };
+
+  template <typename MayStay>
+  void Take(const wire::FrameRows& rows, double time, std::uint64_t number, MayStay may_stay) {
+    const auto array = [&]<typename T>(const wire::RowArray& from,
+                                       std::vector<T>& to) -> std::span<const T> {
+      const std::size_t count = from.bytes() / sizeof(T);
+      if (may_stay(from.in_place, alignof(T))) {
+        return {reinterpret_cast<const T*>(from.in_place), count};
+      }
+      to.resize(count);
+      from.WriteAll(reinterpret_cast<std::byte*>(to.data()));
+      return to;
+    };
+    frame_ = rows.scalars;
+    frame_.time = time;
+    number_ = number;
+    if (std::holds_alternative<std::span<const float>>(frame_.positions)) {
+      frame_.positions = array(rows.positions, singles_);
+    } else {
+      frame_.positions = array(rows.positions, doubles_);
+    }
+    frame_.volumes = array(rows.volumes, volumes_);
+    frame_.ids = array(rows.ids, ids_);
+    frame_.velocities = array(rows.velocities, velocities_);
+    CopyAttributes(rows.scalars.attributes);
+  }
+
   std::vector<float> singles_;
   std::vector<double> doubles_;
   std::vector<float> volumes_, velocities_;
   std::vector<std::uint64_t> ids_;
-  Frame frame_;  // Of views into the vectors.
+  std::vector<Carried> carried_;
+  std::vector<Attribute> attributes_;  // Of views into those.
+  Frame frame_;                        // Of views into the vectors.
   std::uint64_t number_ = 0;
 };
 

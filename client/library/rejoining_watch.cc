@@ -22,7 +22,7 @@ class RejoiningWatch::Calls final : public Attempts {
     const auto channel = MakeChannel(address, watch_.options_.credentials);
     if (!channel.ok()) return channel.status();
     watch_.SetCall(std::make_shared<WatchCall>(*channel, address));
-    watch_.call_->Start(watch_.stream_name_, watch_.options_);
+    watch_.call_->Start(watch_.stream_name_, watch_.options_, watch_.From());
     return absl::OkStatus();
   }
 
@@ -97,7 +97,7 @@ absl::Status RejoiningWatch::ConnectAt(std::chrono::milliseconds connect_timeout
   if (auto status = client::Connect(*channel, address(), connect_timeout); !status.ok())
     return status;
   SetCall(std::make_shared<WatchCall>(*channel, address()));
-  call_->Start(stream_name_, options_);
+  call_->Start(stream_name_, options_, From());
   const auto opened = call_->WaitUntilOpened(Clock::now() + options_.deadline);
   if (!opened.ok()) return opened.status();
   if (!*opened) return NotAccepted(address(), "watcher", options_.deadline);
@@ -138,6 +138,13 @@ absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
     }
     if (!Lose(received)) return received;
   }
+}
+
+std::optional<std::uint64_t> RejoiningWatch::From() const {
+  if (last_ == 0) return options_.from_sequence;
+  // Who wants the newest alone does not want to wait for what it missed.
+  const bool goes_on = options_.mode == WatchMode::kEvery || options_.from_sequence;
+  return goes_on ? std::optional(last_ + 1) : std::nullopt;
 }
 
 // What lies between two calls nobody has counted: results that were dropped, or that came while

@@ -44,6 +44,8 @@ class RejoiningWatch final : public Watcher {
   absl::Status ConnectAt(std::chrono::milliseconds connect_timeout);
   absl::StatusOr<Received> ReceiveOrLose(WatchedFrame& frame,
                                          std::optional<std::chrono::milliseconds> wait);
+  // The first frame that is asked for; none: the newest.
+  std::optional<std::uint64_t> From() const;
   bool Lose(const absl::StatusOr<Received>& received);
   // kEvent once it goes on, kNothingYet if it does not yet; else it never will.
   absl::StatusOr<Received> Rejoin(std::optional<Clock::time_point> until);

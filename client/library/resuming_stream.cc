@@ -7,7 +7,9 @@
 #include "client/library/answer.h"
 #include "client/library/channel.h"
 #include "client/library/frame_request.h"
+#include "client/library/gather.h"
 #include "partiemc/status.h"
+#include "wire/message_bytes.h"
 
 namespace partiemc::client {
 namespace {
@@ -79,12 +81,26 @@ absl::Status ResumingStream::OpenFirst(Lock& lock) {
 }
 
 absl::StatusOr<std::uint64_t> ResumingStream::Send(const Frame& frame, double time) {
-  if (auto fits = CheckParticleCount(frame, info_.limits); !fits.ok()) return fits;
+  wire::FrameRows rows = wire::RowsOf(frame);
+  rows.scalars.time = time;
+  return SendRows(rows, frame.components < 1 ? 0 : frame.ParticleCount());
+}
+
+absl::StatusOr<std::uint64_t> ResumingStream::SendArrays(const ParticleArrays& particles,
+                                                         double time) {
+  const auto rows = RowsOf(particles, time);
+  if (!rows.ok()) return rows.status();
+  return SendRows(*rows, particles.count);
+}
+
+absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& frame,
+                                                       std::size_t particles) {
+  if (auto fits = CheckParticleCount(particles, info_.limits); !fits.ok()) return fits;
   Lock lock(monitor_.mutex);
   if (auto ready = WaitToSend(lock, 0); !ready.ok()) return ready;
   const std::uint64_t sequence = resend_.end();
   lock.unlock();
-  auto request = EncodeFrameRequest(frame, time, sequence, info_.limits);
+  auto request = EncodeFrameRequest(frame, sequence, info_.limits);
   if (!request.ok()) return request.status();
   lock.lock();
   if (auto ready = WaitToSend(lock, request->Length()); !ready.ok()) return ready;

@@ -26,6 +26,7 @@
 #include "client/library/stream_connector.h"
 #include "partiemc/client/stream.h"
 #include "wire/codec.h"
+#include "wire/frame_rows.h"
 
 namespace partiemc::client {
 
@@ -37,6 +38,7 @@ class ResumingStream final : public Stream {
 
   const StreamInfo& info() const override { return info_; }
   absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
+  absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles, double time) override;
   absl::Status FinishSending() override;
   absl::StatusOr<Received> Receive(Event& event,
                                    std::optional<std::chrono::milliseconds> wait) override;
@@ -62,6 +64,7 @@ class ResumingStream final : public Stream {
   void LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, const Loss& loss);
   OptionalTime AnswerDue() const;
   // Of any thread:
+  absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles);
   absl::Status Fail(Lock& lock, absl::Status failure);
   absl::Status WaitToSend(Lock& lock, std::uint64_t bytes);
   bool MaySend(std::uint64_t bytes) const;

@@ -23,7 +23,8 @@ v1::OpenStream OpenMessage(const StreamOptions& options) {
   wire::EncodeOutputs({.mesh = options.outputs.mesh,
                        .normals = options.outputs.normals,
                        .relative_float32 = options.outputs.relative_float32,
-                       .echo_particles = options.outputs.echo_particles},
+                       .echo_particles = options.outputs.echo_particles,
+                       .attributes = options.outputs.attributes},
                       *open.mutable_outputs());
   open.mutable_labels()->insert(options.labels.begin(), options.labels.end());
   if (options.reconnect.give_up_after.count() > 0) {

@@ -39,11 +39,13 @@ WatchCall::~WatchCall() {
   if (thread_.joinable()) thread_.join();
 }
 
-void WatchCall::Start(std::string_view stream_name, const WatcherOptions& options) {
+void WatchCall::Start(std::string_view stream_name, const WatcherOptions& options,
+                      std::optional<std::uint64_t> from_sequence) {
   v1::WatchStreamRequest open;
   open.mutable_open()->set_stream_name(std::string(stream_name));
   open.mutable_open()->set_mode(ToWire(options.mode));
   open.mutable_open()->set_credits(std::max<std::uint32_t>(options.credits, 1));
+  if (from_sequence) open.mutable_open()->set_from_sequence(*from_sequence);
   thread_ = std::thread([this, open = std::move(open)]() mutable { Run(std::move(open)); });
 }
 
@@ -92,6 +94,7 @@ absl::StatusOr<bool> WatchCall::WaitUntilOpened(Clock::time_point until) {
   stream_ = {.stream_id = opened.stream_id(),
              .parameters = *parameters,
              .labels = {opened.labels().begin(), opened.labels().end()}};
+  if (opened.has_frames()) stream_.held = {opened.oldest_sequence(), opened.newest_sequence()};
   lineage_ = opened.lineage();
   return true;
 }
@@ -150,6 +153,7 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.frame.rings_digest = decoded_.rings_digest;
   frame.frame.mesh_digest = decoded_.mesh_digest;
   frame.dropped = message.frame().dropped();
+  frame.oldest_sequence = message.frame().oldest_sequence();
   frame.particles.clear();
   if (result.particles().empty()) return absl::OkStatus();
   particles_.set_position_format(result.particle_format());

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -33,8 +34,9 @@ class WatchCall {
   /// Cancels.
   ~WatchCall();
 
-  /// Begins to open; waits for nothing.
-  void Start(std::string_view stream_name, const WatcherOptions& options);
+  /// Begins to open, in place of options.from_sequence with `from_sequence`; waits for nothing.
+  void Start(std::string_view stream_name, const WatcherOptions& options,
+             std::optional<std::uint64_t> from_sequence);
   /// Whether the server has accepted the watcher; waits for that until then at most.
   /// Errors: what it was refused for.
   absl::StatusOr<bool> WaitUntilOpened(Clock::time_point until);

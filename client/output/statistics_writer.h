@@ -13,11 +13,11 @@
 namespace partiemc::client {
 
 /// The columns in their order: frame, particles, polylines, vertices, triangles_grid, triangles,
-/// area, milliseconds; one per stage, "bins_ms" to "mesh_ms" ("vertices" alone would stand there
-/// twice); perimeter, self_intersections, folded_triangles, dropped_holes, dropped_components,
-/// dropped_spray, rings_digest, mesh_digest, time, doubts (their names, a blank between two of
-/// them). Digests are 16 hexadecimal digits, times
-/// milliseconds of wall time, areas and lengths world units; `vertices` are those of the polylines.
+/// area, milliseconds; one per stage, "bins_ms" to "attributes_ms" ("vertices" alone would stand
+/// there twice); perimeter, self_intersections, folded_triangles, dropped_holes,
+/// dropped_components, dropped_spray, rings_digest, mesh_digest, time, doubts (their names, a blank
+/// between two of them). Digests are 16 hexadecimal digits, times milliseconds of wall time, areas
+/// and lengths world units; `vertices` are those of the polylines.
 std::span<const std::string_view> StatisticsColumns();
 
 /// Writes CSV with a header line, or JSON as an array of one object per frame (a number that is

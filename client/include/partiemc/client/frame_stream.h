@@ -15,6 +15,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "partiemc/client/particle_arrays.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
@@ -87,6 +88,11 @@ class FrameStream {
   /// FAILED_PRECONDITION after FinishSending. DEADLINE_EXCEEDED when the wait lasts longer than the
   /// stream's deadline.
   virtual absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) = 0;
+
+  /// The same of arrays that lie anywhere. Errors: also INVALID_ARGUMENT with a Violation (reason
+  /// COUNT) for a coordinate that is missing.
+  virtual absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles,
+                                                   double time) = 0;
 
   /// No more frames will come; answers to those sent are still to be received.
   virtual absl::Status FinishSending() = 0;

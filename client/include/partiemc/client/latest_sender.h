@@ -52,6 +52,9 @@ class LatestSender {
   /// Copies the frame and returns: costs the copying, whatever the stream does.
   /// Errors: whatever ended the stream before; FAILED_PRECONDITION after Finish.
   absl::Status Offer(const Frame& frame, double time);
+  /// The same of arrays that lie anywhere. Errors: also INVALID_ARGUMENT with a Violation (reason
+  /// COUNT) for a coordinate that is missing; such particles count as never offered.
+  absl::Status OfferArrays(const ParticleArrays& particles, double time);
 
   /// No more frames will come. Waits until the newest one has been sent, then finishes sending on
   /// the stream. Errors: whatever ended the stream.

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "partiemc/client/frame_stream.h"
 
@@ -10,6 +12,7 @@ namespace partiemc::client {
 
 struct LocalStreamOptions {
   ReconstructionParameters parameters = {};
+  std::vector<std::string> attributes = {};  ///< As Outputs::attributes (stream.h).
   FrameLimits limits = {};
   /// Threads that reconstruct, at least 1. 0: one for each processor.
   int threads = 0;

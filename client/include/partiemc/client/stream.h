@@ -35,6 +35,9 @@ struct Outputs {
   /// would move by more than 1e-4 spacings is refused.
   bool relative_float32 = false;
   bool echo_particles = false;  ///< Watchers of the stream get the particles too.
+  /// Of Frame::attributes those that are wanted at the vertices (Result::attributes), at most 16;
+  /// "velocity" are Frame::velocities. A frame that lacks one is refused.
+  std::vector<std::string> attributes = {};
 };
 
 /// How a stream goes on after its connection or its server was lost.

@@ -34,12 +34,17 @@ struct WatcherOptions {
   /// Frames on their way or waiting to be received, at least 1. More hides a slow link; fewer show
   /// newer frames.
   std::uint32_t credits = 2;
+  /// Goes back in the stream: the frames that the server still holds come first, from this sequence
+  /// number on, 0: from the oldest; in their order, none left out in either mode. Then what comes
+  /// live. One that is newer than all of them: that alone. Without it, from the newest frame on.
+  std::optional<std::uint64_t> from_sequence = {};
   Credentials credentials = {};
   /// Servers where the stream may be, beside the one that Open is given.
   std::vector<std::string> fallback_addresses = {};
   /// How a watch goes on whose connection or server was lost, or whose stream was taken over or
-  /// lost its producer: the stream is looked for at every address. `announce` is not used: frames
-  /// tell.
+  /// lost its producer: the stream is looked for at every address. In mode kEvery, and with
+  /// from_sequence, it goes on after the last frame that was received, so that nothing is missed
+  /// that the server still holds; else with the newest. `announce` is not used: frames tell.
   ReconnectPolicy rejoin = {};
   /// For reaching the server; a server that starts meanwhile is found.
   std::chrono::milliseconds connect_timeout{2000};
@@ -47,11 +52,18 @@ struct WatcherOptions {
   std::chrono::milliseconds deadline{30000};
 };
 
+/// What a server holds of a stream for its watchers.
+struct HeldFrames {
+  std::uint64_t oldest_sequence = 0, newest_sequence = 0;
+};
+
 /// The stream that is watched.
 struct WatchedStream {
   std::string stream_id;                ///< As in the server's log.
   ReconstructionParameters parameters;  ///< As resolved.
   std::map<std::string, std::string> labels;
+  /// When the watch was opened or joined again; absent if there were no frames.
+  std::optional<HeldFrames> held = {};
 };
 
 /// Kept by the caller and handed in again, so that its buffers are reused.
@@ -68,6 +80,9 @@ struct WatchedFrame {
   /// Then also the sequence numbers between the frame before and this one. Nobody has counted which
   /// of them were results and which were frames that the server refused; `dropped` is 0.
   std::uint64_t gap = 0;
+  /// The oldest frame that WatcherOptions::from_sequence could still ask for when this one was
+  /// sent; 0 from a server that knows no histories.
+  std::uint64_t oldest_sequence = 0;
 };
 
 /// Why a watch ended.

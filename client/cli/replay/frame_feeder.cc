@@ -1,4 +1,4 @@
-#include "client/cli/frame_feeder.h"
+#include "client/cli/replay/frame_feeder.h"
 
 #include <utility>
 

@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cli/frame_outputs.h"
-#include "client/cli/replay.h"
+#include "client/cli/replay/replay.h"
 #include "client/output/frame_record.h"
 #include "client/output/report.h"
 #include "client/output/summary.h"

@@ -1,4 +1,4 @@
-#include "client/cli/replay.h"
+#include "client/cli/replay/replay.h"
 
 #include <chrono>
 #include <cstdio>
@@ -6,9 +6,10 @@
 #include <utility>
 
 #include "client/cli/console.h"
-#include "client/cli/frame_feeder.h"
 #include "client/cli/input_source.h"
-#include "client/cli/replay_outputs.h"
+#include "client/cli/replay/frame_feeder.h"
+#include "client/cli/replay/looped_input.h"
+#include "client/cli/replay/replay_outputs.h"
 #include "client/cli/replay_parameters.h"
 #include "client/input/base/text.h"
 #include "client/output/progress.h"
@@ -88,6 +89,7 @@ class Receiver {
     return kInterrupted;
   }
 
+  std::uint64_t answered() const { return answered_; }
   std::uint64_t failed_checks() const { return failed_checks_; }
 
  private:
@@ -106,14 +108,17 @@ class Receiver {
       Refuse(frame->source, event_.message);
     } else {
       if (flags_.check) Check(frame->source);
-      status = outputs_.Write({.index = frame->index,
-                               .time = event_.time,
-                               .result = event_.frame.result,
-                               .particles = frame->positions,
-                               .stages_ms = event_.frame.times.stages_ms,
-                               .total_ms = event_.frame.times.total_ms,
-                               .rings_digest = event_.frame.rings_digest,
-                               .mesh_digest = event_.frame.mesh_digest});
+      // A loop has no end: its numbers are not kept.
+      if (!flags_.loop) {
+        status = outputs_.Write({.index = frame->index,
+                                 .time = event_.time,
+                                 .result = event_.frame.result,
+                                 .particles = frame->positions,
+                                 .stages_ms = event_.frame.times.stages_ms,
+                                 .total_ms = event_.frame.times.total_ms,
+                                 .rings_digest = event_.frame.rings_digest,
+                                 .mesh_digest = event_.frame.mesh_digest});
+      }
     }
     feeder_.Recycle(std::move(frame));
     progress_.Update(++answered_);
@@ -181,13 +186,16 @@ int Replay(const ReplayFlags& flags) {
   const auto without_input = ParametersOf(flags, std::nullopt);
   if (!without_input.ok()) return Complain(kUsage, without_input.status());
 
-  const auto input = OpenInput(flags.input, flags.sequence);
+  auto input = OpenInput(flags.input, flags.sequence);
   if (!input.ok()) {
     const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kInput, input.status());
   }
   const auto parameters = ParametersOf(flags, input->spacing);
   if (!parameters.ok()) return Complain(kInput, parameters.status());
+  if (flags.loop) {
+    input->frames = std::make_unique<LoopedInput>(*std::move(input), flags.input, flags.sequence);
+  }
   CatchInterrupts();  // Before there are temporary files to take away.
   auto outputs = ReplayOutputs::Create(flags, *parameters);
   if (!outputs.ok()) {
@@ -237,7 +245,7 @@ int Replay(const ReplayFlags& flags) {
   if (!finished.ok() && ended != kFailed) Complain(kFailed, finished);
   if (ended == kInterrupted) {
     return Complain(kInterrupted,
-                    Concat("interrupted after ", Plural(summary.frame_count(), "frame")));
+                    Concat("interrupted after ", Plural(receiver.answered(), "frame")));
   }
   if (ended != kGood) return ended;
   if (!input_status.ok()) return Complain(kInput, input_status);

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "client/cli/bounded_queue.h"
+#include "client/cli/replay/bounded_queue.h"
 #include "client/input/sequence.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/client/latest_sender.h"

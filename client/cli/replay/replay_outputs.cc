@@ -1,4 +1,4 @@
-#include "client/cli/replay_outputs.h"
+#include "client/cli/replay/replay_outputs.h"
 
 #include <utility>
 

@@ -1,0 +1,27 @@
+// How what goes wrong reaches a program in C.
+#pragma once
+
+#include <exception>
+#include <new>
+
+#include "absl/status/status.h"
+#include "partiemc/c/partiemc.h"
+
+namespace partiemc::c {
+
+/// Keeps `status` for partiemc_last_error of this thread, and gives its code.
+partiemc_code Keep(const absl::Status& status);
+
+/// Calls `body`, which gives a status; no exception leaves it.
+template <typename Body>
+partiemc_code Guarded(Body body) noexcept {
+  try {
+    return Keep(body());
+  } catch (const std::bad_alloc&) {
+    return Keep(absl::ResourceExhaustedError("out of memory"));
+  } catch (const std::exception& error) {
+    return Keep(absl::InternalError(error.what()));
+  }
+}
+
+}  // namespace partiemc::c

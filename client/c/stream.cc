@@ -1,0 +1,262 @@
+#include "partiemc/client/stream.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "client/c/errors.h"
+#include "client/c/particles.h"
+#include "client/c/structs.h"
+#include "partiemc/c/partiemc.h"
+#include "partiemc/client/latest_sender.h"
+#include "partiemc/client/local_stream.h"
+#include "partiemc/client/parameter_names.h"
+
+using partiemc::client::Event;
+using partiemc::client::FrameStream;
+using partiemc::client::LatestSender;
+using partiemc::client::LocalStream;
+using partiemc::client::Received;
+using partiemc::client::SetByName;
+using partiemc::client::Stream;
+
+struct partiemc_stream {
+  std::unique_ptr<FrameStream> stream;
+  std::unique_ptr<LatestSender> latest;  // Ends before the stream. Null without `latest`.
+  bool shows_normals = false;
+  Event event;
+};
+
+namespace partiemc::c {
+namespace {
+
+std::string Text(const char* text) { return text == nullptr ? "" : text; }
+
+// `seconds`, or `otherwise` for 0.
+std::chrono::milliseconds Milliseconds(double seconds, std::chrono::milliseconds otherwise) {
+  constexpr double kLongest = 1e9;  // Some thirty years: what clocks can add.
+  if (seconds == 0 || seconds != seconds) return otherwise;
+  return std::chrono::milliseconds(
+      static_cast<std::int64_t>(1000 * std::clamp(seconds, 0.0, kLongest)));
+}
+
+absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& options) {
+  ReconstructionParameters parameters;
+  if (options.spacing != 0) parameters.spacing = options.spacing;
+  if (options.kernel_radius != 0) parameters.kernel_radius = options.kernel_radius;
+  if (options.cell_size != 0) parameters.cell_size = options.cell_size;
+  absl::Status named;
+  if (options.placement != nullptr)
+    named.Update(SetByName(options.placement, parameters.placement));
+  if (options.fill != nullptr) named.Update(SetByName(options.fill, parameters.fill));
+  if (options.plane != nullptr) named.Update(SetByName(options.plane, parameters.plane));
+  if (!named.ok()) return named;
+  return parameters;
+}
+
+client::StreamOptions StreamOptionsOf(const partiemc_options& options,
+                                      const ReconstructionParameters& parameters) {
+  client::StreamOptions result;
+  result.name = Text(options.name);
+  result.parameters = parameters;
+  result.outputs = {.mesh = parameters.fill != Fill::kNone,
+                    .normals = options.normals != 0,
+                    .echo_particles = options.echo_particles != 0};
+  result.credentials = {.tls = options.tls != 0,
+                        .ca_file = Text(options.ca_file),
+                        .cert_file = Text(options.cert_file),
+                        .key_file = Text(options.key_file),
+                        .token = Text(options.token),
+                        .token_file = Text(options.token_file)};
+  result.connect_timeout = Milliseconds(options.connect_timeout, result.connect_timeout);
+  result.deadline = Milliseconds(options.deadline, result.deadline);
+  auto& give_up_after = result.reconnect.give_up_after;
+  give_up_after = Milliseconds(options.give_up_after, give_up_after);
+  return result;
+}
+
+absl::Status Open(const char* address, const partiemc_options& options, partiemc_stream& opened) {
+  const auto parameters = ParametersOf(options);
+  if (!parameters.ok()) return parameters.status();
+  if (address == nullptr) {
+    auto stream = LocalStream::Open({.parameters = *parameters, .threads = options.threads});
+    if (!stream.ok()) return stream.status();
+    opened.stream = *std::move(stream);
+  } else {
+    auto stream = Stream::Open(address, StreamOptionsOf(options, *parameters));
+    if (!stream.ok()) return stream.status();
+    opened.stream = *std::move(stream);
+  }
+  opened.shows_normals = options.normals != 0;
+  if (options.latest != 0) opened.latest = std::make_unique<LatestSender>(*opened.stream);
+  return absl::OkStatus();
+}
+
+absl::Status Send(partiemc_stream& stream, const partiemc_particles* particles, double time,
+                  std::uint64_t* sequence) {
+  if (sequence != nullptr) *sequence = 0;
+  const auto arrays = ArraysOf(particles);
+  if (!arrays.ok()) return arrays.status();
+  if (stream.latest != nullptr) return stream.latest->OfferArrays(*arrays, time);
+  const auto sent = stream.stream->SendArrays(*arrays, time);
+  if (sent.ok() && sequence != nullptr) *sequence = *sent;
+  return sent.status();
+}
+
+// RingMeasures are handed on as they are.
+static_assert(sizeof(RingMeasures) == sizeof(partiemc_ring) &&
+              offsetof(RingMeasures, area) == offsetof(partiemc_ring, area) &&
+              offsetof(RingMeasures, perimeter) == offsetof(partiemc_ring, perimeter) &&
+              offsetof(RingMeasures, centroid_x) == offsetof(partiemc_ring, centroid_x) &&
+              offsetof(RingMeasures, centroid_y) == offsetof(partiemc_ring, centroid_y) &&
+              offsetof(RingMeasures, particle_count) == offsetof(partiemc_ring, particle_count) &&
+              offsetof(RingMeasures, identity) == offsetof(partiemc_ring, identity));
+static_assert(kNoRing == PARTIEMC_NO_RING && sizeof(TriangleClass) == 1);
+
+void AddResult(const client::FrameResult& frame, bool shows_normals, partiemc_event& event) {
+  const auto& [rings, mesh, attributes, statistics] = frame.result;
+  event.ring_count = rings.RingCount();
+  event.point_count = rings.PointCount();
+  event.points = rings.points.data();
+  event.offsets = rings.offsets.data();
+  event.outer_of = rings.outer_of.data();
+  event.rings = reinterpret_cast<const partiemc_ring*>(rings.measures.data());
+  if (shows_normals && !rings.normals.empty()) event.normals = rings.normals.data();
+  event.mesh_point_count = mesh.PointCount();
+  event.triangle_count = mesh.TriangleCount();
+  event.mesh_points = mesh.points.data();
+  event.triangles = mesh.triangles.data();
+  event.triangle_classes = reinterpret_cast<const std::uint8_t*>(mesh.classes.data());
+  event.particle_count = statistics.particles;
+  event.area = statistics.area;
+  event.perimeter = statistics.perimeter;
+  event.spacing = statistics.spacing;
+  event.cell_size = statistics.cell_size;
+  event.milliseconds = frame.times.total_ms;
+  event.rings_digest = frame.rings_digest;
+  event.mesh_digest = frame.mesh_digest;
+}
+
+partiemc_event Empty(std::int32_t kind) {
+  return {.kind = kind, .message = "", .reason = "", .field = "", .value = "", .rule = ""};
+}
+
+partiemc_event ViewOf(const partiemc_stream& stream) {
+  const Event& event = stream.event;
+  partiemc_event view = Empty(PARTIEMC_NOTICE);
+  view.sequence = event.sequence;
+  view.message = event.message.c_str();
+  if (event.kind == Event::Kind::kRefusal) {
+    view.kind = PARTIEMC_REFUSAL;
+    view.reason = event.violation.reason.c_str();
+    view.field = event.violation.field.c_str();
+    view.value = event.violation.value.c_str();
+    view.rule = event.violation.rule.c_str();
+  } else if (event.kind == Event::Kind::kResult) {
+    view.kind = PARTIEMC_RESULT;
+    view.message = "";
+    view.time = event.time;
+    AddResult(event.frame, stream.shows_normals, view);
+  }
+  return view;
+}
+
+absl::Status Receive(partiemc_stream& stream, double wait, partiemc_event* event) {
+  const std::optional<std::chrono::milliseconds> bound =
+      wait < 0 ? std::nullopt : std::optional(Milliseconds(wait, std::chrono::milliseconds(0)));
+  const auto received = stream.stream->Receive(stream.event, bound);
+  if (!received.ok()) return received.status();
+  if (*received == Received::kEvent) {
+    Give(ViewOf(stream), event->size, event);
+  } else {
+    Give(Empty(*received == Received::kEnd ? PARTIEMC_END : PARTIEMC_NOTHING_YET), event->size,
+         event);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+}  // namespace partiemc::c
+
+using partiemc::c::Guarded;
+
+void partiemc_options_init(partiemc_options* options, size_t size) {
+  partiemc::c::Give(partiemc_options{}, size, options);
+}
+
+partiemc_code partiemc_open(const char* address, const partiemc_options* options,
+                            partiemc_stream** stream) {
+  *stream = nullptr;
+  return Guarded([&] {
+    auto opened = std::make_unique<partiemc_stream>();
+    const absl::Status status =
+        partiemc::c::Open(address, partiemc::c::Take(options, partiemc_options{}), *opened);
+    if (status.ok()) *stream = opened.release();
+    return status;
+  });
+}
+
+void partiemc_close(partiemc_stream* stream) {
+  if (stream != nullptr) stream->latest.reset();
+  delete stream;
+}
+
+partiemc_code partiemc_send(partiemc_stream* stream, const partiemc_particles* particles,
+                            double time, uint64_t* sequence) {
+  return Guarded([&] { return partiemc::c::Send(*stream, particles, time, sequence); });
+}
+
+partiemc_code partiemc_finish(partiemc_stream* stream) {
+  return Guarded([&] {
+    return stream->latest != nullptr ? stream->latest->Finish() : stream->stream->FinishSending();
+  });
+}
+
+void partiemc_cancel(partiemc_stream* stream) { stream->stream->Cancel(); }
+
+size_t partiemc_in_flight(const partiemc_stream* stream) { return stream->stream->InFlight(); }
+
+size_t partiemc_window(const partiemc_stream* stream) {
+  return stream->stream->info().frames_in_flight;
+}
+
+void partiemc_latest_counts(const partiemc_stream* stream, uint64_t* sent, uint64_t* skipped,
+                            uint64_t* refused) {
+  partiemc::client::OfferCounts counts;
+  if (stream->latest != nullptr) counts = stream->latest->counts();
+  if (sent != nullptr) *sent = counts.sent;
+  if (skipped != nullptr) *skipped = counts.skipped;
+  if (refused != nullptr) *refused = counts.refused;
+}
+
+void partiemc_event_init(partiemc_event* event, size_t size) {
+  partiemc::c::Give(partiemc::c::Empty(PARTIEMC_NOTHING_YET), size, event);
+}
+
+partiemc_code partiemc_receive(partiemc_stream* stream, double wait, partiemc_event* event) {
+  return Guarded([&] { return partiemc::c::Receive(*stream, wait, event); });
+}
+
+partiemc_code partiemc_reconstruct(partiemc_stream* stream, const partiemc_particles* particles,
+                                   double time, partiemc_event* event) {
+  return Guarded([&]() -> absl::Status {
+    if (stream->latest != nullptr || stream->stream->InFlight() > 0) {
+      return absl::FailedPreconditionError(
+          "partiemc_reconstruct: needs a stream without `latest` and without frames in flight");
+    }
+    absl::Status status = partiemc::c::Send(*stream, particles, time, nullptr);
+    do {
+      if (status.ok()) status = partiemc::c::Receive(*stream, -1, event);
+    } while (status.ok() && stream->event.kind != Event::Kind::kResult &&
+             stream->event.kind != Event::Kind::kRefusal);
+    return status;
+  });
+}

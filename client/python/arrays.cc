@@ -1,0 +1,154 @@
+#include "client/python/arrays.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "client/python/errors.h"
+#include "partiemc/status.h"
+
+namespace partiemc::python {
+namespace {
+
+namespace py = pybind11;
+
+std::string ShapeOf(const py::array& array) {
+  std::string shape = "shape (";
+  for (py::ssize_t k = 0; k < array.ndim(); ++k) {
+    absl::StrAppend(&shape, k == 0 ? "" : ", ", array.shape(k));
+  }
+  return shape + ")";
+}
+
+[[noreturn]] void RaiseCount(const char* field, std::string value, std::string rule) {
+  Raise(Invalid(kReasonCount, field, std::move(value), std::move(rule)));
+}
+
+[[noreturn]] void RaiseNoNumbers(const char* field, const py::object& type) {
+  Raise(Invalid("UNSUPPORTED", field, py::str(type), "must be an array of numbers"));
+}
+
+py::array AsArray(const py::object& given, const char* field) {
+  py::array array = py::array::ensure(given);
+  if (!array) RaiseNoNumbers(field, py::object(py::type::of(given).attr("__name__")));
+  return array;
+}
+
+// Whether `type` is T in this machine's order of bytes, whatever NumPy calls it.
+template <typename T>
+bool Is(const py::dtype& type) {
+  const py::dtype same = py::dtype::of<T>();
+  return type.kind() == same.kind() && type.itemsize() == same.itemsize() &&
+         type.attr("isnative").cast<bool>();
+}
+
+// A view of numbers of the type that the array has, from `first` on.
+client::Reals RealsOf(const py::array& array, const void* first, py::ssize_t stride) {
+  if (Is<float>(array.dtype())) return {static_cast<const float*>(first), stride};
+  return {static_cast<const double*>(first), stride};
+}
+
+bool IsTuple(const py::object& given) {
+  if (!py::isinstance<py::tuple>(given)) return false;
+  for (const py::handle one : given) {
+    if (!py::isinstance<py::array>(one)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+PythonParticles::PythonParticles(const py::object& positions, const py::object& volumes,
+                                 const py::object& ids, const py::object& velocities) {
+  const auto place = Columns(positions, "positions");
+  arrays_.x = place[0];
+  arrays_.y = place[1];
+  if (place.size() == 3) arrays_.z = place[2];
+  if (!volumes.is_none()) arrays_.volumes = Numbers(volumes, "volumes");
+  if (!ids.is_none()) arrays_.ids = WholeNumbers(ids);
+  if (velocities.is_none()) return;
+  const auto velocity = Columns(velocities, "velocities");
+  if (velocity.size() != place.size()) {
+    RaiseCount("velocities", absl::StrCat(velocity.size(), " columns"),
+               absl::StrCat("must be as many as of positions, ", place.size()));
+  }
+  arrays_.velocity_x = velocity[0];
+  arrays_.velocity_y = velocity[1];
+  if (velocity.size() == 3) arrays_.velocity_z = velocity[2];
+}
+
+// Of float or double, in this machine's order of bytes.
+py::array PythonParticles::Real(const py::array& given, const char* field) {
+  py::array array = given;
+  if (!Is<float>(array.dtype()) && !Is<double>(array.dtype())) {
+    array = py::array_t<double, py::array::forcecast>::ensure(given);
+    if (!array) RaiseNoNumbers(field, py::object(given.dtype()));
+  }
+  kept_.push_back(array);
+  return array;
+}
+
+void PythonParticles::ExpectCount(const py::array& array, const char* field) const {
+  if (counted_ && static_cast<std::size_t>(array.shape(0)) != arrays_.count) {
+    RaiseCount(field, ShapeOf(array), absl::StrCat("must have ", arrays_.count, " rows"));
+  }
+}
+
+std::vector<client::Reals> PythonParticles::Columns(const py::object& given, const char* field) {
+  std::vector<client::Reals> columns;
+  if (IsTuple(given)) {
+    for (const py::handle one : given) {
+      columns.push_back(Numbers(py::reinterpret_borrow<py::object>(one), field));
+    }
+    if (columns.size() != 2 && columns.size() != 3) {
+      RaiseCount(field, absl::StrCat(columns.size(), " arrays"), "must be two or three");
+    }
+    return columns;
+  }
+  const py::array any = AsArray(given, field);
+  if (any.ndim() != 2 || (any.shape(1) != 2 && any.shape(1) != 3)) {
+    RaiseCount(field, ShapeOf(any), "must be (N, 2) or (N, 3), or a tuple of arrays of N each");
+  }
+  ExpectCount(any, field);
+  const py::array array = Real(any, field);
+  arrays_.count = static_cast<std::size_t>(array.shape(0));
+  counted_ = true;
+  for (py::ssize_t k = 0; k < array.shape(1); ++k) {
+    columns.push_back(RealsOf(array, static_cast<const char*>(array.data()) + k * array.strides(1),
+                              array.strides(0)));
+  }
+  return columns;
+}
+
+client::Reals PythonParticles::Numbers(const py::object& given, const char* field) {
+  const py::array any = AsArray(given, field);
+  if (any.ndim() != 1) RaiseCount(field, ShapeOf(any), "must have one dimension");
+  ExpectCount(any, field);
+  const py::array array = Real(any, field);
+  arrays_.count = static_cast<std::size_t>(array.shape(0));
+  counted_ = true;
+  return RealsOf(array, array.data(), array.strides(0));
+}
+
+client::Ids PythonParticles::WholeNumbers(const py::object& given) {
+  const py::array array = AsArray(given, "ids");
+  if (array.ndim() != 1) RaiseCount("ids", ShapeOf(array), "must have one dimension");
+  ExpectCount(array, "ids");
+  kept_.push_back(array);
+  const py::dtype type = array.dtype();
+  const auto stride = array.strides(0);
+  std::optional<client::Ids> ids;
+  const auto take = [&]<typename T>(T) {
+    if (Is<T>(type)) ids = client::Ids(static_cast<const T*>(array.data()), stride);
+  };
+  take(std::int64_t{});
+  take(std::uint64_t{});
+  take(std::int32_t{});
+  take(std::uint32_t{});
+  if (ids) return *ids;
+  Raise(Invalid("UNSUPPORTED", "ids", py::str(py::object(type)),
+                "must be integers of 32 or 64 bits"));
+}
+
+}  // namespace partiemc::python

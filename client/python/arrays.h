@@ -1,0 +1,63 @@
+// NumPy's arrays in, views of our own out.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "partiemc/client/particle_arrays.h"
+
+namespace partiemc::python {
+
+/// What a frame is made of in Python: arrays, and a view of them. Arrays are views themselves, of
+/// whatever stride; what is of another kind (lists, other types of numbers, another order of bytes)
+/// is converted, which copies it.
+class PythonParticles {
+ public:
+  /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes` and
+  /// `ids`: N. `velocities`: as positions. None for what is not there.
+  /// Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
+  PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,
+                  const pybind11::object& ids, const pybind11::object& velocities);
+
+  const client::ParticleArrays& arrays() const { return arrays_; }
+
+ private:
+  // The columns of `given`: two or three views of as many numbers.
+  std::vector<client::Reals> Columns(const pybind11::object& given, const char* field);
+  client::Reals Numbers(const pybind11::object& given, const char* field);
+  client::Ids WholeNumbers(const pybind11::object& given);
+  pybind11::array Real(const pybind11::array& given, const char* field);
+  void ExpectCount(const pybind11::array& array, const char* field) const;
+
+  std::vector<pybind11::array> kept_;
+  bool counted_ = false;
+  client::ParticleArrays arrays_;
+};
+
+/// A view that nobody may write to, of memory that `owner` keeps. `T` is what NumPy is told.
+template <typename T>
+pybind11::array View(const void* first, std::vector<pybind11::ssize_t> shape,
+                     std::vector<pybind11::ssize_t> strides, pybind11::handle owner) {
+  pybind11::array view(pybind11::dtype::of<T>(), std::move(shape), std::move(strides), first,
+                       owner);
+  pybind11::detail::array_proxy(view.ptr())->flags &=
+      ~pybind11::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return view;
+}
+
+/// The numbers of a vector, in rows of `columns`; of one dimension where that is 1.
+template <typename As, typename T>
+pybind11::array View(const std::vector<T>& numbers, std::size_t columns, pybind11::handle owner) {
+  static_assert(sizeof(As) == sizeof(T));
+  const auto rows = static_cast<pybind11::ssize_t>(numbers.size() / columns);
+  const auto width = static_cast<pybind11::ssize_t>(columns * sizeof(T));
+  if (columns == 1) return View<As>(numbers.data(), {rows}, {width}, owner);
+  return View<As>(numbers.data(), {rows, static_cast<pybind11::ssize_t>(columns)},
+                  {width, sizeof(T)}, owner);
+}
+
+}  // namespace partiemc::python

@@ -1,0 +1,13 @@
+// What partiemc/__init__.py is made of.
+#include <pybind11/pybind11.h>
+
+#include "client/python/reconstruct.h"
+#include "client/python/results.h"
+#include "client/python/streams.h"
+
+PYBIND11_MODULE(_native, module) {
+  module.attr("version") = PARTIEMC_VERSION;
+  partiemc::python::DefineResults(module);
+  partiemc::python::DefineReconstructor(module);
+  partiemc::python::DefineStreams(module);
+}

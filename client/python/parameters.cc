@@ -1,0 +1,152 @@
+#include "client/python/parameters.h"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "client/python/errors.h"
+#include "partiemc/client/parameter_names.h"
+
+namespace partiemc::python {
+namespace {
+
+namespace py = pybind11;
+
+// Takes `name` out of the arguments, if it is there and not None.
+template <typename T>
+std::optional<T> Take(py::dict& arguments, const char* name) {
+  if (!arguments.contains(name)) return std::nullopt;
+  const py::object value = arguments.attr("pop")(name);
+  if (value.is_none()) return std::nullopt;
+  try {
+    return value.cast<T>();
+  } catch (const py::cast_error&) {
+    throw py::type_error(std::string(name) + ": " + py::repr(value).cast<std::string>() +
+                         " is of the wrong type");
+  }
+}
+
+template <typename T>
+void TakeInto(py::dict& arguments, const char* name, T& value) {
+  if (auto given = Take<T>(arguments, name)) value = *std::move(given);
+}
+
+template <typename T>
+void TakeInto(py::dict& arguments, const char* name, std::optional<T>& value) {
+  if (auto given = Take<T>(arguments, name)) value = *std::move(given);
+}
+
+template <typename Value>
+void TakeNamed(py::dict& arguments, const char* field, Value& value) {
+  if (const auto name = Take<std::string>(arguments, field)) {
+    RaiseUnlessOk(client::SetByName(*name, value));
+  }
+}
+
+// In seconds.
+void TakeTime(py::dict& arguments, const char* name, std::chrono::milliseconds& time) {
+  constexpr double kLongest = 1e9;  // Some thirty years: what clocks can add.
+  if (const auto seconds = Take<double>(arguments, name)) {
+    if (!(*seconds >= 0)) {
+      Raise(
+          Invalid(kReasonOutOfRange, name, ShortestNumber(*seconds), "must be 0 or more seconds"));
+    }
+    time =
+        std::chrono::milliseconds(static_cast<std::int64_t>(1000 * std::min(*seconds, kLongest)));
+  }
+}
+
+}  // namespace
+
+ReconstructionParameters TakeParameters(py::dict arguments) {
+  ReconstructionParameters parameters;
+  TakeNamed(arguments, "placement", parameters.placement);
+  TakeNamed(arguments, "fill", parameters.fill);
+  TakeNamed(arguments, "plane", parameters.plane);
+  TakeNamed(arguments, "spacing_rule", parameters.spacing_rule);
+  TakeInto(arguments, "spacing", parameters.spacing);
+  TakeInto(arguments, "kernel_radius", parameters.kernel_radius);
+  TakeInto(arguments, "cell_size", parameters.cell_size);
+  TakeInto(arguments, "reference_radius", parameters.reference_radius);
+  TakeInto(arguments, "surface_offset", parameters.surface_offset);
+  TakeInto(arguments, "normal_memory", parameters.normal_memory);
+  TakeInto(arguments, "clean", parameters.clean);
+  TakeInto(arguments, "min_component_area", parameters.min_component_area);
+  TakeInto(arguments, "min_component_particles", parameters.min_component_particles);
+  return parameters;
+}
+
+client::Credentials TakeCredentials(py::dict arguments) {
+  client::Credentials credentials;
+  TakeInto(arguments, "ca_file", credentials.ca_file);
+  TakeInto(arguments, "cert_file", credentials.cert_file);
+  TakeInto(arguments, "key_file", credentials.key_file);
+  TakeInto(arguments, "token", credentials.token);
+  TakeInto(arguments, "token_file", credentials.token_file);
+  credentials.tls = !credentials.ca_file.empty() || !credentials.cert_file.empty();
+  TakeInto(arguments, "tls", credentials.tls);
+  return credentials;
+}
+
+client::StreamOptions TakeStreamOptions(py::dict arguments) {
+  client::StreamOptions options;
+  options.parameters = TakeParameters(arguments);
+  options.credentials = TakeCredentials(arguments);
+  options.outputs.mesh = options.parameters.fill != Fill::kNone;
+  TakeInto(arguments, "normals", options.outputs.normals);
+  TakeInto(arguments, "echo_particles", options.outputs.echo_particles);
+  TakeInto(arguments, "name", options.name);
+  TakeInto(arguments, "labels", options.labels);
+  TakeInto(arguments, "fallback_addresses", options.fallback_addresses);
+  TakeInto(arguments, "checkpoint_interval", options.checkpoint_interval);
+  TakeInto(arguments, "max_held_bytes", options.max_held_bytes);
+  TakeTime(arguments, "connect_timeout", options.connect_timeout);
+  TakeTime(arguments, "deadline", options.deadline);
+  TakeTime(arguments, "give_up_after", options.reconnect.give_up_after);
+  return options;
+}
+
+client::WatcherOptions TakeWatcherOptions(py::dict arguments) {
+  client::WatcherOptions options;
+  options.credentials = TakeCredentials(arguments);
+  if (const auto mode = Take<std::string>(arguments, "mode")) {
+    if (*mode == "every") {
+      options.mode = client::WatchMode::kEvery;
+    } else if (*mode != "latest") {
+      Raise(Invalid("UNSUPPORTED", "mode", *mode, "must be latest, every"));
+    }
+  }
+  TakeInto(arguments, "credits", options.credits);
+  TakeInto(arguments, "fallback_addresses", options.fallback_addresses);
+  TakeTime(arguments, "connect_timeout", options.connect_timeout);
+  TakeTime(arguments, "deadline", options.deadline);
+  TakeTime(arguments, "give_up_after", options.rejoin.give_up_after);
+  return options;
+}
+
+void ExpectNothingElse(const py::dict& arguments, const char* function) {
+  for (const auto& [name, value] : arguments) {
+    throw py::type_error(std::string(function) + "() got an unexpected keyword argument '" +
+                         py::str(name).cast<std::string>() + "'");
+  }
+}
+
+py::dict Told(const ReconstructionParameters& parameters) {
+  const auto named = [](auto value) { return std::string(Name(value)); };
+  using namespace py::literals;
+  return py::dict(
+      "placement"_a = named(parameters.placement), "fill"_a = named(parameters.fill),
+      "plane"_a = named(parameters.plane), "spacing_rule"_a = named(parameters.spacing_rule),
+      "spacing"_a = parameters.spacing, "kernel_radius"_a = parameters.kernel_radius,
+      "cell_size"_a = parameters.cell_size, "reference_radius"_a = parameters.reference_radius,
+      "surface_offset"_a = parameters.surface_offset, "normal_memory"_a = parameters.normal_memory,
+      "clean"_a = parameters.clean, "min_component_area"_a = parameters.min_component_area,
+      "min_component_particles"_a = parameters.min_component_particles);
+}
+
+}  // namespace partiemc::python

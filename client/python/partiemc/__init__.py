@@ -1,0 +1,102 @@
+"""PartiEMC: temporally stable outlines and light meshes of particles, frame by frame.
+
+    import partiemc
+    result = partiemc.reconstruct(positions, spacing=0.01)     # in this process
+    result.rings.points, result.rings.offsets, result.mesh.triangles
+
+    with partiemc.connect("127.0.0.1:50051", spacing=0.01) as stream:   # live, by a server
+        for result in stream.map(frames):
+            ...
+    for result in partiemc.watch("127.0.0.1:50051", "dam-break"):       # somebody else's
+        ...
+
+Positions are (N, 2) or (N, 3) arrays of float32 or float64, or tuples of two or three arrays of N;
+whatever their strides, each number is copied once, into the message. Results are read-only views
+without a copy, which keep their result.
+"""
+
+from . import _convert
+from ._errors import Error
+from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Watch, server, streams,
+                      version as __version__)
+
+__all__ = ["Error", "Mesh", "Reconstructor", "Result", "Rings", "Stream", "Watch", "connect",
+           "reconstruct", "server", "streams", "watch"]
+
+
+def reconstruct(positions, *, volumes=None, ids=None, velocities=None, **parameters):
+    """Reconstructs one frame in this process. Result.
+
+    positions: (N, 2) float32 or float64, world units; (N, 3) for particles in a plane parallel to
+        `plane`; or a tuple of two or three arrays of N. Finite.
+    volumes: (N,) areas that particles stand for, world units squared; spacing squared if None.
+    ids: (N,) integers of 32 or 64 bits, the same for a particle in every frame.
+    velocities: as positions, world units per unit of time.
+    spacing: distance of particles, world units; estimated if None, then the outline is less true.
+    threads: that compute; one per processor if None.
+    placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
+    fill: "greedy", "conforming", "polygon", "grid" or "none".
+    kernel_radius, cell_size, reference_radius: lengths in spacings.
+    plane: "xy", "xz" or "yz", of (N, 3) positions.
+    surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
+        see core/include/partiemc/parameters.h.
+
+    Other arrays and lists are converted, which copies them. For a simulation's frames, one after
+    the other, a Reconstructor keeps outlines steady, tracks rings and is faster. Raises Error.
+    """
+    return Reconstructor(**parameters).reconstruct(positions, volumes=volumes, ids=ids,
+                                                   velocities=velocities)
+
+
+def connect(address, *, latest=False, **options):
+    """Opens a Stream to the server at HOST:PORT, [IPV6]:PORT or unix:PATH, for `with`.
+
+    latest: send never waits; of frames that come while the stream is busy only the newest is sent.
+    name: by which others watch the stream. labels: a dict of strings, shown where it is listed.
+    normals, echo_particles: whether results have normals, and watchers get the particles.
+    tls, ca_file, cert_file, key_file, token, token_file: as the command line has them.
+    fallback_addresses: servers to go on with. checkpoint_interval, max_held_bytes,
+        connect_timeout, deadline, give_up_after (seconds): as in client/include/partiemc/client/
+        stream.h.
+    And the parameters of reconstruct. Raises Error.
+
+    At the end of `with` frames on their way arrive; answers that nobody has received are dropped.
+    """
+    return Stream(address, latest, options)
+
+
+def watch(address, name, **options):
+    """An iterator over the results of the stream `name`, made by somebody else. Watch.
+
+    mode: "latest", the newest frame whenever there is room for one, or "every", every frame from now
+        on; who falls behind for long is disconnected.
+    credits: frames on their way or waiting to be received.
+    tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
+        deadline, give_up_after: as of connect. Raises Error.
+
+    Iteration ends with the stream. Each Result tells in `dropped` how many did not come.
+    """
+    return Watch(address, name, options)
+
+
+def _map(self, frames, times=None):
+    """The results of `frames`, an iterable of positions, in their order: an iterator.
+
+    Sends ahead as far as the window allows, in one thread. times: an iterable; 0, 1, ... if None.
+    A frame that is refused raises Error.
+    """
+    times = None if times is None else iter(times)
+    for positions in frames:
+        while self.in_flight >= self.window:
+            yield self.receive()
+        self.send(positions, None if times is None else next(times))
+    while self.in_flight:
+        yield self.receive()
+
+
+Stream.map = _map
+Rings.to_shapely = _convert.to_shapely
+Rings.to_path = _convert.to_path
+Mesh.to_triangulation = _convert.to_triangulation
+Mesh.to_meshio = _convert.to_meshio
+Result.to_svg = _convert.to_svg

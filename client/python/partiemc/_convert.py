@@ -1,0 +1,63 @@
+"""Results for other libraries. Each is imported when it is asked for."""
+
+
+def to_shapely(rings):
+    """A shapely MultiPolygon: outer rings with their holes."""
+    from shapely.geometry import MultiPolygon, Polygon
+
+    outer_of = rings.outer_of
+    holes = {}
+    for k, outer in enumerate(outer_of):
+        if outer >= 0:
+            holes.setdefault(int(outer), []).append(rings[k])
+    return MultiPolygon([Polygon(rings[k], holes.get(k, []))
+                         for k, outer in enumerate(outer_of) if outer < 0])
+
+
+def to_path(rings):
+    """A matplotlib Path of all rings, for PathPatch: holes are left out of what is filled."""
+    import numpy
+    from matplotlib.path import Path
+
+    starts, ends = rings.offsets[:-1], rings.offsets[1:]
+    vertices = numpy.insert(rings.points, ends, rings.points[starts], axis=0)
+    codes = numpy.full(len(vertices), Path.LINETO, Path.code_type)
+    codes[starts + numpy.arange(len(starts))] = Path.MOVETO
+    codes[ends + numpy.arange(len(ends))] = Path.CLOSEPOLY
+    return Path(vertices, codes)
+
+
+def to_triangulation(mesh):
+    """A matplotlib Triangulation, for triplot and its kin."""
+    from matplotlib.tri import Triangulation
+
+    return Triangulation(mesh.points[:, 0], mesh.points[:, 1], mesh.triangles)
+
+
+def to_meshio(mesh):
+    """A meshio Mesh, which writes VTK, VTU, STL, Gmsh and many others."""
+    import meshio
+
+    return meshio.Mesh(mesh.points, [("triangle", mesh.triangles)])
+
+
+def to_svg(result, width=800):
+    """The text of an SVG picture: outline and mesh, `width` pixels wide."""
+    points = result.rings.points
+    if len(points) == 0:
+        return '<svg xmlns="http://www.w3.org/2000/svg"/>\n'
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    margin = max(right - left, top - bottom) / 20
+
+    def path(rings):
+        return " ".join("M" + " ".join(f"{x:.6g},{-y:.6g}" for x, y in ring) + "Z" for ring in rings)
+
+    box = (left - margin, -top - margin, right - left + 2 * margin, top - bottom + 2 * margin)
+    style = f'stroke-width="{margin / 30:.3g}" stroke-linejoin="round"'
+    return (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" viewBox="'
+            + " ".join(f"{number:.6g}" for number in box) + '">\n'
+            f'<path fill="#cfe3f5" fill-rule="evenodd" d="{path(result.rings)}"/>\n'
+            f'<path fill="none" stroke="#7fa8cc" {style} '
+            f'd="{path(result.mesh.points[result.mesh.triangles])}"/>\n'
+            f'<path fill="none" stroke="#123a5c" stroke-width="{margin / 12:.3g}" '
+            f'd="{path(result.rings)}"/>\n</svg>\n')

@@ -1,0 +1,122 @@
+#include "client/python/reconstruct.h"
+
+#include <pybind11/stl.h>
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "client/library/gather.h"
+#include "client/library/owned_frame.h"
+#include "client/python/arrays.h"
+#include "client/python/errors.h"
+#include "client/python/parameters.h"
+#include "client/python/results.h"
+#include "common/stage_clock.h"
+#include "partiemc/arena.h"
+#include "partiemc/reconstructor.h"
+
+namespace partiemc::python {
+namespace {
+
+namespace py = pybind11;
+
+// A sequence of frames: parameters, what one frame leaves for the next, and warm buffers.
+class Sequence {
+ public:
+  explicit Sequence(py::dict arguments) {
+    if (arguments.contains("threads")) {
+      const auto threads = arguments.attr("pop")("threads").cast<std::optional<unsigned>>();
+      if (threads.value_or(0) > 0) arena_ = std::make_unique<Arena>(*threads);
+    }
+    auto reconstructor = Reconstructor::Create(TakeParameters(arguments));
+    ExpectNothingElse(arguments, "reconstruct");
+    RaiseUnlessOk(reconstructor.status());
+    reconstructor_ = *std::move(reconstructor);
+  }
+
+  std::shared_ptr<PythonResult> Reconstruct(const py::object& positions, std::optional<double> time,
+                                            const py::object& volumes, const py::object& ids,
+                                            const py::object& velocities) {
+    const PythonParticles particles(positions, volumes, ids, velocities);
+    const auto result = results_->Take();
+    absl::Status status;
+    {
+      const py::gil_scoped_release others_may_run;
+      const std::scoped_lock lock(mutex_);
+      status = Compute(particles.arrays(), time, *result);
+    }
+    RaiseUnlessOk(status);
+    return result;
+  }
+
+  void Reset() {
+    const py::gil_scoped_release others_may_run;
+    const std::scoped_lock lock(mutex_);
+    state_ = {};
+    frames_ = 0;
+  }
+
+  py::dict parameters() const { return Told(reconstructor_->parameters()); }
+
+ private:
+  // With the lock.
+  absl::Status Compute(const client::ParticleArrays& particles, std::optional<double> time,
+                       PythonResult& result) {
+    result.time = time.value_or(static_cast<double>(frames_));
+    const auto rows = client::RowsOf(particles, result.time);
+    if (!rows.ok()) return rows.status();
+    gathered_.Adopt(*rows);
+    StageClock clock;
+    absl::Status status;
+    const auto compute = [&] {
+      status = reconstructor_->Reconstruct(gathered_.frame(), state_, workspace_,
+                                           result.frame.result, {.observer = &clock});
+    };
+    if (arena_ != nullptr) {
+      arena_->Execute(compute);
+    } else {
+      compute();
+    }
+    result.frame.times = {.stages_ms = clock.stages_ms(), .total_ms = clock.TotalMs()};
+    result.has_digests = false;
+    if (status.ok()) result.sequence = ++frames_;
+    return status;
+  }
+
+  const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
+  std::optional<Reconstructor> reconstructor_;
+  std::unique_ptr<Arena> arena_;  // Null: as many threads as there are.
+
+  std::mutex mutex_;  // Guards everything below.
+  State state_;
+  Workspace workspace_;
+  client::OwnedFrame gathered_;
+  std::uint64_t frames_ = 0;
+};
+
+}  // namespace
+
+void DefineReconstructor(py::module_& module) {
+  using namespace py::literals;
+  py::class_<Sequence>(module, "Reconstructor",
+                       "Reconstructs frames of one simulation, one after the other, in this "
+                       "process: outlines are as steady and rings are tracked as in a stream.")
+      .def(py::init(
+               [](const py::kwargs& arguments) { return std::make_unique<Sequence>(arguments); }),
+           "Reconstructor(*, spacing=None, threads=None, placement='virtual-plane', "
+           "fill='greedy', ...): see partiemc.reconstruct.")
+      .def("reconstruct", &Sequence::Reconstruct, "positions"_a, "time"_a = py::none(),
+           py::kw_only(), "volumes"_a = py::none(), "ids"_a = py::none(),
+           "velocities"_a = py::none(),
+           "The next frame; `time` defaults to the number of frames before it. See "
+           "partiemc.reconstruct for the arrays. Raises partiemc.Error; such a frame leaves no "
+           "trace.")
+      .def("reset", &Sequence::Reset, "Forgets all frames.")
+      .def_property_readonly("parameters", &Sequence::parameters,
+                             "As resolved, by name; a spacing of None is estimated.");
+}
+
+}  // namespace partiemc::python

@@ -1,0 +1,10 @@
+// The core in this process, for Python.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace partiemc::python {
+
+void DefineReconstructor(pybind11::module_& module);
+
+}  // namespace partiemc::python

@@ -1,0 +1,214 @@
+#include "client/python/results.h"
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <utility>
+
+#include "client/python/arrays.h"
+#include "partiemc/doubt.h"
+#include "partiemc/stage.h"
+
+namespace partiemc::python {
+namespace {
+
+namespace py = pybind11;
+
+// A part of a result. `owner` is the result's object in Python: what arrays hold on to.
+template <typename Part>
+struct PartOf {
+  py::object owner;
+  const Part& part;
+};
+using RingsView = PartOf<Rings>;
+using MeshView = PartOf<Mesh>;
+
+// A member of all measures, without a copy.
+template <typename As, typename T>
+py::array Column(const RingsView& rings, T RingMeasures::*member, py::ssize_t columns = 0) {
+  const auto& measures = rings.part.measures;
+  const void* first = measures.empty() ? nullptr : &(measures.front().*member);
+  const auto count = static_cast<py::ssize_t>(measures.size());
+  constexpr py::ssize_t kStride = sizeof(RingMeasures);
+  if (columns == 0) return View<As>(first, {count}, {kStride}, rings.owner);
+  return View<As>(first, {count, columns}, {kStride, sizeof(T)}, rings.owner);
+}
+
+py::array RingPoints(const RingsView& rings, py::ssize_t index) {
+  const auto count = static_cast<py::ssize_t>(rings.part.RingCount());
+  if (index < 0) index += count;
+  if (index < 0 || index >= count) throw py::index_error("there are fewer rings");
+  const auto points = rings.part.RingPoints(static_cast<std::size_t>(index));
+  return View<double>(points.data(), {static_cast<py::ssize_t>(points.size() / 2), 2},
+                      {2 * sizeof(double), sizeof(double)}, rings.owner);
+}
+
+static_assert(offsetof(RingMeasures, centroid_y) ==
+              offsetof(RingMeasures, centroid_x) + sizeof(double));
+
+void DefineRings(py::module_& module) {
+  using R = const RingsView&;
+  py::class_<RingsView>(module, "Rings",
+                        "Closed polylines, contourpy's way: flat points and offsets. All arrays "
+                        "are read-only views that keep the result. rings[k] is the (P, 2) points "
+                        "of ring k.")
+      .def("__len__", [](R r) { return r.part.RingCount(); })
+      .def("__getitem__", &RingPoints)
+      .def_property_readonly(
+          "points", [](R r) { return View<double>(r.part.points, 2, r.owner); },
+          "(P, 2) float64, world units. The inside lies on the left: outer rings run "
+          "counter-clockwise, holes clockwise. No ring's first point is repeated at its end.")
+      .def_property_readonly(
+          "offsets", [](R r) { return View<std::uint32_t>(r.part.offsets, 1, r.owner); },
+          "(R + 1,) uint32: ring k has points[offsets[k]:offsets[k + 1]].")
+      .def_property_readonly(
+          "outer_of", [](R r) { return View<std::int32_t>(r.part.outer_of, 1, r.owner); },
+          "(R,) int32: of a hole its outer ring, of an outer ring -1.")
+      .def_property_readonly(
+          "normals", [](R r) { return View<float>(r.part.normals, 2, r.owner); },
+          "(P, 2) float32, outward unit normals; (0, 2) where a stream was not asked for them.")
+      .def_property_readonly(
+          "area", [](R r) { return Column<double>(r, &RingMeasures::area); },
+          "(R,) float64, world units squared; negative for holes.")
+      .def_property_readonly(
+          "perimeter", [](R r) { return Column<double>(r, &RingMeasures::perimeter); },
+          "(R,) float64, world units.")
+      .def_property_readonly(
+          "centroids", [](R r) { return Column<double>(r, &RingMeasures::centroid_x, 2); },
+          "(R, 2) float64, world units, of the area that each ring encloses.")
+      .def_property_readonly(
+          "particle_counts",
+          [](R r) { return Column<std::uint64_t>(r, &RingMeasures::particle_count); },
+          "(R,) uint64: particles of the ring's component, 0 for holes.")
+      .def_property_readonly(
+          "identities", [](R r) { return Column<std::uint64_t>(r, &RingMeasures::identity); },
+          "(R,) uint64: the same in every frame where the ring goes on; 0: not tracked.")
+      .def_property_readonly(
+          "parents", [](R r) { return View<std::uint64_t>(r.part.parents, 1, r.owner); },
+          "(Q,) uint64: identities, in the frame before, that ring k continues: "
+          "parents[parent_offsets[k]:parent_offsets[k + 1]].")
+      .def_property_readonly(
+          "parent_offsets",
+          [](R r) { return View<std::uint32_t>(r.part.parent_offsets, 1, r.owner); },
+          "(R + 1,) uint32; (1,) where nothing is tracked.");
+}
+
+void DefineMesh(py::module_& module) {
+  using M = const MeshView&;
+  py::class_<MeshView>(module, "Mesh",
+                       "Triangles that cover the inside. All arrays are read-only views that keep "
+                       "the result.")
+      .def("__len__", [](M m) { return m.part.TriangleCount(); })
+      .def_property_readonly(
+          "points", [](M m) { return View<double>(m.part.points, 2, m.owner); },
+          "(V, 2) float64, world units. The first are rings.points, bit for bit.")
+      .def_property_readonly(
+          "triangles", [](M m) { return View<std::uint32_t>(m.part.triangles, 3, m.owner); },
+          "(T, 3) uint32: counter-clockwise indices of points.")
+      .def_property_readonly(
+          "classes", [](M m) { return View<std::uint8_t>(m.part.classes, 1, m.owner); },
+          "(T,) uint8: 0 in the band along the rings, 1 inside.");
+}
+
+template <typename T>
+auto Statistic(T FrameStatistics::*member) {
+  return [member](const PythonResult& r) { return r.frame.result.statistics.*member; };
+}
+
+py::dict TimesOf(const PythonResult& result) {
+  py::dict times;
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    times[py::str(std::string(kStageNames[k]))] = result.frame.times.stages_ms[k];
+  }
+  times["total"] = result.frame.times.total_ms;
+  return times;
+}
+
+const client::FrameResult& WithDigests(PythonResult& result) {
+  if (!std::exchange(result.has_digests, true)) {
+    result.frame.rings_digest = DigestRings(result.frame.result.rings);
+    result.frame.mesh_digest = DigestMesh(result.frame.result.mesh);
+  }
+  return result.frame;
+}
+
+std::vector<std::string> DoubtsOf(const PythonResult& result) {
+  std::vector<std::string> names;
+  for (const Doubt doubt : kAllDoubts) {
+    if (result.frame.result.statistics.doubts.Has(doubt)) names.emplace_back(Name(doubt));
+  }
+  return names;
+}
+
+}  // namespace
+
+std::shared_ptr<PythonResult> ResultPool::Take() {
+  const auto give_back = [pool = shared_from_this()](PythonResult* result) {
+    const std::scoped_lock lock(pool->mutex_);
+    if (pool->kept_.size() < kMostKept) pool->kept_.push_back(std::move(result->frame));
+    delete result;
+  };
+  std::shared_ptr<PythonResult> result(new PythonResult, give_back);
+  const std::scoped_lock lock(mutex_);
+  if (!kept_.empty()) {
+    result->frame = std::move(kept_.back());
+    kept_.pop_back();
+  }
+  return result;
+}
+
+void DefineResults(py::module_& module) {
+  DefineRings(module);
+  DefineMesh(module);
+  // Parts hold the object that they are asked of, so that what they show cannot go.
+  py::class_<PythonResult, std::shared_ptr<PythonResult>>(module, "Result",
+                                                          "What a frame of particles became.")
+      .def_property_readonly(
+          "rings",
+          [](py::object self) {
+            return RingsView{self, self.cast<const PythonResult&>().frame.result.rings};
+          },
+          "The outline: Rings.")
+      .def_property_readonly(
+          "mesh",
+          [](py::object self) {
+            return MeshView{self, self.cast<const PythonResult&>().frame.result.mesh};
+          },
+          "The inside: Mesh; empty where it was not asked for.")
+      .def_readonly("sequence", &PythonResult::sequence,
+                    "The frame's number: 1, 2, ... in a stream; 0 of partiemc.reconstruct.")
+      .def_readonly("time", &PythonResult::time, "Simulation time, as the frame came with.")
+      .def_property_readonly("area", Statistic(&FrameStatistics::area),
+                             "Sum over rings of their signed areas, world units squared.")
+      .def_property_readonly("perimeter", Statistic(&FrameStatistics::perimeter),
+                             "Sum over rings, world units.")
+      .def_property_readonly("spacing", Statistic(&FrameStatistics::spacing),
+                             "Spacing of particles used in this frame, world units.")
+      .def_property_readonly("cell_size", Statistic(&FrameStatistics::cell_size),
+                             "Of the lattice, world units.")
+      .def_property_readonly("particle_count", Statistic(&FrameStatistics::particles))
+      .def_property_readonly("doubts", &DoubtsOf,
+                             "Names of what speaks against this answer, as 'spacing-provisional'.")
+      .def_property_readonly("times", &TimesOf, "Milliseconds of each stage, and in 'total'.")
+      .def_property_readonly(
+          "rings_digest", [](PythonResult& r) { return WithDigests(r).rings_digest; },
+          "64 bits of the rings: equal digests mean equal bits.")
+      .def_property_readonly(
+          "mesh_digest", [](PythonResult& r) { return WithDigests(r).mesh_digest; },
+          "64 bits of the mesh.")
+      .def_property_readonly(
+          "particles",
+          [](py::object self) {
+            return View<double>(self.cast<const PythonResult&>().particles, 2, self);
+          },
+          "(N, 2) float64 of a watched frame whose producer echoes them, else (0, 2).")
+      .def_readonly("dropped", &PythonResult::dropped,
+                    "Of a watched frame: how many did not come since the one before.")
+      .def_readonly("gap", &PythonResult::gap,
+                    "Of a watched frame: sequence numbers missed while the watch was lost.")
+      .def_readonly("rejoined", &PythonResult::rejoined,
+                    "Of the first frame after the watch was lost: where and why, in one line.");
+}
+
+}  // namespace partiemc::python

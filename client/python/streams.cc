@@ -1,0 +1,374 @@
+#include "client/python/streams.h"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "client/python/arrays.h"
+#include "client/python/errors.h"
+#include "client/python/parameters.h"
+#include "client/python/results.h"
+#include "partiemc/client/latest_sender.h"
+#include "partiemc/client/server_info.h"
+#include "partiemc/client/stream.h"
+#include "partiemc/client/stream_list.h"
+#include "partiemc/client/watcher.h"
+
+namespace partiemc::python {
+namespace {
+
+namespace py = pybind11;
+using client::Event;
+using client::Received;
+using std::chrono::milliseconds;
+
+// After which a wait looks whether somebody has pressed Ctrl-C.
+constexpr milliseconds kSlice(100);
+
+std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
+  constexpr double kLongest = 1e9;  // Some thirty years: what clocks can add.
+  if (!seconds) return std::nullopt;
+  return std::chrono::steady_clock::now() +
+         std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+             std::chrono::duration<double>(std::min(std::max(*seconds, 0.0), kLongest)));
+}
+
+// Calls `receive` with times to wait until something has come or `seconds` are over. Without the
+// GIL but for signals, which may raise.
+template <typename Receive>
+absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
+  const auto until = Until(seconds);
+  for (;;) {
+    auto slice = kSlice;
+    if (until) {
+      slice = std::min(slice,
+                       std::chrono::ceil<milliseconds>(*until - std::chrono::steady_clock::now()));
+    }
+    absl::StatusOr<Received> received = Received::kNothingYet;
+    {
+      const py::gil_scoped_release others_may_run;
+      received = receive(std::max(slice, milliseconds(0)));
+    }
+    if (!received.ok() || *received != Received::kNothingYet) return received;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (until && std::chrono::steady_clock::now() >= *until) return received;
+  }
+}
+
+[[noreturn]] void RaiseEnd() {
+  PyErr_SetString(PyExc_EOFError, "the stream has ended: every frame has been answered");
+  throw py::error_already_set();
+}
+
+class ProducerStream {
+ public:
+  ProducerStream(const std::string& address, bool latest, py::dict arguments) {
+    const client::StreamOptions options = TakeStreamOptions(arguments);
+    ExpectNothingElse(arguments, "connect");
+    absl::StatusOr<std::unique_ptr<client::Stream>> stream = nullptr;
+    {
+      const py::gil_scoped_release others_may_run;
+      stream = client::Stream::Open(address, options);
+    }
+    RaiseUnlessOk(stream.status());
+    stream_ = *std::move(stream);
+    if (latest) latest_ = std::make_unique<client::LatestSender>(*stream_);
+  }
+  ~ProducerStream() {
+    const py::gil_scoped_release others_may_run;
+    latest_.reset();
+    stream_.reset();
+  }
+
+  std::optional<std::uint64_t> Send(const py::object& positions, std::optional<double> time,
+                                    const py::object& volumes, const py::object& ids,
+                                    const py::object& velocities) {
+    const PythonParticles particles(positions, volumes, ids, velocities);
+    absl::StatusOr<std::uint64_t> sent = 0;
+    {
+      const py::gil_scoped_release others_may_run;
+      const std::scoped_lock lock(sending_);
+      const double instant = time.value_or(static_cast<double>(frames_));
+      if (latest_ != nullptr) {
+        const absl::Status offered = latest_->OfferArrays(particles.arrays(), instant);
+        if (!offered.ok()) sent = offered;
+      } else {
+        sent = stream_->SendArrays(particles.arrays(), instant);
+      }
+      if (sent.ok()) ++frames_;
+    }
+    RaiseUnlessOk(sent.status());
+    return latest_ != nullptr ? std::nullopt : std::optional(*sent);
+  }
+
+  // None where nothing has come in time.
+  std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
+    const auto result = results_->Take();
+    for (;;) {
+      Event event;
+      event.frame = std::move(result->frame);
+      const auto received = Wait(wait, [&](milliseconds slice) -> absl::StatusOr<Received> {
+        const std::unique_lock lock(receiving_, slice);
+        if (!lock.owns_lock()) return Received::kNothingYet;
+        return stream_->Receive(event, slice);
+      });
+      result->frame = std::move(event.frame);  // Its buffers, where nothing has come.
+      RaiseUnlessOk(received.status());
+      if (*received == Received::kNothingYet) return nullptr;
+      if (*received == Received::kEnd) RaiseEnd();
+      if (event.kind == Event::Kind::kRefusal) {
+        Raise(event.message, event.violation, event.sequence);
+      }
+      if (event.kind != Event::Kind::kResult) continue;
+      result->sequence = event.sequence;
+      result->time = event.time;
+      return result;
+    }
+  }
+
+  std::shared_ptr<PythonResult> Next() {
+    try {
+      return Receive(std::nullopt);
+    } catch (py::error_already_set& error) {
+      if (error.matches(PyExc_EOFError)) throw py::stop_iteration();
+      throw;
+    }
+  }
+
+  void Finish() {
+    absl::Status status;
+    {
+      const py::gil_scoped_release others_may_run;
+      const std::scoped_lock lock(sending_);
+      if (!std::exchange(finished_, true)) {
+        status = latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
+      }
+    }
+    RaiseUnlessOk(status);
+  }
+
+  // Answers that nobody has received are dropped, so that frames on their way arrive.
+  void Close() {
+    const py::gil_scoped_release others_may_run;
+    std::thread receiver([this] {
+      const std::scoped_lock lock(receiving_);
+      Event event;
+      for (auto got = stream_->Receive(event); got.ok() && *got == Received::kEvent;
+           got = stream_->Receive(event)) {
+      }
+    });
+    {
+      const std::scoped_lock lock(sending_);
+      if (!std::exchange(finished_, true)) {
+        const absl::Status status =
+            latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
+        if (!status.ok()) stream_->Cancel();
+      }
+    }
+    receiver.join();
+  }
+
+  void Cancel() {
+    const py::gil_scoped_release others_may_run;
+    stream_->Cancel();
+  }
+
+  std::size_t InFlight() const { return stream_->InFlight(); }
+  std::size_t Window() const { return stream_->info().frames_in_flight; }
+  std::string Id() const { return stream_->info().stream_id; }
+  py::dict Parameters() const { return Told(stream_->info().parameters); }
+  py::dict Counts() const {
+    const auto counts = latest_ != nullptr ? latest_->counts() : client::OfferCounts{};
+    using namespace py::literals;
+    return py::dict("sent"_a = counts.sent, "skipped"_a = counts.skipped,
+                    "refused"_a = counts.refused);
+  }
+
+ private:
+  const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
+  std::unique_ptr<client::Stream> stream_;
+  std::unique_ptr<client::LatestSender> latest_;  // Ends before the stream.
+  std::timed_mutex receiving_;                    // One thread at a time.
+  std::mutex sending_;                            // Likewise; guards what follows.
+  std::uint64_t frames_ = 0;
+  bool finished_ = false;
+};
+
+class Watch {
+ public:
+  Watch(const std::string& address, const std::string& name, py::dict arguments) {
+    const client::WatcherOptions options = TakeWatcherOptions(arguments);
+    ExpectNothingElse(arguments, "watch");
+    absl::StatusOr<std::unique_ptr<client::Watcher>> watcher = nullptr;
+    {
+      const py::gil_scoped_release others_may_run;
+      watcher = client::Watcher::Open(address, name, options);
+    }
+    RaiseUnlessOk(watcher.status());
+    watcher_ = *std::move(watcher);
+  }
+  ~Watch() {
+    const py::gil_scoped_release others_may_run;
+    watcher_.reset();
+  }
+
+  // None where nothing has come in time; the end is an exception.
+  std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
+    const auto result = results_->Take();
+    client::WatchedFrame frame;
+    frame.frame = std::move(result->frame);
+    const auto received = Wait(wait, [&](milliseconds slice) -> absl::StatusOr<Received> {
+      const std::unique_lock lock(receiving_, slice);
+      if (!lock.owns_lock()) return Received::kNothingYet;
+      return watcher_->Receive(frame, slice);
+    });
+    result->frame = std::move(frame.frame);  // Its buffers, where nothing has come.
+    RaiseUnlessOk(received.status());
+    if (*received == Received::kNothingYet) return nullptr;
+    if (*received == Received::kEnd) {
+      PyErr_SetString(PyExc_EOFError,
+                      (watcher_->end().reason + ": " + watcher_->end().message).c_str());
+      throw py::error_already_set();
+    }
+    result->sequence = frame.sequence;
+    result->time = frame.time;
+    result->particles = std::move(frame.particles);
+    result->dropped = frame.dropped;
+    result->gap = frame.gap;
+    result->rejoined = std::move(frame.rejoined);
+    return result;
+  }
+
+  std::shared_ptr<PythonResult> Next() {
+    try {
+      return Receive(std::nullopt);
+    } catch (py::error_already_set& error) {
+      if (error.matches(PyExc_EOFError)) throw py::stop_iteration();
+      throw;
+    }
+  }
+
+  void Cancel() {
+    const py::gil_scoped_release others_may_run;
+    watcher_->Cancel();
+  }
+  py::dict Parameters() const { return Told(watcher_->stream().parameters); }
+  std::string End() const { return watcher_->end().reason; }
+
+ private:
+  const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
+  std::unique_ptr<client::Watcher> watcher_;
+  std::timed_mutex receiving_;  // One thread at a time.
+};
+
+py::list Streams(const std::string& address, const py::kwargs& arguments) {
+  const client::Credentials credentials = TakeCredentials(arguments);
+  ExpectNothingElse(arguments, "streams");
+  absl::StatusOr<std::vector<client::StreamSummary>> streams;
+  {
+    const py::gil_scoped_release others_may_run;
+    streams = client::ListStreams(address, std::chrono::seconds(5), credentials);
+  }
+  RaiseUnlessOk(streams.status());
+  using namespace py::literals;
+  py::list list;
+  for (const client::StreamSummary& one : *streams) {
+    list.append(py::dict("name"_a = one.name, "id"_a = one.stream_id, "labels"_a = one.labels,
+                         "parameters"_a = Told(one.parameters),
+                         "last_sequence"_a = one.last_sequence, "frames"_a = one.frames,
+                         "frame_errors"_a = one.frame_errors, "watchers"_a = one.watchers,
+                         "open_seconds"_a = one.open_seconds, "idle_seconds"_a = one.idle_seconds));
+  }
+  return list;
+}
+
+py::dict Server(const std::string& address, const py::kwargs& arguments) {
+  const client::Credentials credentials = TakeCredentials(arguments);
+  ExpectNothingElse(arguments, "server");
+  absl::StatusOr<client::ServerInfo> info;
+  {
+    const py::gil_scoped_release others_may_run;
+    info = client::GetServerInfo(address, std::chrono::seconds(5), credentials);
+  }
+  RaiseUnlessOk(info.status());
+  using namespace py::literals;
+  return py::dict(
+      "version"_a = info->version, "method_version"_a = info->method_version,
+      "max_particles_per_frame"_a = info->limits.max_particles_per_frame,
+      "max_frame_bytes"_a = info->limits.max_frame_bytes, "max_streams"_a = info->max_streams,
+      "max_watchers"_a = info->max_watchers, "frames_in_flight"_a = info->frames_in_flight,
+      "compute_threads"_a = info->compute_threads, "capabilities"_a = info->capabilities,
+      "open_streams"_a = info->open_streams, "draining"_a = info->draining);
+}
+
+}  // namespace
+
+void DefineStreams(py::module_& module) {
+  using namespace py::literals;
+  py::class_<ProducerStream>(
+      module, "Stream",
+      "Frames to a server, answers back: made by partiemc.connect. One thread may send while "
+      "another one receives. It outlives lost connections; no frame is lost or comes twice.")
+      .def(py::init<const std::string&, bool, py::dict>())
+      .def("send", &ProducerStream::Send, "positions"_a, "time"_a = py::none(), py::kw_only(),
+           "volumes"_a = py::none(), "ids"_a = py::none(), "velocities"_a = py::none(),
+           "Sends a frame and returns its number. The arrays (see partiemc.reconstruct) are copied "
+           "once, into the message, before it returns. `time` defaults to the number of frames "
+           "before it.\n\nWaits while `window` frames are sent and not received: a program with "
+           "one thread receives when in_flight has reached window. With latest=True it never "
+           "waits, and returns None.")
+      .def("receive", &ProducerStream::Receive, "wait"_a = py::none(),
+           "The next Result. None where nothing has come within `wait` seconds. Raises "
+           "partiemc.Error with a reason for a frame that was refused (the stream goes on), "
+           "without one when the stream has ended with an error; EOFError after finish() and "
+           "the last answer.")
+      .def("__iter__", [](py::object self) { return self; })
+      .def("__next__", &ProducerStream::Next)
+      .def("finish", &ProducerStream::Finish,
+           "No more frames will come: iteration ends with the last answer. With latest=True waits "
+           "until the newest frame has been sent, so another thread must receive.")
+      .def("cancel", &ProducerStream::Cancel, "Ends the stream at once, from any thread.")
+      .def("__enter__", [](py::object self) { return self; })
+      .def(
+          "__exit__",
+          [](ProducerStream& stream, const py::object& type, const py::object&, const py::object&) {
+            if (type.is_none()) {
+              stream.Close();
+            } else {
+              stream.Cancel();
+            }
+          })
+      .def_property_readonly("in_flight", &ProducerStream::InFlight,
+                             "Frames sent and not yet received.")
+      .def_property_readonly("window", &ProducerStream::Window, "How many there may be.")
+      .def_property_readonly("id", &ProducerStream::Id, "As in the server's log.")
+      .def_property_readonly("parameters", &ProducerStream::Parameters, "As resolved, by name.")
+      .def_property_readonly("counts", &ProducerStream::Counts,
+                             "With latest=True: frames 'sent', 'skipped', 'refused'.");
+  py::class_<Watch>(module, "Watch",
+                    "An iterator over somebody else's results: made by partiemc.watch.")
+      .def(py::init<const std::string&, const std::string&, py::dict>())
+      .def("receive", &Watch::Receive, "wait"_a = py::none(),
+           "The next Result; None where nothing has come within `wait` seconds. EOFError at the "
+           "end of the stream, partiemc.Error when the watch was lost.")
+      .def("__iter__", [](py::object self) { return self; })
+      .def("__next__", &Watch::Next)
+      .def("cancel", &Watch::Cancel, "Leaves at once, from any thread.")
+      .def("__enter__", [](py::object self) { return self; })
+      .def("__exit__", [](Watch& watch, const py::args&) { watch.Cancel(); })
+      .def_property_readonly("parameters", &Watch::Parameters, "Of the stream, by name.")
+      .def_property_readonly("end", &Watch::End, "Why it ended: 'FINISHED', 'PRODUCER_LOST', ...");
+  module.def("streams", &Streams, "address"_a, "The streams that are open on a server: dicts.");
+  module.def("server", &Server, "address"_a, "What a server is and allows: a dict.");
+}
+
+}  // namespace partiemc::python

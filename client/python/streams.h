@@ -1,0 +1,10 @@
+// Streams to and from servers, for Python.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace partiemc::python {
+
+void DefineStreams(pybind11::module_& module);
+
+}  // namespace partiemc::python
