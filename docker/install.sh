@@ -1,7 +1,8 @@
 #!/bin/bash
 # Installs the Debian packages of the given sets, those that are missing and nothing else.
-# A set is a file beside this script: packages/SET.txt, one package a line, '@OTHER' includes
-# another set. README, CI and image all install by this script.
+# A set is a file beside this script: packages/SET.txt, one package a line; '@OTHER' includes
+# another set, 'PACKAGE ?COMMAND' leaves a package out where that command is there from elsewhere.
+# README, CI and image all install by this script.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -26,12 +27,12 @@ usage() {
 
 # The packages of a set, one a line, those of the sets that it includes first.
 packages_of() {
-  local file=$here/packages/$1.txt word
+  local file=$here/packages/$1.txt word unless
   [[ -f $file ]] || fail "no package set '$1'; there are: $(sets | awk '{ printf "%s ", $1 }')"
-  while read -r word; do
+  while read -r word unless; do
     case $word in
       @*) packages_of "${word#@}" ;;
-      *) echo "$word" ;;
+      *) [[ -n $unless ]] && command -v "${unless#\?}" >/dev/null || echo "$word" ;;
     esac
   done < <(sed -e 's/#.*//' -e 's/[[:space:]]*$//' -e '/^$/d' "$file")
 }

@@ -11,7 +11,7 @@ usage: tests/bare_root.sh [--working-tree] [--keep] [TRY...]
   --working-tree  take the files as they are, committed or not, instead of a clone
   --keep          leave the root for a look at it, and tell where it is
 What to try, each in a root of its own; demo and tests by default:
-  demo    client/demo.sh, twice
+  demo    client/demo.sh --no-browser, twice
   tests   tests/run.sh, then its quickest step again
   core    the core alone, where no package of the service is installed
 USAGE
@@ -106,8 +106,8 @@ for what in "${tries[@]}"; do
   make_root "$what"
   case $what in
     demo)
-      try "demo" client/demo.sh
-      try "demo, again at once" client/demo.sh
+      try "demo" client/demo.sh --no-browser
+      try "demo, again at once" client/demo.sh --no-browser
       try "demo's files" sh -c 'cd build/demo && ls *.html && ls -R | grep -c geojson'
       ;;
     tests)

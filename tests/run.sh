@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout contract release recordings sanitized threads fuzz includes core-alone consumer bench)
+readonly all_steps=(layout contract release recordings viewer sanitized threads fuzz includes core-alone consumer bench)
 
 readonly buf_version=1.50.0
 
@@ -16,7 +16,8 @@ Steps, all of them by default:
   contract    the .proto as buf lints it, and that it breaks nobody (where npm can fetch buf)
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
-  sanitized   core, sessions and client streams under AddressSanitizer and
+  viewer      the page in the browser: its parts by node, the whole in Chromium (after release)
+  sanitized   core, sessions, client streams and the gateway under AddressSanitizer and
               UndefinedBehaviorSanitizer
   threads     core and sessions under ThreadSanitizer, as far as threads meet in them
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
@@ -136,7 +137,8 @@ step_contract() {
 }
 
 step_release() {
-  check "release: configure" cmake --preset release -DPARTIEMC_VTK=ON &&
+  check "release: configure" cmake --preset release -DPARTIEMC_VTK=ON -DPARTIEMC_C=ON \
+    -DPARTIEMC_PYTHON=ON &&
     check "release: build" cmake --build build/release -j "$jobs" &&
     run_ctest release build/release
 }
@@ -144,6 +146,39 @@ step_release() {
 step_recordings() {
   check "recordings" /usr/bin/python3 tests/end_to_end/check_recordings.py \
     --partiemc build/release/bin/partiemc
+}
+
+# run_node NAME SCRIPT: runs tests by node's own runner, and adds its figures to the sum.
+run_node() {
+  local name=$1 log
+  log=$(mktemp)
+  node "$2" 2>&1 | tee "$log"
+  local well bad
+  well=$(sed -n -E 's/^[^ ]+ pass ([0-9]+)$/\1/p' "$log")
+  bad=$(sed -n -E 's/^[^ ]+ fail ([0-9]+)$/\1/p' "$log")
+  if [[ -z $well || -z $bad ]]; then
+    record_failure 1 "$name: node gave no result"
+  else
+    passed=$((passed + well))
+    if ((bad != 0)); then
+      sed -n '/failing tests:/,$p' "$log" >>"$details"
+      record_failure "$bad" "$name"
+    elif ((well == 0)); then
+      record_failure 1 "$name: no test was run"
+    fi
+  fi
+  rm -f "$log"
+}
+
+# Its packages come from npm alone, as buf does.
+step_viewer() {
+  if ! client/viewer/build.sh --packages >build/viewer.log 2>&1; then
+    echo "viewer is left out: npm is not here or cannot fetch its packages (build/viewer.log)"
+    return
+  fi
+  check "viewer: build" client/viewer/build.sh || return
+  run_node "viewer" client/viewer/tests/run.mjs
+  PARTIEMC_BIN=build/release/bin run_node "viewer in Chromium" client/viewer/tests/page/run.mjs
 }
 
 # Core and server, one room after the other, then of the client what goes on in the background, so
@@ -156,9 +191,10 @@ step_sanitized() {
     check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
       run_ctest "sanitized $room" "build/asan/tests/$room"
   done
-  check "sanitized: build client" cmake --build build/asan -j "$jobs" \
+  check "sanitized: build client and web" cmake --build build/asan -j "$jobs" \
     --target partiemc_sanitized_tests &&
-    run_ctest "sanitized client" build/asan/tests/client/library -L sanitized
+    run_ctest "sanitized client" build/asan/tests/client/library -L sanitized &&
+    run_ctest "sanitized web" build/asan/tests/service -L sanitized
 }
 
 step_threads() {

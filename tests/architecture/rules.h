@@ -28,7 +28,8 @@ Violations FilesKeepTheirRooms(const SourceTree& tree);
 Violations NoFolderIsTooFull(const SourceTree& tree);
 
 /// Of the server, the rooms rpc and security, what starts it, and logging.cc, which takes gRPC's
-/// own lines, alone include gRPC and messages.
+/// own lines, alone include gRPC and messages; calls messages and their bytes, nothing else of
+/// gRPC.
 Violations GrpcStaysInItsRooms(const SourceTree& tree);
 
 /// Each stage has its header and source; a stage reaches the headers of earlier

@@ -75,6 +75,10 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments) {
   if (std::find(arguments.begin(), arguments.end(), "--log-level") == arguments.end()) {
     arguments.insert(arguments.end(), {"--log-level", "off"});
   }
+  // What honest streams hold for their watchers would hide what attackers take.
+  if (std::find(arguments.begin(), arguments.end(), "--history-bytes") == arguments.end()) {
+    arguments.insert(arguments.end(), {"--history-bytes", "1MB"});
+  }
   // On a busy machine four seconds may not be enough for what an attacker has left behind.
   if (std::find(arguments.begin(), arguments.end(), "--grace-seconds") == arguments.end()) {
     arguments.insert(arguments.end(), {"--grace-seconds", "20"});

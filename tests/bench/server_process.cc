@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <fstream>
 #include <thread>
-#include <vector>
 
 #include "bench/clocks.h"
 #include "bench/progress.h"
@@ -42,11 +41,14 @@ pid_t Spawn(std::vector<std::string> arguments, const std::filesystem::path& log
 
 }  // namespace
 
-ServerProcess::ServerProcess(Transport transport) {
+ServerProcess::ServerProcess(Transport transport, const std::vector<std::string>& flags) {
   const std::filesystem::path port_file = folder_ / "address", log = folder_ / "log";
   const std::string listen = transport == Transport::kTcp ? std::string("127.0.0.1:0")
                                                           : "unix:" + (folder_ / "socket").string();
-  process_ = Spawn({PARTIEMC_SERVER, "--address", listen, "--port-file", port_file.string()}, log);
+  std::vector<std::string> command = {PARTIEMC_SERVER, "--address", listen, "--port-file",
+                                      port_file.string()};
+  command.insert(command.end(), flags.begin(), flags.end());
+  process_ = Spawn(command, log);
   const double begin = WallMs();
   while (!std::filesystem::exists(port_file)) {
     int status = 0;

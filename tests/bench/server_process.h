@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <string>
+#include <vector>
 
 #include "support/temporary_folder.h"
 
@@ -16,7 +17,7 @@ class ServerProcess {
   /// Starts one on a free port of loopback or on a socket in a new temporary folder, and waits
   /// until it serves. Ends the program where it does not. The system kills it when the thread that
   /// starts it ends, however it ends.
-  explicit ServerProcess(Transport transport);
+  explicit ServerProcess(Transport transport, const std::vector<std::string>& flags = {});
   /// Asks it to leave, and waits until it has.
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;

@@ -27,7 +27,8 @@ struct ServerMemory {
 };
 
 ServerMemory PlayAndWatch(const Scene& scene, int frames) {
-  const ServerProcess server(Transport::kTcp);
+  // What is held for watchers comes on top of it, as much as the server is told.
+  const ServerProcess server(Transport::kTcp, {"--history-bytes", "0"});
   FrameExchange exchange(server, scene);
   // A moment tells little: a frame or two may be on their way just then, or none.
   const int tenth = std::max(frames / 10, 1), step = std::max(frames / 100, 1);

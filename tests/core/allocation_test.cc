@@ -5,10 +5,12 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <new>
 #include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -96,6 +98,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
     frames.push_back(frame);
   }
   frames.insert(frames.begin() + 2, {support::Disc(5), Particles()});
+  const std::vector<float> values(2 * frames[0].size() + 4000, 1.0f);
   State state;
   Workspace workspace;
   Result result;
@@ -106,7 +109,12 @@ TEST_P(WarmFrame, AllocatesNothing) {
     before = allocations;
     for (const Particles& frame : frames) {
       arena.execute([&] {
-        ASSERT_TRUE(reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result).ok());
+        const std::array<Attribute, 2> attributes = {
+            {{"pressure", 1, std::span(values).first(frame.size())},
+             {"velocity", 2, std::span(values).first(2 * frame.size())}}};
+        Frame next = frame.AsFrame();
+        if (tested.ids) next.attributes = attributes;
+        ASSERT_TRUE(reconstructor->Reconstruct(next, state, workspace, result).ok());
       });
     }
     if (round == 0) {
@@ -161,6 +169,7 @@ struct MemoryCase {
   std::string name;
   Particles particles;
   ReconstructionParameters parameters;
+  bool carries = false;  // Attributes.
 };
 
 // Frames that differ in what they need most memory for.
@@ -172,6 +181,7 @@ std::vector<MemoryCase> MemoryCases() {
     cases.push_back({name, particles, parameters});
     cases.push_back({absl::StrCat(name, ", ids"), particles, parameters});
     for (std::size_t k = 0; k < particles.size(); ++k) cases.back().particles.ids.push_back(k);
+    cases.push_back({absl::StrCat(name, ", attributes"), particles, parameters, true});
   };
   const auto spread = [](int side, double distance, double x0 = 0) {
     return support::Scaled(support::Lattice(side, side, x0 / distance, x0 / distance), distance);
@@ -196,6 +206,11 @@ TEST(MemoryGuard, IsToldNoLessThanAFrameTakesAndNotMuchMore) {
     SCOPED_TRACE(tested.name);
     const auto reconstructor = Reconstructor::Create(tested.parameters);
     ASSERT_TRUE(reconstructor.ok());
+    const std::vector<float> values(3 * tested.particles.size(), 1.0f);
+    const std::array<Attribute, 3> attributes = {
+        {{"a", 3, values}, {"b", 3, values}, {"c", 3, values}}};
+    Frame frame = tested.particles.AsFrame();
+    if (tested.carries) frame.attributes = attributes;
     const std::size_t before = live_bytes;
     Guard guard(100);
     std::size_t held = 0;
@@ -205,8 +220,8 @@ TEST(MemoryGuard, IsToldNoLessThanAFrameTakesAndNotMuchMore) {
       Result result;
       for (int k = 0; k < 2; ++k) {  // The second one remembers the first.
         guard = Guard(100);
-        const absl::Status status = reconstructor->Reconstruct(
-            tested.particles.AsFrame(), state, workspace, result, {.memory = &guard});
+        const absl::Status status =
+            reconstructor->Reconstruct(frame, state, workspace, result, {.memory = &guard});
         ASSERT_TRUE(status.ok()) << status;
       }
       held = live_bytes - before;

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <new>
+#include <span>
 #include <thread>
 #include <vector>
 
@@ -60,21 +61,30 @@ class Cancellation : public testing::TestWithParam<unsigned> {
  protected:
   Cancellation() {
     for (int k = 0; k < kFrames; ++k) frames_.push_back(SceneAt(k));
+    for (const Particles& frame : frames_) {
+      values_.emplace_back(frame.xy.begin(), frame.xy.end());
+      attributes_.push_back({.name = "place", .components = 2, .values = values_.back()});
+    }
     State state;
     Workspace workspace;
     Result result;
-    for (const Particles& frame : frames_) {
-      EXPECT_TRUE(reconstructor_->Reconstruct(frame.AsFrame(), state, workspace, result).ok());
+    for (int k = 0; k < kFrames; ++k) {
+      EXPECT_TRUE(reconstructor_->Reconstruct(FrameAt(k), state, workspace, result).ok());
       expected_.push_back(result);
       states_.push_back(state);
     }
   }
 
+  Frame FrameAt(int k) const {
+    Frame frame = frames_[k].AsFrame();
+    frame.attributes = std::span(attributes_).subspan(k, 1);
+    return frame;
+  }
+
   // The frame after the first `done`, undisturbed.
   void ExpectNext(int done, State& state, Workspace& workspace) {
     Result result;
-    ASSERT_TRUE(
-        reconstructor_->Reconstruct(frames_[done].AsFrame(), state, workspace, result).ok());
+    ASSERT_TRUE(reconstructor_->Reconstruct(FrameAt(done), state, workspace, result).ok());
     EXPECT_EQ(result, expected_[done]);
     EXPECT_EQ(state, states_[done]);
   }
@@ -84,6 +94,8 @@ class Cancellation : public testing::TestWithParam<unsigned> {
   const absl::StatusOr<Reconstructor> reconstructor_ =
       Reconstructor::Create({.fill = Fill::kConforming, .spacing = 1});
   std::vector<Particles> frames_;
+  std::vector<std::vector<float>> values_;
+  std::vector<Attribute> attributes_;  // Each of its frame.
   std::vector<Result> expected_;
   std::vector<State> states_;
 };
@@ -98,9 +110,8 @@ TEST_P(Cancellation, AfterAnyStageLeavesNoTrace) {
       std::atomic<bool> flag = false;
       CancelAfter observer(static_cast<Stage>(stage), flag);
       Result result = expected_[0];
-      const absl::Status status =
-          reconstructor_->Reconstruct(frames_[3].AsFrame(), state, workspace, result,
-                                      {.observer = &observer, .cancelled = &flag});
+      const absl::Status status = reconstructor_->Reconstruct(
+          FrameAt(3), state, workspace, result, {.observer = &observer, .cancelled = &flag});
       EXPECT_TRUE(absl::IsCancelled(status)) << status;
       EXPECT_EQ(observer.last(), static_cast<Stage>(stage)) << "it went on";
       EXPECT_EQ(result, Result());
@@ -133,7 +144,7 @@ TEST_P(Cancellation, AtAnyMomentLeavesNoTrace) {
     absl::Status status;
     arena_.Execute([&] {
       has_begun.store(true, std::memory_order_relaxed);
-      status = reconstructor_->Reconstruct(frames_[done].AsFrame(), state, workspace, result,
+      status = reconstructor_->Reconstruct(FrameAt(done), state, workspace, result,
                                            {.cancelled = &flag});
     });
     canceller.join();

@@ -22,6 +22,12 @@ void RequireArrives(const Result& result, wire::Outputs outputs) {
   wire::ReconstructedFrame frame;
   RequireOk(wire::DecodeResult(received, frame), "the client takes what the server sends");
   Require(frame.rings_digest == DigestRings(result.rings), "the rings' digest arrives");
+  if (outputs.rings || outputs.mesh) {
+    Require(frame.result.attributes.size() == result.attributes.size(), "attributes arrive");
+  }
+  if (outputs.mesh && result.mesh.PointCount() > 0) {
+    Require(frame.result.attributes == result.attributes, "attributes arrive bit for bit");
+  }
   if (outputs.relative_float32) return;
   if (outputs.rings) {
     Require(DigestRings(frame.result.rings) == frame.rings_digest, "rings arrive bit for bit");
@@ -39,7 +45,9 @@ void AttackFrameMessage(Bytes bytes) {
   if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
   const auto parameters = wire::DecodeParameters(request.parameters());
   const auto outputs = wire::DecodeOutputs(request.outputs(), request.has_outputs());
-  const auto frame = wire::DecodeFrame(request.frame());
+  static auto* const views = new wire::AttributeViews;
+  const auto frame = wire::DecodeFrame(
+      request.frame(), outputs.ok() ? outputs->attributes : std::vector<std::string>(), *views);
   for (const absl::Status& status : {parameters.status(), outputs.status(), frame.status()}) {
     if (!status.ok()) RequireViolation(status);
   }

@@ -10,7 +10,7 @@
 #include "fuzz/require.h"
 #include "fuzz/single_thread.h"
 #include "partiemc/status.h"
-#include "server/rpc/stream_messages.h"
+#include "server/calls/stream_messages.h"
 #include "server/watch/watch_dispatcher.h"
 #include "wire/message_bytes.h"
 

@@ -23,6 +23,7 @@ std::span<const Target> AllTargets() {
       {"vtk", AttackVtk},
 #endif
       {"watch_requests", AttackWatchRequests},
+      {"web_requests", AttackWebRequests},
       {"xyz", AttackXyz},
   };
   return kTargets;

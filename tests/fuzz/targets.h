@@ -31,6 +31,7 @@ Attack AttackTextTable;
 Attack AttackTokens;         // The token file of a server.
 Attack AttackVtk;            // Legacy VTK, VTP and VTU; only where VTK is built in.
 Attack AttackWatchRequests;  // A watcher's messages while results come.
+Attack AttackWebRequests;    // Headers of the gateway, whole or one by one.
 Attack AttackXyz;
 
 struct Target {

@@ -72,13 +72,18 @@ class Watch final : private server::WatchTransport {
     is_open_ = true;
     credit_ = parsed_.open().credits();
     is_every_ = parsed_.open().mode() == v1::WATCH_MODE_EVERY;
-    return server::WatchTerms{
+    server::WatchTerms terms{
         .broadcaster = broadcaster_,
         .mode = is_every_ ? server::WatchMode::kEvery : server::WatchMode::kLatest,
         .credit = credit_};
+    if (parsed_.open().has_from_sequence()) terms.from_sequence = parsed_.open().from_sequence();
+    return terms;
   }
-  void WriteOpened() override { Write(); }
-  void WriteFrame(const server::WatchFrame& frame, std::uint64_t) override {
+  void WriteOpened(const server::HeldFrames& held) override {
+    Require(held.oldest <= held.newest, "what is held has an order");
+    Write();
+  }
+  void WriteFrame(const server::WatchFrame& frame, std::uint64_t, std::uint64_t) override {
     Require(frame.bytes() <= kMaxWatcherBytes, "a frame that is too large is not written");
     Require(credit_-- > 0, "no frame is written without credit");
     Write();
@@ -113,9 +118,12 @@ class Watch final : private server::WatchTransport {
 
 void AttackWatchRequests(Bytes bytes) {
   static auto* const dispatcher = new server::WatchDispatcher;
+  server::HistoryRoom room(2 * kMaxWatcherBytes, 3 * kMaxWatcherBytes);
   const auto broadcaster = std::make_shared<server::ResultBroadcaster>(
       *dispatcher,
       server::ResultBroadcaster::Limits{.mailbox_bytes = 2 * kMaxWatcherBytes, .kept_bytes = 256});
+  broadcaster->BeginHistory(room, nullptr, 1);
+  std::uint64_t sequence = 0;
   Choices choices(bytes);
   {
     Watch watch(broadcaster);
@@ -134,8 +142,11 @@ void AttackWatchRequests(Bytes bytes) {
         case 4:
         case 5:
           if (over) break;
-          broadcaster->Publish(std::make_shared<server::WatchFrame>(16 * std::size_t{what}));
-          broadcaster->Announce();
+          sequence += 1 + what / 128;  // Some frames are refused.
+          if (broadcaster->Publish(std::make_shared<server::WatchFrame>(16 * std::size_t{what}),
+                                   sequence)) {
+            broadcaster->Announce();
+          }
           break;
         case 6:
           watch.ReadEnded();

@@ -34,7 +34,7 @@ ROOMS = {
         "compute_pool_test", "watch_state_machine_test", "stream_state_machine_test",
         "memory_budget_test", "idle_test", "message_orders_test", "answer_afterwards_test",
         "codec_test", "bearer_tokens_test", "tls_identity_test", "options_test", "security_test",
-        "observed_test", "watch_test", "protocol_test", "streams_test", "overload_test",
+        "observed_test", "watch_test", "watch_history_test", "protocol_test", "streams_test", "overload_test",
         "resume_protocol_test", "error_table_test", "operation_test"],
     "client": [
         "client_input_test", "client_output_test", "client_recording_test", "client_stream_test",

@@ -101,6 +101,41 @@ TEST(Parameters, AnEnumOfALaterVersionIsRefusedByItsNameAndNumber) {
   EXPECT_EQ(violation.value, "77");
 }
 
+TEST(FrameMessage, AttributesAreChosenByName) {
+  const std::vector<double> positions = {0, 0, 1, 0, 0, 1};
+  const std::vector<float> velocities = {1, 2, 3, 4, 5, 6}, pressure = {7, 8, 9};
+  const std::vector<float> stress = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+  const std::vector<Attribute> attributes = {{"stress", 3, stress}, {"pressure", 1, pressure}};
+  v1::ParticleFrame message;
+  EncodeFrame({.positions = positions, .velocities = velocities, .attributes = attributes},
+              message);
+  const std::vector<std::string> names = {"pressure", "velocity", "stress"};
+  AttributeViews views;
+  const auto frame = DecodeFrame(message, names, views);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  ASSERT_EQ(frame->attributes.size(), 3u);
+  const auto expect = [&](std::size_t k, std::string_view name, int components,
+                          const std::vector<float>& values) {
+    EXPECT_EQ(frame->attributes[k].name, name);
+    EXPECT_EQ(frame->attributes[k].components, components);
+    EXPECT_EQ(
+        std::vector<float>(frame->attributes[k].values.begin(), frame->attributes[k].values.end()),
+        values);
+  };
+  expect(0, "pressure", 1, pressure);
+  expect(1, "velocity", 2, velocities);
+  expect(2, "stress", 3, stress);
+  // Those of the frame before are gone where a message is used again.
+  EncodeFrame({.positions = positions}, message);
+  EXPECT_EQ(message.scalars_size(), 0);
+  EXPECT_TRUE(DecodeFrame(message).ok());
+  const auto lacking = DecodeFrame(message, names, views);
+  EXPECT_EQ(ViolationOf(lacking.status()).reason, kReasonNoSuchAttribute);
+  // A frame without particles lacks nothing.
+  EncodeFrame({}, message);
+  EXPECT_TRUE(DecodeFrame(message, names, views).ok());
+}
+
 TEST(OutputsMessage, AbsentMeansRingsAndMesh) {
   const auto outputs = DecodeOutputs({}, /*present=*/false);
   ASSERT_TRUE(outputs.ok());
@@ -122,6 +157,15 @@ TEST(OutputsMessage, EveryCombinationThatMeansSomethingComesBackAsItWas) {
     ASSERT_TRUE(decoded.ok());
     EXPECT_EQ(*decoded, outputs);
   }
+}
+
+TEST(OutputsMessage, AttributesComeBackInTheirOrder) {
+  const Outputs outputs{.attributes = {"pressure", "density", "velocity"}};
+  v1::Outputs message;
+  EncodeOutputs(outputs, message);
+  const auto decoded = DecodeOutputs(message, /*present=*/true);
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_EQ(*decoded, outputs);
 }
 
 // Such a client would get statistics and wait for geometry.
@@ -149,15 +193,11 @@ TEST(OutputsMessage, NormalsAndFormatsWithoutGeometryAreRefused) {
 }
 
 TEST(OutputsMessage, WhatTheServerCannotDoIsRefusedAndNotIgnored) {
-  v1::Outputs attributes;
-  attributes.add_attributes("pressure");
   v1::Outputs format;
   format.set_coordinate_format(static_cast<v1::CoordinateFormat>(9));
-  for (const v1::Outputs& message : {attributes, format}) {
-    const auto decoded = DecodeOutputs(message, /*present=*/true);
-    ASSERT_EQ(decoded.status().code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_EQ(ViolationOf(decoded.status()).reason, kReasonUnsupported);
-  }
+  const auto decoded = DecodeOutputs(format, /*present=*/true);
+  ASSERT_EQ(decoded.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ViolationOf(decoded.status()).reason, kReasonUnsupported);
 }
 
 template <typename T>

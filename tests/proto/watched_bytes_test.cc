@@ -36,8 +36,10 @@ v1::ReconstructResponse AnswerWith(const v1::ReconstructedFrame& frame) {
   return answer;
 }
 
+constexpr std::uint64_t kOldest = 1000;
+
 v1::WatchedFrame Seen(const WatchedBytes& bytes, std::uint64_t dropped) {
-  grpc::ByteBuffer written = bytes.ToResponse(dropped);
+  grpc::ByteBuffer written = bytes.ToResponse(dropped, kOldest);
   v1::WatchStreamResponse response;
   EXPECT_TRUE(MergeBytes(written, response));
   EXPECT_TRUE(response.has_frame());
@@ -51,9 +53,12 @@ TEST(WatchedBytes, AreThoseOfTheFrameWhateverFieldsItAndItsAnswerHave) {
     grpc::ByteBuffer written = ToBytes(answer);
     const WatchedBytes bytes(written);
     EXPECT_EQ(bytes.size(), frame.ByteSizeLong());
+    EXPECT_GE(bytes.memory(), bytes.size());
+    EXPECT_LE(bytes.memory(), written.Length());
     for (const std::uint64_t dropped : {0, 300}) {
       const v1::WatchedFrame seen = Seen(bytes, dropped);
       EXPECT_EQ(seen.dropped(), dropped);
+      EXPECT_EQ(seen.oldest_sequence(), kOldest);
       EXPECT_TRUE(seen.frame().SerializeAsString() == frame.SerializeAsString());
     }
   }

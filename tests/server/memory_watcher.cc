@@ -6,8 +6,9 @@
 namespace partiemc::server {
 
 MemoryWatcher::MemoryWatcher(std::shared_ptr<ResultBroadcaster> broadcaster, WatchMode mode,
-                             std::uint64_t credit, std::size_t max_bytes)
-    : terms_{std::move(broadcaster), mode, credit},
+                             std::uint64_t credit, std::size_t max_bytes,
+                             std::optional<std::uint64_t> from_sequence)
+    : terms_{std::move(broadcaster), mode, credit, from_sequence},
       machine_(std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), max_bytes)),
       sent_{{WatchRequest::Kind::kOpen, 0}},
       paid_(credit),
@@ -59,6 +60,11 @@ absl::Status MemoryWatcher::status() {
   return *finished_;
 }
 
+HeldFrames MemoryWatcher::held() const {
+  const std::lock_guard lock(mutex_);
+  return held_;
+}
+
 std::vector<SeenFrame> MemoryWatcher::seen() const {
   const std::lock_guard lock(mutex_);
   return seen_;
@@ -94,13 +100,15 @@ void MemoryWatcher::BeginWrite() {
   changed_.notify_all();
 }
 
-void MemoryWatcher::WriteOpened() {
+void MemoryWatcher::WriteOpened(const HeldFrames& held) {
   const std::lock_guard lock(mutex_);
   opened_ = true;
+  held_ = held;
   BeginWrite();
 }
 
-void MemoryWatcher::WriteFrame(const WatchFrame& frame, std::uint64_t dropped) {
+void MemoryWatcher::WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+                               std::uint64_t /*oldest_sequence*/) {
   const std::lock_guard lock(mutex_);
   BeginWrite();
   seen_.push_back({static_cast<const NumberedFrame&>(frame).number, dropped});

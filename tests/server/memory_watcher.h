@@ -36,7 +36,8 @@ class MemoryWatcher final : private WatchTransport {
  public:
   /// Opens at once.
   MemoryWatcher(std::shared_ptr<ResultBroadcaster> broadcaster, WatchMode mode,
-                std::uint64_t credit, std::size_t max_bytes);
+                std::uint64_t credit, std::size_t max_bytes,
+                std::optional<std::uint64_t> from_sequence = std::nullopt);
   /// Cancels what goes on and waits for the end.
   ~MemoryWatcher() override;
 
@@ -47,6 +48,8 @@ class MemoryWatcher final : private WatchTransport {
   void StopReading();
   /// Waits until it is told that it is in.
   void WaitUntilOpened();
+  /// Of the answer to its `open`, once it is told that it is in.
+  HeldFrames held() const;
   /// Waits until as many frames have come in all, or the watch has ended.
   void WaitForFrames(std::size_t count);
   /// Waits for the end.
@@ -64,8 +67,9 @@ class MemoryWatcher final : private WatchTransport {
  private:
   void StartRead() override;
   absl::StatusOr<WatchTerms> Open() override;
-  void WriteOpened() override;
-  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped) override;
+  void WriteOpened(const HeldFrames& held) override;
+  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+                  std::uint64_t oldest_sequence) override;
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
@@ -82,6 +86,7 @@ class MemoryWatcher final : private WatchTransport {
   std::vector<SeenFrame> seen_;
   std::string end_reason_;
   std::uint64_t end_dropped_ = 0, paid_ = 0, unpaid_ = 0;
+  HeldFrames held_;
   bool opened_ = false, reading_ = false, writing_ = false, taking_ = true, cut_ = false;
   std::optional<absl::Status> finished_;
   std::thread thread_;

@@ -93,6 +93,22 @@ TEST(CommandLineOptions, MemoryIsThatOfTheMachineUnlessToldOtherwise) {
   EXPECT_THAT(Refused({"--memory-budget", "0"}), HasSubstr("--memory-budget"));
 }
 
+TEST(CommandLineOptions, HistoriesAreAnEighthOfTheBudgetAtMost) {
+  const auto limits = [](std::initializer_list<const char*> flags) {
+    return Parsed(flags).server.limits;
+  };
+  EXPECT_EQ(limits({}).history_bytes, 64u << 20);
+  EXPECT_EQ(limits({"--history-bytes", "3MB", "--max-streams", "5", "--memory-budget", "1GB"})
+                .AllHistoryBytes(),
+            15u << 20);
+  const auto small = limits({"--memory-budget", "80MB"});
+  EXPECT_EQ(small.AllHistoryBytes(), 10u << 20);
+  EXPECT_EQ(small.FrameBudget(), 70u << 20);
+  EXPECT_EQ(limits({"--history-bytes", "0"}).AllHistoryBytes(), 0u);
+  EXPECT_EQ(limits({"--history-bytes", "0", "--memory-budget", "1"}).FrameBudget(), 1u);
+  EXPECT_THAT(Refused({"--history-bytes", "-1"}), HasSubstr("--history-bytes"));
+}
+
 TEST(CommandLineOptions, AStreamMayBeIdleForAnHourUnlessToldOtherwise) {
   using std::chrono::milliseconds;
   EXPECT_EQ(Parsed({}).server.limits.idle.streaming, std::chrono::hours(1));

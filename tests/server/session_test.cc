@@ -292,9 +292,13 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
 TEST(Session, TheClockOfAResultHasATimeForEveryStageAndForTheWhole) {
   Stream stream;
   const std::vector<double> positions = MovingBlob(kSeed, 0);
+  const std::vector<float> pressure(positions.size() / 2);
+  const std::vector<Attribute> attributes = {{.name = "pressure", .values = pressure}};
+  Frame frame = FrameOf(positions);
+  frame.attributes = attributes;
   double stages = -1, total = -1;
   ASSERT_TRUE(stream.session()
-                  .Answer(1, FrameOf(positions), stream.worker(),
+                  .Answer(1, frame, stream.worker(),
                           [&](const Result&, const StageClock& clock) {
                             stages = 0;
                             for (const double ms : clock.stages_ms()) {

@@ -34,7 +34,7 @@ class WatchTest : public ::testing::Test {
  protected:
   // Frame `number` of the stream.
   void Publish(std::uint64_t number, std::size_t bytes = kFrameBytes) {
-    if (broadcaster_->Publish(std::make_shared<NumberedFrame>(number, bytes)))
+    if (broadcaster_->Publish(std::make_shared<NumberedFrame>(number, bytes), number))
       broadcaster_->Announce();
   }
   std::unique_ptr<MemoryWatcher> Join(WatchMode mode, std::uint64_t credit) {
@@ -121,12 +121,11 @@ TEST_F(WatchTest, AStreamEndsWhileItsWatchersAreServed) {
 TEST(ResultMailbox, HoldsNoMoreBytesThanItMayAndDropsTheOlderOnes) {
   ResultMailbox mailbox(3 * (kFrameBytes + kPublishedBytes));
   const auto put = [&](std::uint64_t number) {
-    mailbox.Put({std::make_shared<NumberedFrame>(number, kFrameBytes), number},
-                /*keep_older=*/true);
+    mailbox.Put({std::make_shared<NumberedFrame>(number, kFrameBytes), number});
   };
   const auto taken = [&] {
     std::vector<std::uint64_t> numbers;
-    for (const Published& published : mailbox.Take()) numbers.push_back(published.number);
+    mailbox.Take([&](const Published& published) { numbers.push_back(published.number); });
     return numbers;
   };
   for (const std::uint64_t number : {1, 2, 3}) put(number);
@@ -162,8 +161,8 @@ class StepTransport final : public WatchTransport {
 
   void StartRead() override {}
   absl::StatusOr<WatchTerms> Open() override { return terms_; }
-  void WriteOpened() override { ++under_way; }
-  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped) override {
+  void WriteOpened(const HeldFrames&) override { ++under_way; }
+  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped, std::uint64_t) override {
     ++under_way;
     written.push_back({static_cast<const NumberedFrame&>(frame).number, dropped});
   }

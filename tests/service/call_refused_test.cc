@@ -134,6 +134,27 @@ TEST_F(CallRefused, OUT_OF_RANGE) {
   ExpectOfOpen(format, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
                "outputs.coordinate_format: COORDINATE_FORMAT_FLOAT64; must come with outputs.rings "
                "or outputs.mesh: nothing else has coordinates");
+  auto attributes = OpenRequest();
+  attributes.mutable_open()->mutable_outputs()->add_attributes("pressure");
+  ExpectOfOpen(attributes, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+               "outputs.attributes: pressure; must come with outputs.rings or outputs.mesh: they "
+               "are at their vertices");
+  attributes.mutable_open()->mutable_outputs()->set_mesh(true);
+  for (int k = 0; k < 16; ++k) {
+    attributes.mutable_open()->mutable_outputs()->add_attributes(std::to_string(k));
+  }
+  ExpectOfOpen(attributes, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
+               "outputs.attributes: 17 names; must be at most 16");
+}
+
+TEST_F(CallRefused, DUPLICATE) {
+  auto open = OpenRequest();
+  open.mutable_open()->mutable_outputs()->set_rings(true);
+  for (const char* name : {"pressure", "density", "pressure"}) {
+    open.mutable_open()->mutable_outputs()->add_attributes(name);
+  }
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "DUPLICATE",
+               "outputs.attributes: 3 names; must all be different");
 }
 
 TEST_F(CallRefused, UNSUPPORTED) {
@@ -305,6 +326,7 @@ TEST_F(CallRefused, NOT_PERMITTED) {
 
 TEST_F(CallRefused, MEMORY_BUDGET) {
   options_.limits.memory_budget = 100;
+  options_.limits.history_bytes = 0;  // Which has a part of it.
   ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET",
                "request: " + std::to_string(CallRequest().ByteSizeLong()) +
                    " bytes; must fit with what is being worked on into 100 bytes; try again later, "

@@ -120,7 +120,7 @@ bool IsFieldOrSubject(const std::string& field) {
        {v1::ReconstructRequest::descriptor(), v1::OpenStream::descriptor(),
         v1::ParticleFrame::descriptor(), v1::ReconstructFrameRequest::descriptor(),
         v1::WatchStreamRequest::descriptor(), v1::ListStreamsRequest::descriptor(),
-        v1::ReconstructedFrame::descriptor()}) {
+        v1::ReconstructedFrame::descriptor(), v1::Rings::descriptor()}) {
     if (IsPath(message, PartsOf(field))) return true;
   }
   return false;

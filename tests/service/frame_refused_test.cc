@@ -38,7 +38,22 @@ class FrameRefused : public ErrorTable {
     EXPECT_TRUE(IsFieldOrSubject(error.field())) << error.field();
     EXPECT_EQ(error.sequence(), frame.frame().sequence());
     EXPECT_EQ(error.next_sequence(), next_sequence);
-    EXPECT_TRUE(client.SendAndReceive(BlobRequest(next_sequence, 1, 0)).has_frame());
+    auto next = BlobRequest(next_sequence, 1, 0);
+    for (const std::string& name : open.open().outputs().attributes()) Carry(name, next);
+    EXPECT_TRUE(client.SendAndReceive(next).has_frame());
+  }
+  static v1::ReconstructRequest OpenFor(const std::string& attribute) {
+    auto open = OpenRequest();
+    open.mutable_open()->mutable_outputs()->set_rings(true);
+    open.mutable_open()->mutable_outputs()->add_attributes(attribute);
+    return open;
+  }
+  // Gives the particles of `request` zeros of that name.
+  static v1::NamedScalar& Carry(const std::string& name, v1::ReconstructRequest& request) {
+    v1::NamedScalar& scalar = *request.mutable_frame()->add_scalars();
+    scalar.set_name(name);
+    scalar.set_values(std::string(request.frame().positions().size() / 16 * sizeof(float), '\0'));
+    return scalar;
   }
   // A good frame whose number at `index` of `positions` is `value`.
   static v1::ReconstructRequest WithCoordinate(std::size_t index, double value) {
@@ -92,6 +107,14 @@ TEST_F(FrameRefused, BYTE_COUNT) {
          "ids: 3 bytes; must be empty or 8 bytes for each of " + particles + " particles");
 }
 
+TEST_F(FrameRefused, NO_SUCH_ATTRIBUTE) {
+  auto request = BlobRequest(1, 1, 0);
+  Carry("density", request);
+  Expect(request, "NO_SUCH_ATTRIBUTE",
+         "attributes: pressure; must be in every frame, as it is asked for", 2,
+         OpenFor("pressure"));
+}
+
 TEST_F(FrameRefused, TOO_MANY_PARTICLES) {
   auto request = BlobRequest(1, 1, 0);
   request.mutable_frame()->set_positions(std::string(16 * 20'001, '\0'));
@@ -123,11 +146,19 @@ TEST_F(FrameRefused, DUPLICATE) {
 TEST_F(FrameRefused, NOT_FINITE) {
   Expect(WithCoordinate(7, std::numeric_limits<double>::quiet_NaN()), "NOT_FINITE",
          "positions[3].y: nan; must be finite");
+  auto request = BlobRequest(1, 1, 0);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(Carry("pressure", request).mutable_values()->data() + 8, &nan, sizeof(nan));
+  Expect(request, "NOT_FINITE", "attributes[0].values[2]: nan; must be finite", 2,
+         OpenFor("pressure"));
 }
 
 TEST_F(FrameRefused, OUT_OF_RANGE) {
   Expect(WithCoordinate(7, 1e300), "OUT_OF_RANGE",
          "positions[3].y: 1e+300; must be at most 1e69 in magnitude");
+  auto request = BlobRequest(1, 1, 0);
+  Carry("stress", request).set_components(4);
+  Expect(request, "OUT_OF_RANGE", "scalars[0].components: 4; must be 1, 2 or 3");
 }
 
 TEST_F(FrameRefused, NOT_PLANAR) {

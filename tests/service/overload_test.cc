@@ -100,6 +100,7 @@ TEST_P(Overload, WithoutAnyBudgetStreamsGoOnFrameByFrameWithTheSameResults) {
 
 TEST_P(Overload, ACallThatTheBudgetHasNoRoomForIsRefusedAtOnceWithTheWayOut) {
   limits_.memory_budget = 100;
+  limits_.history_bytes = 0;  // Which has a part of it.
   Serve(limits_);
   v1::ReconstructFrameRequest request;
   *request.mutable_parameters() = OpenRequest().open().parameters();

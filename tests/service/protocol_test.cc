@@ -109,15 +109,6 @@ TEST_P(Protocol, ParametersOutOfRangeAreRefusedWithFieldValueAndRule) {
                 "parameters.kernel_radius: 20; must be in [1.5, 8] spacings");
 }
 
-TEST_P(Protocol, PartsOfTheProtocolThatThisServerDoesNotSpeakAreRefused) {
-  auto attributes = OpenRequest();
-  attributes.mutable_open()->mutable_outputs()->add_attributes("pressure");
-  for (const auto& [open, capability] : {std::pair(attributes, "attributes")}) {
-    ExpectRefused(open, grpc::StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
-                  std::string("lacks the capability \"") + capability + '"');
-  }
-}
-
 TEST_P(Protocol, NamesAndLabelsOutOfRangeAreRefused) {
   ExpectRefused(OpenRequest("a b"), grpc::StatusCode::INVALID_ARGUMENT, "NAME", "\"a b\"");
   auto labels = OpenRequest();

@@ -136,11 +136,13 @@ WatchClient::~WatchClient() {
   Finish();
 }
 
-bool WatchClient::Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits) {
+bool WatchClient::Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits,
+                       std::optional<std::uint64_t> from_sequence) {
   v1::WatchStreamRequest request;
   request.mutable_open()->set_stream_name(stream_name);
   request.mutable_open()->set_mode(mode);
   request.mutable_open()->set_credits(credits);
+  if (from_sequence) request.mutable_open()->set_from_sequence(*from_sequence);
   return rpc_->Write(request);
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -78,7 +79,8 @@ class WatchClient {
   /// Cancels a watch that was not finished.
   ~WatchClient();
 
-  bool Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits);
+  bool Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits,
+            std::optional<std::uint64_t> from_sequence = std::nullopt);
   bool Send(const v1::WatchStreamRequest& request) { return rpc_->Write(request); }
   bool Credit(std::uint32_t frames);
   /// A message without a case once the watch has ended.

@@ -218,7 +218,8 @@ class Soak : public ::testing::Test {
     std::this_thread::sleep_for(std::chrono::duration_cast<Clock::duration>(time));
   }
 
-  ServingProcess server_{{"--log-level", "off", "--threads", "2"}};
+  // Histories that are full once all is warm.
+  ServingProcess server_{{"--log-level", "off", "--threads", "2", "--history-bytes", "1MB"}};
 };
 
 TEST_F(Soak, NothingGrows) {

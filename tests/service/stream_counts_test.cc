@@ -149,8 +149,9 @@ class StreamCosts : public ::testing::Test {
 
   static std::uint32_t MaxStreams() { return static_cast<std::uint32_t>(counts.idle + 10); }
 
-  ServingProcess server_{
-      {"--log-level", "off", "--threads", "2", "--max-streams", std::to_string(MaxStreams())}};
+  ServingProcess server_{{"--log-level", "off", "--threads", "2", "--max-streams",
+                          std::to_string(MaxStreams()), "--history-bytes",
+                          "0"}};  // What is held for watchers is bounded by itself.
   std::shared_ptr<grpc::Channel> channel_ = NewChannel(address());
 };
 

@@ -11,8 +11,8 @@
 
 #include "partiemc/status.h"
 #include "partiemc/validate.h"
+#include "server/calls/stream_messages.h"
 #include "server/moving_blob.h"
-#include "server/rpc/stream_messages.h"
 #include "server/stream/session.h"
 #include "service/service_testing.h"
 #include "wire/codec.h"
@@ -64,6 +64,59 @@ TEST_P(Streams, AnAnswerIsAWholeAndValidResultWhoseDigestsAreItsOwn) {
   EXPECT_EQ(DigestMesh(frame.result.mesh), frame.mesh_digest);
   EXPECT_GE(frame.result.rings.RingCount(), 2u);
   EXPECT_GT(frame.times.total_ms, 0);
+}
+
+TEST_P(Streams, AttributesComeAsTheCoreMakesThem) {
+  const std::vector<double> positions = MovingBlob(3, 0);
+  std::vector<float> pressure, velocities;
+  for (std::size_t k = 0; k < positions.size() / 2; ++k) {
+    pressure.push_back(static_cast<float>(positions[2 * k] - 3 * positions[2 * k + 1]));
+    velocities.push_back(static_cast<float>(k % 7));
+    velocities.push_back(static_cast<float>(k % 5));
+  }
+  const std::vector<Attribute> attributes = {{"velocity", 2, velocities},
+                                             {"pressure", 1, pressure}};
+  auto open = OpenRequest();
+  v1::Outputs& outputs = *open.mutable_open()->mutable_outputs();
+  outputs.set_rings(true);
+  outputs.add_attributes("velocity");
+  outputs.add_attributes("pressure");
+  for (const bool with_mesh : {true, false}) {
+    SCOPED_TRACE(with_mesh);
+    outputs.set_mesh(with_mesh);
+    StreamClient client(channel_);
+    ASSERT_TRUE(client.SendAndReceive(open).has_opened());
+    v1::ReconstructRequest request;
+    wire::EncodeFrame({.positions = positions,
+                       .velocities = velocities,
+                       .attributes = std::span(attributes).last(1)},
+                      *request.mutable_frame());
+    request.mutable_frame()->set_sequence(1);
+    const auto answer = client.SendAndReceive(request);
+    ASSERT_TRUE(answer.has_frame()) << answer.ShortDebugString().substr(0, 200);
+    wire::ReconstructedFrame frame;
+    ASSERT_TRUE(wire::DecodeResult(answer.frame(), frame).ok());
+
+    const auto parameters = wire::DecodeParameters(open.open().parameters());
+    const auto reconstructor = Reconstructor::Create(*parameters);
+    State state;
+    Workspace workspace;
+    Result expected;
+    ASSERT_TRUE(
+        reconstructor
+            ->Reconstruct(
+                {.positions = positions, .velocities = velocities, .attributes = attributes}, state,
+                workspace, expected)
+            .ok());
+    ASSERT_EQ(frame.result.attributes.size(), 2u);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const AttributeValues& got = frame.result.attributes[k];
+      AttributeValues& wanted = expected.attributes[k];
+      if (!with_mesh) wanted.values.resize(expected.rings.PointCount() * wanted.components);
+      EXPECT_EQ(got, wanted);
+      EXPECT_FALSE(got.values.empty());
+    }
+  }
 }
 
 TEST_P(Streams, RelativeCoordinatesThatWouldBeTooCoarseRefuseTheFrameAndLeaveTheStateAlone) {

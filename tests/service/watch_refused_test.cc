@@ -45,6 +45,7 @@ class WatchRefused : public ErrorTable {
   void ExpectOfFrames(std::uint64_t max_watcher_bytes, const std::string& reason,
                       const std::string& message) {
     options_.limits.max_watcher_bytes = max_watcher_bytes;
+    options_.limits.history_bytes = 0;  // Where it would wait.
     OpenProducer();
     WatchClient watcher(channel_);
     watcher.Open("tank", v1::WATCH_MODE_EVERY, 1);

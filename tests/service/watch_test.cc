@@ -317,7 +317,7 @@ TEST_P(Watch, TheLoadTellsWatchersAndWhatTheyHaveNotTaken) {
       grpc::ClientContext context;
       SetDeadline(context);
       ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
-      EXPECT_EQ(info.load().memory_budget(), TestOptions().limits.memory_budget);
+      EXPECT_EQ(info.load().memory_budget(), TestOptions().limits.FrameBudget());
     } while (!expected(info.load()));
   };
   OpenProducer();

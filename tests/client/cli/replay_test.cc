@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <regex>
 #include <sstream>
 #include <thread>
 #include <tuple>
@@ -319,6 +320,23 @@ TEST(Replay, CtrlCEndsItWithWholeFramesTheirStatisticsAndTheirReport) {
       EXPECT_TRUE(Content(directory.Path(file)).ends_with("}\n")) << file;
     }
   }
+}
+
+TEST(Replay, ALoopBeginsAnewUntilCtrlC) {
+  const ServerProgram server;
+  Program replay(PARTIEMC_PROGRAM, {"replay", kDamBreak, "--frames", "0:3", "--loop", "--name",
+                                    "loop", "--server", server.address()});
+  // Of three frames the tenth is there.
+  const std::regex ten(R"("frames": *\d\d)");
+  while (replay.Running() &&
+         !std::regex_search(RunPartiemc({"streams", "--json", "--server", server.address()}).out,
+                            ten)) {
+  }
+  EXPECT_TRUE(replay.Running());
+  replay.Signal(SIGINT);
+  EXPECT_EQ(replay.Wait(), 130);
+  EXPECT_THAT(replay.Error(), HasSubstr("interrupted after"));
+  EXPECT_THAT(replay.Out(), IsEmpty());  // There is no table of what has no end.
 }
 
 // Its checkpoints are of no use without another server, to which it looks in vain.

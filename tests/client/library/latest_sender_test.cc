@@ -41,6 +41,9 @@ class GatedStream final : public FrameStream {
     volumes.assign(frame.volumes.begin(), frame.volumes.end());
     return taken.size();
   }
+  absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays&, double) override {
+    return absl::UnimplementedError("a LatestSender sends its own copy");
+  }
   absl::Status FinishSending() override {
     finished = true;
     return absl::OkStatus();

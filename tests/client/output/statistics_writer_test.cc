@@ -17,14 +17,14 @@ using ::testing::IsEmpty;
 constexpr const char* kHeader =
     "frame,particles,polylines,vertices,triangles_grid,triangles,area,milliseconds,"
     "bins_ms,field_ms,crossings_ms,rings_ms,normals_ms,vertices_ms,identities_ms,mesh_ms,"
-    "perimeter,self_intersections,folded_triangles,dropped_holes,dropped_components,"
+    "attributes_ms,perimeter,self_intersections,folded_triangles,dropped_holes,dropped_components,"
     "dropped_spray,rings_digest,mesh_digest,time,doubts";
 
 FrameRecord Record(const Result& result) {
   return {.index = 3,
           .time = 0.1,
           .result = result,
-          .stages_ms = {1, 2, 3, 4, 5, 6, 7, 8},
+          .stages_ms = {1, 2, 3, 4, 5, 6, 7, 8, 9},
           .total_ms = 28.5,
           .rings_digest = 0x0123456789abcdef,
           .mesh_digest = 0xf};
@@ -49,7 +49,7 @@ TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
   result.statistics.dropped_spray = 5;
   EXPECT_EQ(Written(directory / "stats.csv", {Record(result)}),
             std::string(kHeader) +
-                "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,8,23.5,1,2,3,4,5,"
+                "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,8,9,23.5,1,2,3,4,5,"
                 "0123456789abcdef,000000000000000f,0.1,\n");
 }
 

@@ -1,0 +1,307 @@
+/* usage: c_calls [ADDRESS]. Every function of the C interface as a program in C99 calls it, with a
+ * server or in process. Exits with 1 at the first thing that is not as the header says. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "partiemc/c/partiemc.h"
+
+#define EXPECT(condition)                                                            \
+  do {                                                                               \
+    if (!(condition)) {                                                              \
+      fprintf(stderr, "%s:%d: %s; last error: %s\n", __FILE__, __LINE__, #condition, \
+              partiemc_last_error()->message);                                       \
+      exit(1);                                                                       \
+    }                                                                                \
+  } while (0)
+
+enum { kSide = 30, kCount = kSide * kSide };
+
+struct body {
+  char kind;
+  float x, y;
+  double mass;
+  int32_t tag;
+  double vx, vy;
+};
+
+static float xy[kCount][2], x[kCount], y[kCount];
+static double xyz[kCount][3];
+static struct body bodies[kCount];
+
+static void fill(double shift) {
+  for (int k = 0; k < kCount; ++k) {
+    x[k] = xy[k][0] = bodies[k].x = (float)(k % kSide + shift);
+    y[k] = xy[k][1] = bodies[k].y = (float)(k / kSide);
+    xyz[k][0] = x[k];
+    xyz[k][1] = y[k];
+    bodies[k].mass = 1;
+    bodies[k].tag = k;
+    bodies[k].vx = shift;
+  }
+}
+
+static partiemc_stream* open_stream(const char* address, int latest) {
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  options.spacing = 1;
+  options.normals = 1;
+  options.latest = latest;
+  partiemc_stream* stream = NULL;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK && stream != NULL);
+  EXPECT(partiemc_window(stream) >= 1 && partiemc_in_flight(stream) == 0);
+  return stream;
+}
+
+static partiemc_particles plain(void) {
+  partiemc_particles particles;
+  partiemc_particles_init(&particles, sizeof particles);
+  partiemc_set_float32(&particles, &xy[0][0], kCount, 2);
+  return particles;
+}
+
+static void check_result(const partiemc_event* event) {
+  EXPECT(event->kind == PARTIEMC_RESULT);
+  EXPECT(event->ring_count == 1 && event->point_count > 50);
+  EXPECT(event->offsets[0] == 0 && event->offsets[1] == event->point_count);
+  EXPECT(event->outer_of[0] == PARTIEMC_NO_RING);
+  EXPECT(fabs(event->rings[0].area - kCount) < .01 * kCount);
+  EXPECT(event->rings[0].particle_count == kCount && event->particle_count == kCount);
+  EXPECT(event->rings[0].identity != 0 && event->rings[0].perimeter == event->perimeter);
+  EXPECT(event->area == event->rings[0].area && event->spacing == 1 && event->cell_size == 1);
+  EXPECT(event->milliseconds > 0 && event->rings_digest != 0 && event->mesh_digest != 0);
+  double area = 0; /* Of the triangles: those of the rings, all inside. */
+  EXPECT(event->triangle_count > 0 && event->mesh_point_count >= event->point_count);
+  for (size_t k = 0; k < event->triangle_count; ++k) {
+    const uint32_t* corner = event->triangles + 3 * k;
+    const double* a = event->mesh_points + 2 * corner[0];
+    const double* b = event->mesh_points + 2 * corner[1];
+    const double* c = event->mesh_points + 2 * corner[2];
+    area += ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2;
+    EXPECT(event->triangle_classes[k] <= 1);
+  }
+  EXPECT(fabs(area - event->area) < 1e-6);
+  for (size_t k = 0; k < event->point_count; ++k) {
+    EXPECT(event->points[2 * k] == event->mesh_points[2 * k]);
+    EXPECT(fabs(hypot(event->normals[2 * k], event->normals[2 * k + 1]) - 1) < 1e-5);
+  }
+}
+
+/* The same particles in every layout give the same digests. */
+static void try_layouts(const char* address) {
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  EXPECT(event.kind == PARTIEMC_NOTHING_YET && event.message[0] == 0);
+  uint64_t digests[4], identities[4];
+  for (int layout = 0; layout < 4; ++layout) {
+    partiemc_stream* stream = open_stream(address, 0);
+    partiemc_particles particles = plain();
+    const ptrdiff_t stride = sizeof(struct body);
+    if (layout == 1) {
+      const partiemc_array apart_x = {x, sizeof(float), PARTIEMC_FLOAT32};
+      const partiemc_array apart_y = {y + kCount - 1, -(ptrdiff_t)sizeof(float), PARTIEMC_FLOAT32};
+      particles.x = apart_x;
+      particles.y = apart_y;
+      for (int k = 0; k < kCount / 2; ++k) { /* y backwards, as the stride is. */
+        const float kept = y[k];
+        y[k] = y[kCount - 1 - k];
+        y[kCount - 1 - k] = kept;
+      }
+    } else if (layout == 2) {
+      partiemc_set_float64(&particles, &xyz[0][0], kCount, 3);
+    } else if (layout == 3) {
+      const partiemc_array body_x = {&bodies[0].x, stride, PARTIEMC_FLOAT32};
+      const partiemc_array body_y = {&bodies[0].y, stride, PARTIEMC_FLOAT32};
+      const partiemc_array tags = {&bodies[0].tag, stride, PARTIEMC_INT32};
+      const partiemc_array vx = {&bodies[0].vx, stride, PARTIEMC_FLOAT64};
+      const partiemc_array vy = {&bodies[0].vy, stride, PARTIEMC_FLOAT64};
+      particles.x = body_x;
+      particles.y = body_y;
+      particles.ids = tags;
+      particles.velocity_x = vx;
+      particles.velocity_y = vy;
+    }
+    EXPECT(partiemc_reconstruct(stream, &particles, 0.5, &event) == PARTIEMC_OK);
+    check_result(&event);
+    EXPECT(event.sequence == 1 && event.time == 0.5);
+    digests[layout] = event.rings_digest ^ event.mesh_digest;
+    identities[layout] = event.rings[0].identity;
+    partiemc_close(stream);
+  }
+  for (int layout = 1; layout < 4; ++layout) {
+    EXPECT(digests[layout] == digests[0] && identities[layout] == identities[0]);
+  }
+  fill(0);
+}
+
+/* With one thread: as many frames as the window has room for, then their answers. */
+static void try_window(const char* address) {
+  partiemc_stream* stream = open_stream(address, 0);
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  const size_t window = partiemc_window(stream);
+  const partiemc_particles particles = plain();
+  EXPECT(partiemc_receive(stream, 0, &event) == PARTIEMC_OK && event.kind == PARTIEMC_NOTHING_YET);
+  uint64_t sequence = 0;
+  for (size_t k = 1; k <= window; ++k) {
+    EXPECT(partiemc_send(stream, &particles, (double)k, &sequence) == PARTIEMC_OK);
+    EXPECT(sequence == k && partiemc_in_flight(stream) == k);
+  }
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_FAILED_PRECONDITION);
+  EXPECT(partiemc_finish(stream) == PARTIEMC_OK);
+  for (size_t k = 1; k <= window; ++k) {
+    EXPECT(partiemc_receive(stream, -1, &event) == PARTIEMC_OK && event.sequence == k);
+    check_result(&event);
+  }
+  EXPECT(partiemc_receive(stream, 10, &event) == PARTIEMC_OK && event.kind == PARTIEMC_END);
+  EXPECT(event.points == NULL && event.ring_count == 0);
+  EXPECT(partiemc_send(stream, &particles, 0, &sequence) == PARTIEMC_FAILED_PRECONDITION);
+  EXPECT(partiemc_last_error()->reason[0] == 0 && strlen(partiemc_last_error()->message) > 0);
+  partiemc_close(stream);
+}
+
+/* Frames that break a rule, here and in the core, leave no trace. */
+static void try_refusals(const char* address) {
+  partiemc_stream* stream = open_stream(address, 0);
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  partiemc_particles particles = plain();
+  const partiemc_array none = {NULL, 0, PARTIEMC_NONE}, lost = {NULL, 4, PARTIEMC_FLOAT32};
+  const partiemc_array whole = {x, 4, PARTIEMC_INT32};
+  const struct {
+    partiemc_array y;
+    const char* reason;
+  } wrong[] = {{none, "COUNT"}, {lost, "COUNT"}, {whole, "UNSUPPORTED"}};
+  for (size_t k = 0; k < 3; ++k) {
+    particles.y = wrong[k].y;
+    EXPECT(partiemc_send(stream, &particles, 0, NULL) == PARTIEMC_INVALID_ARGUMENT);
+    const partiemc_error* error = partiemc_last_error();
+    EXPECT(error->code == PARTIEMC_INVALID_ARGUMENT && strcmp(error->reason, wrong[k].reason) == 0);
+    EXPECT(strcmp(error->field, "positions.y") == 0);
+    EXPECT(strstr(error->message, error->rule) != NULL && strstr(error->message, error->value));
+  }
+  EXPECT(partiemc_send(stream, NULL, 0, NULL) == PARTIEMC_INVALID_ARGUMENT);
+
+  particles = plain();
+  xy[7][1] = NAN;
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_REFUSAL && event.sequence == 1 && event.ring_count == 0);
+  EXPECT(strcmp(event.reason, "NOT_FINITE") == 0 && strcmp(event.field, "positions[7].y") == 0);
+  EXPECT(strcmp(event.value, "nan") == 0 && strlen(event.rule) > 0);
+  fill(0);
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+  check_result(&event);
+  EXPECT(event.sequence == 2);
+  EXPECT(partiemc_last_error()->code == PARTIEMC_OK);
+
+  partiemc_cancel(stream);
+  EXPECT(partiemc_receive(stream, -1, &event) == PARTIEMC_CANCELLED);
+  partiemc_close(stream);
+}
+
+/* Every frame that is offered is sent, skipped or refused, and those that are sent are answered. */
+static void try_latest(const char* address) {
+  partiemc_stream* stream = open_stream(address, 1);
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  partiemc_particles particles = plain();
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_FAILED_PRECONDITION);
+  const int frames = 50;
+  uint64_t sequence = 7, answers = 0, sent, skipped, refused;
+  double last = -1;
+  for (int k = 0; k < frames; ++k) {
+    fill(0.1 * k);
+    EXPECT(partiemc_send(stream, &particles, k, &sequence) == PARTIEMC_OK && sequence == 0);
+  }
+  while (last < frames - 1) { /* The newest one is never skipped. */
+    EXPECT(partiemc_receive(stream, 30, &event) == PARTIEMC_OK);
+    check_result(&event);
+    EXPECT(event.time > last);
+    last = event.time;
+    ++answers;
+  }
+  EXPECT(partiemc_finish(stream) == PARTIEMC_OK);
+  EXPECT(partiemc_receive(stream, 30, &event) == PARTIEMC_OK && event.kind == PARTIEMC_END);
+  partiemc_latest_counts(stream, &sent, &skipped, &refused);
+  EXPECT(sent == answers && sent + skipped == (uint64_t)frames && refused == 0);
+  partiemc_latest_counts(stream, NULL, NULL, NULL);
+  partiemc_close(stream);
+  fill(0);
+}
+
+/* Programs that were compiled with shorter structs, and with longer ones. */
+static void try_sizes(const char* address) {
+  struct {
+    partiemc_event event;
+    char more[16];
+  } longer;
+  struct { /* The first members of partiemc_event, and something behind that must stay. */
+    size_t size;
+    int32_t kind;
+    uint64_t sequence;
+    char behind[16];
+  } shorter;
+  memset(&longer, 1, sizeof longer);
+  partiemc_event_init(&longer.event, sizeof longer);
+  memset(&shorter, 1, sizeof shorter);
+  shorter.size = offsetof(partiemc_event, time);
+  partiemc_stream* stream = open_stream(address, 0);
+  const partiemc_particles particles = plain();
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &longer.event) == PARTIEMC_OK);
+  check_result(&longer.event);
+  EXPECT(longer.more[0] == 1);
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, (partiemc_event*)&shorter) == PARTIEMC_OK);
+  EXPECT(shorter.kind == PARTIEMC_RESULT && shorter.sequence == 2 && shorter.behind[0] == 1);
+  partiemc_close(stream);
+}
+
+static void try_options(const char* address) {
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  partiemc_stream* stream = (partiemc_stream*)&options;
+  options.spacing = -1;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT && stream == NULL);
+  EXPECT(strcmp(partiemc_last_error()->field, "parameters.spacing") == 0);
+  options.spacing = 1;
+  options.fill = "mostly";
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
+  EXPECT(strstr(partiemc_last_error()->rule, "greedy") != NULL);
+  options.fill = "none";
+  options.placement = "marching-squares";
+  options.plane = "xz";
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+  for (int k = 0; k < kCount; ++k) {
+    xyz[k][2] = xyz[k][1];
+    xyz[k][1] = 3;
+  }
+  partiemc_particles particles;
+  partiemc_particles_init(&particles, sizeof particles);
+  partiemc_set_float64(&particles, &xyz[0][0], kCount, 3);
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_RESULT && event.ring_count == 1 && event.triangle_count == 0);
+  EXPECT(event.normals == NULL);
+  partiemc_close(stream);
+  EXPECT(partiemc_open("nowhere:", NULL, &stream) == PARTIEMC_INVALID_ARGUMENT && stream == NULL);
+  partiemc_close(NULL);
+  EXPECT(partiemc_version()[0] != 0);
+  fill(0);
+  memset(xyz, 0, sizeof xyz);
+  fill(0);
+}
+
+int main(int argc, char** argv) {
+  const char* address = argc > 1 ? argv[1] : NULL;
+  EXPECT(partiemc_last_error()->code == PARTIEMC_OK && partiemc_last_error()->message[0] == 0);
+  fill(0);
+  try_layouts(address);
+  try_window(address);
+  try_refusals(address);
+  try_latest(address);
+  try_sizes(address);
+  try_options(address);
+  puts("all is as the header says");
+  return 0;
+}

@@ -1,0 +1,129 @@
+// The C interface as programs in C and Fortran use it, in process and with a real server.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+#include "support/temporary_folder.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+Ran RunFile(const std::string& name, const std::vector<std::string>& arguments) {
+  Program program(name, arguments);
+  const int exit_code = program.Wait();
+  return {exit_code, program.Out(), program.Error()};
+}
+
+// The last two words of each line, of which the first has the digest of rings.
+std::vector<std::string> DigestsOf(const std::string& text) {
+  std::vector<std::string> digests;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    for (char& letter : line) letter = static_cast<char>(std::tolower(letter));
+    digests.push_back(line.size() < 33 ? line : line.substr(line.size() - 33));
+  }
+  return digests;
+}
+
+// What `partiemc replay` makes of the particles of the examples.
+std::vector<std::string> DigestsOfReplay() {
+  const support::TemporaryFolder folder;
+  for (int step = 0; step < 5; ++step) {
+    std::ofstream file(folder.Path("frame_" + std::to_string(step) + ".csv"));
+    file.precision(17);
+    file << "x,y\n";
+    for (int k = 0; k < 800; ++k) {
+      const int column = k % 20, row = k / 20;
+      file << 0.01 * column + 0.002 * step * (40 - row) / 16 << ',' << 0.01 * row << '\n';
+    }
+  }
+  const Ran ran = RunPartiemc({"replay", folder.Path("frame_*.csv"), "--local", "--spacing", "0.01",
+                               "--stats", folder.Path("statistics.csv")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  std::ifstream file(folder.Path("statistics.csv"));
+  const auto cells = [&file] {
+    std::string line, cell;
+    std::getline(file, line);
+    std::vector<std::string> found;
+    for (std::istringstream row(line); std::getline(row, cell, ',');) found.push_back(cell);
+    return found;
+  };
+  const std::vector<std::string> header = cells();
+  const auto column = [&header](const std::string& name) {
+    return static_cast<std::size_t>(std::ranges::find(header, name) - header.begin());
+  };
+  std::vector<std::string> digests;
+  for (auto row = cells(); row.size() > column("mesh_digest"); row = cells()) {
+    digests.push_back(row[column("rings_digest")] + " " + row[column("mesh_digest")]);
+  }
+  return digests;
+}
+
+TEST(CInterface, EveryCallDoesWhatTheHeaderSaysInProcess) {
+  const Ran ran = RunFile(C_CALLS, {});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(ran.out, "all is as the header says\n");
+}
+
+TEST(CInterface, EveryCallDoesWhatTheHeaderSaysWithAServer) {
+  const ServerProgram server;
+  const Ran ran = RunFile(C_CALLS, {server.address()});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(ran.out, "all is as the header says\n");
+}
+
+TEST(CInterface, TheExampleGivesTheDigestsOfReplay) {
+  const std::vector<std::string> expected = DigestsOfReplay();
+  EXPECT_THAT(expected, SizeIs(5));
+  const Ran local = RunFile(C_EXAMPLE, {});
+  EXPECT_EQ(local.exit_code, 0) << local.error;
+  EXPECT_EQ(DigestsOf(local.out), expected);
+  const ServerProgram server;
+  const Ran remote = RunFile(C_EXAMPLE, {server.address()});
+  EXPECT_EQ(remote.out, local.out);
+
+  const Ran nowhere = RunFile(C_EXAMPLE, {"unix:/nowhere.sock"});
+  EXPECT_EQ(nowhere.exit_code, 14);  // UNAVAILABLE.
+  EXPECT_THAT(nowhere.error, HasSubstr("/nowhere.sock"));
+}
+
+TEST(CInterface, TheExampleInFortranGivesTheDigestsOfReplay) {
+  if (std::string(FORTRAN_EXAMPLE).empty()) {
+    GTEST_SKIP() << "NOT TESTED: there is no Fortran compiler (Debian: gfortran)";
+  }
+  const Ran ran = RunFile(FORTRAN_EXAMPLE, {});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(DigestsOf(ran.out), DigestsOfReplay());
+}
+
+TEST(CInterface, TheLibraryShowsItsFunctionsAndNothingElse) {
+  const Ran ran = RunFile("/usr/bin/nm", {"--dynamic", "--defined-only", "--format=just-symbols",
+                                          "--without-symbol-versions", C_LIBRARY});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  std::vector<std::string> symbols;
+  std::istringstream lines(ran.out);
+  for (std::string line; std::getline(lines, line);) {
+    if (line != "PARTIEMC_1") symbols.push_back(line);  // The version itself.
+  }
+  EXPECT_THAT(symbols, SizeIs(17));
+  EXPECT_THAT(symbols, Each(StartsWith("partiemc_")));
+  const Ran dynamic = RunFile("/usr/bin/readelf", {"--dynamic", C_LIBRARY});
+  EXPECT_THAT(dynamic.out, HasSubstr("soname: [libpartiemc_c.so.1]"));
+  EXPECT_THAT(dynamic.out, testing::Not(HasSubstr("libpartiemc_client")));
+}
+
+}  // namespace
+}  // namespace partiemc::client

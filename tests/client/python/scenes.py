@@ -1,0 +1,63 @@
+"""Particles, servers and the command line, for the tests of the Python package."""
+
+import csv
+import os
+import pathlib
+import subprocess
+import tempfile
+import time
+
+import numpy
+
+
+def block(shift=0.0, side=30, dtype=numpy.float64):
+    """A block of particles with a hole, spacing 1, `shift` to the right: (N, 2)."""
+    rows, columns = numpy.divmod(numpy.arange(side * side), side)
+    inside = (abs(2 * rows - side) * 3 >= side) | (abs(2 * columns - side) * 3 >= side)
+    return numpy.stack([columns[inside] + shift, rows[inside]], axis=1).astype(dtype)
+
+
+def digests(result):
+    return f"{result.rings_digest:016x} {result.mesh_digest:016x}"
+
+
+def digests_of_replay(frames, spacing=1.0):
+    """What `partiemc replay` makes of the same frames."""
+    with tempfile.TemporaryDirectory() as folder:
+        for k, frame in enumerate(frames):
+            numpy.save(f"{folder}/frame_{k:03}.npy", frame)
+        subprocess.run([os.environ["PARTIEMC_PROGRAM"], "replay", f"{folder}/frame_*.npy", "--local",
+                        "--spacing", str(spacing), "--stats", f"{folder}/statistics.csv"],
+                       check=True, capture_output=True)
+        with open(f"{folder}/statistics.csv", newline="") as file:
+            return [f"{row['rings_digest']} {row['mesh_digest']}" for row in csv.DictReader(file)]
+
+
+class Server:
+    """partiemc-server on a socket of its own, for `with`."""
+
+    def __enter__(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.address = f"unix:{self.folder.name}/server.sock"
+        program = os.environ["PARTIEMC_SERVER_PROGRAM"]
+        self.process = subprocess.Popen([program, "--address", self.address],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for _ in range(300):
+            ready = subprocess.run([program, "--address", self.address, "--health-check"],
+                                   capture_output=True)
+            if ready.returncode == 0:
+                return self
+            time.sleep(0.1)
+        self.__exit__()
+        raise RuntimeError("the server does not come up")
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+        self.folder.cleanup()
+
+
+def readme():
+    """The script of client/python/README.md."""
+    text = pathlib.Path(os.environ["PARTIEMC_SOURCE_DIR"], "client/python/README.md").read_text()
+    return text.split("```python\n")[1].split("```")[0]

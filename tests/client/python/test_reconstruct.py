@@ -1,0 +1,284 @@
+"""The core in this process: arrays in, views out."""
+
+import gc
+import pickle
+import subprocess
+import sys
+import threading
+import tracemalloc
+import unittest
+
+import numpy
+import partiemc
+
+from scenes import block, digests, digests_of_replay
+
+
+class Layouts(unittest.TestCase):
+    def test_every_layout_gives_the_digests_of_replay(self):
+        for dtype in (numpy.float32, numpy.float64):
+            particles = block(0.25, dtype=dtype)
+            expected, = digests_of_replay([particles])
+            wide = numpy.zeros((len(particles), 7), dtype)
+            wide[:, 3:5] = particles
+            record = numpy.zeros(len(particles), [("kind", "i1"), ("x", dtype), ("y", dtype)])
+            record["x"], record["y"] = particles.T  # Packed: nothing is aligned.
+            spatial = numpy.insert(particles, 1, 5, axis=1)
+            layouts = {
+                "contiguous": particles,
+                "columns of a table": wide[:, 3:5],
+                "Fortran's order": numpy.asfortranarray(particles),
+                "tuple": (particles[:, 0].copy(), particles[:, 1].copy()),
+                "fields of a record": (record["x"], record["y"]),
+                "reversed twice": particles[::-1].copy()[::-1],
+                "read only": numpy.frombuffer(particles.tobytes(), dtype).reshape(-1, 2),
+                "another order of bytes": particles.astype(particles.dtype.newbyteorder()),
+            }
+            for name, positions in layouts.items():
+                with self.subTest(layout=name, dtype=dtype):
+                    result = partiemc.reconstruct(positions, spacing=1)
+                    self.assertEqual(digests(result), expected)
+            result = partiemc.reconstruct(spatial, spacing=1, plane="xz")
+            self.assertEqual(digests(result), expected)
+        self.assertEqual(digests(partiemc.reconstruct(block().tolist(), spacing=1)),
+                         digests(partiemc.reconstruct(block(), spacing=1)))
+        self.assertEqual(digests(partiemc.reconstruct(block().astype(int), spacing=1)),
+                         digests(partiemc.reconstruct(block(), spacing=1)))
+
+    def test_a_sequence_gives_the_digests_of_replay(self):
+        frames = [block(0.3 * k) for k in range(8)]
+        sequence = partiemc.Reconstructor(spacing=1, threads=2)
+        results = [sequence.reconstruct(frame) for frame in frames]
+        self.assertEqual([digests(result) for result in results], digests_of_replay(frames))
+        self.assertEqual([result.sequence for result in results], list(range(1, 9)))
+        self.assertEqual([result.time for result in results], list(range(8)))
+        first = results[0].rings.identities
+        self.assertTrue(all((result.rings.identities == first).all() for result in results))
+        self.assertEqual(results[1].rings.parents.tolist(), first.tolist())
+        sequence.reset()
+        self.assertEqual(digests(sequence.reconstruct(frames[0])), digests(results[0]))
+
+    def test_what_goes_along_counts(self):
+        # A drop that leaps over a body: ids and velocities tell that it is the same.
+        def leap(frame):
+            drop = numpy.array([[60.0 * frame + k % 4, 40 + k // 4] for k in range(16)])
+            return numpy.concatenate([block(side=20), drop])
+
+        for velocity_dtype in (numpy.float32, numpy.float64):
+            for id_dtype in (numpy.int32, numpy.uint32, numpy.int64, numpy.uint64):
+                sequence = partiemc.Reconstructor(spacing=1)
+                ids = numpy.arange(len(leap(0)), dtype=id_dtype)
+                velocities = numpy.zeros((len(ids), 2), velocity_dtype)
+                velocities[-16:, 0] = 60
+                found = []
+                for frame in range(2):
+                    result = sequence.reconstruct(leap(frame), frame, ids=ids,
+                                                  velocities=velocities)
+                    drop = numpy.argmax(result.rings.centroids[:, 1])
+                    found.append(int(result.rings.identities[drop]))
+                self.assertEqual(found[0], found[1])
+        heavy = partiemc.reconstruct(block(), spacing=1, volumes=numpy.full(len(block()), 1.2))
+        self.assertGreater(heavy.area, partiemc.reconstruct(block(), spacing=1).area)
+
+
+class Results(unittest.TestCase):
+    def setUp(self):
+        self.result = partiemc.reconstruct(block(), spacing=1)
+
+    def test_shapes_and_values_are_as_documented(self):
+        rings, mesh = self.result.rings, self.result.mesh
+        self.assertEqual(len(rings), 2)
+        points = int(rings.offsets[-1])
+        shapes = {"points": (points, 2), "offsets": (3,), "outer_of": (2,), "normals": (points, 2),
+                  "area": (2,), "perimeter": (2,), "centroids": (2, 2), "particle_counts": (2,),
+                  "identities": (2,), "parents": (0,), "parent_offsets": (3,)}
+        for name, shape in shapes.items():
+            self.assertEqual(getattr(rings, name).shape, shape, name)
+        self.assertEqual(mesh.points.shape[1], 2)
+        self.assertEqual(mesh.triangles.shape, (len(mesh), 3))
+        self.assertEqual(mesh.classes.shape, (len(mesh),))
+        self.assertEqual(sorted(rings.outer_of.tolist()), [-1, int(numpy.argmax(rings.area))])
+        self.assertAlmostEqual(rings.area.sum(), self.result.area)
+        self.assertLess(abs(self.result.area / len(block()) - 1), .02)
+        self.assertEqual(self.result.particle_count, len(block()))
+        self.assertEqual((self.result.spacing, self.result.cell_size), (1, 1))
+        self.assertEqual(self.result.doubts, [])
+        self.assertIn("vertices", self.result.times)
+        corners = mesh.points[mesh.triangles]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        areas = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+        self.assertTrue((areas > 0).all())
+        self.assertAlmostEqual(areas.sum(), self.result.area)
+        self.assertEqual([len(ring) for ring in rings], numpy.diff(rings.offsets).tolist())
+        self.assertTrue((rings[-1] == rings.points[rings.offsets[1]:]).all())
+        with self.assertRaises(IndexError):
+            rings[2]
+
+    def test_arrays_are_views_that_keep_their_result(self):
+        rings = self.result.rings
+        address = rings.points.__array_interface__["data"][0]
+        self.assertEqual(rings.points.__array_interface__["data"][0], address)  # Not made anew.
+        self.assertIs(rings.points.base, self.result)
+        self.assertIs(self.result.mesh.triangles.base, self.result)
+        second = rings[1].__array_interface__["data"][0]
+        self.assertEqual(second, address + 16 * int(rings.offsets[1]))
+        measures = [rings.area, rings.perimeter, rings.identities]
+        starts = [array.__array_interface__["data"][0] for array in measures]
+        self.assertEqual(starts[1] - starts[0], 8)  # Columns of one table.
+        self.assertGreater(measures[0].strides[0], 8)
+        for array in (rings.points, rings.offsets, rings.area, rings[0], self.result.mesh.points):
+            self.assertFalse(array.flags.owndata)
+            with self.assertRaises(ValueError):
+                array[0] = 7
+
+        points, expected = rings.points, rings.points.copy()
+        del rings, measures
+        self.result = None
+        gc.collect()
+        for k in range(20):
+            partiemc.reconstruct(block(k), spacing=1)  # Whatever was freed is written over.
+        self.assertTrue((points == expected).all())
+        self.assertEqual(points.__array_interface__["data"][0], address)
+
+    def test_nothing_of_numpys_is_allocated_for_a_frame(self):
+        wide = numpy.zeros((200_000, 7))
+        wide[:, 0], wide[:, 3] = numpy.divmod(numpy.arange(len(wide)), 400)
+        ids = numpy.arange(2 * len(wide), dtype=numpy.int32)[::2]
+        sequence = partiemc.Reconstructor(spacing=1)
+        tracemalloc.start()
+        try:
+            result = sequence.reconstruct((wide[:, 0], wide[:, 3]), ids=ids)
+            seen = [result.rings.points, result.mesh.points, result.mesh.triangles]
+            _, peak = tracemalloc.get_traced_memory()
+            self.assertLess(peak, 100_000)
+            copy = wide[:, 0].copy()  # What the count sees of a copy.
+            self.assertGreater(tracemalloc.get_traced_memory()[1], copy.nbytes)
+        finally:
+            tracemalloc.stop()
+        self.assertEqual(len(seen), 3)
+
+    def test_no_particles_are_an_empty_result(self):
+        result = partiemc.reconstruct(numpy.zeros((0, 2)), spacing=1)
+        self.assertEqual((len(result.rings), len(result.mesh)), (0, 0))
+        self.assertEqual(result.rings.points.shape, (0, 2))
+        self.assertEqual(result.rings.offsets.tolist(), [0])
+        self.assertTrue(result.to_svg().startswith("<svg"))
+
+    def test_others_take_results(self):
+        try:
+            shapes = self.result.rings.to_shapely()
+        except ImportError:
+            self.skipTest("NOT TESTED: there is no shapely (Debian: python3-shapely)")
+        self.assertTrue(shapes.is_valid)
+        self.assertAlmostEqual(shapes.area, self.result.area)
+        self.assertEqual(len(shapes.geoms[0].interiors), 1)
+        self.assertGreater(self.result.to_svg().count("M"), len(self.result.mesh))
+
+    def test_matplotlib_takes_results(self):
+        try:
+            path = self.result.rings.to_path()
+        except ImportError:
+            self.skipTest("NOT TESTED: there is no matplotlib (Debian: python3-matplotlib)")
+        self.assertEqual(len(path.to_polygons()), 2)
+        self.assertEqual(len(self.result.mesh.to_triangulation().triangles), len(self.result.mesh))
+
+    def test_meshio_takes_results(self):
+        try:
+            mesh = self.result.mesh.to_meshio()
+        except ImportError:
+            self.skipTest("NOT TESTED: there is no meshio (Debian: python3-meshio)")
+        self.assertEqual(len(mesh.cells[0].data), len(self.result.mesh))
+
+
+class Errors(unittest.TestCase):
+    def assert_refused(self, reason, field, **arguments):
+        arguments.setdefault("positions", block())
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.reconstruct(**{"spacing": 1, **arguments})
+        error = caught.exception
+        self.assertEqual((error.reason, error.field), (reason, field), str(error))
+        self.assertTrue(error.value and error.rule)
+        for part in (error.field, error.value, error.rule):
+            self.assertIn(part, str(error))
+        return error
+
+    def test_they_tell_what_broke_which_rule(self):
+        spoiled = block()
+        spoiled[17, 0] = numpy.nan
+        error = self.assert_refused("NOT_FINITE", "positions[17].x", positions=spoiled)
+        self.assertEqual((error.value, error.code), ("nan", "INVALID_ARGUMENT"))
+        again = pickle.loads(pickle.dumps(error))
+        self.assertEqual((str(again), again.reason), (str(error), error.reason))
+        count = len(block())
+        self.assert_refused("COUNT", "positions", positions=numpy.zeros((5, 4)))
+        self.assert_refused("COUNT", "positions", positions=numpy.zeros(5))
+        self.assert_refused("COUNT", "positions", positions=(numpy.zeros(5), numpy.zeros(4)))
+        self.assert_refused("COUNT", "positions", positions=(numpy.zeros(5),))
+        self.assert_refused("UNSUPPORTED", "positions", positions=numpy.array([["a", "b"]]))
+        self.assert_refused("COUNT", "positions", positions=object())
+        self.assert_refused("COUNT", "volumes", volumes=numpy.ones(count - 1))
+        self.assert_refused("COUNT", "volumes", volumes=numpy.ones((count, 1)))
+        self.assert_refused("COUNT", "ids", ids=numpy.arange(count + 1))
+        self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count))
+        self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count, numpy.int16))
+        self.assert_refused("DUPLICATE", "ids[1]", ids=numpy.ones(count, int))
+        self.assert_refused("COUNT", "velocities", velocities=numpy.zeros((count, 3)))
+        self.assert_refused("COUNT", "velocities", velocities=numpy.zeros((count - 1, 2)))
+        self.assert_refused("OUT_OF_RANGE", "parameters.spacing", spacing=-1)
+        error = self.assert_refused("UNSUPPORTED", "parameters.fill", fill="mostly")
+        self.assertIn("greedy", error.rule)
+
+    def test_a_refused_frame_leaves_no_trace(self):
+        sequence, untouched = (partiemc.Reconstructor(spacing=1) for _ in range(2))
+        sequence.reconstruct(block())
+        untouched.reconstruct(block())
+        with self.assertRaises(partiemc.Error):
+            sequence.reconstruct(numpy.full((3, 2), numpy.inf))
+        results = [each.reconstruct(block(0.3)) for each in (sequence, untouched)]
+        self.assertEqual(digests(results[0]), digests(results[1]))
+        self.assertEqual(results[0].sequence, 2)
+
+    def test_unknown_names_are_told(self):
+        with self.assertRaisesRegex(TypeError, "spaceing"):
+            partiemc.reconstruct(block(), spaceing=1)
+        with self.assertRaisesRegex(TypeError, "spacing"):
+            partiemc.reconstruct(block(), spacing="wide")
+
+
+class Threads(unittest.TestCase):
+    def test_others_run_while_a_frame_is_computed(self):
+        sequence = partiemc.Reconstructor(spacing=1)
+        particles = block(side=500)
+        done = threading.Event()
+        worker = threading.Thread(target=lambda: (sequence.reconstruct(particles), done.set()))
+        worker.start()
+        turns = 0
+        while not done.is_set():
+            turns += 1
+            done.wait(0.001)
+        worker.join()
+        self.assertGreater(turns, 5)  # One, where the GIL is held.
+
+    def test_many_threads_get_the_same_bits(self):
+        expected = digests(partiemc.reconstruct(block(side=60), spacing=1))
+        found = []
+        workers = [threading.Thread(target=lambda: found.append(
+            digests(partiemc.reconstruct(block(side=60), spacing=1)))) for _ in range(4)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        self.assertEqual(found, [expected] * 4)
+
+
+class Import(unittest.TestCase):
+    def test_it_takes_no_numpy_and_no_converter(self):
+        script = ("import sys, partiemc\n"
+                  "print([m for m in ('numpy', 'shapely', 'matplotlib', 'meshio')"
+                  " if m in sys.modules])")
+        ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+        self.assertEqual(ran.stdout, "[]\n", ran.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

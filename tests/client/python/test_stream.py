@@ -1,0 +1,201 @@
+"""Streams to a real server."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import tracemalloc
+import unittest
+
+import numpy
+import partiemc
+
+from scenes import Server, block, digests, digests_of_replay, readme
+
+
+class Streams(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server = Server().__enter__()
+        cls.addClassCleanup(cls.server.__exit__)
+        cls.address = cls.server.address
+
+    def test_one_thread_gets_the_digests_of_replay(self):
+        frames = [block(0.3 * k) for k in range(20)]
+        expected = digests_of_replay(frames)
+        with partiemc.connect(self.address, spacing=1, name="one-thread") as stream:
+            self.assertGreater(stream.window, 1)
+            self.assertEqual(stream.parameters["spacing"], 1)
+            results = list(stream.map(frames))
+            self.assertEqual(stream.in_flight, 0)
+        self.assertEqual([digests(result) for result in results], expected)
+        self.assertEqual([result.sequence for result in results], list(range(1, 21)))
+        self.assertEqual([result.time for result in results], list(range(20)))
+        self.assertEqual(results[3].rings.normals.shape, (0, 2))
+
+    def test_two_threads_get_the_same(self):
+        frames = [numpy.asfortranarray(block(0.3 * k)) for k in range(20)]
+        with partiemc.connect(self.address, spacing=1, normals=True) as stream:
+            def send():
+                for k, frame in enumerate(frames):
+                    stream.send(frame, 0.5 * k, ids=numpy.arange(len(frame), dtype=numpy.int32))
+                stream.finish()
+
+            sender = threading.Thread(target=send)
+            sender.start()
+            results = list(stream)
+            sender.join()
+            with self.assertRaises(EOFError):
+                stream.receive()
+        self.assertEqual([digests(result) for result in results], digests_of_replay(frames))
+        self.assertEqual([result.time for result in results], [0.5 * k for k in range(20)])
+        self.assertEqual(results[3].rings.normals.shape, results[3].rings.points.shape)
+        lengths = numpy.hypot(*results[3].rings.normals.T)
+        self.assertLess(abs(lengths - 1).max(), 1e-5)
+
+    def test_sending_allocates_nothing_of_numpys(self):
+        wide = numpy.zeros((300_000, 7))
+        wide[:, 0], wide[:, 3] = numpy.divmod(numpy.arange(len(wide)), 600)
+        with partiemc.connect(self.address, spacing=1) as stream:
+            tracemalloc.start()
+            try:
+                stream.send((wide[:, 0], wide[:, 3]), volumes=numpy.broadcast_to(1.0, len(wide)))
+                result = stream.receive()
+                points = result.mesh.points
+                _, peak = tracemalloc.get_traced_memory()
+            finally:
+                tracemalloc.stop()
+        self.assertLess(peak, 100_000)
+        self.assertIs(points.base, result)
+        expected = partiemc.reconstruct(wide[:, :6:3], spacing=1, volumes=numpy.ones(len(wide)))
+        self.assertEqual(digests(result), digests(expected))
+
+    def test_a_refused_frame_leaves_the_stream_as_it_was(self):
+        with partiemc.connect(self.address, spacing=1) as stream:
+            with self.assertRaises(partiemc.Error) as caught:  # By the client.
+                stream.send(numpy.zeros((5, 4)))
+            self.assertEqual((caught.exception.reason, caught.exception.sequence), ("COUNT", 0))
+            stream.send(numpy.full((3, 2), numpy.nan))
+            with self.assertRaises(partiemc.Error) as caught:  # By the server.
+                stream.receive()
+            self.assertEqual(caught.exception.reason, "NOT_FINITE")
+            self.assertEqual(caught.exception.field, "positions[0].x")
+            self.assertEqual(caught.exception.sequence, 1)
+            stream.send(block())
+            result = stream.receive()
+            self.assertEqual(result.sequence, 2)
+            self.assertIsNone(stream.receive(wait=0))
+            self.assertIsNone(stream.receive(wait=0.01))
+        self.assertEqual(digests(result), digests(partiemc.reconstruct(block(), spacing=1)))
+
+    def test_latest_never_waits_and_the_newest_arrives(self):
+        frames = [block(0.1 * k, side=60) for k in range(60)]
+        with partiemc.connect(self.address, spacing=1, latest=True) as stream:
+            for k, frame in enumerate(frames):
+                passing = frame.copy()
+                self.assertIsNone(stream.send(passing, k))
+                passing[:] = numpy.nan  # It was copied.
+            results = []
+            while not results or results[-1].time < 59:
+                results.append(stream.receive(wait=30))
+            counts = stream.counts
+        self.assertEqual(counts["sent"], len(results))
+        self.assertEqual(counts["sent"] + counts["skipped"], len(frames))
+        self.assertEqual(digests(results[0]), digests(partiemc.reconstruct(frames[int(
+            results[0].time)], spacing=1)))
+
+    def test_frames_that_nobody_receives_arrive_at_the_end_of_with(self):
+        for latest in (False, True):
+            seen = []
+            with partiemc.connect(self.address, spacing=1, name="unheard", latest=latest) as stream:
+                watch = partiemc.watch(self.address, "unheard", mode="every", credits=10)
+                watcher = threading.Thread(target=lambda: seen.extend(watch))
+                watcher.start()
+                for k in range(stream.window):
+                    stream.send(block(0.3 * k))
+            watcher.join()
+            self.assertEqual(watch.end, "FINISHED")
+            self.assertEqual(seen[-1].time, stream.window - 1)
+
+    def test_watchers_see_what_the_producer_gets(self):
+        with partiemc.connect(self.address, spacing=1, name="watched", labels={"run": "7"},
+                              echo_particles=True) as stream:
+            one, = [each for each in partiemc.streams(self.address) if each["name"] == "watched"]
+            self.assertEqual((one["labels"], one["frames"]), ({"run": "7"}, 0))
+            with partiemc.watch(self.address, "watched", mode="every") as watch:
+                self.assertEqual(watch.parameters["spacing"], 1)
+                self.assertIsNone(watch.receive(wait=0.01))
+                for k in range(3):
+                    stream.send(block(0.3 * k), k)
+                    made, seen = stream.receive(), next(watch)
+                    self.assertEqual((digests(seen), seen.time), (digests(made), k))
+                    self.assertTrue((seen.particles == block(0.3 * k)).all())
+                    self.assertIs(seen.particles.base, seen)
+                    self.assertEqual((seen.dropped, seen.gap, seen.rejoined), (0, 0, ""))
+                stream.finish()
+                self.assertEqual(list(watch), [])
+                self.assertEqual(watch.end, "FINISHED")
+
+    def test_what_cannot_be_opened_is_told(self):
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.connect("unix:/nowhere.sock", connect_timeout=0.1)
+        self.assertEqual((caught.exception.code, caught.exception.reason), ("UNAVAILABLE", ""))
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.watch(self.address, "nobody")
+        self.assertEqual(caught.exception.code, "NOT_FOUND")
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.watch(self.address, "nobody", mode="sometimes")
+        self.assertEqual(caught.exception.reason, "UNSUPPORTED")
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.connect(self.address, deadline=-1)
+        self.assertEqual(caught.exception.field, "deadline")
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.connect(self.address, ca_file="/nowhere.pem")
+        self.assertEqual(caught.exception.code, "INVALID_ARGUMENT")
+        with self.assertRaisesRegex(TypeError, "windows"):
+            partiemc.connect(self.address, windows=3)
+        self.assertGreater(partiemc.server(self.address)["max_streams"], 0)
+
+    def test_an_error_in_with_ends_the_stream_at_once(self):
+        with self.assertRaises(ZeroDivisionError):
+            with partiemc.connect(self.address, spacing=1) as stream:
+                stream.send(block())
+                1 / 0
+        with self.assertRaises(partiemc.Error) as caught:
+            stream.send(block())
+        self.assertEqual(caught.exception.code, "CANCELLED")
+
+    def test_ctrl_c_ends_a_wait(self):
+        script = (f"import partiemc, sys\ns = partiemc.connect({self.address!r}, spacing=1)\n"
+                  "print('ready', flush=True)\ns.receive()")
+        waiting = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.assertEqual(waiting.stdout.readline(), "ready\n")
+        waiting.send_signal(2)
+        _, error = waiting.communicate(timeout=60)
+        self.assertIn("KeyboardInterrupt", error)
+
+    def test_the_script_of_the_readme_draws_and_gives_the_digests_of_replay(self):
+        script = readme()
+        self.assertLessEqual(len(script.split("\n\n")[1].splitlines()), 10)
+        frames = [block(0.3 * k) for k in range(6)]
+        with tempfile.TemporaryDirectory() as folder:
+            for k, frame in enumerate(frames):
+                numpy.save(f"{folder}/frame_{k}.npy", frame)
+            files = [f"frame_{k}.npy" for k in range(6)]
+            ran = subprocess.run([sys.executable, "-c", script, self.address, "1", *files],
+                                 cwd=folder, capture_output=True, text=True)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            self.assertEqual(ran.stdout.split("\n")[:-1], digests_of_replay(frames))
+            with open(f"{folder}/outline.svg") as picture:
+                text = picture.read()
+        self.assertEqual(text.count("<path"), 3)
+        self.assertTrue(text.endswith("</svg>\n"))
+        if "PARTIEMC_PICTURES" in os.environ:  # For whoever wants to look at it.
+            with open(os.path.join(os.environ["PARTIEMC_PICTURES"], "readme.svg"), "w") as copy:
+                copy.write(text)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,110 @@
+// What a stream holds for watchers that go back: bounds, order, drops, and the shares of many.
+#include "server/watch/result_history.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "server/memory_watcher.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::size_t kFrameBytes = 1000;
+constexpr std::uint64_t kCost = kFrameBytes + kPublishedBytes;
+
+Published Frame(std::uint64_t number, std::size_t bytes = kFrameBytes) {
+  return {std::make_shared<NumberedFrame>(number, bytes), number, 10 * number};
+}
+
+std::vector<std::uint64_t> NumbersOf(const ResultHistory& history) {
+  std::vector<std::uint64_t> numbers;
+  for (std::size_t k = 0; k < history.size(); ++k) numbers.push_back(history.at(k).number);
+  return numbers;
+}
+
+TEST(ResultHistory, KeepsAsManyOfTheNewestAsFitInTheirOrder) {
+  std::mt19937 random(1);
+  constexpr std::uint64_t kMost = 20'000;
+  HistoryRoom room(kMost, 1'000'000);
+  ResultHistory history(room);
+  std::deque<std::uint64_t> numbers, costs;  // The same, written down plainly.
+  std::uint64_t sum = 0;
+  for (std::uint64_t number = 1; number <= 3000; ++number) {
+    const std::size_t bytes = random() % 8 == 0 ? random() % 40'000 : random() % 3000;
+    history.Add(Frame(number, bytes));
+    numbers.push_back(number), costs.push_back(bytes + kPublishedBytes);
+    sum += costs.back();
+    while (sum > kMost) {
+      sum -= costs.front();
+      numbers.pop_front(), costs.pop_front();
+    }
+    ASSERT_EQ(NumbersOf(history), std::vector<std::uint64_t>(numbers.begin(), numbers.end()));
+    ASSERT_EQ(history.bytes(), sum);
+    ASSERT_EQ(room.held(), sum);
+  }
+}
+
+TEST(ResultHistory, HasNoHole) {
+  HistoryRoom room(100 * kCost, 100 * kCost);
+  ResultHistory history(room);
+  for (const std::uint64_t number : {1, 2, 3, 5}) history.Add(Frame(number));
+  EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{5}));
+  history.Add(Frame(6, 101 * kCost));  // Too large, and what comes after it has a hole before it.
+  EXPECT_TRUE(history.empty());
+  history.Add(Frame(7));
+  EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{7}));
+}
+
+TEST(ResultHistory, ManyHaveEqualSharesAndNeverMoreThanThereIs) {
+  HistoryRoom room(6 * kCost, 12 * kCost);
+  ResultHistory first(room), second(room);
+  EXPECT_FALSE(room.is_scarce());
+  for (std::uint64_t number = 1; number <= 9; ++number) {
+    first.Add(Frame(number));
+    second.Add(Frame(number));
+  }
+  EXPECT_EQ(room.held(), 12 * kCost);
+  {
+    ResultHistory third(room);
+    EXPECT_TRUE(room.is_scarce());
+    EXPECT_EQ(room.share(), 4 * kCost);
+    third.Add(Frame(1));  // The others have not heard of it yet.
+    EXPECT_TRUE(third.empty());
+    EXPECT_EQ(room.held(), 12 * kCost);
+    first.Shrink();
+    EXPECT_EQ(NumbersOf(first), (std::vector<std::uint64_t>{6, 7, 8, 9}));
+    third.Add(Frame(2));
+    third.Add(Frame(3));
+    third.Add(Frame(4));  // The second still has more than its share: in place of an own one.
+    EXPECT_EQ(NumbersOf(third), (std::vector<std::uint64_t>{3, 4}));
+    EXPECT_EQ(room.held(), 12 * kCost);
+    second.Add(Frame(10));
+    EXPECT_EQ(second.size(), 4u);
+  }
+  EXPECT_EQ(room.held(), 8 * kCost);
+  EXPECT_EQ(room.share(), 6 * kCost);
+}
+
+TEST(ResultHistory, FindsTheFirstFromANumberOrASequenceOn) {
+  HistoryRoom room(5 * kCost, 5 * kCost);
+  ResultHistory history(room);
+  EXPECT_EQ(history.FromNumber(0), nullptr);
+  EXPECT_EQ(history.FromSequence(0), nullptr);
+  for (std::uint64_t number = 1; number <= 23; ++number) history.Add(Frame(number));
+  for (std::uint64_t asked = 0; asked <= 22; ++asked) {
+    const std::uint64_t first = std::max<std::uint64_t>(asked, 19);
+    EXPECT_EQ(history.FromNumber(asked)->number, first);
+    EXPECT_EQ(history.FromSequence(10 * asked)->number, first);
+    EXPECT_EQ(history.FromSequence(10 * asked - (asked > 0 ? 3 : 0))->number, first);
+  }
+  EXPECT_EQ(history.FromNumber(24), nullptr);
+  EXPECT_EQ(history.FromSequence(231), nullptr);
+}
+
+}  // namespace
+}  // namespace partiemc::server

@@ -1,0 +1,121 @@
+// What requests to the gateway ask for, and what they must not.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "server/web/requests.h"
+
+namespace partiemc::server {
+namespace {
+
+TEST(FilePathOf, NamesAFileBelowTheFolderOrNothing) {
+  EXPECT_EQ(FilePathOf("/"), "index.html");
+  EXPECT_EQ(FilePathOf("/?stream=tank"), "index.html");
+  EXPECT_EQ(FilePathOf("/assets/app-1.2.js"), "assets/app-1.2.js");
+  EXPECT_EQ(FilePathOf("/assets%2Fapp.js"), "assets/app.js");
+  for (const char* target :
+       {"", "x", "/..", "/a/../b", "/a/./b", "/.a", "/a//b", "/a/", "//a", "/%2e%2e/a", "/a%00",
+        "/%", "/%4", "/%zz", "/a b", "/a\\b", "/a:b", "/*", "http://a/b"}) {
+    EXPECT_EQ(FilePathOf(target), std::nullopt) << target;
+  }
+  EXPECT_EQ(FilePathOf("/" + std::string(2000, 'a')), std::nullopt);
+}
+
+TEST(DecodeBase64Url, TakesOneWayOfWritingOnly) {
+  EXPECT_EQ(DecodeBase64Url(""), "");
+  EXPECT_EQ(DecodeBase64Url("YQ"), "a");
+  EXPECT_EQ(DecodeBase64Url("YWI"), "ab");
+  EXPECT_EQ(DecodeBase64Url("YWJj"), "abc");
+  EXPECT_EQ(DecodeBase64Url("-_-_"), "\xfb\xff\xbf");
+  for (const char* text : {"Y", "YQ==", "YR", "YWJ", "+/+/", "YW Jj", "YWJjZ"}) {
+    EXPECT_EQ(DecodeBase64Url(text), std::nullopt) << text;
+  }
+}
+
+TEST(ParseProtocols, FindsOursAndTheToken) {
+  EXPECT_TRUE(ParseProtocols({"partiemc.v1"}).ours);
+  EXPECT_TRUE(ParseProtocols({"chat", " partiemc.v1 ,x"}).ours);
+  EXPECT_FALSE(ParseProtocols({"partiemc.v10", "PARTIEMC.V1"}).ours);
+  EXPECT_FALSE(ParseProtocols({}).ours);
+  const auto offered = ParseProtocols({"partiemc.v1, bearer.YWJj"});
+  EXPECT_EQ(offered.tokens, std::vector<std::string>{"abc"});
+  EXPECT_FALSE(offered.is_malformed);
+  EXPECT_TRUE(ParseProtocols({"partiemc.v1, bearer."}).is_malformed);
+  EXPECT_TRUE(ParseProtocols({"partiemc.v1, bearer.Y"}).is_malformed);
+  EXPECT_TRUE(ParseProtocols({"bearer.YWJj", "bearer.YWJj"}).is_malformed);
+}
+
+TEST(AcceptsGzip, LooksAtItsWeight) {
+  for (const char* header : {"gzip", "br, GZIP", "gzip;q=0.1", "gzip; q=1.0, br"}) {
+    EXPECT_TRUE(AcceptsGzip(header)) << header;
+  }
+  for (const char* header : {"", "br", "gzip;q=0", "gzip; q=0.000", "xgzip", "*"}) {
+    EXPECT_FALSE(AcceptsGzip(header)) << header;
+  }
+}
+
+TEST(NormalOrigin, HasOneForm) {
+  EXPECT_EQ(*NormalOrigin("HTTPS://Viewer.Example:443"), "https://viewer.example");
+  EXPECT_EQ(*NormalOrigin("http://localhost:8080"), "http://localhost:8080");
+  EXPECT_EQ(*NormalOrigin("http://[::1]:80"), "http://[::1]");
+  for (const char* origin :
+       {"", "null", "http://", "ftp://a", "http://a/", "http://a:", "http://a:b", "http://a:123456",
+        "http://a@b", "http://a b", "http://[::1", "http://::1", "viewer.example", "http://:80"}) {
+    EXPECT_FALSE(NormalOrigin(origin).ok()) << origin;
+  }
+}
+
+TEST(IsOriginAllowed, TakesThePagesOfThisServerAndThoseThatAreNamed) {
+  const WebRules local{.origins = {"https://viewer.example"}, .is_local = true};
+  const WebRules open{.origins = {}, .is_local = false};
+  EXPECT_TRUE(IsOriginAllowed("http://localhost:8080", "localhost:8080", local));
+  EXPECT_TRUE(IsOriginAllowed("http://127.0.0.1:8080", "127.0.0.1:8080", local));
+  EXPECT_TRUE(IsOriginAllowed("http://[::1]:8080", "[::1]:8080", local));
+  EXPECT_TRUE(IsOriginAllowed("http://lab.localhost", "lab.localhost:80", local));
+  EXPECT_TRUE(IsOriginAllowed("https://viewer.example", "127.0.0.1:8080", local));
+  EXPECT_TRUE(IsOriginAllowed("https://lab.example", "lab.example", open));
+  EXPECT_FALSE(IsOriginAllowed("http://lab.example:8080", "lab.example:8080", local));
+  EXPECT_FALSE(IsOriginAllowed("http://localhost:8081", "localhost:8080", local));
+  EXPECT_FALSE(IsOriginAllowed("http://localhost.evil.example", "localhost", open));
+  EXPECT_FALSE(IsOriginAllowed("http://evil.example", "lab.example", open));
+  EXPECT_FALSE(IsOriginAllowed("null", "null", open));
+  EXPECT_FALSE(IsOriginAllowed("", "", open));
+}
+
+TEST(Understand, KnowsWhatIsAskedFor) {
+  WebRequest request{.method = "GET", .target = "/v1/watch", .hosts = {"localhost"}};
+  const auto refused = [&] {
+    return std::get<WebRefused>(Understand(request, {}).what).http_status;
+  };
+  EXPECT_EQ(refused(), 426u);
+  request.is_upgrade = true;
+  EXPECT_EQ(refused(), 400u);
+  request.protocols = {"partiemc.v1"};
+  request.authorizations = {"Bearer abc"};
+  const WebCall call = std::get<WebCall>(Understand(request, {}).what);
+  EXPECT_EQ(call.method, WebMethod::kWatch);
+  EXPECT_EQ(call.authorization, "Bearer abc");
+  EXPECT_FALSE(call.from_page);
+  request.protocols = {"partiemc.v1, bearer.YWJj"};
+  EXPECT_EQ(std::get<WebCall>(Understand(request, {}).what).authorization, std::nullopt);
+  request.authorizations = {};
+  EXPECT_EQ(std::get<WebCall>(Understand(request, {}).what).authorization, "Bearer abc");
+  request.origins = {"http://evil.example"};
+  EXPECT_EQ(refused(), 403u);
+  request.origins = {"http://localhost"};
+  EXPECT_TRUE(std::get<WebCall>(Understand(request, {}).what).from_page);
+  request.method = "POST";
+  EXPECT_EQ(refused(), 405u);
+  request.target = "/v1/frame";
+  EXPECT_EQ(refused(), 415u);
+  request.content_type = "Application/X-Protobuf; messageType=x";
+  const WebAnswer post = Understand(request, {});
+  EXPECT_EQ(std::get<WebCall>(post.what).method, WebMethod::kFrame);
+  EXPECT_EQ(post.allowed_origin, "http://localhost");
+  request.hosts = {"localhost", "localhost"};
+  EXPECT_EQ(refused(), 400u);
+}
+
+}  // namespace
+}  // namespace partiemc::server
