@@ -50,7 +50,7 @@ export class BareChromium {
   async close() {
     this.child.kill();
     await once(this.child, 'exit');
-    rmSync(this.#profile, { recursive: true, force: true, maxRetries: 5 });
+    rmSync(this.#profile, { recursive: true, force: true, maxRetries: 20 });
   }
 
   #receive(text) {
