@@ -53,7 +53,12 @@ failures=()
 details=$(mktemp)  # What the failed tests wrote.
 trap 'rm -f "$details"' EXIT
 
-headline() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
+# Seconds since the beginning, and of processor time of what has ended since then.
+headline() {
+  local ticks
+  ticks=$(awk '{ sub(/.*\) /, ""); print $14 + $15 }' /proc/$$/stat)
+  printf '\n== %s (%d s, processors %d s)\n' "$1" "$SECONDS" $((ticks / $(getconf CLK_TCK)))
+}
 
 record_failure() {
   failed=$((failed + $1))
