@@ -62,6 +62,22 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   return parameters;
 }
 
+// What is not given is that of the environment.
+client::Credentials CredentialsOf(const partiemc_options& options) {
+  client::Credentials result = client::CredentialsFromEnvironment();
+  const auto take = [](const char* text, std::string& value) {
+    if (text != nullptr) value = text;
+  };
+  take(options.ca_file, result.ca_file);
+  take(options.cert_file, result.cert_file);
+  take(options.key_file, result.key_file);
+  if (options.token_file != nullptr) result.token.clear();
+  take(options.token_file, result.token_file);
+  take(options.token, result.token);
+  result.tls |= options.tls != 0;
+  return result;
+}
+
 client::StreamOptions StreamOptionsOf(const partiemc_options& options,
                                       const ReconstructionParameters& parameters) {
   client::StreamOptions result;
@@ -70,16 +86,12 @@ client::StreamOptions StreamOptionsOf(const partiemc_options& options,
   result.outputs = {.mesh = parameters.fill != Fill::kNone,
                     .normals = options.normals != 0,
                     .echo_particles = options.echo_particles != 0};
-  result.credentials = {.tls = options.tls != 0,
-                        .ca_file = Text(options.ca_file),
-                        .cert_file = Text(options.cert_file),
-                        .key_file = Text(options.key_file),
-                        .token = Text(options.token),
-                        .token_file = Text(options.token_file)};
+  result.credentials = CredentialsOf(options);
   result.connect_timeout = Milliseconds(options.connect_timeout, result.connect_timeout);
   result.deadline = Milliseconds(options.deadline, result.deadline);
   auto& give_up_after = result.reconnect.give_up_after;
   give_up_after = Milliseconds(options.give_up_after, give_up_after);
+  if (options.send_timeout > 0) result.send_timeout = Milliseconds(options.send_timeout, {});
   return result;
 }
 
@@ -91,7 +103,8 @@ absl::Status Open(const char* address, const partiemc_options& options, partiemc
     if (!stream.ok()) return stream.status();
     opened.stream = *std::move(stream);
   } else {
-    auto stream = Stream::Open(address, StreamOptionsOf(options, *parameters));
+    auto stream = Stream::Open(*address == '\0' ? client::ServerFromEnvironment() : address,
+                               StreamOptionsOf(options, *parameters));
     if (!stream.ok()) return stream.status();
     opened.stream = *std::move(stream);
   }

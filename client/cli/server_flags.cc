@@ -8,10 +8,12 @@ namespace partiemc::client {
 
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group) {
   Credentials& credentials = flags.credentials;
-  CLI::Option* server = app.add_option("--server", flags.address, "Server: HOST:PORT or unix:PATH")
-                            ->type_name("ADDRESS")
-                            ->capture_default_str()
-                            ->group(group);
+  CLI::Option* server =
+      app.add_option("--server", flags.address,
+                     "Server: HOST:PORT or unix:PATH; PARTIEMC_SERVER names another default")
+          ->type_name("ADDRESS")
+          ->capture_default_str()
+          ->group(group);
   app.add_flag("--tls", credentials.tls,
                "Speak TLS, and only to a server whose certificate is for that host")
       ->envname("PARTIEMC_TLS")

@@ -14,7 +14,7 @@ class Option;
 namespace partiemc::client {
 
 struct ServerFlags {
-  std::string address = "127.0.0.1:50051";
+  std::string address = ServerFromEnvironment();
   Credentials credentials;
 };
 

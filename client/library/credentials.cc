@@ -1,6 +1,7 @@
 #include "client/library/credentials.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string_view>
@@ -85,6 +86,11 @@ class TokenSenderFactory final : public experimental::ClientInterceptorFactoryIn
   const Credentials credentials_;
 };
 
+std::string Variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials(
@@ -127,6 +133,25 @@ absl::StatusOr<std::unique_ptr<experimental::ClientInterceptorFactoryInterface>>
   }
   sender = std::make_unique<TokenSenderFactory>(credentials);
   return sender;
+}
+
+Credentials CredentialsFromEnvironment() {
+  Credentials credentials{.ca_file = Variable("PARTIEMC_TLS_CA"),
+                          .cert_file = Variable("PARTIEMC_TLS_CERT"),
+                          .key_file = Variable("PARTIEMC_TLS_KEY"),
+                          .token = Variable("PARTIEMC_TOKEN"),
+                          .token_file = Variable("PARTIEMC_TOKEN_FILE")};
+  // What is no clear no, is taken for the safer side.
+  constexpr std::string_view kNo[] = {"", "0", "false", "no", "off", "n", "f", "disable"};
+  credentials.tls = !std::ranges::count(kNo, absl::AsciiStrToLower(Variable("PARTIEMC_TLS"))) ||
+                    !credentials.ca_file.empty() || !credentials.cert_file.empty() ||
+                    !credentials.key_file.empty();
+  return credentials;
+}
+
+std::string ServerFromEnvironment() {
+  std::string address = Variable("PARTIEMC_SERVER");
+  return address.empty() ? "127.0.0.1:50051" : address;
 }
 
 }  // namespace partiemc::client

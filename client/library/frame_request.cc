@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "client/library/channel.h"
 #include "partiemc/status.h"
 #include "wire/message_bytes.h"
 
@@ -40,6 +41,16 @@ absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const wire::FrameRows& frame
                            .rule = absl::StrCat("the server takes at most ", limit)});
   }
   return request.ToBytes();
+}
+
+absl::Status SendTimeout(std::chrono::milliseconds timeout) {
+  return ViolationError(
+      absl::StatusCode::kDeadlineExceeded,
+      {.reason = "SEND_TIMEOUT",
+       .field = "frame",
+       .value = "not sent",
+       .rule = absl::StrCat("gets a place in the window within ", Seconds(timeout),
+                            "; send it again, or a later one")});
 }
 
 }  // namespace partiemc::client

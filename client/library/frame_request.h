@@ -3,6 +3,7 @@
 
 #include <grpcpp/support/byte_buffer.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 
@@ -21,5 +22,8 @@ absl::Status CheckParticleCount(std::size_t particles, const StreamLimits& limit
 absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const wire::FrameRows& frame,
                                                     std::uint64_t sequence,
                                                     const StreamLimits& limits);
+
+/// Of a frame that got no place in the window within `timeout`: DEADLINE_EXCEEDED with a Violation.
+absl::Status SendTimeout(std::chrono::milliseconds timeout);
 
 }  // namespace partiemc::client

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/library/frame_request.h"
 #include "client/library/gather.h"
 #include "client/library/owned_frame.h"
 #include "common/stage_clock.h"
@@ -24,6 +25,7 @@ class Worker final : public LocalStream {
   Worker(Reconstructor reconstructor, const LocalStreamOptions& options)
       : reconstructor_(std::move(reconstructor)),
         attributes_(options.attributes),
+        send_timeout_(options.send_timeout),
         arena_(static_cast<unsigned>(std::max(options.threads, 0))) {
     info_ = {.parameters = reconstructor_.parameters(),
              .frames_in_flight = std::max<std::size_t>(1, options.frames_in_flight),
@@ -60,6 +62,7 @@ class Worker final : public LocalStream {
 
   const Reconstructor reconstructor_;
   const std::vector<std::string> attributes_;
+  const std::optional<std::chrono::milliseconds> send_timeout_;
   StreamInfo info_;
   Arena arena_;
   State state_;                    // Of the worker's thread alone.
@@ -81,8 +84,14 @@ class Worker final : public LocalStream {
 template <typename Particles>
 absl::StatusOr<std::uint64_t> Worker::Submit(const Particles& frame, double time) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock,
-                [this] { return cancelled_ || finished_ || in_flight_ < info_.frames_in_flight; });
+  const auto ready = [this] {
+    return cancelled_ || finished_ || in_flight_ < info_.frames_in_flight;
+  };
+  if (!send_timeout_) {
+    changed_.wait(lock, ready);
+  } else if (!changed_.wait_for(lock, *send_timeout_, ready)) {
+    return SendTimeout(*send_timeout_);
+  }
   if (cancelled_) return absl::CancelledError("the stream was cancelled");
   if (finished_) return absl::FailedPreconditionError("Send after FinishSending");
   OwnedFrame owned;

@@ -29,6 +29,8 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
                  .max_tiles_per_frame = opened.limits().max_tiles_per_frame()}};
 }
 
+constexpr auto kNever = StreamCall::Clock::time_point::max();
+
 // 0 is no limit.
 bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
   return limit == 0 || (former != 0 && limit >= former);
@@ -96,14 +98,15 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendArrays(const ParticleArrays& p
 absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& frame,
                                                        std::size_t particles) {
   if (auto fits = CheckParticleCount(particles, info_.limits); !fits.ok()) return fits;
+  const auto start = Clock::now();
   Lock lock(monitor_.mutex);
-  if (auto ready = WaitToSend(lock, 0); !ready.ok()) return ready;
+  if (auto ready = WaitToSend(lock, start, 0); !ready.ok()) return ready;
   const std::uint64_t sequence = resend_.end();
   lock.unlock();
   auto request = EncodeFrameRequest(frame, sequence, info_.limits);
   if (!request.ok()) return request.status();
   lock.lock();
-  if (auto ready = WaitToSend(lock, request->Length()); !ready.ok()) return ready;
+  if (auto ready = WaitToSend(lock, start, request->Length()); !ready.ok()) return ready;
   if (all_answered()) due_since_ = Clock::now();
   resend_.Add(*request);
   if (call_ != nullptr) call_->Queue(lock, *std::move(request));
@@ -131,8 +134,8 @@ std::optional<absl::Status> ResumingStream::FatalEnd() const {
   return std::move(loss.status);
 }
 
-absl::Status ResumingStream::WaitToSend(Lock& lock, std::uint64_t bytes) {
-  const auto start = Clock::now();
+absl::Status ResumingStream::WaitToSend(Lock& lock, Clock::time_point start, std::uint64_t bytes) {
+  const auto give_up = options_.send_timeout ? start + *options_.send_timeout : kNever;
   for (;;) {
     if (!failure_.ok()) return failure_;
     if (finished_) return absl::FailedPreconditionError("Send after FinishSending");
@@ -141,8 +144,10 @@ absl::Status ResumingStream::WaitToSend(Lock& lock, std::uint64_t bytes) {
     const auto due = (call_ != nullptr ? std::max(start, adopted_at_)
                                        : start + options_.reconnect.give_up_after) +
                      options_.deadline;
-    if (Clock::now() >= due) return Fail(lock, TooSlowToSend());
-    monitor_.changed.wait_until(lock, due);
+    const auto now = Clock::now();
+    if (now >= due) return Fail(lock, TooSlowToSend());
+    if (now >= give_up) return SendTimeout(*options_.send_timeout);
+    monitor_.changed.wait_until(lock, std::min(due, give_up));
   }
   if (resend_.bytes() + bytes <= options_.max_held_bytes) return absl::OkStatus();
   return ViolationError(

@@ -66,7 +66,7 @@ class ResumingStream final : public Stream {
   // Of any thread:
   absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles);
   absl::Status Fail(Lock& lock, absl::Status failure);
-  absl::Status WaitToSend(Lock& lock, std::uint64_t bytes);
+  absl::Status WaitToSend(Lock& lock, Clock::time_point start, std::uint64_t bytes);
   bool MaySend(std::uint64_t bytes) const;
   absl::Status TooSlowToSend() const;
   std::optional<absl::Status> FatalEnd() const;

@@ -61,6 +61,14 @@ void TakeTime(py::dict& arguments, const char* name, std::chrono::milliseconds& 
   }
 }
 
+void TakeTime(py::dict& arguments, const char* name,
+              std::optional<std::chrono::milliseconds>& time) {
+  if (!arguments.contains(name)) return;
+  std::chrono::milliseconds given{0};
+  TakeTime(arguments, name, given);
+  time = given;
+}
+
 }  // namespace
 
 ReconstructionParameters TakeParameters(py::dict arguments) {
@@ -82,13 +90,14 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
 }
 
 client::Credentials TakeCredentials(py::dict arguments) {
-  client::Credentials credentials;
+  client::Credentials credentials = client::CredentialsFromEnvironment();
   TakeInto(arguments, "ca_file", credentials.ca_file);
   TakeInto(arguments, "cert_file", credentials.cert_file);
   TakeInto(arguments, "key_file", credentials.key_file);
+  if (arguments.contains("token_file")) credentials.token.clear();  // That of the environment.
   TakeInto(arguments, "token", credentials.token);
   TakeInto(arguments, "token_file", credentials.token_file);
-  credentials.tls = !credentials.ca_file.empty() || !credentials.cert_file.empty();
+  credentials.tls |= !credentials.ca_file.empty() || !credentials.cert_file.empty();
   TakeInto(arguments, "tls", credentials.tls);
   return credentials;
 }
@@ -108,6 +117,7 @@ client::StreamOptions TakeStreamOptions(py::dict arguments) {
   TakeTime(arguments, "connect_timeout", options.connect_timeout);
   TakeTime(arguments, "deadline", options.deadline);
   TakeTime(arguments, "give_up_after", options.reconnect.give_up_after);
+  TakeTime(arguments, "send_timeout", options.send_timeout);
   return options;
 }
 

@@ -64,6 +64,10 @@ absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
   }
 }
 
+std::string AddressOf(const std::optional<std::string>& address) {
+  return address ? *address : client::ServerFromEnvironment();
+}
+
 [[noreturn]] void RaiseEnd() {
   PyErr_SetString(PyExc_EOFError, "the stream has ended: every frame has been answered");
   throw py::error_already_set();
@@ -71,13 +75,13 @@ absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
 
 class ProducerStream {
  public:
-  ProducerStream(const std::string& address, bool latest, py::dict arguments) {
+  ProducerStream(const std::optional<std::string>& address, bool latest, py::dict arguments) {
     const client::StreamOptions options = TakeStreamOptions(arguments);
     ExpectNothingElse(arguments, "connect");
     absl::StatusOr<std::unique_ptr<client::Stream>> stream = nullptr;
     {
       const py::gil_scoped_release others_may_run;
-      stream = client::Stream::Open(address, options);
+      stream = client::Stream::Open(AddressOf(address), options);
     }
     RaiseUnlessOk(stream.status());
     stream_ = *std::move(stream);
@@ -205,13 +209,13 @@ class ProducerStream {
 
 class Watch {
  public:
-  Watch(const std::string& address, const std::string& name, py::dict arguments) {
+  Watch(const std::optional<std::string>& address, const std::string& name, py::dict arguments) {
     const client::WatcherOptions options = TakeWatcherOptions(arguments);
     ExpectNothingElse(arguments, "watch");
     absl::StatusOr<std::unique_ptr<client::Watcher>> watcher = nullptr;
     {
       const py::gil_scoped_release others_may_run;
-      watcher = client::Watcher::Open(address, name, options);
+      watcher = client::Watcher::Open(AddressOf(address), name, options);
     }
     RaiseUnlessOk(watcher.status());
     watcher_ = *std::move(watcher);
@@ -270,13 +274,13 @@ class Watch {
   std::timed_mutex receiving_;  // One thread at a time.
 };
 
-py::list Streams(const std::string& address, const py::kwargs& arguments) {
+py::list Streams(const std::optional<std::string>& address, const py::kwargs& arguments) {
   const client::Credentials credentials = TakeCredentials(arguments);
   ExpectNothingElse(arguments, "streams");
   absl::StatusOr<std::vector<client::StreamSummary>> streams;
   {
     const py::gil_scoped_release others_may_run;
-    streams = client::ListStreams(address, std::chrono::seconds(5), credentials);
+    streams = client::ListStreams(AddressOf(address), std::chrono::seconds(5), credentials);
   }
   RaiseUnlessOk(streams.status());
   using namespace py::literals;
@@ -291,13 +295,13 @@ py::list Streams(const std::string& address, const py::kwargs& arguments) {
   return list;
 }
 
-py::dict Server(const std::string& address, const py::kwargs& arguments) {
+py::dict Server(const std::optional<std::string>& address, const py::kwargs& arguments) {
   const client::Credentials credentials = TakeCredentials(arguments);
   ExpectNothingElse(arguments, "server");
   absl::StatusOr<client::ServerInfo> info;
   {
     const py::gil_scoped_release others_may_run;
-    info = client::GetServerInfo(address, std::chrono::seconds(5), credentials);
+    info = client::GetServerInfo(AddressOf(address), std::chrono::seconds(5), credentials);
   }
   RaiseUnlessOk(info.status());
   using namespace py::literals;
@@ -318,7 +322,7 @@ void DefineStreams(py::module_& module) {
       module, "Stream",
       "Frames to a server, answers back: made by partiemc.connect. One thread may send while "
       "another one receives. It outlives lost connections; no frame is lost or comes twice.")
-      .def(py::init<const std::string&, bool, py::dict>())
+      .def(py::init<const std::optional<std::string>&, bool, py::dict>())
       .def("send", &ProducerStream::Send, "positions"_a, "time"_a = py::none(), py::kw_only(),
            "volumes"_a = py::none(), "ids"_a = py::none(), "velocities"_a = py::none(),
            "Sends a frame and returns its number. The arrays (see partiemc.reconstruct) are copied "
@@ -356,7 +360,7 @@ void DefineStreams(py::module_& module) {
                              "With latest=True: frames 'sent', 'skipped', 'refused'.");
   py::class_<Watch>(module, "Watch",
                     "An iterator over somebody else's results: made by partiemc.watch.")
-      .def(py::init<const std::string&, const std::string&, py::dict>())
+      .def(py::init<const std::optional<std::string>&, const std::string&, py::dict>())
       .def("receive", &Watch::Receive, "wait"_a = py::none(),
            "The next Result; None where nothing has come within `wait` seconds. EOFError at the "
            "end of the stream, partiemc.Error when the watch was lost.")
@@ -367,8 +371,9 @@ void DefineStreams(py::module_& module) {
       .def("__exit__", [](Watch& watch, const py::args&) { watch.Cancel(); })
       .def_property_readonly("parameters", &Watch::Parameters, "Of the stream, by name.")
       .def_property_readonly("end", &Watch::End, "Why it ended: 'FINISHED', 'PRODUCER_LOST', ...");
-  module.def("streams", &Streams, "address"_a, "The streams that are open on a server: dicts.");
-  module.def("server", &Server, "address"_a, "What a server is and allows: a dict.");
+  module.def("streams", &Streams, "address"_a = py::none(),
+             "The streams that are open on a server: dicts.");
+  module.def("server", &Server, "address"_a = py::none(), "What a server is and allows: a dict.");
 }
 
 }  // namespace partiemc::python

@@ -48,16 +48,19 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, **paramet
                                                    velocities=velocities)
 
 
-def connect(address, *, latest=False, **options):
+def connect(address=None, *, latest=False, **options):
     """Opens a Stream to the server at HOST:PORT, [IPV6]:PORT or unix:PATH, for `with`.
+
+    address: that of PARTIEMC_SERVER if None, or else 127.0.0.1:50051.
 
     latest: send never waits; of frames that come while the stream is busy only the newest is sent.
     name: by which others watch the stream. labels: a dict of strings, shown where it is listed.
     normals, echo_particles: whether results have normals, and watchers get the particles.
-    tls, ca_file, cert_file, key_file, token, token_file: as the command line has them.
+    tls, ca_file, cert_file, key_file, token, token_file: as the command line has them; those of the
+        environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...) unless given.
     fallback_addresses: servers to go on with. checkpoint_interval, max_held_bytes,
-        connect_timeout, deadline, give_up_after (seconds): as in client/include/partiemc/client/
-        stream.h.
+        connect_timeout, deadline, give_up_after, send_timeout (seconds): as in client/include/
+        partiemc/client/stream.h.
     And the parameters of reconstruct. Raises Error.
 
     At the end of `with` frames on their way arrive; answers that nobody has received are dropped.

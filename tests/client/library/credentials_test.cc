@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -160,6 +161,47 @@ TEST_F(ClientCredentials, ATokenLeavesThisMachineOverTlsOnly) {
     EXPECT_EQ(GetServerInfo(address, kShortDeadline, {.token = kToken}).status().code(),
               absl::StatusCode::kUnavailable)
         << address;
+  }
+}
+
+// Variables of the environment, gone at the end.
+class Environment {
+ public:
+  void Set(const char* name, const std::string& value) {
+    names_.push_back(name);
+    setenv(name, value.c_str(), 1);
+  }
+  ~Environment() {
+    for (const char* name : names_) unsetenv(name);
+  }
+
+ private:
+  std::vector<const char*> names_;
+};
+
+TEST_F(ClientCredentials, OfTheEnvironmentLetAQuestionThrough) {
+  EXPECT_EQ(ServerFromEnvironment(), "127.0.0.1:50051");
+  EXPECT_FALSE(CredentialsFromEnvironment().tls);
+  Environment environment;
+  environment.Set("PARTIEMC_SERVER", address_);
+  environment.Set("PARTIEMC_TLS_CA", good_.ca_file);
+  environment.Set("PARTIEMC_TLS_CERT", good_.cert_file);
+  environment.Set("PARTIEMC_TLS_KEY", good_.key_file);
+  environment.Set("PARTIEMC_TOKEN_FILE", good_.token_file);
+  EXPECT_TRUE(CredentialsFromEnvironment().tls);
+  const auto info = GetServerInfo(ServerFromEnvironment(), kDeadline, CredentialsFromEnvironment());
+  EXPECT_TRUE(info.ok()) << info.status();
+}
+
+TEST(EnvironmentOfTheClient, TlsIsOffOnlyWhereItSaysSo) {
+  Environment environment;
+  for (const char* no : {"", "0", "false", "No", "OFF"}) {
+    environment.Set("PARTIEMC_TLS", no);
+    EXPECT_FALSE(CredentialsFromEnvironment().tls) << no;
+  }
+  for (const char* yes : {"1", "true", "yes", "on", "enabled", "?"}) {
+    environment.Set("PARTIEMC_TLS", yes);
+    EXPECT_TRUE(CredentialsFromEnvironment().tls) << yes;
   }
 }
 

@@ -305,6 +305,34 @@ TEST(Resume, ACallThatIsOnlyAcceptedAgainAndAgainIsNoProgress) {
   EXPECT_GT(calls, 2);
 }
 
+TEST(Resume, SendWaitsNoLongerThanItsTimeoutAlsoWhileAServerIsLookedFor) {
+  std::atomic<int> calls = 0;
+  FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    if (++calls > 1) return WaitForCancel(context);
+    AcceptResumable(rpc, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  StreamOptions options = Options();
+  options.send_timeout = kShort;
+  const auto stream = Stream::Open(server.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  std::thread receiver([&] {
+    Event event;
+    while ((*stream)->Receive(event).ok()) continue;
+  });
+  absl::Status refused;
+  int taken = 0;
+  for (; refused.ok() && taken < 100; taken += refused.ok() ? 1 : 0) {
+    refused = (*stream)->Send(kFrame, taken).status();
+  }
+  EXPECT_EQ(refused.code(), absl::StatusCode::kDeadlineExceeded) << refused;
+  ASSERT_TRUE(FindViolation(refused)) << refused;
+  EXPECT_EQ(FindViolation(refused)->reason, "SEND_TIMEOUT");
+  EXPECT_EQ((*stream)->InFlight(), static_cast<std::size_t>(taken));  // The stream lives.
+  (*stream)->Cancel();
+  receiver.join();
+}
+
 TEST(Resume, CancelEndsTheSearchForAServer) {
   std::atomic<int> calls = 0;
   FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {

@@ -81,12 +81,17 @@ typedef struct partiemc_options {
   double deadline;        /* Seconds for each answer; 0: 30. */
   double give_up_after;   /* Seconds to mend a lost connection for; 0: 30. Negative: the stream
                              ends with its connection. */
+  double send_timeout;    /* Seconds for partiemc_send to get a place in the window, whatever becomes
+                             of the connection: DEADLINE_EXCEEDED then, and the stream goes on; 0:
+                             as long as the stream lives. */
 } partiemc_options;
 /* Every option at its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
 
-/* Opens a stream to the server at HOST:PORT, [IPV6]:PORT or unix:PATH; `address` NULL: to the
- * method in this process, with the same answers, bit for bit. `options` may be NULL. On success
+/* Opens a stream to the server at HOST:PORT, [IPV6]:PORT or unix:PATH; `address` "": at
+ * PARTIEMC_SERVER, or else at 127.0.0.1:50051; NULL: to the method in this process, with the same
+ * answers, bit for bit. Credentials that are NULL are those of the environment, PARTIEMC_TOKEN_FILE
+ * and so on. `options` may be NULL. On success
  * `*stream` is to be closed by partiemc_close, else it is NULL. Errors: INVALID_ARGUMENT,
  * UNAVAILABLE, UNAUTHENTICATED, RESOURCE_EXHAUSTED, DEADLINE_EXCEEDED. */
 partiemc_code partiemc_open(const char* address, const partiemc_options* options,

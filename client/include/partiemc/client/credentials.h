@@ -24,4 +24,12 @@ struct Credentials {
   std::string token_file = {};
 };
 
+/// What the command line reads, too: PARTIEMC_TLS (0, false, no, off or empty: not),
+/// PARTIEMC_TLS_CA, PARTIEMC_TLS_CERT, PARTIEMC_TLS_KEY, PARTIEMC_TOKEN, PARTIEMC_TOKEN_FILE.
+/// Whoever names a certificate wants TLS.
+Credentials CredentialsFromEnvironment();
+
+/// PARTIEMC_SERVER, or else 127.0.0.1:50051.
+std::string ServerFromEnvironment();
+
 }  // namespace partiemc::client

@@ -86,7 +86,8 @@ class FrameStream {
   /// are sent and not yet received. Errors: one that carries a Violation (FindViolation) refuses
   /// this frame alone, uses up no number, and the stream goes on; any other has ended the stream.
   /// FAILED_PRECONDITION after FinishSending. DEADLINE_EXCEEDED when the wait lasts longer than the
-  /// stream's deadline.
+  /// stream's deadline; with a Violation (reason SEND_TIMEOUT) when it lasts longer than its
+  /// `send_timeout`.
   virtual absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) = 0;
 
   /// The same of arrays that lie anywhere. Errors: also INVALID_ARGUMENT with a Violation (reason

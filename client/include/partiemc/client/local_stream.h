@@ -2,7 +2,9 @@
 // as from a server, without one.
 #pragma once
 
+#include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,9 +20,11 @@ struct LocalStreamOptions {
   int threads = 0;
   /// Frames that wait or are in work, at least 1. 2 lets the caller read the next one meanwhile.
   std::size_t frames_in_flight = 2;
+  /// As StreamOptions::send_timeout (stream.h). Absent: no limit, as the work is done by this
+  /// process itself.
+  std::optional<std::chrono::milliseconds> send_timeout = {};
 };
 
-/// Send waits without a deadline: the work is done by this process itself.
 class LocalStream : public FrameStream {
  public:
   /// Errors: INVALID_ARGUMENT, see Validate(ReconstructionParameters).

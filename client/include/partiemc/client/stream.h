@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,6 +69,11 @@ struct StreamOptions {
   /// For the server to accept the stream, and then for each answer, counted from the frame, the
   /// answer or the reconnection before it, whichever came last.
   std::chrono::milliseconds deadline{30000};
+  /// For Send to get a place in the window, whatever becomes of connection and server. A frame that
+  /// gets none is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream goes on. Absent: as
+  /// long as the stream lives, that is for `deadline`, after a loss for `reconnect.give_up_after`
+  /// more.
+  std::optional<std::chrono::milliseconds> send_timeout = {};
   /// Servers to go on with, beside the one that Open is given: of the same version and with no
   /// smaller limits. Behind a proxy one address is enough.
   std::vector<std::string> fallback_addresses = {};
@@ -87,7 +93,8 @@ struct StreamOptions {
 ///
 /// A stream survives its connection and its server: Receive connects again, to the next address
 /// first, and goes on from the last checkpoint. Every frame is still answered once, in order, with
-/// the bits that it would have had. Send does not fail meanwhile; it waits for the window.
+/// the bits that it would have had. Send does not fail meanwhile; it waits for the window, for
+/// `send_timeout` at most.
 class Stream : public FrameStream {
  public:
   /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.

@@ -1,0 +1,140 @@
+#include "partiemc/client/async_stream.h"
+
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "partiemc/status.h"
+
+namespace partiemc::client {
+namespace {
+
+using Answer = AsyncStream::Answer;
+using Answered = AsyncStream::Answered;
+
+/// What fulfils a promise; std::function wants to be copied, which a promise cannot be.
+Answered FulfilmentOf(const std::shared_ptr<std::promise<Answer>>& promise) {
+  return [promise](Answer answer) { promise->set_value(std::move(answer)); };
+}
+
+}  // namespace
+
+class AsyncStream::Receiving {
+ public:
+  Receiving(FrameStream& stream, Told told) : stream_(stream), told_(std::move(told)) {
+    thread_ = std::thread([this] { Run(); });
+  }
+  ~Receiving() {
+    if (!thread_.joinable()) return;
+    stream_.Cancel();
+    thread_.join();
+  }
+
+  FrameStream& stream() { return stream_; }
+
+  /// `send` sends the frame. Answers come in the order of the frames, so the first that waits is
+  /// the next to be answered; it waits from before its frame is sent, as its answer may come first.
+  template <typename Sending>
+  void Send(Answered answered, const Sending& send) {
+    {
+      const std::scoped_lock lock(mutex_);
+      waiting_.push_back(std::move(answered));
+    }
+    const absl::StatusOr<std::uint64_t> sent = send();
+    if (sent.ok()) return;
+    if (auto refused = TakeNewest()) refused(sent.status());
+  }
+
+  absl::Status Finish() {
+    if (!thread_.joinable()) return absl::FailedPreconditionError("Finish: called twice");
+    const absl::Status finished = stream_.FinishSending();
+    thread_.join();
+    return ended_.ok() ? finished : ended_;
+  }
+
+ private:
+  void Run() {
+    Event event;
+    for (;;) {
+      const auto received = stream_.Receive(event);
+      if (!received.ok() || *received == Received::kEnd) {
+        ended_ = received.status();
+        break;
+      }
+      switch (event.kind) {
+        case Event::Kind::kResult:
+          Deliver(std::move(event.frame));
+          break;
+        case Event::Kind::kRefusal:
+          Deliver(ViolationError(absl::StatusCode::kInvalidArgument, event.violation));
+          break;
+        case Event::Kind::kNotice:
+        case Event::Kind::kReconnected:
+          if (told_) told_(event);
+          break;
+      }
+    }
+    while (auto left = TakeOldest()) {
+      left(ended_.ok() ? absl::CancelledError("the stream has ended") : ended_);
+    }
+  }
+
+  void Deliver(Answer answer) {
+    if (const auto answered = TakeOldest()) answered(std::move(answer));
+  }
+
+  Answered TakeOldest() {
+    const std::scoped_lock lock(mutex_);
+    if (waiting_.empty()) return nullptr;
+    Answered oldest = std::move(waiting_.front());
+    waiting_.pop_front();
+    return oldest;
+  }
+
+  /// Null where the end of the stream has answered it already.
+  Answered TakeNewest() {
+    const std::scoped_lock lock(mutex_);
+    if (waiting_.empty()) return nullptr;
+    Answered newest = std::move(waiting_.back());
+    waiting_.pop_back();
+    return newest;
+  }
+
+  FrameStream& stream_;
+  const Told told_;
+  std::mutex mutex_;
+  std::deque<Answered> waiting_;  // Guarded by the mutex; of the frames sent, in their order.
+  absl::Status ended_;            // Of the thread, until it has been joined.
+  std::thread thread_;
+};
+
+AsyncStream::AsyncStream(FrameStream& stream, Told told)
+    : receiving_(std::make_unique<Receiving>(stream, std::move(told))) {}
+AsyncStream::~AsyncStream() = default;
+
+void AsyncStream::Send(const Frame& frame, double time, Answered answered) {
+  receiving_->Send(std::move(answered), [&] { return receiving_->stream().Send(frame, time); });
+}
+void AsyncStream::SendArrays(const ParticleArrays& particles, double time, Answered answered) {
+  receiving_->Send(std::move(answered),
+                   [&] { return receiving_->stream().SendArrays(particles, time); });
+}
+
+std::future<AsyncStream::Answer> AsyncStream::Send(const Frame& frame, double time) {
+  const auto promise = std::make_shared<std::promise<Answer>>();
+  auto answer = promise->get_future();
+  Send(frame, time, FulfilmentOf(promise));
+  return answer;
+}
+std::future<AsyncStream::Answer> AsyncStream::SendArrays(const ParticleArrays& particles,
+                                                         double time) {
+  const auto promise = std::make_shared<std::promise<Answer>>();
+  auto answer = promise->get_future();
+  SendArrays(particles, time, FulfilmentOf(promise));
+  return answer;
+}
+
+absl::Status AsyncStream::Finish() { return receiving_->Finish(); }
+
+}  // namespace partiemc::client
