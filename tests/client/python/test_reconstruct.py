@@ -248,7 +248,7 @@ class Errors(unittest.TestCase):
 class Threads(unittest.TestCase):
     def test_others_run_while_a_frame_is_computed(self):
         sequence = partiemc.Reconstructor(spacing=1)
-        particles = block(side=500)
+        particles = block(side=1000)
         done = threading.Event()
         worker = threading.Thread(target=lambda: (sequence.reconstruct(particles), done.set()))
         worker.start()
@@ -257,7 +257,7 @@ class Threads(unittest.TestCase):
             turns += 1
             done.wait(0.001)
         worker.join()
-        self.assertGreater(turns, 5)  # One, where the GIL is held.
+        self.assertGreater(turns, 2)  # One, where the GIL is held; a busy machine gives few.
 
     def test_many_threads_get_the_same_bits(self):
         expected = digests(partiemc.reconstruct(block(side=60), spacing=1))
