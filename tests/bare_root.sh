@@ -14,6 +14,7 @@ What to try, each in a root of its own; demo and tests by default:
   demo    client/demo.sh --no-browser, twice
   tests   tests/run.sh, then its quickest step again
   core    the core alone, where no package of the service is installed
+  packages  the Debian packages and the wheel: installed, tried, removed (docker/debian/build.sh)
 USAGE
 }
 
@@ -30,7 +31,7 @@ for argument in "$@"; do
     -h | --help) usage; exit 0 ;;
     --working-tree) working_tree=true ;;
     --keep) keep=true ;;
-    demo | tests | core) tries+=("$argument") ;;
+    demo | tests | core | packages) tries+=("$argument") ;;
     *) usage >&2; exit 2 ;;
   esac
 done
@@ -119,6 +120,13 @@ for what in "${tries[@]}"; do
       try "no gRPC, Protobuf, VTK" sh -c \
         '! ls -d /usr/include/grpcpp /usr/include/google/protobuf /usr/include/vtk* 2>/dev/null'
       try "core alone" tests/run.sh --no-install core-alone
+      ;;
+    packages)
+      docker/install.sh debian
+      docker/debian/build.sh build/debian/packages
+      mkdir -p "$root/packages"
+      cp build/debian/packages/* "$root/packages"
+      try "packages" docker/debian/try.sh /packages
       ;;
   esac
   cleanup

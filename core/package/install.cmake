@@ -1,5 +1,7 @@
-# What `cmake --install` puts where, and the package that find_package(partiemc) finds.
+# What `cmake --install` puts where, and the package that find_package(partiemc) finds. Components are
+# Debian packages, too (docker/debian): server, client, c, python, and dev, which is the rest.
 include(CMakePackageConfigHelpers)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/partiemc)
 
 # One export set per component, so that the core is found where no gRPC is installed.
@@ -21,9 +23,12 @@ if(PARTIEMC_SERVICE)
   if(PARTIEMC_SHARED)
     set_target_properties(${programs} PROPERTIES INSTALL_RPATH $ORIGIN/../${CMAKE_INSTALL_LIBDIR})
   endif()
-  install(TARGETS ${programs})
+  install(TARGETS partiemc COMPONENT client)
+  if(PARTIEMC_SERVER)
+    install(TARGETS partiemc-server COMPONENT server)
+  endif()
   install(FILES client/recordings/dam_break.pemc client/recordings/README.md
-    DESTINATION ${CMAKE_INSTALL_DATADIR}/partiemc/recordings)
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/partiemc/recordings COMPONENT client)
   install(DIRECTORY client/include/ TYPE INCLUDE)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/partiemc TYPE INCLUDE
     FILES_MATCHING PATTERN reconstruction.*.h)
@@ -33,7 +38,7 @@ if(PARTIEMC_SERVICE)
 endif()
 if(PARTIEMC_C)
   list(APPEND PARTIEMC_COMPONENTS c)
-  install(TARGETS partiemc_c EXPORT partiemcC)
+  install(TARGETS partiemc_c EXPORT partiemcC LIBRARY COMPONENT c NAMELINK_COMPONENT dev)
   install(EXPORT partiemcC NAMESPACE partiemc:: DESTINATION ${package_dir})
 endif()
 
@@ -43,3 +48,6 @@ write_basic_package_version_file(partiemcConfigVersion.cmake COMPATIBILITY SameM
 install(FILES ${PROJECT_BINARY_DIR}/partiemcConfig.cmake
   ${PROJECT_BINARY_DIR}/partiemcConfigVersion.cmake DESTINATION ${package_dir})
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+if(PARTIEMC_DEBIAN)
+  include(docker/debian/packages.cmake)
+endif()

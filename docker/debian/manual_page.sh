@@ -1,0 +1,17 @@
+#!/bin/bash
+# usage: manual_page.sh FILE.gz PAGE NAME PROGRAM [VERB]
+# Writes the manual page PAGE, a summary NAME of what it is, from what `PROGRAM [VERB] --help` says.
+set -euo pipefail
+file=$1 page=$2 name=$3 program=$4 verb=${5-}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+# help2man runs one program, whose name becomes the page's.
+cat >"$work/$page" <<SCRIPT
+#!/bin/bash
+[[ \$1 == --version ]] && exec echo "$page $("$program" --version | cut -d " " -f 2)"
+exec "$program" $verb "\$@"
+SCRIPT
+chmod +x "$work/$page"
+mkdir -p "$(dirname "$file")"
+help2man --no-info --section 1 --name "$name" "$work/$page" | gzip -n9 >"$file.part"
+mv "$file.part" "$file"
