@@ -53,6 +53,9 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       ->allow_extra_args(false);
   verb->add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
       ->type_name("NAMES");
+  AddAttributesFlag(*verb, flags.sequence,
+                    "What particles carry that is kept, too: columns, or arrays of two or three "
+                    "components; of a recording all are");
   verb->add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
       ->type_name("FILE");
   verb->add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
@@ -71,7 +74,8 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       "Examples:\n"
       "  partiemc convert frames/ dam_break.pemc --spacing 0.0303\n"
       "  partiemc convert drum.lammpstrj.gz drum.pemc --select type=1 --frames 0:100\n"
-      "A recording holds time, position, id, volume and velocity of the particles, compressed;\n"
+      "A recording holds time, position, id, volume, velocity and --attributes of the particles, "
+      "compressed;\n"
       "if it is cut off, only its last frames are lost.");
   verb->parse_complete_callback([&flags] {
     if (!std::string_view(flags.output).ends_with(".pemc")) {

@@ -11,8 +11,9 @@ absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
     auto formats = ParseFrameFormats(places.format);
     if (!formats.ok()) return formats.status();
     outputs.show_normals_ = std::ranges::count(*formats, FrameFormat::kCsv) > 0;
-    auto frames =
-        FrameWriter::Create({.directory = places.output_dir, .formats = *std::move(formats)});
+    auto frames = FrameWriter::Create({.directory = places.output_dir,
+                                       .formats = *std::move(formats),
+                                       .color_by = places.color_by});
     if (!frames.ok()) return frames.status();
     outputs.frames_ = *std::move(frames);
   }

@@ -19,7 +19,7 @@ class FrameOutputs {
  public:
   /// As the flags of the same names; empty: none.
   struct Places {
-    std::string output_dir, format, stats;
+    std::string output_dir, format, stats, color_by;
   };
 
   /// Opens each, so that a place that cannot be written is known before the work.

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
 #include "client/recording/recording.h"
 
@@ -28,6 +29,13 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
   if (!reader.ok()) return reader.status();
   const auto spacing = (*reader)->header().spacing;
   return InputSource{.frames = *std::move(reader), .spacing = spacing};
+}
+
+CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what) {
+  return app.add_option("--attributes", options.attributes, what)
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAMES");
 }
 
 std::string BaseName(const std::string& path) {

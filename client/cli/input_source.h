@@ -8,6 +8,11 @@
 #include "absl/status/statusor.h"
 #include "client/input/sequence.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace partiemc::client {
 
 struct InputSource {
@@ -17,6 +22,9 @@ struct InputSource {
 
 /// Errors: those of Sequence::Open.
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
+
+/// Adds --attributes, a list of names.
+CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what);
 
 /// The last part of a path: "dam_break.pemc" of "client/recordings/dam_break.pemc".
 std::string BaseName(const std::string& path);

@@ -4,6 +4,7 @@
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
+#include "client/cli/input_source.h"
 #include "client/output/frame_writer.h"
 #include "client/output/text.h"
 
@@ -16,6 +17,11 @@ absl::Status CheckCombinations(const CLI::App& app) {
   }
   if (app.count("--format") > 0 && app.count("--output-dir") == 0) {
     return absl::InvalidArgumentError("--format: goes with --output-dir, the place of the files");
+  }
+  if (app.count("--color-by") > 0 &&
+      (app.count("--attributes") == 0 || app.count("--output-dir") == 0)) {
+    return absl::InvalidArgumentError(
+        "--color-by: goes with --attributes, which names it, and --output-dir");
   }
   if (app.count("--loop") > 0) {
     for (const char* output : {"--output-dir", "--stats", "--report"}) {
@@ -40,6 +46,11 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       ->group(kGroup);
   app.add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
       ->type_name("NAMES")
+      ->group(kGroup);
+  AddAttributesFlag(
+      app, flags.sequence,
+      "What particles carry that is wanted at the vertices, too: columns, arrays of two "
+      "or three components, or velocity")
       ->group(kGroup);
   app.add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
       ->type_name("FILE")
@@ -163,6 +174,10 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_option("--format", flags.format, "Of these files, a list of " + formats)
       ->type_name("LIST")
       ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--color-by", flags.color_by,
+                 "Colour the pictures of svg by this one of --attributes; of a vector its length")
+      ->type_name("NAME")
       ->group(kGroup);
   app.add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
       ->type_name("FILE")

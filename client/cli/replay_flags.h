@@ -49,6 +49,7 @@ struct ReplayFlags {
 
   std::string output_dir;
   std::string format = "geojson";
+  std::string color_by;
   std::string stats;
   std::string report;
 };

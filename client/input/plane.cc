@@ -164,6 +164,7 @@ void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows,
       TellOnce(told_ids_, rows, "ids are ignored: several particles have the same", notices);
     }
   }
+  frame.attributes = rows.attributes;
   frame.volumes.clear();
   if (!rows.has_volumes) return;
   frame.volumes.assign(rows.volumes.begin(), rows.volumes.end());

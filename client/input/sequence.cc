@@ -225,6 +225,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   auto request = ParseColumnRequest(options.select, options.columns);
   if (!request.ok()) return request.status();
   recording.request = *std::move(request);
+  recording.request.attributes = options.attributes;
   const auto range = ParseFrameRange(options.frames);
   if (!range.ok()) return range.status();
   recording.range = *range;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "client/input/base/particle_attribute.h"
 
 namespace partiemc::client {
 
@@ -25,6 +26,8 @@ struct RecordedFrame {
   std::vector<float> volumes;  ///< Area per particle, all positive and finite; empty if none.
   std::vector<std::uint64_t> ids;  ///< Unique within the frame; empty if none.
   std::vector<float> velocities;   ///< vx, vy interleaved, as `positions`, finite; empty if none.
+  /// Those that were asked for; of a recording of our own, all that it has.
+  std::vector<ParticleAttribute> attributes;
 
   std::size_t ParticleCount() const { return positions.size() / 2; }
 };
@@ -44,6 +47,10 @@ struct SequenceOptions {
   ///   a column named "-" is ignored.
   /// VTK files know where their positions are; the option is refused for them.
   std::string columns = {};
+
+  /// What else is wanted of each particle: columns of these names, or arrays of two or three
+  /// components; "velocity" are `velocities`. A file that lacks one is refused.
+  std::vector<std::string> attributes = {};
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if it is one.

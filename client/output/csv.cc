@@ -3,9 +3,32 @@
 
 namespace partiemc::client {
 
+namespace {
+
+// As RFC 4180 wants it: a name may hold any printable character.
+std::string Cell(const std::string& text) {
+  if (text.find_first_of(",\"") == std::string::npos) return text;
+  std::string cell = "\"";
+  for (const char c : text) cell += c == '"' ? "\"\"" : std::string(1, c);
+  return cell + '"';
+}
+
+void AppendAttributeNames(std::string& out, const AttributeValues& attribute) {
+  for (int k = 0; k < attribute.components; ++k) {
+    AppendAll(out, ",",
+              Cell(attribute.components == 1 ? attribute.name : Concat(attribute.name, ":", k)));
+  }
+}
+
+}  // namespace
+
 std::string EncodeCsv(const FrameRecord& frame) {
   const Rings& rings = frame.result.rings;
-  std::string out = "ring,index,x,y,nx,ny\n";
+  std::string out = "ring,index,x,y,nx,ny";
+  for (const AttributeValues& attribute : frame.result.attributes) {
+    AppendAttributeNames(out, attribute);
+  }
+  out += '\n';
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
       AppendAll(out, ring, ",", k - rings.offsets[ring], ",");
@@ -16,6 +39,12 @@ std::string EncodeCsv(const FrameRecord& frame) {
       if (!rings.normals.empty()) AppendNumber(out, rings.normals[2 * k]);
       out += ',';
       if (!rings.normals.empty()) AppendNumber(out, rings.normals[2 * k + 1]);
+      for (const AttributeValues& attribute : frame.result.attributes) {
+        const auto components = static_cast<std::size_t>(attribute.components);
+        for (std::size_t c = 0; c < components; ++c) {
+          AppendAll(out, ",", attribute.values[components * k + c]);
+        }
+      }
       out += '\n';
     }
   }

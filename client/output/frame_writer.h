@@ -25,10 +25,11 @@ enum class FrameFormat : std::uint8_t {
   /// Wavefront: "v x y 0", groups "mesh" (faces) and "rings" (closed polylines), 1-based.
   kObj,
   /// VTK XML PolyData: rings as closed lines, triangles as polygons; cell data "class" (0 boundary
-  /// and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for triangles); field data
-  /// TimeValue. Only in builds with VTK.
+  /// and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for triangles); point data:
+  /// the attributes; field data TimeValue. Only in builds with VTK.
   kVtp,
-  /// ring,index,x,y,nx,ny: one row per vertex of the rings; nx,ny empty without normals.
+  /// ring,index,x,y,nx,ny: one row per vertex of the rings; nx,ny empty without normals. Behind
+  /// them a column for each attribute, NAME:0, NAME:1 and NAME:2 for a vector.
   kCsv,
 };
 
@@ -49,6 +50,9 @@ struct FrameWriterOptions {
   /// outside is cut off. Absent: each frame is fitted to itself.
   std::optional<Box> picture_box = {};
   bool picture_particles = true;  ///< Draw the particles where the record has them.
+  /// Colour pictures by this attribute, of a vector its length, with a legend; empty: none. A frame
+  /// without it has the usual colours.
+  std::string color_by = {};
 };
 
 /// The bytes of a frame in one of AllFrameFormats().

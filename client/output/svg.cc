@@ -1,10 +1,14 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "client/output/color_map.h"
 #include "client/output/formats.h"
+#include "client/output/html.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {
@@ -29,7 +33,14 @@ constexpr std::string_view kStyle =
     ".mesh{fill:none;stroke:#9dbfdc;stroke-width:.6}"
     ".particles{fill:none;stroke:#6f8597}"
     ".outline{fill:none;stroke:#0b4f86;stroke-width:2}"
+    ".bands path{stroke-width:.7}"
+    ".lines path{fill:none;stroke-width:3}"
+    ".legend{font:22px sans-serif;fill:#333}"
     "</style>\n";
+
+// Below the picture, where it is coloured by an attribute: a bar of all colours with its two ends.
+constexpr double kLegendHeight = 70;
+constexpr double kLegendBar = 400;
 
 /// World to picture: y up becomes y down, the box's upper left corner becomes (0, 0).
 class Picture {
@@ -118,6 +129,123 @@ std::string DotPath(std::span<const double> particles, const Picture& picture) {
   return path;
 }
 
+/// A corner of what is left of a triangle, and its share of the range of colours.
+struct Corner {
+  double x, y, share;
+};
+
+/// The part of a convex polygon whose shares lie on one side of `bound`: above for side 1, below
+/// for -1. (Sutherland and Hodgman, "Reentrant polygon clipping", 1974.)
+std::vector<Corner> Clip(const std::vector<Corner>& polygon, double bound, double side) {
+  std::vector<Corner> kept;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Corner& from = polygon[k];
+    const Corner& to = polygon[(k + 1) % polygon.size()];
+    const bool in = side * (from.share - bound) >= 0;
+    if (in) kept.push_back(from);
+    if (in == (side * (to.share - bound) >= 0)) continue;
+    const double part = (bound - from.share) / (to.share - from.share);
+    kept.push_back({from.x + part * (to.x - from.x), from.y + part * (to.y - from.y), bound});
+  }
+  return kept;
+}
+
+std::size_t BandOf(double share) {
+  const double band = std::clamp(share, 0.0, 1.0) * kColorBands;
+  return std::min(static_cast<std::size_t>(band), kColorBands - 1);
+}
+
+/// For each band of colours the path of what lies in it. The attribute is linear in each triangle.
+using BandPaths = std::array<std::string, kColorBands>;
+
+void AppendTriangle(const std::array<Corner, 3>& triangle, const Picture& picture,
+                    BandPaths& paths) {
+  const auto [low, high] =
+      std::ranges::minmax({triangle[0].share, triangle[1].share, triangle[2].share});
+  std::vector<Corner> rest(triangle.begin(), triangle.end());
+  for (std::size_t band = BandOf(low); band <= BandOf(high); ++band) {
+    const double top = static_cast<double>(band + 1) / kColorBands;
+    const std::vector<Corner> part = band == BandOf(high) ? rest : Clip(rest, top, -1);
+    if (part.size() >= 3) {
+      for (std::size_t k = 0; k < part.size(); ++k) {
+        paths[band] += k == 0 ? 'M' : 'L';
+        const double point[] = {part[k].x, part[k].y};
+        picture.AppendPoint(paths[band], point);
+      }
+      paths[band] += 'Z';
+    }
+    if (band < BandOf(high)) rest = Clip(rest, top, 1);
+  }
+}
+
+BandPaths InsideByBand(const Mesh& mesh, std::span<const double> values, const ValueRange& range,
+                       const Picture& picture) {
+  BandPaths paths;
+  for (std::size_t k = 0; k < mesh.triangles.size(); k += 3) {
+    std::array<Corner, 3> triangle{};
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const std::size_t point = mesh.triangles[k + corner];
+      triangle[corner] = {mesh.points[2 * point], mesh.points[2 * point + 1],
+                          range.ShareOf(values[point])};
+    }
+    AppendTriangle(triangle, picture, paths);
+  }
+  return paths;
+}
+
+/// Each segment of the rings in the colour of its middle.
+BandPaths RingsByBand(const Rings& rings, std::span<const double> values, const ValueRange& range,
+                      const Picture& picture) {
+  BandPaths paths;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const std::size_t begin = rings.offsets[ring], end = rings.offsets[ring + 1];
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t next = k + 1 < end ? k + 1 : begin;
+      std::string& path = paths[BandOf(range.ShareOf((values[k] + values[next]) / 2))];
+      path += 'M';
+      picture.AppendPoint(path, &rings.points[2 * k]);
+      path += 'L';
+      picture.AppendPoint(path, &rings.points[2 * next]);
+    }
+  }
+  return paths;
+}
+
+void AppendBands(std::string& out, std::string_view kind, const BandPaths& paths) {
+  AppendAll(out, "<g class=\"", kind, "\">\n");
+  for (std::size_t band = 0; band < kColorBands; ++band) {
+    if (paths[band].empty()) continue;
+    const std::string color = ColorOf((static_cast<double>(band) + .5) / kColorBands);
+    AppendAll(out, "<path stroke=\"", color, "\"");
+    if (kind == "bands") AppendAll(out, " fill=\"", color, "\"");
+    AppendAll(out, " d=\"", paths[band], "\"/>\n");
+  }
+  out += "</g>\n";
+}
+
+void AppendLegend(std::string& out, const std::string& name, const ValueRange& range, double top) {
+  constexpr double kLeft = 20, kBarHeight = 18;
+  AppendAll(out, "<g class=\"legend\" transform=\"translate(", kLeft, " ");
+  AppendNumber(out, top);
+  out += ")\">\n";
+  for (std::size_t band = 0; band < kColorBands; ++band) {
+    const double step = kLegendBar / kColorBands;
+    AppendAll(out, "<rect x=\"", step * static_cast<double>(band), "\" width=\"", step + .5,
+              "\" height=\"", kBarHeight, "\" fill=\"",
+              ColorOf((static_cast<double>(band) + .5) / kColorBands), "\"/>\n");
+  }
+  AppendAll(out, "<text y=\"46\">", absl::StrCat(range.low), "</text>\n<text x=\"", kLegendBar,
+            "\" y=\"46\" text-anchor=\"end\">", absl::StrCat(range.high), "</text>\n<text x=\"",
+            kLegendBar + 20, "\" y=\"17\">", EscapeHtml(name), "</text>\n</g>\n");
+}
+
+const AttributeValues* FindAttribute(const Result& result, const std::string& name) {
+  for (const AttributeValues& attribute : result.attributes) {
+    if (!name.empty() && attribute.name == name) return &attribute;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& options) {
@@ -126,12 +254,20 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   std::string out = R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 )";
   AppendNumber(out, picture.width());
   out += ' ';
-  AppendNumber(out, picture.height());
+  const AttributeValues* const attribute = FindAttribute(frame.result, options.color_by);
+  AppendNumber(out, picture.height() + (attribute != nullptr ? kLegendHeight : 0));
   AppendAll(out, "\">\n<title>Frame ", frame.index, ", time ");
   AppendNumber(out, frame.time);
   AppendAll(out, "</title>\n", kStyle, "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n");
   const std::string rings = RingPath(frame.result.rings, picture);
   AppendAll(out, R"(<path class="inside" d=")", rings, "\"/>\n");
+  const Mesh& mesh = frame.result.mesh;
+  const std::vector<double> values =
+      attribute != nullptr ? MagnitudesOf(*attribute) : std::vector<double>();
+  const ValueRange range = RangeOf(values);
+  // The values are those of the rings' points, then of what points the mesh has more.
+  const bool inside = values.size() == mesh.PointCount() && !mesh.triangles.empty();
+  if (inside) AppendBands(out, "bands", InsideByBand(mesh, values, range, picture));
   AppendAll(out, R"(<path class="mesh" d=")", EdgePath(frame.result.mesh, picture), "\"/>\n");
   if (dots) {
     const double spacing = frame.result.statistics.spacing;
@@ -142,7 +278,12 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
     AppendNumber(out, std::round(dot * kSteps) / kSteps);
     AppendAll(out, R"(" d=")", DotPath(frame.particles, picture), "\"/>\n");
   }
-  AppendAll(out, R"(<path class="outline" d=")", rings, "\"/>\n</svg>\n");
+  AppendAll(out, R"(<path class="outline" d=")", rings, "\"/>\n");
+  if (attribute != nullptr && !inside) {
+    AppendBands(out, "lines", RingsByBand(frame.result.rings, values, range, picture));
+  }
+  if (attribute != nullptr) AppendLegend(out, attribute->name, range, picture.height());
+  out += "</svg>\n";
   return out;
 }
 

@@ -2,12 +2,16 @@
 #include <vtkCellData.h>
 #include <vtkDoubleArray.h>
 #include <vtkFieldData.h>
+#include <vtkFloatArray.h>
 #include <vtkIntArray.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataWriter.h>
+
+#include <algorithm>
 
 #include "client/output/formats.h"
 #include "client/output/text.h"
@@ -30,6 +34,18 @@ void AddField(vtkPolyData* data, const char* name, double value) {
   array->SetName(name);
   array->InsertNextValue(value);
   data->GetFieldData()->AddArray(array);
+}
+
+// At the points, which are those of the mesh, or of the rings where there is none.
+void AddAttributes(const Result& result, vtkPolyData* data) {
+  for (const AttributeValues& attribute : result.attributes) {
+    vtkNew<vtkFloatArray> array;
+    array->SetName(attribute.name.c_str());
+    array->SetNumberOfComponents(attribute.components);
+    array->SetNumberOfTuples(data->GetNumberOfPoints());
+    std::ranges::copy(attribute.values, array->GetPointer(0));
+    data->GetPointData()->AddArray(array);
+  }
 }
 
 }  // namespace
@@ -75,6 +91,9 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   data->GetCellData()->AddArray(classes);
   data->GetCellData()->AddArray(ring_of);
   AddField(data, "TimeValue", frame.time);
+  // Where the mesh does not begin with the points of the rings, there are no values for all of
+  // them.
+  if (shared || mesh.points.empty()) AddAttributes(frame.result, data);
   vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);
   writer->WriteToOutputStringOn();

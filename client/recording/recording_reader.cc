@@ -45,6 +45,25 @@ absl::Status CopyPositions(const v1::ParticleFrame& message, RecordedFrame& fram
   return absl::OkStatus();
 }
 
+absl::Status CopyAttributes(const v1::ParticleFrame& message, RecordedFrame& frame) {
+  frame.attributes.resize(static_cast<std::size_t>(message.scalars_size()));
+  for (std::size_t k = 0; k < frame.attributes.size(); ++k) {
+    const v1::NamedScalar& scalar = message.scalars(static_cast<int>(k));
+    const std::uint32_t components = std::max(scalar.components(), 1u);
+    if (components > 3) return absl::DataLossError("a scalar has more than three components");
+    const std::size_t bytes = 4 * components * frame.ParticleCount();
+    if (scalar.values().size() != bytes) {
+      return absl::DataLossError(absl::StrCat("a scalar has ", scalar.values().size(),
+                                              " bytes where ", bytes, " are due"));
+    }
+    ParticleAttribute& attribute = frame.attributes[k];
+    attribute.name = scalar.name();
+    attribute.components = static_cast<int>(components);
+    wire::CopyBytes(scalar.values(), attribute.values);
+  }
+  return absl::OkStatus();
+}
+
 absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   absl::Status status = CopyPositions(message, frame);
   const std::size_t count = frame.ParticleCount();
@@ -52,6 +71,7 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   if (status.ok()) status = CheckBytes("volumes", message.volumes().size(), 4 * count);
   if (status.ok()) status = CheckBytes("velocities", message.velocities().size(), 8 * count);
   if (!status.ok()) return status;
+  if (absl::Status copied = CopyAttributes(message, frame); !copied.ok()) return copied;
   frame.time = message.time();
   wire::CopyBytes(message.ids(), frame.ids);
   wire::CopyBytes(message.volumes(), frame.volumes);

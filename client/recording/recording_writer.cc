@@ -78,6 +78,13 @@ class RecordingWriter::Impl {
     wire::AssignBytes(
         frame.time ? std::span<const float>(frame.velocities) : std::span<const float>(),
         *message_.mutable_velocities());
+    message_.clear_scalars();
+    for (const ParticleAttribute& attribute : frame.attributes) {
+      v1::NamedScalar& scalar = *message_.add_scalars();
+      scalar.set_name(attribute.name);
+      scalar.set_components(static_cast<std::uint32_t>(attribute.components));
+      wire::AssignBytes(std::span<const float>(attribute.values), *scalar.mutable_values());
+    }
     AppendDelimited(message_, block_);
     ++frame_count_;
     ++block_frames_;

@@ -15,8 +15,13 @@ double TimeOf(const RecordedFrame& recorded) {
 }  // namespace
 
 FrameFeeder::FrameFeeder(Sequence& input, FrameStream& stream,
-                         std::optional<double> frames_per_second, SendPolicy policy)
-    : input_(input), stream_(stream), frames_per_second_(frames_per_second), policy_(policy) {
+                         std::optional<double> frames_per_second, SendPolicy policy,
+                         std::vector<std::string> attributes)
+    : input_(input),
+      stream_(stream),
+      frames_per_second_(frames_per_second),
+      policy_(policy),
+      attribute_names_(std::move(attributes)) {
   reader_ = std::thread([this] { Read(); });
   sender_ = std::thread([this] { SendAll(); });
 }
@@ -115,6 +120,8 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
               .ids = recorded.ids};
   // Without a time, velocities tell nothing of the way from frame to frame.
   if (recorded.time) frame.velocities = recorded.velocities;
+  ViewAttributes(recorded);
+  frame.attributes = attributes_;
   if (recorded.float32) {  // Half of the bytes, and nothing is lost.
     as_float32_.assign(recorded.positions.size(), 0);
     for (std::size_t k = 0; k < as_float32_.size(); ++k) {
@@ -123,6 +130,19 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
     frame.positions = std::span<const float>(as_float32_);
   }
   return frame;
+}
+
+// Those that are asked for, as far as they are there: the stream tells which one is not.
+void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
+  attributes_.clear();
+  for (const std::string& name : attribute_names_) {
+    for (const ParticleAttribute& one : recorded.attributes) {
+      if (one.name == name) attributes_.push_back({one.name, one.components, one.values});
+    }
+    if (name == kVelocityAttribute && !recorded.time && !recorded.velocities.empty()) {
+      attributes_.push_back({kVelocityAttribute, 2, recorded.velocities});
+    }
+  }
 }
 
 bool FrameFeeder::SendOne(FramePointer owned) {

@@ -41,9 +41,10 @@ class FrameFeeder {
     std::string message;
   };
 
-  /// Starts at once. `input` and `stream` must outlive it. Absent rate: as fast as it goes.
+  /// Starts at once. `input` and `stream` must outlive it. Absent rate: as fast as it goes. Of what
+  /// particles carry besides, `attributes` are sent along.
   FrameFeeder(Sequence& input, FrameStream& stream, std::optional<double> frames_per_second,
-              SendPolicy policy);
+              SendPolicy policy, std::vector<std::string> attributes);
   /// Stops as Stop does.
   ~FrameFeeder();
 
@@ -70,6 +71,7 @@ class FrameFeeder {
   bool Offer(LatestSender& sender, FramePointer frame);
   OfferHooks Hooks();
   Frame View(const RecordedFrame& recorded);
+  void ViewAttributes(const RecordedFrame& recorded);
   void RefuseLast(const absl::Status& status);
   bool Pace(std::size_t sent);
 
@@ -79,8 +81,10 @@ class FrameFeeder {
   const SendPolicy policy_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   BoundedQueue<FramePointer> read_ahead_{2};
-  absl::Status input_status_;      // Of the reader thread until it is joined.
-  std::vector<float> as_float32_;  // Of the sender thread alone.
+  absl::Status input_status_;  // Of the reader thread until it is joined.
+  const std::vector<std::string> attribute_names_;
+  std::vector<float> as_float32_;      // Of the sender thread alone.
+  std::vector<Attribute> attributes_;  // Likewise.
 
   mutable std::mutex mutex_;
   std::condition_variable stopped_;

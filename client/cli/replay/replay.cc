@@ -38,7 +38,9 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
                                                         const ReconstructionParameters& parameters,
                                                         bool normals) {
   if (flags.local) {
-    auto stream = LocalStream::Open({.parameters = parameters, .threads = flags.threads});
+    auto stream = LocalStream::Open({.parameters = parameters,
+                                     .attributes = flags.sequence.attributes,
+                                     .threads = flags.threads});
     if (!stream.ok()) return stream.status();
     return *std::move(stream);
   }
@@ -50,7 +52,8 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
                                      .parameters = parameters,
                                      .outputs = {.mesh = parameters.fill != Fill::kNone,
                                                  .normals = normals,
-                                                 .echo_particles = flags.echo_particles},
+                                                 .echo_particles = flags.echo_particles,
+                                                 .attributes = flags.sequence.attributes},
                                      .labels = {{"input", InputLabel(flags.input)}},
                                      .credentials = flags.server.credentials,
                                      .deadline = deadline,
@@ -216,7 +219,8 @@ int Replay(const ReplayFlags& flags) {
   Progress progress(std::move(progress_options));
   const Clock::time_point start = Clock::now();
   FrameFeeder feeder(*input->frames, **stream, *rate,
-                     flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock);
+                     flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock,
+                     flags.sequence.attributes);
   Receiver receiver(flags, **stream, feeder, *outputs, progress);
   const ExitCode ended = receiver.Run();
   if (ended != kGood) feeder.Stop();

@@ -8,8 +8,10 @@ namespace partiemc::client {
 
 absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                                     const ReconstructionParameters& parameters) {
-  auto frames = FrameOutputs::Create(
-      {.output_dir = flags.output_dir, .format = flags.format, .stats = flags.stats});
+  auto frames = FrameOutputs::Create({.output_dir = flags.output_dir,
+                                      .format = flags.format,
+                                      .stats = flags.stats,
+                                      .color_by = flags.color_by});
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));
   if (!flags.report.empty()) {

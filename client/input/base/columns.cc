@@ -8,6 +8,7 @@
 #include "absl/strings/str_join.h"
 #include "client/input/base/number_text.h"
 #include "client/input/base/text.h"
+#include "partiemc/frame.h"
 
 namespace partiemc::client::input {
 namespace {
@@ -183,6 +184,38 @@ absl::Status PlanConditions(const Names& names, const Names& canonical,
   return absl::OkStatus();
 }
 
+// The columns of "NAME:0", "NAME:1" and perhaps "NAME:2", also as NAME_x and so on.
+std::vector<std::size_t> FindComponents(const Names& names, const Names& canonical,
+                                        const std::string& asked) {
+  const std::string stem = Canonical(asked);
+  std::vector<std::size_t> found;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    auto column = FindFirst(names, {Concat(asked, ":", axis)});
+    if (!column && !stem.empty()) column = FindFirst(canonical, Spellings({stem}, axis));
+    if (!column) break;
+    found.push_back(*column);
+  }
+  return found.size() < 2 ? std::vector<std::size_t>() : found;
+}
+
+absl::Status PlanAttributes(const Names& names, const Names& canonical,
+                            const ColumnRequest& request, ColumnPlan& plan) {
+  for (const std::string& asked : request.attributes) {
+    // The rows keep velocities by their axes, which the plane of the particles chooses from.
+    if (asked == kVelocityAttribute && CountFound(plan.velocities) >= 2) continue;
+    std::vector<std::size_t> columns = FindComponents(names, canonical, asked);
+    if (const auto column = FindAsked(names, canonical, asked); column && columns.empty()) {
+      columns = {*column};
+    }
+    if (columns.empty()) {
+      return absl::FailedPreconditionError(Concat(
+          "there is no column '", asked, "' for --attributes; the columns are ", List(names)));
+    }
+    plan.attributes.push_back({asked, std::move(columns)});
+  }
+  return absl::OkStatus();
+}
+
 Names AllCanonical(const Names& names) {
   Names canonical;
   for (const std::string& name : names) canonical.push_back(Canonical(name));
@@ -244,6 +277,9 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
                                      : PlanAskedPositions(names, canonical, request, plan);
   if (!positions.ok()) return positions;
   if (absl::Status status = PlanConditions(names, canonical, request, plan); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = PlanAttributes(names, canonical, request, plan); !status.ok()) {
     return status;
   }
   return plan;

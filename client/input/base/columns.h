@@ -29,12 +29,19 @@ struct Condition {
 /// What the caller says about columns.
 struct ColumnRequest {
   std::vector<Condition> conditions;
-  std::vector<std::string> columns;  ///< SequenceOptions::columns, split; empty: by names.
+  std::vector<std::string> attributes;  ///< SequenceOptions::attributes.
+  std::vector<std::string> columns;     ///< SequenceOptions::columns, split; empty: by names.
 };
 
 /// kInvalidArgument if an expression is not "COLUMN=VALUE" or an entry of `columns` is empty.
 absl::StatusOr<ColumnRequest> ParseColumnRequest(const std::vector<std::string>& select,
                                                  std::string_view columns);
+
+/// The columns of one of ColumnRequest::attributes: a column each component, 1 to 3.
+struct AttributeColumns {
+  std::string name;
+  std::vector<std::size_t> columns;
+};
 
 /// Which column is what. Axes are x, y, z in the input's own terms.
 struct ColumnPlan {
@@ -42,6 +49,7 @@ struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> velocities;
   std::optional<std::size_t> id;
   std::optional<std::size_t> volume;
+  std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
   std::size_t column_count = 0;
   bool scaled = false;  ///< Positions are LAMMPS's xs ys zs: fractions of the box.
@@ -49,8 +57,10 @@ struct ColumnPlan {
 
 /// A plan for a table that names its columns. Recognised, in any case of letters, with any of
 /// " _.:-" between the parts, and with a unit in brackets behind: x, Pos.x, Points:0, Position_X,
-/// xu, xs, vx, Vel:0, velocity_x, id, idp, particle_id, volume, vol, area and the like.
-/// Errors: kFailedPrecondition if there are no positions or a column that is asked for is missing.
+/// xu, xs, vx, Vel:0, velocity_x, id, idp, particle_id, volume, vol, area and the like. An
+/// attribute is a column of its name, or an array of two or three, NAME:0, NAME:1, NAME_x and the
+/// like; the velocities are "velocity", whatever their columns are called. Errors:
+/// kFailedPrecondition if there are no positions or a column that is asked for is missing.
 absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& names,
                                             const ColumnRequest& request);
 

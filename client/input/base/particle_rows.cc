@@ -89,6 +89,12 @@ void ParticleRows::Begin(const ColumnPlan& plan) {
   }
   ids.clear();
   volumes.clear();
+  attributes.resize(plan.attributes.size());
+  for (std::size_t k = 0; k < attributes.size(); ++k) {
+    attributes[k].name = plan.attributes[k].name;
+    attributes[k].components = static_cast<int>(plan.attributes[k].columns.size());
+    attributes[k].values.clear();
+  }
   has_ids = plan.id.has_value();
   has_volumes = plan.volume.has_value();
   float32 = false;
@@ -125,6 +131,13 @@ absl::Status AppendTextRow(std::span<const std::string_view> cells, const Column
     const auto number = NumberOf(cells[*plan.volume]);
     if (!number.ok()) return number.status();
     rows.volumes.push_back(*number);
+  }
+  for (std::size_t k = 0; k < plan.attributes.size(); ++k) {
+    for (const std::size_t column : plan.attributes[k].columns) {
+      const auto number = NumberOf(cells[column]);
+      if (!number.ok()) return number.status();
+      rows.attributes[k].values.push_back(static_cast<float>(*number));
+    }
   }
   if (rows.has_ids) {
     const auto id = ParseId(cells[*plan.id]);
@@ -196,6 +209,13 @@ absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t r
   if (plan.volume) {
     for (const std::size_t row : *selected) {
       rows.volumes.push_back(columns[*plan.volume].Number(row));
+    }
+  }
+  for (std::size_t k = 0; k < plan.attributes.size(); ++k) {
+    for (const std::size_t row : *selected) {
+      for (const std::size_t column : plan.attributes[k].columns) {
+        rows.attributes[k].values.push_back(static_cast<float>(columns[column].Number(row)));
+      }
     }
   }
   for (const std::size_t row : *selected) {

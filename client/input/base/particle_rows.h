@@ -12,6 +12,7 @@
 
 #include "absl/status/status.h"
 #include "client/input/base/columns.h"
+#include "client/input/base/particle_attribute.h"
 
 namespace partiemc::client::input {
 
@@ -20,6 +21,7 @@ struct ParticleRows {
   std::array<std::vector<float>, 3> velocities;
   std::vector<std::uint64_t> ids;
   std::vector<double> volumes;
+  std::vector<ParticleAttribute> attributes;  ///< Those of the plan, in its order.
   std::array<bool, 3> has_position = {};
   std::array<bool, 3> has_velocity = {};
   bool has_ids = false;  ///< Falls to false at the first id that is no id.

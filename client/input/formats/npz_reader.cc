@@ -137,6 +137,9 @@ class NpzReader final : public OneFrameReader {
     if (plan_.id) needed[*plan_.id] = true;
     if (plan_.volume) needed[*plan_.volume] = true;
     for (const std::size_t column : plan_.conditions) needed[column] = true;
+    for (const AttributeColumns& attribute : plan_.attributes) {
+      for (const std::size_t column : attribute.columns) needed[column] = true;
+    }
     return needed;
   }
 

@@ -258,8 +258,10 @@ class VtkReader final : public OneFrameReader {
     } else {
       // Frames without particles leave out what they have no data for.
       table.names = {"Points:0", "Points:1", "Points:2"};
-      for (const Condition& condition : request_.conditions)
+      for (const Condition& condition : request_.conditions) {
         table.names.push_back(condition.column);
+      }
+      table.names.insert(table.names.end(), request_.attributes.begin(), request_.attributes.end());
       table.columns.resize(table.names.size());
     }
     const auto plan = PlanNamedColumns(table.names, request_);

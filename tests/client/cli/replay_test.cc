@@ -383,5 +383,69 @@ TEST(Info, TellsVersionAndLimitsForPeopleAndPrograms) {
   EXPECT_EQ(std::ranges::count(json.out, '\n'), 1);
 }
 
+// A block whose particles carry a linear field and a linear velocity.
+void WriteLinearFields(const support::TemporaryFolder& directory) {
+  std::ofstream file(directory.Path("frame_0.csv"));
+  file << "x,y,vx,vy,p\n";
+  for (int row = 0; row < 20; ++row) {
+    for (int column = 0; column < 20; ++column) {
+      file << column << "," << row << "," << 2 * row << "," << -column << "," << 3 * column - row
+           << "\n";
+    }
+  }
+}
+
+void ExpectLinearFields(const std::string& csv) {
+  const auto x = Column(csv, "x"), y = Column(csv, "y"), p = Column(csv, "p");
+  const auto u = Column(csv, "velocity:0"), v = Column(csv, "velocity:1");
+  ASSERT_GT(x.size(), 40);
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double at_x = std::stod(x[k]), at_y = std::stod(y[k]);
+    EXPECT_NEAR(std::stod(p[k]), 3 * at_x - at_y, .6) << "1 % of the range, 76";
+    EXPECT_NEAR(std::stod(u[k]), 2 * at_y, .4);
+    EXPECT_NEAR(std::stod(v[k]), -at_x, .2);
+  }
+}
+
+TEST(Replay, WritesAttributesAtTheVerticesOfFilesAndRecordings) {
+  const support::TemporaryFolder directory;
+  WriteLinearFields(directory);
+  const std::vector<std::string> wanted = {"--local", "--attributes", "p,velocity", "--format",
+                                           "csv,svg", "--color-by",   "p",          "--quiet"};
+  auto replay = [&](const std::string& input, const std::string& output) {
+    std::vector<std::string> arguments{
+        "replay", directory.Path(input), "--output-dir", directory.Path(output), "--spacing", "1"};
+    arguments.insert(arguments.end(), wanted.begin(), wanted.end());
+    const Ran ran = RunPartiemc(arguments);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    ExpectLinearFields(Content(directory.Path(output + "/frame_000000.csv")));
+    return Content(directory.Path(output + "/frame_000000.svg"));
+  };
+  const std::string from_csv = replay("frame_0.csv", "from_csv");
+  EXPECT_THAT(from_csv, HasSubstr("class=\"bands\""));
+  const Ran converted = RunPartiemc({"convert", directory.Path("frame_0.csv"),
+                                     directory.Path("block.pemc"), "--quiet", "--attributes", "p"});
+  ASSERT_EQ(converted.exit_code, 0) << converted.error;
+  const Ran again = RunPartiemc(
+      {"convert", directory.Path("block.pemc"), directory.Path("again.pemc"), "--quiet"});
+  ASSERT_EQ(again.exit_code, 0) << again.error;
+  const Ran ran = RunPartiemc({"replay", directory.Path("again.pemc"), "--local", "--spacing", "1",
+                               "--attributes", "p", "--output-dir", directory.Path("pemc"),
+                               "--format", "csv", "--quiet"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(Column(Content(directory.Path("pemc/frame_000000.csv")), "p"),
+            Column(Content(directory.Path("from_csv/frame_000000.csv")), "p"));
+}
+
+TEST(Replay, AnAttributeThatIsMissingIsTold) {
+  const support::TemporaryFolder directory;
+  WriteLinearFields(directory);
+  const Ran ran = RunPartiemc(
+      {"replay", directory.Path("frame_0.csv"), "--local", "--attributes", "q", "--quiet"});
+  EXPECT_EQ(ran.exit_code, 3);
+  EXPECT_THAT(ran.error, AllOf(HasSubstr("'q'"), HasSubstr("x,y,vx,vy,p")));
+  EXPECT_EQ(RunPartiemc({"replay", "x.pemc", "--local", "--color-by", "q"}).exit_code, 2);
+}
+
 }  // namespace
 }  // namespace partiemc::client

@@ -121,5 +121,31 @@ TEST(Csv, DegenerateFilesAreRefusedInOneLine) {
                 {"frame.csv:2", "1 MiB"});
 }
 
+TEST(Csv, AttributesAreColumnsOfTheirNamesOrArrays) {
+  const RecordedFrame frame = Read("x,y,p,T:0,T:1,Vel_x,Vel_y\n1,2,.5,3,4,7,8\n3,4,1.5,5,6,9,10\n",
+                                   {.attributes = {"T", "p", "velocity"}});
+  ASSERT_EQ(frame.attributes.size(), 2);  // Velocities have a place of their own.
+  EXPECT_EQ(frame.attributes[0], (ParticleAttribute{"T", 2, {3, 4, 5, 6}}));
+  EXPECT_EQ(frame.attributes[1], (ParticleAttribute{"p", 1, {.5, 1.5}}));
+  EXPECT_THAT(frame.velocities, ElementsAre(7, 8, 9, 10));
+  EXPECT_THAT(Read("x,y,p\n1,2,.5\n").attributes, IsEmpty());
+}
+
+TEST(Csv, ItsSelectionHoldsForAttributesToo) {
+  const RecordedFrame frame =
+      Read("type,x,y,p\n1,1,2,.5\n2,3,4,1.5\n", {.select = {"type=2"}, .attributes = {"p"}});
+  EXPECT_THAT(frame.attributes[0].values, ElementsAre(1.5));
+}
+
+TEST(Csv, AMissingAttributeIsToldWithTheColumnsThereAre) {
+  ExpectRefused(Refusal("x,y,p\n1,2,3\n", {.attributes = {"density"}}),
+                absl::StatusCode::kFailedPrecondition,
+                {"frame.csv", "'density'", "--attributes", "x,y,p"});
+  ExpectRefused(Refusal("x,y,p\n1,2,3\n", {.attributes = {"velocity"}}),
+                absl::StatusCode::kFailedPrecondition, {"'velocity'"});
+  ExpectRefused(Refusal("x,y,p\n1,2,high\n", {.attributes = {"p"}}), absl::StatusCode::kDataLoss,
+                {"'high' is not a number"});
+}
+
 }  // namespace
 }  // namespace partiemc::client

@@ -8,6 +8,7 @@
 #include <random>
 #include <sstream>
 
+#include "client/output/color_map.h"
 #include "client/output/fixtures.h"
 #include "client/output/text.h"
 #include "gmock/gmock.h"
@@ -344,6 +345,55 @@ TEST(FrameFormats, AnUnknownWordIsNamedWithWhatMayStandThere) {
     ASSERT_EQ(formats.status().code(), absl::StatusCode::kInvalidArgument) << list;
     EXPECT_THAT(std::string(formats.status().message()), HasSubstr("must be some of geojson,svg"));
   }
+}
+
+// The square with hole and island, with a linear field and a vector at every point.
+Result WithAttributes() {
+  Result result = SquareWithHoleAndIsland();
+  AttributeValues height{"height", 1, {}}, place{"a,b", 2, {}};
+  for (std::size_t k = 0; k < result.mesh.points.size(); k += 2) {
+    height.values.push_back(static_cast<float>(result.mesh.points[k + 1]));
+    place.values.push_back(static_cast<float>(result.mesh.points[k]));
+    place.values.push_back(static_cast<float>(result.mesh.points[k + 1]));
+  }
+  result.attributes = {height, place};
+  return result;
+}
+
+TEST(Csv, HasAColumnForEachNumberOfAnAttribute) {
+  const Result result = WithAttributes();
+  std::istringstream lines(Encode(FrameFormat::kCsv, {.result = result}));
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "ring,index,x,y,nx,ny,height,\"a,b:0\",\"a,b:1\"");
+  std::getline(lines, line);
+  EXPECT_TRUE(line.ends_with(",0,0,0")) << line;
+  std::getline(lines, line);
+  EXPECT_TRUE(line.ends_with(",0,4,0")) << line;
+}
+
+TEST(Svg, ColoursByAnAttributeWithALegend) {
+  const Result result = WithAttributes();
+  const FrameRecord frame{.result = result};
+  const std::string plain = Encode(FrameFormat::kSvg, frame);
+  EXPECT_EQ(plain.find("class=\"bands\""), std::string::npos);
+  const std::string colored = Encode(FrameFormat::kSvg, frame, {.color_by = "height"});
+  EXPECT_GT(CountOf(colored, " fill=\"#"), 2 * kColorBands - 2);  // Of the bands and the legend.
+  EXPECT_THAT(colored, HasSubstr(">0</text>"));
+  EXPECT_THAT(colored, HasSubstr(">4</text>"));
+  EXPECT_THAT(colored, HasSubstr(">height</text>"));
+  EXPECT_EQ(Encode(FrameFormat::kSvg, frame, {.color_by = "other"}), plain);
+}
+
+TEST(Svg, ColoursTheOutlineWhereThereIsNoMesh) {
+  Result result = WithAttributes();
+  result.mesh = {};
+  for (AttributeValues& one : result.attributes) {
+    one.values.resize(static_cast<std::size_t>(one.components) * result.rings.points.size() / 2);
+  }
+  const std::string colored = Encode(FrameFormat::kSvg, {.result = result}, {.color_by = "a,b"});
+  EXPECT_THAT(colored, HasSubstr("class=\"lines\""));
+  EXPECT_THAT(colored, Not(HasSubstr("class=\"bands\"")));
 }
 
 }  // namespace

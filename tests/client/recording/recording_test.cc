@@ -314,5 +314,38 @@ TEST(BundledRecording, IsTheDamBreakBelowTwoMegabytes) {
   EXPECT_EQ(*read.frames[1].time, 0.023347);
 }
 
+TEST_F(Recording, AttributesComeBackWithTheirBits) {
+  std::vector<RecordedFrame> frames = RandomFrames(3);
+  for (RecordedFrame& frame : frames) {
+    ParticleAttribute vector{"T", 3, {}}, scalar{"a name, quoted \"so\"", 1, {}};
+    for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
+      scalar.values.push_back(1.f / static_cast<float>(3 + k));
+      for (int c = 0; c < 3; ++c) vector.values.push_back(static_cast<float>(c) - .3f);
+    }
+    frame.attributes = {vector, scalar};
+  }
+  frames[1].attributes.clear();
+  Write(Path(), frames);
+  const auto reader = RecordingReader::Open(Path(), "");
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  RecordedFrame frame;
+  for (const RecordedFrame& expected : frames) {
+    ASSERT_TRUE(*(*reader)->Next(frame));
+    EXPECT_EQ(frame.attributes, expected.attributes);
+  }
+}
+
+TEST_F(Recording, AnAttributeOfAnotherLengthIsDamage) {
+  std::vector<RecordedFrame> frames = RandomFrames(1);
+  frames[0].attributes = {{"p", 1, {1.f}}};
+  Write(Path(), frames);
+  const auto reader = RecordingReader::Open(Path(), "");
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  RecordedFrame frame;
+  const auto read = (*reader)->Next(frame);
+  EXPECT_EQ(read.status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(read.status().message()), HasSubstr("a scalar has 4 bytes where"));
+}
+
 }  // namespace
 }  // namespace partiemc::client
