@@ -58,7 +58,8 @@ struct ReconnectPolicy {
 /// stream of the same name, sends its particles of each step, all ranks as many frames and in the
 /// same order, also where it has none, and receives. Rank 0 gets the results, the others
 /// Event::Kind::kPartTaken for what they have sent. A frame is that of all its particles, in the
-/// order of their ids where they have ids, else part by part.
+/// order of their ids where they have ids, else part by part. Not for a LatestSender: ranks would
+/// leave out different frames.
 struct FrameParts {
   std::uint32_t parts = 0;  ///< 0: frames come whole.
   std::uint32_t part = 0;   ///< Below `parts`. Part 0 opens the stream; others wait for that.
