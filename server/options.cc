@@ -155,6 +155,14 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->type_name("N")
       ->envname("PARTIEMC_MAX_WATCHERS")
       ->group(kGroup);
+  app.add_option("--max-parts", limits.max_parts,
+                 "Parts that frames of a stream may come in, and connections of all streams that "
+                 "send them; 0: frames come whole")
+      ->check(CLI::Range(0, 10'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_PARTS")
+      ->group(kGroup);
   app.add_option("--max-watcher-bytes", limits.max_watcher_bytes,
                  "Memory that one watcher may hold, units as in 16MB allowed; larger results "
                  "cannot be watched")

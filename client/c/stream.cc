@@ -92,12 +92,20 @@ client::StreamOptions StreamOptionsOf(const partiemc_options& options,
   auto& give_up_after = result.reconnect.give_up_after;
   give_up_after = Milliseconds(options.give_up_after, give_up_after);
   if (options.send_timeout > 0) result.send_timeout = Milliseconds(options.send_timeout, {});
+  result.parts.parts = options.parts;
+  result.parts.part = options.part;
+  result.parts.token = Text(options.parts_token);
+  result.parts.timeout = Milliseconds(options.part_timeout, result.parts.timeout);
   return result;
 }
 
 absl::Status Open(const char* address, const partiemc_options& options, partiemc_stream& opened) {
   const auto parameters = ParametersOf(options);
   if (!parameters.ok()) return parameters.status();
+  if (options.parts > 0 && (address == nullptr || options.latest != 0)) {
+    return absl::InvalidArgumentError(
+        "parts: needs an address and no `latest`: parts of a frame meet at a server");
+  }
   if (address == nullptr) {
     auto stream = LocalStream::Open({.parameters = *parameters, .threads = options.threads});
     if (!stream.ok()) return stream.status();
@@ -173,6 +181,9 @@ partiemc_event ViewOf(const partiemc_stream& stream) {
     view.field = event.violation.field.c_str();
     view.value = event.violation.value.c_str();
     view.rule = event.violation.rule.c_str();
+  } else if (event.kind == Event::Kind::kPartTaken) {
+    view.kind = PARTIEMC_PART_TAKEN;
+    view.message = "";
   } else if (event.kind == Event::Kind::kResult) {
     view.kind = PARTIEMC_RESULT;
     view.message = "";
@@ -269,7 +280,8 @@ partiemc_code partiemc_reconstruct(partiemc_stream* stream, const partiemc_parti
     do {
       if (status.ok()) status = partiemc::c::Receive(*stream, -1, event);
     } while (status.ok() && stream->event.kind != Event::Kind::kResult &&
-             stream->event.kind != Event::Kind::kRefusal);
+             stream->event.kind != Event::Kind::kRefusal &&
+             stream->event.kind != Event::Kind::kPartTaken);
     return status;
   });
 }

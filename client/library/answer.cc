@@ -6,8 +6,13 @@
 
 namespace partiemc::client {
 
+bool IsAnswer(const v1::ReconstructResponse& response) {
+  return response.has_frame() || response.has_error() || response.has_part();
+}
+
 std::uint64_t AnsweredSequence(const v1::ReconstructResponse& response) {
   if (response.has_frame()) return response.frame().sequence();
+  if (response.has_part()) return response.part().sequence();
   return response.has_error() ? response.error().sequence() : 0;
 }
 
@@ -37,6 +42,10 @@ absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::st
                        .value = error.value(),
                        .rule = error.rule()};
     event.message = error.message();
+    return absl::OkStatus();
+  }
+  if (response.has_part()) {
+    event.kind = Event::Kind::kPartTaken;
     return absl::OkStatus();
   }
   if (response.has_notice()) {

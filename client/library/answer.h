@@ -11,6 +11,9 @@
 
 namespace partiemc::client {
 
+/// Whether `response` answers a frame, or a part of one.
+bool IsAnswer(const v1::ReconstructResponse& response);
+
 /// The number of the frame that `response` answers; 0 where it answers none.
 std::uint64_t AnsweredSequence(const v1::ReconstructResponse& response);
 

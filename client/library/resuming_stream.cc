@@ -31,6 +31,35 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
 
 constexpr auto kNever = StreamCall::Clock::time_point::max();
 
+// Of a call that was open: what part 0 waits for is its former call alone.
+CallPurpose LossPurpose(const StreamOptions& options) {
+  return options.parts.part > 0 ? CallPurpose::kJoin : CallPurpose::kOpen;
+}
+
+absl::Status InvalidParts(std::string field, std::string value, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
+}
+
+absl::Status CheckParts(const StreamOptions& options) {
+  const FrameParts& parts = options.parts;
+  if (parts.part >= std::max(parts.parts, 1u)) {
+    return InvalidParts("part", absl::StrCat(parts.part), "must be below parts");
+  }
+  if (parts.parts == 0) return absl::OkStatus();
+  if (options.name.empty()) {
+    return InvalidParts("name", "\"\"", "must be given where frames come in parts");
+  }
+  const std::chrono::milliseconds most =
+      std::min<std::chrono::milliseconds>(options.deadline, std::chrono::minutes(10));
+  if (parts.timeout < std::chrono::milliseconds(1) || parts.timeout > most) {
+    return InvalidParts("timeout", absl::StrCat(parts.timeout.count(), " ms"),
+                        absl::StrCat("must be 1 ms to ", most.count(), " ms"));
+  }
+  return absl::OkStatus();
+}
+
 // 0 is no limit.
 bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
   return limit == 0 || (former != 0 && limit >= former);
@@ -40,8 +69,8 @@ bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
 
 absl::StatusOr<std::unique_ptr<Stream>> Stream::Open(std::string_view address,
                                                      const StreamOptions& options) {
-  const absl::Status valid = Validate(options.parameters);
-  if (!valid.ok()) return valid;
+  if (auto valid = Validate(options.parameters); !valid.ok()) return valid;
+  if (auto valid = CheckParts(options); !valid.ok()) return valid;
   return ResumingStream::Open(address, options);
 }
 
@@ -74,9 +103,15 @@ absl::Status ResumingStream::OpenFirst(Lock& lock) {
     return info.status();
   }
   info_ = *std::move(info);
+  if (options_.parts.parts > 0 && opened->message.limits().max_parts() == 0) {
+    connector_.Drop(lock, std::move(opened->call));
+    return absl::UnimplementedError("the server takes no frames in parts: use a newer one");
+  }
   survives_ = options_.reconnect.give_up_after.count() > 0 && options_.checkpoint_interval > 0 &&
-              !opened->message.stream_token().empty();
-  checkpoint_next_ = next_answer_ = std::max<std::uint64_t>(1, opened->message.next_sequence());
+              (sends_other_part() || !opened->message.stream_token().empty());
+  // A part that comes late has the number of its step all the same.
+  checkpoint_next_ = next_answer_ =
+      sends_other_part() ? 1 : std::max<std::uint64_t>(1, opened->message.next_sequence());
   resend_ = ResendBuffer(next_answer_);
   Adopt(lock, *std::move(opened), info_.frames_in_flight);
   return absl::OkStatus();
@@ -124,7 +159,7 @@ bool ResumingStream::MaySend(std::uint64_t bytes) const {
 // What the stream has ended for, if its call is done and no other may do better.
 std::optional<absl::Status> ResumingStream::FatalEnd() const {
   if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
-  Loss loss = LossOf(*call_, /*resuming=*/false);
+  Loss loss = LossOf(*call_, LossPurpose(options_));
   if (survives_ && loss.retryable) return std::nullopt;
   if (call_->end().ok() && !all_answered()) {
     return absl::UnavailableError(
@@ -209,6 +244,12 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
       event.message = connector_.Story();
       return Received::kEvent;
     }
+    if (next_answer_ < over_below_) {
+      event.kind = Event::Kind::kPartTaken;
+      event.sequence = next_answer_++;
+      monitor_.changed.notify_all();
+      return Received::kEvent;
+    }
     if (auto response = call_->Take(lock)) {
       const auto delivered = Deliver(lock, std::move(response), event);
       if (!delivered.ok()) return delivered.status();
@@ -246,6 +287,7 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
 ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
   if (call_->reads_over()) return call_->progress_at() + kEndTimeout;
   if (all_answered() && !finished_) return std::nullopt;
+  if (sends_other_part()) return std::nullopt;  // It waits for part 0.
   return std::max(due_since_, call_->progress_at()) + options_.deadline;
 }
 
@@ -253,7 +295,7 @@ ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
 absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response response,
                                              Event& event) {
   // The receiver's thread alone changes what is used here without the lock.
-  const bool is_answer = response->has_frame() || response->has_error();
+  const bool is_answer = IsAnswer(*response);
   const bool is_new = is_answer ? next_of_call_ == next_answer_ : !survives_;
   lock.unlock();
   absl::Status status;
@@ -282,6 +324,11 @@ absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response re
 
 // Of an answer with a checkpoint: the frames up to this one need not be sent again.
 void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
+  if (answer.has_part() && survives_) {
+    checkpoint_next_ =
+        std::max(checkpoint_next_, std::min(answer.part().resume_sequence(), next_of_call_ + 1));
+    resend_.DropBelow(checkpoint_next_);
+  }
   const std::string& checkpoint = answer.checkpoint();
   if (checkpoint.empty() || next_of_call_ < checkpoint_next_) return;
   checkpoint_ = checkpoint;
@@ -291,7 +338,9 @@ void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
 
 // The call has ended: whether the stream has, too. False where it is to go on.
 absl::StatusOr<bool> ResumingStream::EndCall(Lock& lock) {
-  const Loss loss = LossOf(*call_, /*resuming=*/false);
+  const Loss loss = LossOf(*call_, LossPurpose(options_));
+  // Part 0 has finished.
+  if (sends_other_part() && all_answered() && call_->end().ok()) finished_ = true;
   if (finished_ && all_answered() && (call_->end().ok() || (survives_ && loss.retryable))) {
     return true;
   }
@@ -329,7 +378,8 @@ absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
 absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                                           const StreamInfo& info) const {
   const std::string& address = opened.call->address();
-  if (opened.message.next_sequence() != checkpoint_next_) {
+  if (sends_other_part() ? opened.message.next_sequence() < checkpoint_next_
+                         : opened.message.next_sequence() != checkpoint_next_) {
     return absl::DataLossError(absl::StrCat("the server at ", address, " goes on with frame ",
                                             opened.message.next_sequence(), " where frame ",
                                             checkpoint_next_, " was due"));
@@ -349,14 +399,21 @@ absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                    " has smaller limits than the first: give all servers of a stream the same"));
 }
 
+// A part of a frame that is over when its call is replaced is not sent again.
+std::uint64_t ResumingStream::FirstToSend(const StreamConnector::Opened& opened) const {
+  if (!sends_other_part()) return checkpoint_next_;
+  return std::clamp(opened.message.next_sequence(), checkpoint_next_, resend_.end());
+}
+
 // Sends what is unanswered through a call that has been opened, and makes it the stream's.
 void ResumingStream::Adopt(Lock& lock, StreamConnector::Opened opened, std::size_t window) {
   token_ = opened.message.stream_token();
-  next_of_call_ = checkpoint_next_;
+  next_of_call_ = FirstToSend(opened);
+  over_below_ = next_of_call_;
   StreamCall& call = *opened.call;
   call.SetWindow(lock, window);
   // Until it is the stream's call, the sender adds to the buffer alone: frames keep their order.
-  for (std::uint64_t k = checkpoint_next_; k < resend_.end(); ++k) call.Queue(lock, resend_.at(k));
+  for (std::uint64_t k = next_of_call_; k < resend_.end(); ++k) call.Queue(lock, resend_.at(k));
   due_since_ = adopted_at_ = Clock::now();
   call_ = std::move(opened.call);
   if (all_answered()) connector_.Recovered();

@@ -71,6 +71,8 @@ class ResumingStream final : public Stream {
   absl::Status TooSlowToSend() const;
   std::optional<absl::Status> FatalEnd() const;
   bool all_answered() const { return next_answer_ == resend_.end(); }
+  bool sends_other_part() const { return options_.parts.part > 0; }
+  std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const;
 
   const StreamOptions options_;
   // Fixed once open:
@@ -89,6 +91,7 @@ class ResumingStream final : public Stream {
   std::uint64_t checkpoint_next_ = 1;         // The number that the checkpoint expects.
   std::uint64_t next_answer_ = 1;             // To be delivered.
   std::uint64_t next_of_call_ = 1;            // To be answered by call_.
+  std::uint64_t over_below_ = 0;              // Parts that call_ has found to be over.
   Clock::time_point due_since_, adopted_at_;  // What the deadline counts from.
   bool finished_ = false;                     // FinishSending was called.
   absl::Status failure_;                      // What the stream has ended for.

@@ -17,6 +17,21 @@ constexpr std::array<std::string_view, 7> kRetryableWhileResuming = {
     "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",    "CALLER_STREAMS",
     "CALLER_CALLS", "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE"};
 
+constexpr std::array<std::string_view, 4> kRetryableWhileJoining = {
+    "NO_SUCH_STREAM", "LEADER_GONE", "TOO_MANY_OPENING", "CALLER_CALLS"};
+
+bool IsRetryable(std::string_view reason, CallPurpose purpose) {
+  switch (purpose) {
+    case CallPurpose::kOpen:
+      return false;
+    case CallPurpose::kResume:
+      return std::ranges::count(kRetryableWhileResuming, reason) > 0;
+    case CallPurpose::kJoin:
+      return std::ranges::count(kRetryableWhileJoining, reason) > 0;
+  }
+  return false;
+}
+
 }  // namespace
 
 bool IsLostConnection(grpc::StatusCode code, std::string_view reason) {
@@ -33,12 +48,11 @@ bool IsLostConnection(grpc::StatusCode code, std::string_view reason) {
   }
 }
 
-Loss LossOf(const StreamCall& call, bool resuming) {
-  Loss loss{
-      .status = FromGrpc(call.end(), call.address()),
-      .why = Reason(call.end()),
-      .retryable = IsLostConnection(call.end().error_code(), call.reason()) ||
-                   (resuming && std::ranges::count(kRetryableWhileResuming, call.reason()) > 0)};
+Loss LossOf(const StreamCall& call, CallPurpose purpose) {
+  Loss loss{.status = FromGrpc(call.end(), call.address()),
+            .why = Reason(call.end()),
+            .retryable = IsLostConnection(call.end().error_code(), call.reason()) ||
+                         IsRetryable(call.reason(), purpose)};
   if (loss.status.ok()) {
     loss.status = absl::UnavailableError(
         absl::StrCat("the server at ", call.address(), " ended the stream: start again"));

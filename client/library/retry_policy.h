@@ -21,10 +21,18 @@ struct Loss {
 /// refused.
 bool IsLostConnection(grpc::StatusCode code, std::string_view reason);
 
+/// What a call was for.
+enum class CallPurpose {
+  kOpen,
+  kResume,
+  kJoin,  ///< As another part than 0.
+};
+
 /// Of a call that is done. A server that gives a reason has decided: only its going away is
-/// retryable and, `resuming`, what another replica or a moment may change. Without a reason the
+/// retryable and, unless a stream was to be opened, what another replica or a moment may change; of
+/// a part also that part 0 is not there. Without a reason the
 /// connection has ended the call, in words that depend on what was between: UNAVAILABLE for none,
 /// INTERNAL, UNKNOWN or CANCELLED for a proxy, OK for one that closes politely.
-Loss LossOf(const StreamCall& call, bool resuming);
+Loss LossOf(const StreamCall& call, CallPurpose purpose);
 
 }  // namespace partiemc::client

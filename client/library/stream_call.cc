@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/library/answer.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::client {
@@ -149,7 +150,7 @@ void StreamCall::OnReadDone(bool ok) {
   Lock lock(monitor_.mutex);
   progress_at_ = Clock::now();
   if (ok) {
-    if (reading_->has_frame() || reading_->has_error()) ++answered_;
+    if (IsAnswer(*reading_)) ++answered_;
     ready_.push_back(std::move(reading_));
     ReadNext(lock);
     WriteNext(lock);

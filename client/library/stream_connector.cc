@@ -30,6 +30,12 @@ v1::OpenStream OpenMessage(const StreamOptions& options) {
   if (options.reconnect.give_up_after.count() > 0) {
     open.set_checkpoint_interval(options.checkpoint_interval);
   }
+  open.set_parts(options.parts.parts);
+  open.set_part(options.parts.part);
+  open.set_parts_token(options.parts.token);
+  if (options.parts.parts > 0) {
+    open.set_part_timeout_ms(static_cast<std::uint32_t>(options.parts.timeout.count()));
+  }
   return open;
 }
 
@@ -65,7 +71,7 @@ class StreamConnector::Calls final : public Attempts {
       return true;
     }
     if (!call.done()) return false;
-    Loss loss = LossOf(call, connector_.resuming_);
+    Loss loss = LossOf(call, connector_.Purpose());
     retryable = loss.retryable;
     return std::move(loss.status);
   }
@@ -92,7 +98,9 @@ StreamConnector::StreamConnector(Monitor& monitor, std::vector<std::string> addr
       retry_(std::move(addresses), "stream", options.reconnect, options.connect_timeout) {}
 
 absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNew(Lock& lock) {
-  const auto give_up_at = Clock::now() + options_.connect_timeout;
+  // Part 0 may come later than the others.
+  const auto give_up_at =
+      Clock::now() + (options_.parts.part > 0 ? options_.deadline : options_.connect_timeout);
   for (;; retry_.UseNextAddress()) {
     bool retryable = true;
     auto opened = OpenNewAt(lock, give_up_at, retryable);
@@ -152,9 +160,14 @@ absl::StatusOr<std::optional<StreamConnector::Opened>> StreamConnector::OpenAgai
                                              retry_.refusal().message()));
 }
 
+CallPurpose StreamConnector::Purpose() const {
+  if (options_.parts.part > 0) return CallPurpose::kJoin;
+  return resuming_ ? CallPurpose::kResume : CallPurpose::kOpen;
+}
+
 void StreamConnector::Start(Lock& lock, std::shared_ptr<grpc::Channel> channel) {
   v1::OpenStream open = OpenMessage(options_);
-  if (resuming_) *open.mutable_resume() = resume_;
+  if (Purpose() == CallPurpose::kResume) *open.mutable_resume() = resume_;
   lock.unlock();
   auto call = std::make_unique<StreamCall>(monitor_, std::move(channel), address());
   call->Start(open);

@@ -63,6 +63,7 @@ class StreamConnector {
   absl::StatusOr<Opened> OpenNewAt(Lock& lock, Clock::time_point give_up_at, bool& retryable);
   void Start(Lock& lock, std::shared_ptr<grpc::Channel> channel);
   const std::string& address() const { return retry_.address(); }
+  CallPurpose Purpose() const;
 
   Monitor& monitor_;
   const StreamOptions options_;

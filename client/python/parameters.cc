@@ -118,6 +118,10 @@ client::StreamOptions TakeStreamOptions(py::dict arguments) {
   TakeTime(arguments, "deadline", options.deadline);
   TakeTime(arguments, "give_up_after", options.reconnect.give_up_after);
   TakeTime(arguments, "send_timeout", options.send_timeout);
+  TakeInto(arguments, "part", options.parts.part);
+  TakeInto(arguments, "parts", options.parts.parts);
+  TakeInto(arguments, "parts_token", options.parts.token);
+  TakeTime(arguments, "part_timeout", options.parts.timeout);
   return options;
 }
 

@@ -78,6 +78,9 @@ class ProducerStream {
   ProducerStream(const std::optional<std::string>& address, bool latest, py::dict arguments) {
     const client::StreamOptions options = TakeStreamOptions(arguments);
     ExpectNothingElse(arguments, "connect");
+    if (latest && options.parts.parts > 0) {
+      throw py::value_error("latest: True; must be False where frames come in parts");
+    }
     absl::StatusOr<std::unique_ptr<client::Stream>> stream = nullptr;
     {
       const py::gil_scoped_release others_may_run;
@@ -114,7 +117,7 @@ class ProducerStream {
     return latest_ != nullptr ? std::nullopt : std::optional(*sent);
   }
 
-  // None where nothing has come in time.
+  // None where nothing has come in time, and for a part that was taken.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     for (;;) {
@@ -132,6 +135,7 @@ class ProducerStream {
       if (event.kind == Event::Kind::kRefusal) {
         Raise(event.message, event.violation, event.sequence);
       }
+      if (event.kind == Event::Kind::kPartTaken) return nullptr;
       if (event.kind != Event::Kind::kResult) continue;
       result->sequence = event.sequence;
       result->time = event.time;
@@ -331,7 +335,8 @@ void DefineStreams(py::module_& module) {
            "one thread receives when in_flight has reached window. With latest=True it never "
            "waits, and returns None.")
       .def("receive", &ProducerStream::Receive, "wait"_a = py::none(),
-           "The next Result. None where nothing has come within `wait` seconds. Raises "
+           "The next Result. None where nothing has come within `wait` seconds; of another part "
+           "than 0 always, for each of its parts that was taken. Raises "
            "partiemc.Error with a reason for a frame that was refused (the stream goes on), "
            "without one when the stream has ended with an error; EOFError after finish() and "
            "the last answer.")

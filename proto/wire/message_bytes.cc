@@ -56,6 +56,20 @@ bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& ty
   return true;
 }
 
+// The last `sequence` of the ParticleFrame in `input`, which ends where `input` does.
+bool ReadSequence(CodedInputStream& input, google::protobuf::uint64& sequence, int& fields) {
+  constexpr std::uint32_t kSequence = WireFormatLite::MakeTag(
+      v1::ParticleFrame::kSequenceFieldNumber, WireFormatLite::WIRETYPE_VARINT);
+  while (const std::uint32_t tag = input.ReadTag()) {
+    if (++fields > kMaxFields) return false;
+    if (tag == kSequence ? !input.ReadVarint64(&sequence)
+                         : !WireFormatLite::SkipField(&input, tag)) {
+      return false;
+    }
+  }
+  return input.BytesUntilLimit() == 0;
+}
+
 // `frame` without its arrays, but with its attributes, which are messages of their own.
 Frame ScalarsOf(const Frame& frame) {
   Frame scalars{.positions = frame.positions,
@@ -122,6 +136,30 @@ std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last) {
   }
   if (!input.ConsumedEntireMessage()) return std::nullopt;
   return held;
+}
+
+std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes) {
+  grpc::ProtoBufferReader reader(&bytes);
+  if (!reader.status().ok()) return std::nullopt;
+  CodedInputStream input(&reader);
+  google::protobuf::uint64 sequence = 0;
+  int fields = 0;
+  while (const std::uint32_t tag = input.ReadTag()) {
+    if (++fields > kMaxFields) return std::nullopt;
+    if (tag == LengthTag(v1::ReconstructRequest::kFrameFieldNumber)) {
+      int length = 0;
+      if (!input.ReadVarintSizeAsInt(&length)) return std::nullopt;
+      const auto limit = input.PushLimit(length);
+      if (!ReadSequence(input, sequence, fields)) return std::nullopt;
+      input.PopLimit(limit);
+    } else if (!WireFormatLite::SkipField(&input, tag)) {
+      return std::nullopt;
+    } else if (tag == LengthTag(v1::ReconstructRequest::kOpenFieldNumber)) {
+      sequence = 0;  // It takes the place of a frame before it.
+    }
+  }
+  if (!input.ConsumedEntireMessage()) return std::nullopt;
+  return sequence;
 }
 
 bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message) {

@@ -30,6 +30,10 @@ bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& t
 /// fields. What is in the fields is not looked at.
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
 
+/// The `sequence` of the ParticleFrame in `bytes`, a ReconstructRequest that holds one; nothing
+/// where they are none, or have more than kMaxFields fields. Passes over the frame's arrays.
+std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes);
+
 /// Adds what `bytes` holds to `message`; strings that are there and empty keep their memory. False
 /// where `bytes` is no such message; `message` may then hold a part of it.
 bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message);

@@ -30,6 +30,15 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
             {"reason", violation ? violation->reason : std::string()}});
 }
 
+void LogPartEnd(const JoinedPart& part, const absl::Status& status) {
+  const auto violation = FindViolation(status);
+  LogEvent(spdlog::level::info, "part left",
+           {{"stream", part.stream_id},
+            {"part", std::uint64_t{part.seat.part}},
+            {"status", absl::StatusCodeToString(status.code())},
+            {"reason", violation ? violation->reason : std::string()}});
+}
+
 }  // namespace
 
 ReconstructCall::ReconstructCall(CallChannel& channel, const MethodMeters* meters,
@@ -85,7 +94,12 @@ void ReconstructCall::Cut() { channel().Cancel(); }
 void ReconstructCall::Finish(const absl::Status& status) {
   // Closed first: a client that sees the end may open the same name again at once.
   const auto stream = registry_.Close(*machine_);
-  LogEnd(stream, channel().peer(), status);
+  messages_.End(status);
+  if (messages_.other_part()) {
+    LogPartEnd(messages_.other_part()->joined(), status);
+  } else {
+    LogEnd(stream, channel().peer(), status);
+  }
   if (stream) stream->description.broadcaster->End(WatchEnd::OfStream(status));
   End(status);
 }

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <memory>
-#include <new>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -31,24 +30,6 @@ std::unique_ptr<FrameMessages> TakeMessages(Worker& worker) {
   if (worker.message_buffers == nullptr) return std::make_unique<FrameMessages>();
   return std::unique_ptr<FrameMessages>(
       static_cast<FrameMessages*>(worker.message_buffers.release()));
-}
-
-// Parses a request that holds a frame into `request`, whose buffers are used again. What is not
-// known of it is passed over, and kept nowhere.
-absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request) {
-  request.mutable_frame()->Clear();
-  try {
-    if (wire::HasFewFields(bytes, *request.GetDescriptor()) && wire::MergeBytes(bytes, request)) {
-      request.DiscardUnknownFields();
-      return absl::OkStatus();
-    }
-  } catch (const std::bad_alloc&) {
-    return OutOfMemory(absl::StrCat(bytes.Length(), " bytes"));
-  }
-  return ViolationError(
-      absl::StatusCode::kInvalidArgument,
-      {std::string(kReasonMalformed), "frame", absl::StrCat(bytes.Length(), " bytes"),
-       absl::StrCat("must be a ParticleFrame of at most ", wire::kMaxFields, " fields")});
 }
 
 absl::Status TooLargeOpen(std::size_t bytes, std::string rule) {
@@ -97,6 +78,7 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
   message.set_idle_timeout_seconds(static_cast<std::uint32_t>(
       std::chrono::ceil<std::chrono::seconds>(limits.idle.streaming).count()));
   message.set_max_watchers(limits.max_watchers);
+  message.set_max_parts(limits.max_parts);
 }
 
 absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits,
@@ -145,6 +127,8 @@ RequestKind StreamMessages::Kind(std::size_t slot) {
     case ReconstructRequest::kOpenFieldNumber:
       return RequestKind::kOpen;
     case ReconstructRequest::kFrameFieldNumber:
+      if (part_zero_) part_zero_->Came(slot, requests_[slot]);
+      if (other_part_) other_part_->Came(slot, requests_[slot]);
       return RequestKind::kFrame;
     case 0:
       return RequestKind::kEmpty;
@@ -171,6 +155,12 @@ absl::Status StreamMessages::Open(std::size_t slot, const StreamStateMachine& st
     return status;
   }
   const v1::OpenStream& open = request.open();
+  if (auto status = CheckParts(open, limits_); !status.ok()) return status;
+  return open.part() > 0 ? JoinStream(open, stream_machine) : OpenStream(open, stream_machine);
+}
+
+absl::Status StreamMessages::OpenStream(const v1::OpenStream& open,
+                                        const StreamStateMachine& stream_machine) {
   const auto parameters = wire::DecodeParameters(open.parameters());
   if (!parameters.ok()) return parameters.status();
   const auto outputs = wire::DecodeOutputs(open.outputs(), open.has_outputs());
@@ -183,12 +173,16 @@ absl::Status StreamMessages::Open(std::size_t slot, const StreamStateMachine& st
     auto status = Resume(open.resume(), limits_, checkpoint_keys_, *session, terms);
     if (!status.ok()) return status;
   }
+  // Before others can join.
+  if (open.parts() > 0) part_zero_.emplace(open, limits_, session->next_sequence());
   auto stream = registry_.Open(stream_machine,
                                {.name = terms.name,
                                 .labels = {open.labels().begin(), open.labels().end()},
                                 .parameters = session->parameters(),
                                 .broadcaster = broadcaster_,
-                                .next_sequence = session->next_sequence()},
+                                .next_sequence = session->next_sequence(),
+                                .assembler = part_zero_ ? part_zero_->assembler() : nullptr,
+                                .parts_token = open.parts_token()},
                                token);
   if (!stream.ok()) return stream.status();
   session_ = *std::move(session);
@@ -196,32 +190,97 @@ absl::Status StreamMessages::Open(std::size_t slot, const StreamStateMachine& st
   terms_ = std::move(terms);
   terms_.name = stream->description.name;
 
-  v1::ReconstructResponse response;
-  v1::StreamOpened& opened = *response.mutable_opened();
+  v1::StreamOpened opened;
   opened.set_stream_id(stream->id);
   opened.set_stream_token(token);
   wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
-  opened.set_frames_in_flight(limits_.frames_in_flight);
-  EncodeLimits(limits_, *opened.mutable_limits());
   opened.set_next_sequence(session_->next_sequence());
-  opened_ = wire::ToBytes(response);
+  TellOpened(std::move(opened));
   LogEvent(spdlog::level::info, "stream opened",
            {{"id", stream->id},
             {"name", terms_.name},
             {"peer", origin_.peer},
             {"client", origin_.client},
             {"placement", std::string(Name(session_->parameters().placement))},
-            {"fill", std::string(Name(session_->parameters().fill))}});
+            {"fill", std::string(Name(session_->parameters().fill))},
+            {"parts", std::uint64_t{open.parts()}}});
   return absl::OkStatus();
+}
+
+absl::Status StreamMessages::JoinStream(const v1::OpenStream& open,
+                                        const StreamStateMachine& stream_machine) {
+  auto joined = registry_.JoinPart(stream_machine, {.stream_name = open.stream_name(),
+                                                    .part = open.part(),
+                                                    .parts = open.parts(),
+                                                    .token = open.parts_token()});
+  if (!joined.ok()) return joined.status();
+  other_part_.emplace(*std::move(joined), limits_.frames_in_flight);
+  const JoinedPart& part = other_part_->joined();
+  v1::StreamOpened opened;
+  opened.set_stream_id(part.stream_id);
+  wire::EncodeParameters(part.parameters, *opened.mutable_parameters());
+  opened.set_next_sequence(part.assembler->next_wanted());
+  TellOpened(std::move(opened));
+  LogEvent(spdlog::level::info, "part joined",
+           {{"stream", part.stream_id},
+            {"name", open.stream_name()},
+            {"part", std::uint64_t{part.seat.part}},
+            {"peer", origin_.peer},
+            {"client", origin_.client}});
+  return absl::OkStatus();
+}
+
+void StreamMessages::TellOpened(v1::StreamOpened opened) {
+  opened.set_frames_in_flight(limits_.frames_in_flight);
+  EncodeLimits(limits_, *opened.mutable_limits());
+  v1::ReconstructResponse response;
+  *response.mutable_opened() = std::move(opened);
+  opened_ = wire::ToBytes(response);
+}
+
+bool StreamMessages::MayAnswer(std::size_t slot) {
+  if (part_zero_) return part_zero_->MayAnswer(slot);
+  return !other_part_ || other_part_->MayAnswer(slot);
+}
+
+std::chrono::milliseconds StreamMessages::LookEvery() const {
+  return part_zero_ ? part_zero_->LookEvery() : std::chrono::milliseconds(0);
+}
+
+void StreamMessages::End(const absl::Status& status) {
+  if (part_zero_) part_zero_->assembler()->End(status);
+  if (other_part_) other_part_->joined().assembler->Leave(other_part_->joined().seat);
 }
 
 Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
                                 const std::atomic<bool>& cancelled) {
+  return other_part_ ? AnswerPart(slot) : AnswerFrameIn(slot, worker, cancelled);
+}
+
+Answered StreamMessages::AnswerPart(std::size_t slot) {
+  absl::Status refusal;
+  answers_[slot] = wire::ToBytes(other_part_->Answer(slot, refusal));
+  requests_[slot].Clear();
+  return {.is_result = refusal.ok(), .bytes = answers_[slot].Length()};
+}
+
+// The frame in `slot`, with its other parts where it has any.
+absl::Status StreamMessages::ParseWhole(std::size_t slot, v1::ReconstructRequest& request) {
+  auto status = ParseFrame(requests_[slot], request);
+  if (status.ok() && part_zero_) {
+    status = part_zero_->Join(slot, outputs_.attributes, request);
+    if (status.ok() && outputs_.echo_particles) requests_[slot] = wire::ToBytes(request);
+  }
+  if (!outputs_.echo_particles) requests_[slot].Clear();
+  return status;
+}
+
+Answered StreamMessages::AnswerFrameIn(std::size_t slot, Worker& worker,
+                                       const std::atomic<bool>& cancelled) {
   std::unique_ptr<FrameMessages> messages = TakeMessages(worker);
   Answered answered;
   const std::uint64_t request_bytes = requests_[slot].Length();
-  const absl::Status parsed = ParseFrame(requests_[slot], messages->request);
-  if (!outputs_.echo_particles) requests_[slot].Clear();
+  const absl::Status parsed = ParseWhole(slot, messages->request);
   const v1::ParticleFrame& request = messages->request.frame();
   v1::ReconstructedFrame& result = *messages->result.mutable_frame();
   const std::uint64_t next_sequence = session_->next_sequence();
@@ -230,12 +289,15 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
       request.sequence(), outputs_, *session_, worker, cancelled, result);
   std::string checkpoint =
       CheckpointAfter(next_sequence, *session_, terms_, limits_, checkpoint_keys_);
+  if (part_zero_) {
+    part_zero_->assembler()->Answered(session_->next_sequence(), !checkpoint.empty());
+  }
+  bool tell_watchers = false;
   if (status.ok()) {
     result.set_sequence(request.sequence());
     messages->result.set_checkpoint(std::move(checkpoint));
     answers_[slot] = wire::ToBytes(messages->result);
-    if (ShowWatchers(slot, request))
-      answered.afterwards = [broadcaster = broadcaster_] { broadcaster->Announce(); };
+    tell_watchers = ShowWatchers(slot, request);
   } else {
     v1::ReconstructResponse error;
     wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
@@ -250,7 +312,17 @@ Answered StreamMessages::Answer(std::size_t slot, Worker& worker,
   answered.is_result = status.ok();
   answered.last_sequence = session_->next_sequence() - 1;
   answered.bytes = answers_[slot].Length();
+  answered.afterwards = Afterwards(tell_watchers);
   return answered;
+}
+
+std::function<void()> StreamMessages::Afterwards(bool tell_watchers) const {
+  const auto assembler = part_zero_ ? part_zero_->assembler() : nullptr;
+  if (assembler == nullptr && !tell_watchers) return {};
+  return [assembler, broadcaster = tell_watchers ? broadcaster_ : nullptr] {
+    if (assembler != nullptr) assembler->TellMembers();
+    if (broadcaster != nullptr) broadcaster->Announce();
+  };
 }
 
 // They share the bytes of the answer, and of the request where particles are echoed.

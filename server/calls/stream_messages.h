@@ -4,7 +4,9 @@
 #include <grpcpp/support/byte_buffer.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +15,7 @@
 
 #include "absl/status/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
+#include "server/calls/frame_parts.h"
 #include "server/calls/resume.h"
 #include "server/stream/limits.h"
 #include "server/stream/session.h"
@@ -24,7 +27,6 @@
 namespace partiemc::server {
 
 /// Beside the reasons of streams, of sessions, of the core and of the codec (proto/PROTOCOL.md).
-inline constexpr std::string_view kReasonFrameBytes = "FRAME_BYTES";
 inline constexpr std::string_view kReasonOpenBytes = "OPEN_BYTES";
 
 void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
@@ -62,8 +64,22 @@ class StreamMessages final : public StreamHandler {
 
   absl::Status Open(std::size_t slot, const StreamStateMachine& stream) override;
   Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) override;
+  bool MayAnswer(std::size_t slot) override;
+  std::chrono::milliseconds LookEvery() const override;
+  /// The call has ended: whoever waits for parts of it is told.
+  void End(const absl::Status& status);
+
+  /// Where the call sends a part of a stream that another one has opened.
+  const std::optional<OtherPart>& other_part() const { return other_part_; }
 
  private:
+  absl::Status OpenStream(const v1::OpenStream& open, const StreamStateMachine& stream);
+  absl::Status JoinStream(const v1::OpenStream& open, const StreamStateMachine& stream);
+  void TellOpened(v1::StreamOpened opened);
+  absl::Status ParseWhole(std::size_t slot, v1::ReconstructRequest& request);
+  Answered AnswerFrameIn(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled);
+  Answered AnswerPart(std::size_t slot);
+  std::function<void()> Afterwards(bool tell_watchers) const;
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
   // True if somebody watches and is to be told.
   bool ShowWatchers(std::size_t slot, const v1::ParticleFrame& request);
@@ -78,6 +94,9 @@ class StreamMessages final : public StreamHandler {
   grpc::ByteBuffer opened_;
   grpc::ByteBuffer draining_;
   std::optional<Session> session_;  // Once open.
+  // Of a stream whose frames come in parts, one of the two, once open.
+  std::optional<PartZero> part_zero_;
+  std::optional<OtherPart> other_part_;
   StreamTerms terms_;
   wire::Outputs outputs_;
 };

@@ -10,7 +10,7 @@ using std::chrono::milliseconds;
 
 // For as long one that comes only now cannot have waited for too long.
 milliseconds ShortestLimit(const ServerLimits& limits) {
-  milliseconds shortest = milliseconds::max();
+  milliseconds shortest = std::chrono::hours(1);
   for (const milliseconds limit :
        {limits.idle.opening, limits.idle.streaming, limits.unary.request, limits.unary.answer}) {
     if (limit > milliseconds(0)) shortest = std::min(shortest, limit);
@@ -23,16 +23,26 @@ milliseconds ShortestLimit(const ServerLimits& limits) {
 IdleTimer::IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
                      const ServerLimits& limits)
     : streams_(streams), watchers_(watchers), calls_(calls), limits_(limits) {
-  if (ShortestLimit(limits) < milliseconds::max()) thread_ = std::thread([this] { Run(); });
+  thread_ = std::thread([this] { Run(); });
+  streams_.OnEarlierLook([this] { Look(); });
 }
 
 IdleTimer::~IdleTimer() {
+  streams_.OnEarlierLook({});
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
-  stop_came_.notify_all();
-  if (thread_.joinable()) thread_.join();
+  changed_.notify_all();
+  thread_.join();
+}
+
+void IdleTimer::Look() {
+  {
+    const std::lock_guard lock(mutex_);
+    look_ = true;
+  }
+  changed_.notify_all();
 }
 
 void IdleTimer::Run() {
@@ -44,7 +54,8 @@ void IdleTimer::Run() {
                                 watchers_.EndSilent(limits_.idle.opening, now),
                                 calls_.EndIdle(limits_.unary, now), now + ShortestLimit(limits_)});
     lock.lock();
-    stop_came_.wait_until(lock, next, [this] { return stopping_; });
+    changed_.wait_until(lock, next, [this] { return stopping_ || look_; });
+    look_ = false;
   }
 }
 

@@ -24,14 +24,15 @@ class IdleTimer {
 
  private:
   void Run();
+  void Look();
 
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
   UnaryRegistry& calls_;
   const ServerLimits limits_;
   std::mutex mutex_;
-  std::condition_variable stop_came_;
-  bool stopping_ = false;  // Guarded by mutex_.
+  std::condition_variable changed_;
+  bool stopping_ = false, look_ = false;  // Guarded by mutex_.
   std::thread thread_;
 };
 

@@ -70,6 +70,10 @@ struct ServerLimits {
   /// Watchers of all streams together.
   std::uint32_t max_watchers = 64;
 
+  /// Parts that frames of a stream may come in, and, counted apart, connections that send parts,
+  /// those of part 0 left out, of all streams together. 0: frames come whole.
+  std::uint32_t max_parts = 256;
+
   /// What one watcher may keep from being freed: the frames that it has not taken yet, of which
   /// most are shared with other watchers. A larger frame cannot be watched.
   std::uint64_t max_watcher_bytes = std::uint64_t{16} << 20;
@@ -83,7 +87,7 @@ struct ServerLimits {
 
   /// Calls of one caller, of all methods, unless its token says otherwise: room for all that is
   /// limited by itself, and for what just ends and begins.
-  std::uint32_t CallsOfOneCaller() const { return 4 * MaxOpeningCalls(); }
+  std::uint32_t CallsOfOneCaller() const { return 4 * MaxOpeningCalls() + max_parts; }
 
   /// Of a serialised `open`: its checkpoint, and what little stands beside it.
   std::uint64_t MaxOpenBytes() const { return MaxCheckpointBytes() + kQuickOpenBytes; }

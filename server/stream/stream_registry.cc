@@ -64,8 +64,10 @@ absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
 
 }  // namespace
 
-StreamRegistry::StreamRegistry(std::uint32_t max_streams, HistoryRoom* history)
+StreamRegistry::StreamRegistry(std::uint32_t max_streams, HistoryRoom* history,
+                               std::uint32_t max_parts)
     : max_streams_(max_streams),
+      max_parts_(max_parts),
       history_(history),
       id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
 
@@ -109,6 +111,10 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
   entry.stream->opened = std::chrono::steady_clock::now();
   entry.stream->description = std::move(description);
   entry.token = std::move(token);
+  if (const auto& assembler = entry.stream->description.assembler; assembler != nullptr) {
+    assembler->SetLeader(entry.machine);
+    if (tell_earlier_look_) tell_earlier_look_();
+  }
   StreamSummary opened = *entry.stream;
   if (former == nullptr) return opened;
   former->taken_over = true;
@@ -167,6 +173,56 @@ StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {
   return nullptr;
 }
 
+absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& machine,
+                                                    const PartTerms& terms) {
+  std::shared_ptr<StreamStateMachine> member;
+  Caller caller;
+  {
+    const std::lock_guard lock(mutex_);
+    Entry& entry = entries_.at(&machine);
+    member = entry.machine;
+    caller = entry.caller;
+  }
+  const auto stream = Find(terms.stream_name, caller);
+  if (!stream.ok()) return stream.status();
+  {
+    const std::lock_guard lock(mutex_);
+    if (auto status = CheckPart(stream->description, terms); !status.ok()) return status;
+    entries_.at(&machine).sends_part = true;
+  }
+  // Without the lock: a call that had the part leaves.
+  const auto& assembler = stream->description.assembler;
+  const auto seat = assembler->Join(terms.part, member);
+  if (!seat.ok()) return seat.status();
+  return JoinedPart{assembler, *seat, stream->id, stream->description.parameters};
+}
+
+absl::Status StreamRegistry::CheckPart(const StreamDescription& stream,
+                                       const PartTerms& terms) const {
+  // First, so that only who knows it learns of the rest.
+  if (!SameToken(stream.parts_token, terms.token)) {
+    return Refused(absl::StatusCode::kPermissionDenied, kReasonPartsToken, "open.parts_token",
+                   absl::StrCat(terms.token.size(), " characters"), "must be that of part 0");
+  }
+  const std::uint32_t parts = stream.assembler == nullptr ? 0 : stream.assembler->parts();
+  if (parts != terms.parts) {
+    return Refused(absl::StatusCode::kFailedPrecondition, kReasonPartsCount, "open.parts",
+                   absl::StrCat(terms.parts), absl::StrCat("must be ", parts, ", as in part 0"));
+  }
+  const auto senders = std::count_if(entries_.begin(), entries_.end(),
+                                     [](const auto& item) { return item.second.sends_part; });
+  if (senders < max_parts_) return absl::OkStatus();
+  return Refused(
+      absl::StatusCode::kResourceExhausted, kReasonTooManyParts, "streams",
+      absl::StrCat(senders, " connections that send parts"),
+      absl::StrCat("must be at most ", max_parts_, "; start the server with a larger --max-parts"));
+}
+
+void StreamRegistry::OnEarlierLook(std::function<void()> tell) {
+  const std::lock_guard lock(mutex_);
+  tell_earlier_look_ = std::move(tell);
+}
+
 std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& machine) {
   std::optional<StreamSummary> summary;
   {
@@ -174,6 +230,7 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& mac
     const auto found = entries_.find(&machine);
     if (found != entries_.end()) {
       found->second.place = {};
+      found->second.sends_part = false;
       summary.swap(found->second.stream);
     }
   }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -27,6 +28,10 @@ inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
 inline constexpr std::string_view kReasonLabels = "LABELS";
 inline constexpr std::string_view kReasonTooManyStreams = "TOO_MANY_STREAMS";
 inline constexpr std::string_view kReasonNoSuchStream = "NO_SUCH_STREAM";
+/// For which a call does not send parts of a stream.
+inline constexpr std::string_view kReasonPartsCount = "PARTS_COUNT";
+inline constexpr std::string_view kReasonPartsToken = "PARTS_TOKEN";
+inline constexpr std::string_view kReasonTooManyParts = "TOO_MANY_PARTS";
 /// Of a ListStreams that wants a page that is none.
 inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
 
@@ -36,6 +41,24 @@ struct StreamDescription {
   ReconstructionParameters parameters;             ///< As resolved.
   std::shared_ptr<ResultBroadcaster> broadcaster;  ///< Shows its results to watchers.
   std::uint64_t next_sequence = 1;                 ///< Of the first frame that will come.
+  std::shared_ptr<FrameAssembler> assembler = {};  ///< Where frames come in parts.
+  std::string parts_token = {};                    ///< What their senders show.
+};
+
+/// What a call says that sends a part of a stream's frames.
+struct PartTerms {
+  std::string stream_name;
+  std::uint32_t part = 1;  ///< Below `parts`; not 0.
+  std::uint32_t parts = 2;
+  std::string token;
+};
+
+/// A part's place, in the assembler of its stream.
+struct JoinedPart {
+  std::shared_ptr<FrameAssembler> assembler;
+  FrameAssembler::Seat seat;
+  std::string stream_id;  ///< Of the stream, and its parameters.
+  ReconstructionParameters parameters;
 };
 
 struct StreamSummary {
@@ -51,8 +74,9 @@ struct StreamSummary {
 class StreamRegistry {
  public:
   /// Watchers of the streams can go back as far as `history`, which lives longer, has room; null:
-  /// not at all.
-  explicit StreamRegistry(std::uint32_t max_streams, HistoryRoom* history = nullptr);
+  /// not at all. At most `max_parts` calls send parts of streams that others have opened.
+  explicit StreamRegistry(std::uint32_t max_streams, HistoryRoom* history = nullptr,
+                          std::uint32_t max_parts = 256);
 
   /// A call of `caller` comes in, not open yet: those are counted elsewhere (OpeningCalls).
   /// Errors: UNAVAILABLE (DRAINING).
@@ -66,6 +90,12 @@ class StreamRegistry {
   /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS), UNAVAILABLE (DRAINING).
   absl::StatusOr<StreamSummary> Open(const StreamStateMachine& machine,
                                      StreamDescription description, std::string token);
+
+  /// A machine that has entered sends a part of the frames of a stream that is open.
+  /// Errors, each with a Violation: those of Find; FAILED_PRECONDITION (PARTS_COUNT: the stream's
+  /// frames come in another number of parts, or whole); PERMISSION_DENIED (PARTS_TOKEN);
+  /// RESOURCE_EXHAUSTED (TOO_MANY_PARTS); those of FrameAssembler::Join.
+  absl::StatusOr<JoinedPart> JoinPart(const StreamStateMachine& machine, const PartTerms& terms);
 
   /// The machine's stream ends: its name and its place are free. What it was, if it had been
   /// opened.
@@ -94,6 +124,9 @@ class StreamRegistry {
   /// none of those that are here now will have.
   std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
                                                 std::chrono::steady_clock::time_point now);
+  /// From now on `tell` is called whenever there is a stream that wants to be looked at before the
+  /// last call of EndIdle said; empty: nobody is told. It must not call this.
+  void OnEarlierLook(std::function<void()> tell);
   /// Whether all machines have left before the deadline.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
 
@@ -105,6 +138,7 @@ class StreamRegistry {
     std::optional<StreamSummary> stream;  // While open; its counts are asked of the machine.
     std::string token;                    // Of the stream.
     bool taken_over = false;  // By another entry: the stream is not this one's any more.
+    bool sends_part = false;  // Of a stream that another entry has opened.
 
     bool IsOpen() const { return stream && !taken_over; }
   };
@@ -117,9 +151,10 @@ class StreamRegistry {
   static absl::Status TakePlace(Entry& entry, Entry* former);
   std::vector<std::shared_ptr<StreamStateMachine>> Machines() const;
   Entry* FindOpen(std::string_view token);
+  absl::Status CheckPart(const StreamDescription& stream, const PartTerms& terms) const;
   void BeginHistory(const StreamDescription& description, const Entry* former);
 
-  const std::uint32_t max_streams_;
+  const std::uint32_t max_streams_, max_parts_;
   HistoryRoom* const history_;
   const std::string id_prefix_;  // Tells the ids of one run of a server from those of another.
 
@@ -129,6 +164,7 @@ class StreamRegistry {
   std::uint64_t opened_ = 0;
   bool draining_ = false;
   std::uint64_t turned_away_ = 0;
+  std::function<void()> tell_earlier_look_;
 };
 
 }  // namespace partiemc::server

@@ -26,6 +26,8 @@ std::string Name(RequestKind kind) {
   return "";
 }
 
+constexpr std::chrono::milliseconds kLookWhileOpening(100);
+
 absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
 
 }  // namespace
@@ -159,7 +161,20 @@ void StreamStateMachine::GiveWay(const absl::Status& status) {
 void StreamStateMachine::Drain() {
   On([&] {
     if (phase_ == Phase::kStreaming) owes_notice_ = true;
+    if (phase_ == Phase::kOpening || phase_ == Phase::kStreaming) waits_for_none_ = true;
     End(DrainingError());
+  });
+}
+
+void StreamStateMachine::LookAgain() {
+  On([] {});
+}
+
+void StreamStateMachine::LeftOut(const absl::Status& status) {
+  On([&] {
+    if (!status.ok()) waits_for_none_ = true;
+    if (phase_ == Phase::kOpening || phase_ == Phase::kStreaming) return End(status);
+    if (phase_ == Phase::kEnding && status_.ok()) status_ = status;
   });
 }
 
@@ -167,18 +182,21 @@ TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now)
   TimePoint look_again = TimePoint::max();
   On([&] {
     if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
+    // What a handler waits for it knows once it is open, and that may be at any time.
+    const auto every = opening_ ? kLookWhileOpening : handler_.LookEvery();
+    if (every > every.zero()) look_again = now + every;
     const auto limit = phase_ == Phase::kOpening ? limits.opening : limits.streaming;
     if (limit <= limit.zero()) {
       // An opening stream may come under the other limit at any time.
       if (phase_ == Phase::kOpening && limits.streaming > limit.zero()) {
-        look_again = now + limits.streaming;
+        look_again = std::min(look_again, now + limits.streaming);
       }
       return;
     }
-    const bool ours = opening_ || computing_;
+    const bool ours = opening_ || computing_ || computed_ < read_;
     const TimePoint due = (ours ? now : counts_.last_activity) + limit;
     if (now < due) {
-      look_again = due;
+      look_again = std::min(look_again, due);
     } else if (writing_) {
       Abandon(IdleError("takes no answer", limit));
       owes_cut_ = true;
@@ -247,23 +265,31 @@ StreamStateMachine::Actions StreamStateMachine::Decide() {
     actions.read = read_ % window_;
   }
   const bool answers = phase_ == Phase::kStreaming || phase_ == Phase::kEnding;
-  if (answers && !computing_ && computed_ < read_) {
+  if (answers && MayCompute()) {
     computing_ = true;
     actions.compute = computed_ % window_;
   }
   if (answers && !writing_) DecideWrite(actions);
-  const bool all_said = phase_ == Phase::kAbandoned ||
-                        (phase_ == Phase::kEnding && written_ == read_ && !owes_notice_);
   // Once finished there may be no transport any more.
   if (std::exchange(owes_cut_, false) && phase_ != Phase::kFinished) {
     actions.cut = cutting_ = true;
   }
-  if (all_said && !opening_ && !computing_ && !writing_ && !starting_read_ && !cutting_) {
+  if (IsAllSaid() && !opening_ && !computing_ && !writing_ && !starting_read_ && !cutting_) {
     phase_ = Phase::kFinished;
     actions.finish = status_;
   }
   DecideMemory(actions);
   return actions;
+}
+
+bool StreamStateMachine::MayCompute() {
+  return !computing_ && computed_ < read_ && handler_.MayAnswer(computed_ % window_);
+}
+
+bool StreamStateMachine::IsAllSaid() {
+  if (phase_ == Phase::kAbandoned) return true;
+  if (phase_ != Phase::kEnding || owes_notice_) return false;
+  return written_ == read_ || (waits_for_none_ && written_ == computed_ && !computing_);
 }
 
 // Asked only when the next read could begin at once.

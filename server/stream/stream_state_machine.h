@@ -18,6 +18,7 @@
 #include "server/compute/busy_streams.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
+#include "server/stream/frame_assembler.h"
 
 namespace partiemc::server {
 
@@ -73,6 +74,13 @@ class StreamHandler {
   /// Turns the frame in `slot` into its answer, unless `cancelled`. Called by a worker, one frame
   /// of a stream at a time and in their order.
   virtual Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) = 0;
+
+  /// Whether the frame in `slot`, the oldest that is not answered, can be. One that waits for parts
+  /// of others is asked for again by StreamStateMachine::LookAgain, and from time to time as
+  /// LookEvery says. Called with the stream's lock held: it must not call the stream.
+  virtual bool MayAnswer(std::size_t /*slot*/) { return true; }
+  /// 0: nothing waits for anything but LookAgain.
+  virtual std::chrono::milliseconds LookEvery() const { return std::chrono::milliseconds(0); }
 };
 
 /// For how long a client may let a stream wait for it; 0: for ever.
@@ -100,12 +108,17 @@ struct StreamCounts {
 /// its answer's writing, so that a client that does not read its answers is not read from either.
 /// Ending answers what was read; abandoned answers nothing more. Safe from any thread.
 ///
+/// A frame that comes in parts from several streams is computed when the handler of each says that
+/// it may be. A stream that ends because of the server, or because of the stream that its parts
+/// belong to, does not wait for that: frames that still lack something are not answered.
+///
 /// Memory: the bytes of requests that were read, `open` among them, and of answers that are not
 /// written count against the budget of all streams. While something of a stream is in flight,
 /// another frame is read only when the budget has room for one of the size of the last. A stream of
 /// which nothing is in flight always reads one frame, so that none stands still for the sake of
 /// another.
 class StreamStateMachine final : public MemoryBudget::Waiter,
+                                 public AssemblyMember,
                                  public std::enable_shared_from_this<StreamStateMachine> {
  public:
   /// `transport` and `handler` live until the transport's Finish returns, `pool` and `budget`
@@ -146,6 +159,8 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
   const std::atomic<bool>& cancelled() const { return cancelled_; }
 
   void Granted(std::uint64_t bytes) override;
+  void LookAgain() override;
+  void LeftOut(const absl::Status& status) override;
 
  private:
   enum class Phase { kOpening, kStreaming, kEnding, kAbandoned, kFinished };
@@ -162,6 +177,8 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
 
   // With the lock held:
   Actions Decide();
+  bool MayCompute();
+  bool IsAllSaid();
   bool MayRead(Actions& actions);
   void DecideWrite(Actions& actions);
   void DecideMemory(Actions& actions);
@@ -199,6 +216,7 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
   bool starting_read_ = false, cutting_ = false;
   bool owes_cut_ = false;
   bool owes_opened_ = false, owes_notice_ = false;
+  bool waits_for_none_ = false;             // Frames that still lack something are not answered.
   Outgoing in_flight_ = Outgoing::kAnswer;  // What is being written.
   // Of the budget: what each slot holds, what has been set aside for the next read, what is to be
   // given back once the lock is released.

@@ -50,8 +50,9 @@ std::string LineageOf(std::string_view token) {
 }
 
 bool SameToken(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
   unsigned char difference = 0;
-  for (std::size_t k = 0; k < kDigits; ++k) {
+  for (std::size_t k = 0; k < a.size(); ++k) {
     difference = static_cast<unsigned char>(difference | (a[k] ^ b[k]));
   }
   return difference == 0;

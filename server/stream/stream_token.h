@@ -24,7 +24,7 @@ absl::Status CheckStreamToken(std::string_view text);
 /// from which nobody finds the token.
 std::string LineageOf(std::string_view token);
 
-/// In a time that does not tell how much of them is alike. Requires: both are tokens.
+/// In a time that does not tell how much of them is alike, but for their lengths.
 bool SameToken(std::string_view a, std::string_view b);
 
 }  // namespace partiemc::server

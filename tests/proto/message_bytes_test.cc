@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -99,6 +100,31 @@ TEST(HeldField, IsTheOneOfTheOneofThatComesLast) {
   }
   grpc::ByteBuffer empty = ToBytes(v1::ReconstructRequest());
   EXPECT_EQ(HeldField(empty, kLast), 0);
+}
+
+TEST(SequenceOf, IsWhatAParserReads) {
+  v1::ReconstructRequest open, frame, other;
+  open.mutable_open()->set_stream_name("name");
+  frame.mutable_frame()->set_positions(std::string(1000, 'p'));
+  frame.mutable_frame()->set_sequence(std::uint64_t{1} << 63);
+  frame.mutable_frame()->add_scalars()->set_name("heat");
+  other.mutable_frame()->set_sequence(7);
+  const std::string open_text = open.SerializeAsString(), frame_text = frame.SerializeAsString();
+  const std::string unknown = "\x18\x05\x22\x02hi";    // Field 3, a number; field 4, two bytes.
+  const std::string no_number = "\x12\x04\x0a\x02hi";  // A frame whose `sequence` is bytes.
+  for (const std::size_t piece : {1, 7, 4096}) {
+    for (const std::string& text :
+         {frame_text, open_text + frame_text, frame_text + unknown, std::string("\x12\x00", 2),
+          frame_text + other.SerializeAsString(), frame_text + no_number,
+          frame_text + open_text + no_number, frame_text.substr(0, 500), frame_text + "\x07",
+          frame_text + "\x12\x05\x08\x01"}) {
+      grpc::ByteBuffer bytes = InPieces(text, piece);
+      v1::ReconstructRequest parsed;
+      std::optional<std::uint64_t> expected;
+      if (parsed.ParseFromString(text)) expected = parsed.frame().sequence();
+      EXPECT_EQ(SequenceOf(bytes), expected) << parsed.ShortDebugString().substr(0, 100);
+    }
+  }
 }
 
 TEST(MergeBytes, WritesIntoTheMemoryThatIsThere) {

@@ -113,6 +113,9 @@ std::vector<std::string> Subjects() {
 }  // namespace
 
 bool IsFieldOrSubject(const std::string& field) {
+  // A field of one part of a frame.
+  static const std::regex kPart("parts\\[[0-9]+\\]\\.(.+)");
+  if (std::smatch match; std::regex_match(field, match, kPart)) return IsFieldOrSubject(match[1]);
   const auto subjects = Subjects();
   if (std::find(subjects.begin(), subjects.end(), field) != subjects.end()) return true;
   // Those that errors are about, and parts of them that a caller fills in.
@@ -137,6 +140,10 @@ std::vector<ErrorRow> FrameErrorRows() {
 
 std::vector<ErrorRow> CallErrorRows() {
   return CallRowsOf(TablesUnder("### A call is refused").at(0));
+}
+
+std::vector<ErrorRow> PartErrorRows() {
+  return CallRowsOf(TablesUnder("### A part is refused").at(0));
 }
 
 std::vector<ErrorRow> WatchErrorRows() {

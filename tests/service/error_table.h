@@ -19,6 +19,9 @@ std::vector<ErrorRow> FrameErrorRows();
 /// The rows of the table "A call is refused or ended".
 std::vector<ErrorRow> CallErrorRows();
 
+/// The rows of the table "A part is refused".
+std::vector<ErrorRow> PartErrorRows();
+
 /// The rows of the table of watches behind it.
 std::vector<ErrorRow> WatchErrorRows();
 

@@ -41,6 +41,7 @@ TEST(ErrorTables, EveryRowHasItsTest) {
   ExpectTests("FrameRefused", FrameErrorRows());
   ExpectTests("CallRefused", CallErrorRows());
   ExpectTests("WatchRefused", WatchErrorRows());
+  ExpectTests("PartRefused", PartErrorRows());
 }
 
 TEST(ErrorTables, EveryReasonInTheCodeHasARow) {

@@ -69,6 +69,9 @@ class AsyncStream::Receiving {
         case Event::Kind::kRefusal:
           Deliver(ViolationError(absl::StatusCode::kInvalidArgument, event.violation));
           break;
+        case Event::Kind::kPartTaken:
+          Deliver(FrameResult());
+          break;
         case Event::Kind::kNotice:
         case Event::Kind::kReconnected:
           if (told_) told_(event);

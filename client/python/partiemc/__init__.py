@@ -61,6 +61,12 @@ def connect(address=None, *, latest=False, **options):
     fallback_addresses: servers to go on with. checkpoint_interval, max_held_bytes,
         connect_timeout, deadline, give_up_after, send_timeout (seconds): as in client/include/
         partiemc/client/stream.h.
+    part, parts: of a simulator of many processes, each of which connects with the same `name`: its
+        number from 0 on, and how many there are. Every one sends its particles of each frame, also
+        none; part 0 gets the results, the others None for each frame. The frame is that of all
+        particles, in the order of ids where they have ids, else part by part.
+    parts_token: a secret of theirs, the same for all; "" lets in who may produce the stream.
+    part_timeout: seconds after which a frame that lacks a part is an Error (PARTS_MISSING); 10.
     And the parameters of reconstruct. Raises Error.
 
     At the end of `with` frames on their way arrive; answers that nobody has received are dropped.

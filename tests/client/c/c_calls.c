@@ -230,6 +230,46 @@ static void try_latest(const char* address) {
   fill(0);
 }
 
+/* Two parts make the frame that plain() is; in process there are none. */
+static void try_parts(const char* address) {
+  partiemc_stream* streams[2] = {NULL, NULL};
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  options.spacing = 1;
+  options.normals = 1;
+  options.name = "c-parts";
+  options.parts = 2;
+  options.parts_token = "between two";
+  if (address == NULL) {
+    EXPECT(partiemc_open(NULL, &options, &streams[0]) == PARTIEMC_INVALID_ARGUMENT);
+    return;
+  }
+  for (uint32_t part = 0; part < 2; ++part) {
+    options.part = part;
+    EXPECT(partiemc_open(address, &options, &streams[part]) == PARTIEMC_OK);
+  }
+  for (size_t part = 0; part < 2; ++part) { /* Each has half of the rows. */
+    partiemc_particles particles;
+    partiemc_particles_init(&particles, sizeof particles);
+    partiemc_set_float32(&particles, &xy[part * kCount / 2][0], kCount / 2, 2);
+    EXPECT(partiemc_send(streams[part], &particles, 0, NULL) == PARTIEMC_OK);
+  }
+  EXPECT(partiemc_receive(streams[0], 30, &event) == PARTIEMC_OK && event.sequence == 1);
+  check_result(&event);
+  EXPECT(partiemc_receive(streams[1], 30, &event) == PARTIEMC_OK && event.sequence == 1);
+  EXPECT(event.kind == PARTIEMC_PART_TAKEN && event.ring_count == 0);
+  for (int part = 1; part >= 0; --part) {
+    EXPECT(partiemc_finish(streams[part]) == PARTIEMC_OK);
+    EXPECT(partiemc_receive(streams[part], 30, &event) == PARTIEMC_OK);
+    EXPECT(event.kind == PARTIEMC_END);
+    partiemc_close(streams[part]);
+  }
+  options.latest = 1;
+  EXPECT(partiemc_open(address, &options, &streams[0]) == PARTIEMC_INVALID_ARGUMENT);
+}
+
 /* Programs that were compiled with shorter structs, and with longer ones. */
 static void try_sizes(const char* address) {
   struct {
@@ -300,6 +340,7 @@ int main(int argc, char** argv) {
   try_window(address);
   try_refusals(address);
   try_latest(address);
+  try_parts(address);
   try_sizes(address);
   try_options(address);
   puts("all is as the header says");

@@ -54,6 +54,32 @@ class Streams(unittest.TestCase):
         lengths = numpy.hypot(*results[3].rings.normals.T)
         self.assertLess(abs(lengths - 1).max(), 1e-5)
 
+    def test_parts_of_several_connections_make_whole_frames(self):
+        frames = [block(0.3 * k) for k in range(12)]
+        received = [[], [], []]
+
+        def send_part(part):
+            def shares():
+                for frame in frames:
+                    yield frame[len(frame) * part // 3:len(frame) * (part + 1) // 3]
+            with partiemc.connect(self.address, spacing=1, name="in-parts", part=part, parts=3,
+                                  parts_token="of this job", part_timeout=20) as stream:
+                received[part] = list(stream.map(shares()))
+
+        ranks = [threading.Thread(target=send_part, args=(part,)) for part in (2, 1, 0)]
+        for rank in ranks:
+            rank.start()
+        for rank in ranks:
+            rank.join()
+        self.assertEqual([digests(result) for result in received[0]], digests_of_replay(frames))
+        self.assertEqual(received[1], [None] * 12)
+        self.assertEqual(received[2], [None] * 12)
+        with self.assertRaises(ValueError):
+            partiemc.connect(self.address, name="in-parts", parts=2, latest=True)
+        with self.assertRaises(partiemc.Error) as caught:
+            partiemc.connect(self.address, name="in-parts", parts=2, part=2)
+        self.assertEqual((caught.exception.field, caught.exception.value), ("part", "2"))
+
     def test_sending_allocates_nothing_of_numpys(self):
         wide = numpy.zeros((300_000, 7))
         wide[:, 0], wide[:, 3] = numpy.divmod(numpy.arange(len(wide)), 600)

@@ -84,6 +84,16 @@ typedef struct partiemc_options {
   double send_timeout;    /* Seconds for partiemc_send to get a place in the window, whatever becomes
                              of the connection: DEADLINE_EXCEEDED then, and the stream goes on; 0:
                              as long as the stream lives. */
+  /* Of a simulator of many processes, each of which opens the stream of the same `name`, and sends
+   * its particles of each frame, also none. Part 0 gets the results, the others PARTIEMC_PART_TAKEN
+   * for each frame. The frame is that of all particles, in the order of ids where they have ids,
+   * else part by part. Not with `latest`. */
+  uint32_t parts;          /* How many there are; 0: frames come whole. */
+  uint32_t part;           /* Which one this is, from 0 on. */
+  const char* parts_token; /* A secret of theirs, the same for all; NULL: who may produce the stream
+                              may send its parts. */
+  double part_timeout;     /* Seconds after which a frame that lacks a part is refused
+                              (PARTS_MISSING); 0: 10. */
 } partiemc_options;
 /* Every option at its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -181,7 +191,8 @@ enum {
   PARTIEMC_REFUSAL = 1,     /* Frame `sequence` broke a rule and left no trace. */
   PARTIEMC_NOTICE = 2,      /* A word of the server in `message`. */
   PARTIEMC_NOTHING_YET = 3, /* The time to wait is over. */
-  PARTIEMC_END = 4          /* partiemc_finish was called and every frame has been answered. */
+  PARTIEMC_END = 4,         /* partiemc_finish was called and every frame has been answered. */
+  PARTIEMC_PART_TAKEN = 5   /* Part 0 has the answer to frame `sequence`, of which this was a part. */
 };
 
 #define PARTIEMC_NO_RING 0xffffffffu

@@ -21,8 +21,9 @@ namespace partiemc::client {
 /// its buffers, which Receive would use again. One thread sends.
 class AsyncStream {
  public:
-  /// What a frame became. Errors: one with a Violation (FindViolation) where it was refused, and
-  /// the stream goes on; else what ended the stream.
+  /// What a frame became; of parts other than 0 (StreamOptions) nothing. Errors: one with a
+  /// Violation (FindViolation) where it was refused, and the stream goes on; else what ended the
+  /// stream.
   using Answer = absl::StatusOr<FrameResult>;
   using Answered = std::function<void(Answer)>;
   /// Told of what is no answer: Event::Kind::kNotice and kReconnected.

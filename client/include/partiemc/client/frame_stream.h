@@ -45,13 +45,14 @@ struct Event {
     kRefusal,      ///< Frame `sequence` broke `violation`; it left no trace, the stream goes on.
     kNotice,       ///< `message` is a word from the server (it is about to go away).
     kReconnected,  ///< The stream goes on after a loss that `message` tells; nothing is missing.
+    kPartTaken,    ///< Part of frame `sequence`, which part 0 has the answer for (StreamOptions).
   };
   Kind kind = Kind::kResult;
   std::uint64_t sequence = 0;  ///< 0 for what is of no frame.
   double time = 0;             ///< Of a result: simulation time as it was sent.
   FrameResult frame;
   Violation violation;
-  std::string message;  ///< Of all but a result: one line for a person.
+  std::string message;  ///< Of all but a result and a part: one line for a person.
 };
 
 /// What a frame may cost; a larger one is refused.

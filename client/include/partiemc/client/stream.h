@@ -54,6 +54,23 @@ struct ReconnectPolicy {
   bool announce = false;
 };
 
+/// Frames that come in parts, each from a process of its own: every rank of a simulator opens the
+/// stream of the same name, sends its particles of each step, all ranks as many frames and in the
+/// same order, also where it has none, and receives. Rank 0 gets the results, the others
+/// Event::Kind::kPartTaken for what they have sent. A frame is that of all its particles, in the
+/// order of their ids where they have ids, else part by part. Not for a LatestSender: ranks would
+/// leave out different frames.
+struct FrameParts {
+  std::uint32_t parts = 0;  ///< 0: frames come whole.
+  std::uint32_t part = 0;   ///< Below `parts`. Part 0 opens the stream; others wait for that.
+  /// The same for all parts and for nobody else, at most 128 bytes of printable ASCII. Empty:
+  /// whoever may produce a stream of this name may send its parts.
+  std::string token = {};
+  /// A frame that lacks a part for so long after part 0 has come is refused (PARTS_MISSING). Below
+  /// `deadline`, at most ten minutes; part 0 decides.
+  std::chrono::milliseconds timeout{10000};
+};
+
 struct StreamOptions {
   /// 1 to 128 characters of [A-Za-z0-9._-], unique on the server. Empty: the server makes one up.
   std::string name = {};
@@ -82,6 +99,9 @@ struct StreamOptions {
   /// with its connection.
   std::uint32_t checkpoint_interval = 4;
   ReconnectPolicy reconnect = {};
+  /// Wants a name. What else is set here counts for part 0 alone, but for credentials, addresses
+  /// and times.
+  FrameParts parts = {};
   /// What frames may take that are held for being sent again: `checkpoint_interval` and a window of
   /// them. A frame that does not fit is refused.
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;

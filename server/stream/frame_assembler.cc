@@ -1,0 +1,244 @@
+#include "server/stream/frame_assembler.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/base/call_errors.h"
+
+namespace partiemc::server {
+namespace {
+
+absl::Status RefusedPart(std::string_view reason, std::string field, std::string value,
+                         std::string rule) {
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(reason), std::move(field), std::move(value), std::move(rule)});
+}
+
+absl::Status LeaderGone() {
+  return ViolationError(absl::StatusCode::kUnavailable,
+                        {std::string(kReasonLeaderGone), "stream", "part 0 has left",
+                         "must have a part 0; try again when it has resumed the stream"});
+}
+
+absl::Status PartTakenOver() {
+  return ViolationError(absl::StatusCode::kAborted,
+                        {std::string(kReasonTakenOver), "open.part", "sent by another call now",
+                         "must be sent by one call of the stream"});
+}
+
+// "3, 7, 8 and 5 more".
+template <typename Parts>
+std::string Missing(const Parts& parts) {
+  constexpr std::uint32_t kNamed = 8;
+  std::string text;
+  std::uint32_t missing = 0;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    if (parts[k] != nullptr || ++missing > kNamed) continue;
+    absl::StrAppend(&text, missing > 1 ? ", " : "", k + 1);
+  }
+  if (missing > kNamed) absl::StrAppend(&text, " and ", missing - kNamed, " more");
+  return text;
+}
+
+}  // namespace
+
+FrameAssembler::FrameAssembler(const Terms& terms)
+    : terms_(terms),
+      members_(terms.parts - 1),
+      next_(terms.next_sequence),
+      wanted_(terms.next_sequence),
+      resume_(terms.next_sequence) {}
+
+void FrameAssembler::SetLeader(std::weak_ptr<AssemblyMember> leader) {
+  const std::lock_guard lock(mutex_);
+  leader_ = std::move(leader);
+}
+
+void FrameAssembler::LeaderSent(std::uint64_t sequence) {
+  const std::lock_guard lock(mutex_);
+  if (sequence < next_ || sequence - next_ >= terms_.window) return;  // A number that is refused.
+  while (!checkpoints_.empty() && sequence >= terms_.window &&
+         checkpoints_.front() <= sequence - terms_.window) {
+    resume_ = checkpoints_.front() + 1;
+    checkpoints_.pop_front();
+  }
+}
+
+bool FrameAssembler::IsReady(std::uint64_t sequence, Clock::time_point since,
+                             Clock::time_point now) const {
+  const std::lock_guard lock(mutex_);
+  if (sequence != next_ || now - since >= terms_.timeout) return true;
+  const auto found = frames_.find(sequence);
+  return (found == frames_.end() ? 0 : found->second.count) == members_.size();
+}
+
+absl::StatusOr<std::vector<std::shared_ptr<const PartBytes>>> FrameAssembler::Take() {
+  Gathered frame;
+  {
+    const std::lock_guard lock(mutex_);
+    wanted_ = next_ + 1;
+    if (auto node = frames_.extract(next_)) frame = std::move(node.mapped());
+  }
+  frame.parts.resize(members_.size());
+  if (frame.count == members_.size()) return std::move(frame.parts);
+  return ViolationError(
+      absl::StatusCode::kDeadlineExceeded,
+      {std::string(kReasonPartsMissing), "parts", Missing(frame.parts),
+       absl::StrCat("must come within ", terms_.timeout.count(), " ms of part 0")});
+}
+
+void FrameAssembler::Answered(std::uint64_t next_sequence, bool with_checkpoint) {
+  std::map<std::uint64_t, Gathered> over;  // Freed without the lock.
+  const std::lock_guard lock(mutex_);
+  next_ = next_sequence;
+  wanted_ = std::max(wanted_, next_);
+  while (!frames_.empty() && frames_.begin()->first < next_) {
+    over.insert(frames_.extract(frames_.begin()));
+  }
+  if (!terms_.has_checkpoints) {
+    resume_ = next_;
+  } else if (with_checkpoint) {
+    checkpoints_.push_back(next_ - 1);
+  }
+}
+
+std::vector<std::weak_ptr<AssemblyMember>> FrameAssembler::Calls() const {
+  std::vector<std::weak_ptr<AssemblyMember>> calls;
+  calls.reserve(members_.size());
+  for (const Member& member : members_) {
+    if (member.holder != 0) calls.push_back(member.call);
+  }
+  return calls;
+}
+
+void FrameAssembler::TellMembers() {
+  std::vector<std::weak_ptr<AssemblyMember>> calls;
+  {
+    const std::lock_guard lock(mutex_);
+    calls = Calls();
+  }
+  for (const auto& weak : calls) {
+    if (const auto call = weak.lock()) call->LookAgain();
+  }
+}
+
+void FrameAssembler::End(const absl::Status& status) {
+  std::vector<std::weak_ptr<AssemblyMember>> calls;
+  std::map<std::uint64_t, Gathered> frames;
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(ended_, true)) return;
+    calls = Calls();
+    frames.swap(frames_);
+  }
+  for (const auto& weak : calls) {
+    if (const auto call = weak.lock()) call->LeftOut(status.ok() ? status : LeaderGone());
+  }
+}
+
+absl::StatusOr<FrameAssembler::Seat> FrameAssembler::Join(std::uint32_t part,
+                                                          std::weak_ptr<AssemblyMember> member) {
+  Seat seat{.part = part};
+  std::weak_ptr<AssemblyMember> former;
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return LeaderGone();
+    Withdraw(part);
+    Member& place = members_[part - 1];
+    former = std::exchange(place.call, std::move(member));
+    seat.holder = place.holder = ++holders_;
+  }
+  if (const auto call = former.lock()) call->LeftOut(PartTakenOver());
+  return seat;
+}
+
+void FrameAssembler::Leave(const Seat& seat) {
+  const std::lock_guard lock(mutex_);
+  if (seat.holder == 0 || members_[seat.part - 1].holder != seat.holder) return;
+  members_[seat.part - 1] = {};
+  Withdraw(seat.part);
+}
+
+// The bytes stay with their call, so that little is freed under the lock.
+void FrameAssembler::Withdraw(std::uint32_t part) {
+  for (auto& [sequence, frame] : frames_) {
+    if (frame.parts[part - 1] == nullptr) continue;
+    frame.parts[part - 1] = nullptr;
+    frame.all_bytes -= std::exchange(frame.bytes[part - 1], 0);
+    --frame.count;
+  }
+}
+
+absl::Status FrameAssembler::CheckOffer(std::uint32_t part, std::uint64_t sequence,
+                                        std::uint64_t bytes) const {
+  if (sequence < wanted_) {
+    return RefusedPart(kReasonPartLate, "sequence", absl::StrCat(sequence),
+                       absl::StrCat("must be at least ", wanted_, "; this frame is over"));
+  }
+  if (sequence - next_ >= terms_.window) {
+    return RefusedPart(
+        kReasonPartAhead, "sequence", absl::StrCat(sequence),
+        absl::StrCat("must be below ", next_ + terms_.window, "; frames before it are unanswered"));
+  }
+  const auto found = frames_.find(sequence);
+  const bool begun = found != frames_.end();
+  if (begun && found->second.parts[part - 1] != nullptr) {
+    return RefusedPart(kReasonPartDuplicate, "sequence", absl::StrCat(sequence),
+                       absl::StrCat("must be sent once by part ", part, "; the first one counts"));
+  }
+  const std::uint64_t held = begun ? found->second.all_bytes : 0;
+  if (bytes > terms_.max_frame_bytes - held) {
+    return RefusedPart(kReasonFrameBytes, "frame", absl::StrCat(bytes, " bytes"),
+                       absl::StrCat("must be at most ", terms_.max_frame_bytes - held,
+                                    " bytes beside the parts that have come"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std::uint64_t bytes,
+                                   std::shared_ptr<const PartBytes> part) {
+  std::shared_ptr<AssemblyMember> leader;
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_ || members_[seat.part - 1].holder != seat.holder) {
+      return absl::CancelledError("the call sends no part any more");
+    }
+    if (auto status = CheckOffer(seat.part, sequence, bytes); !status.ok()) return status;
+    Gathered& frame = frames_[sequence];
+    frame.parts.resize(members_.size());
+    frame.bytes.resize(members_.size());
+    frame.parts[seat.part - 1] = std::move(part);
+    frame.bytes[seat.part - 1] = bytes;
+    frame.all_bytes += bytes;
+    if (++frame.count == members_.size()) leader = leader_.lock();
+  }
+  if (leader != nullptr) leader->LookAgain();
+  return absl::OkStatus();
+}
+
+bool FrameAssembler::IsOver(std::uint64_t sequence) const {
+  const std::lock_guard lock(mutex_);
+  return ended_ || sequence < next_;
+}
+
+absl::Status FrameAssembler::OutcomeOf(std::uint64_t sequence) const {
+  const std::lock_guard lock(mutex_);
+  if (sequence < next_) return absl::OkStatus();
+  return RefusedPart(kReasonPartLate, "sequence", absl::StrCat(sequence),
+                     absl::StrCat("must be below ", next_, "; part 0 has ended the stream"));
+}
+
+std::uint64_t FrameAssembler::next_wanted() const {
+  const std::lock_guard lock(mutex_);
+  return wanted_;
+}
+
+std::uint64_t FrameAssembler::resume_sequence() const {
+  const std::lock_guard lock(mutex_);
+  return resume_;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,184 @@
+// Each row of "A part is refused" in proto/PROTOCOL.md: a test named as the row's reason, with the
+// exact reason and words (error_table_test.cc looks for rows without).
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "service/error_testing.h"
+#include "service/parts_testing.h"
+
+namespace partiemc::server {
+namespace {
+
+class PartRefused : public ErrorTable {
+ protected:
+  void SetUp() override {
+    options_.limits.max_parts = 4;
+    Serve();
+  }
+
+  static void ExpectError(const v1::ReconstructResponse& answer, const std::string& reason,
+                          const std::string& message) {
+    ASSERT_TRUE(answer.has_error()) << answer.ShortDebugString().substr(0, 200);
+    const v1::FrameError& error = answer.error();
+    EXPECT_EQ(error.reason(), reason);
+    EXPECT_EQ(error.message(), message);
+    EXPECT_TRUE(IsFieldOrSubject(error.field())) << error.field();
+  }
+  void ExpectEnd(StreamClient& client, grpc::StatusCode code, const std::string& reason,
+                 const std::string& message) {
+    const grpc::Status status = client.Finish();
+    EXPECT_EQ(status.error_code(), code);
+    EXPECT_EQ(client.reason(), reason);
+    EXPECT_EQ(status.error_message(), message);
+    ExpectDetails(status, reason);
+  }
+  void ExpectNotOpened(const v1::ReconstructRequest& open, grpc::StatusCode code,
+                       const std::string& reason, const std::string& message) {
+    StreamClient client(Connect(*server_, Transport::kTcp));
+    EXPECT_FALSE(client.SendAndReceive(open).has_opened());
+    ExpectEnd(client, code, reason, message);
+  }
+};
+
+TEST_F(PartRefused, PARTS_MISSING) {
+  Ranks ranks(*server_, "tank", 3, 50);
+  ranks.Send(0, 1);
+  ExpectError(ranks[0].Receive(), "PARTS_MISSING", "parts: 1, 2; must come within 50 ms of part 0");
+}
+
+TEST_F(PartRefused, PART_MISMATCH) {
+  Ranks ranks(*server_, "tank", 2);
+  ranks.Send(0, 1, 1, /*ids=*/true);
+  ranks.Send(1, 1, 1, /*ids=*/false);
+  const auto answer = ranks[0].Receive();
+  ExpectError(answer, "PART_MISMATCH",
+              "parts[1].ids: 0 bytes; must be there, as in the parts before");
+  EXPECT_EQ(answer.error().next_sequence(), 2u);
+  ranks.ExpectTaken(1, 1);
+  ranks.SendAll(2);
+  EXPECT_TRUE(ranks[0].Receive().has_frame());
+}
+
+TEST_F(PartRefused, PART_LATE) {
+  Ranks ranks(*server_, "tank", 2, 50);
+  ranks.Send(0, 1);
+  EXPECT_TRUE(ranks[0].Receive().has_error());
+  ranks.Send(1, 1);
+  ExpectError(ranks[1].Receive(), "PART_LATE",
+              "sequence: 1; must be at least 2; this frame is over");
+}
+
+TEST_F(PartRefused, PART_DUPLICATE) {
+  Ranks ranks(*server_, "tank", 2);
+  ranks.Send(1, 1);
+  ranks.Send(1, 1);
+  ranks.Send(0, 1);
+  ranks.ExpectTaken(1, 1);
+  ExpectError(ranks[1].Receive(), "PART_DUPLICATE",
+              "sequence: 1; must be sent once by part 1; the first one counts");
+}
+
+TEST_F(PartRefused, PART_AHEAD) {
+  Ranks ranks(*server_, "tank", 2);
+  ranks.Send(1, 5);
+  ExpectError(ranks[1].Receive(), "PART_AHEAD",
+              "sequence: 5; must be below 5; frames before it are unanswered");
+}
+
+TEST_F(PartRefused, FRAME_BYTES) {
+  Ranks ranks(*server_, "tank", 3);
+  auto large = PartRequest(1, 3, 1, 1, 0, false);
+  large.mutable_frame()->set_positions(std::string(700'000, 'x'));
+  ranks[1].Send(large);
+  EXPECT_TRUE(Eventually([&] {
+    ranks[2].Send(large);
+    const auto answer = ranks[2].Receive();
+    return answer.error().reason() == "FRAME_BYTES";
+  }));
+}
+
+TEST_F(PartRefused, MALFORMED) {
+  Ranks ranks(*server_, "tank", 2);
+  auto strange = PartRequest(1, 2, 1, 1, 0, true);
+  for (int k = 0; k < 5000; ++k) strange.mutable_frame()->add_scalars()->set_name("s");
+  ranks[1].Send(strange);
+  ExpectError(ranks[1].Receive(), "MALFORMED",
+              "frame: " + std::to_string(strange.ByteSizeLong()) +
+                  " bytes; must be a ParticleFrame of at most 4096 fields");
+  ranks.SendAll(1);
+  EXPECT_TRUE(ranks[0].Receive().has_frame());
+}
+
+TEST_F(PartRefused, OUT_OF_RANGE) {
+  const auto expect = [this](const v1::ReconstructRequest& open, const std::string& message) {
+    ExpectNotOpened(open, grpc::StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE", message);
+  };
+  expect(OpenPart("tank", 0, 5),
+         "open.parts: 5; must be at most 4; start the server with a larger --max-parts");
+  expect(OpenPart("tank", 3, 3), "open.part: 3; must be below open.parts");
+  expect(OpenPart("tank", 1, 0), "open.part: 1; must be below open.parts");
+  auto open = OpenPart("tank", 0, 2);
+  open.mutable_open()->set_part_timeout_ms(600'001);
+  expect(open, "open.part_timeout_ms: 600001; must be at most 600000");
+  open = OpenPart("tank", 0, 2);
+  open.mutable_open()->set_parts_token("line\nbreak");
+  expect(open, "open.parts_token: 10 bytes; must be at most 128 bytes of printable ASCII");
+}
+
+TEST_F(PartRefused, NO_SUCH_STREAM) {
+  ExpectNotOpened(OpenPart("tank", 1, 2), grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM",
+                  "open.stream_name: \"tank\"; must be the name of an open stream; ListStreams "
+                  "tells them");
+}
+
+TEST_F(PartRefused, PARTS_COUNT) {
+  StreamClient whole(channel_);
+  auto open = OpenRequest("whole");
+  open.mutable_open()->set_parts_token(kPartsToken);
+  ASSERT_TRUE(whole.SendAndReceive(open).has_opened());
+  ExpectNotOpened(OpenPart("whole", 1, 2), grpc::StatusCode::FAILED_PRECONDITION, "PARTS_COUNT",
+                  "open.parts: 2; must be 0, as in part 0");
+  Ranks ranks(*server_, "tank", 2);
+  ExpectNotOpened(OpenPart("tank", 2, 3), grpc::StatusCode::FAILED_PRECONDITION, "PARTS_COUNT",
+                  "open.parts: 3; must be 2, as in part 0");
+}
+
+TEST_F(PartRefused, PARTS_TOKEN) {
+  Ranks ranks(*server_, "tank", 2);
+  auto open = OpenPart("tank", 1, 2);
+  open.mutable_open()->set_parts_token("guessed");
+  ExpectNotOpened(open, grpc::StatusCode::PERMISSION_DENIED, "PARTS_TOKEN",
+                  "open.parts_token: 7 characters; must be that of part 0");
+  ranks.SendAll(1);
+  EXPECT_TRUE(ranks[0].Receive().has_frame());
+}
+
+TEST_F(PartRefused, TOO_MANY_PARTS) {
+  Ranks first(*server_, "first", 4), second(*server_, "second", 2);
+  StreamClient third(channel_);
+  ASSERT_TRUE(third.SendAndReceive(OpenPart("third", 0, 2)).has_opened());
+  ExpectNotOpened(
+      OpenPart("third", 1, 2), grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_PARTS",
+      "streams: 4 connections that send parts; must be at most 4; start the server with "
+      "a larger --max-parts");
+}
+
+TEST_F(PartRefused, TAKEN_OVER) {
+  Ranks ranks(*server_, "tank", 2);
+  StreamClient second(Connect(*server_, Transport::kTcp));
+  ASSERT_TRUE(second.SendAndReceive(OpenPart("tank", 1, 2)).has_opened());
+  ExpectEnd(ranks[1], grpc::StatusCode::ABORTED, "TAKEN_OVER",
+            "open.part: sent by another call now; must be sent by one call of the stream");
+}
+
+TEST_F(PartRefused, LEADER_GONE) {
+  Ranks ranks(*server_, "tank", 2);
+  ranks[0].Cancel();
+  ExpectEnd(
+      ranks[1], grpc::StatusCode::UNAVAILABLE, "LEADER_GONE",
+      "stream: part 0 has left; must have a part 0; try again when it has resumed the stream");
+}
+
+}  // namespace
+}  // namespace partiemc::server
