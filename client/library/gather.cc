@@ -92,15 +92,31 @@ absl::Status Missing(std::string field, std::size_t count) {
                          .rule = absl::StrCat("must be given for each of ", count, " particles")});
 }
 
+absl::StatusOr<wire::AttributeRows> RowsOf(const AttributeArrays& attribute, std::size_t count) {
+  const auto& [name, x, y, z] = attribute;
+  wire::AttributeRows rows{.name = name, .components = y.empty() ? 1 : z.empty() ? 2 : 3};
+  if (count == 0) return rows;
+  if (x.empty()) return Missing(absl::StrCat("attributes[", std::string(name), "].x"), count);
+  if (y.empty() && !z.empty())
+    return Missing(absl::StrCat("attributes[", std::string(name), "].y"), count);
+  rows.values = y.empty() ? Rows<float, Reals, 1>(count, {x}) : Rows<float>(count, x, y, z);
+  return rows;
+}
+
 }  // namespace
 
 absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double time) {
-  const auto& [count, x, y, z, volumes, ids, vx, vy, vz] = particles;
+  const auto& [count, x, y, z, volumes, ids, vx, vy, vz, attributes] = particles;
   wire::FrameRows rows;
   rows.scalars = {
       .positions = std::span<const float>(), .components = z.empty() ? 2 : 3, .time = time};
   const bool is_double = IsDouble(x) || IsDouble(y) || IsDouble(z);
   if (is_double) rows.scalars.positions = std::span<const double>();
+  for (const AttributeArrays& one : attributes) {
+    auto attribute = RowsOf(one, count);
+    if (!attribute.ok()) return attribute.status();
+    rows.attributes.push_back(*std::move(attribute));
+  }
   if (count == 0) return rows;
 
   if (x.empty()) return Missing("positions.x", count);

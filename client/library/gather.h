@@ -9,7 +9,7 @@
 namespace partiemc::client {
 
 /// A view of `particles` as a frame's message holds them: rows of two or three coordinates, volumes
-/// and velocities as float, ids as 64 bits. Nothing is copied until rows are written.
+/// velocities and attributes as float, ids as 64 bits. Nothing is copied until rows are written.
 /// Errors: INVALID_ARGUMENT with a Violation (reason COUNT) for coordinates or velocities of which
 /// one is missing.
 absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double time);

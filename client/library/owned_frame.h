@@ -98,7 +98,15 @@ class OwnedFrame {
     frame_.volumes = array(rows.volumes, volumes_);
     frame_.ids = array(rows.ids, ids_);
     frame_.velocities = array(rows.velocities, velocities_);
-    CopyAttributes(rows.scalars.attributes);
+    carried_.resize(rows.attributes.size());
+    attributes_.clear();
+    for (std::size_t k = 0; k < rows.attributes.size(); ++k) {
+      const wire::AttributeRows& from = rows.attributes[k];
+      carried_[k].name = from.name;
+      attributes_.push_back(
+          {carried_[k].name, from.components, array(from.values, carried_[k].values)});
+    }
+    frame_.attributes = attributes_;
   }
 
   std::vector<float> singles_;

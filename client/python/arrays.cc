@@ -60,13 +60,21 @@ bool IsTuple(const py::object& given) {
 }  // namespace
 
 PythonParticles::PythonParticles(const py::object& positions, const py::object& volumes,
-                                 const py::object& ids, const py::object& velocities) {
+                                 const py::object& ids, const py::object& velocities,
+                                 const py::object& attributes) {
   const auto place = Columns(positions, "positions");
   arrays_.x = place[0];
   arrays_.y = place[1];
   if (place.size() == 3) arrays_.z = place[2];
   if (!volumes.is_none()) arrays_.volumes = Numbers(volumes, "volumes");
   if (!ids.is_none()) arrays_.ids = WholeNumbers(ids);
+  if (!attributes.is_none()) {
+    if (!py::isinstance<py::dict>(attributes)) {
+      Raise(Invalid("UNSUPPORTED", "attributes", py::str(py::type::of(attributes).attr("__name__")),
+                    "must be a dict of names and arrays"));
+    }
+    TakeAttributes(attributes);
+  }
   if (velocities.is_none()) return;
   const auto velocity = Columns(velocities, "velocities");
   if (velocity.size() != place.size()) {
@@ -76,6 +84,25 @@ PythonParticles::PythonParticles(const py::object& positions, const py::object& 
   arrays_.velocity_x = velocity[0];
   arrays_.velocity_y = velocity[1];
   if (velocity.size() == 3) arrays_.velocity_z = velocity[2];
+}
+
+void PythonParticles::TakeAttributes(const py::dict& given) {
+  names_.reserve(given.size());  // Views into them stay.
+  for (const auto& [key, value] : given) {
+    const auto values = py::reinterpret_borrow<py::object>(value);
+    if (!py::isinstance<py::str>(key)) {
+      Raise(Invalid("UNSUPPORTED", "attributes", py::str(key), "must have names that are strings"));
+    }
+    client::AttributeArrays attribute{.name = names_.emplace_back(py::str(key)), .x = {}};
+    const bool is_scalar = !IsTuple(values) && AsArray(values, "attributes").ndim() == 1;
+    const auto columns =
+        is_scalar ? std::vector{Numbers(values, "attributes")} : Columns(values, "attributes");
+    attribute.x = columns[0];
+    if (columns.size() > 1) attribute.y = columns[1];
+    if (columns.size() > 2) attribute.z = columns[2];
+    attributes_.push_back(attribute);
+  }
+  arrays_.attributes = attributes_;
 }
 
 // Of float or double, in this machine's order of bytes.

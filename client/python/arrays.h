@@ -5,6 +5,7 @@
 #include <pybind11/pybind11.h>
 
 #include <cstddef>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -18,22 +19,28 @@ namespace partiemc::python {
 class PythonParticles {
  public:
   /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes` and
-  /// `ids`: N. `velocities`: as positions. None for what is not there.
-  /// Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
+  /// `ids`: N. `velocities`: as positions. `attributes`: a dict of names and (N,), (N, 2), (N, 3),
+  /// or tuples. None for what is not there. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
   PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,
-                  const pybind11::object& ids, const pybind11::object& velocities);
+                  const pybind11::object& ids, const pybind11::object& velocities,
+                  const pybind11::object& attributes);
+  PythonParticles(const PythonParticles&) = delete;  // Of views into itself.
+  PythonParticles& operator=(const PythonParticles&) = delete;
 
   const client::ParticleArrays& arrays() const { return arrays_; }
 
  private:
   // The columns of `given`: two or three views of as many numbers.
   std::vector<client::Reals> Columns(const pybind11::object& given, const char* field);
+  void TakeAttributes(const pybind11::dict& given);
   client::Reals Numbers(const pybind11::object& given, const char* field);
   client::Ids WholeNumbers(const pybind11::object& given);
   pybind11::array Real(const pybind11::array& given, const char* field);
   void ExpectCount(const pybind11::array& array, const char* field) const;
 
   std::vector<pybind11::array> kept_;
+  std::vector<std::string> names_;
+  std::vector<client::AttributeArrays> attributes_;
   bool counted_ = false;
   client::ParticleArrays arrays_;
 };

@@ -109,6 +109,7 @@ client::StreamOptions TakeStreamOptions(py::dict arguments) {
   options.outputs.mesh = options.parameters.fill != Fill::kNone;
   TakeInto(arguments, "normals", options.outputs.normals);
   TakeInto(arguments, "echo_particles", options.outputs.echo_particles);
+  TakeInto(arguments, "attributes", options.outputs.attributes);
   TakeInto(arguments, "name", options.name);
   TakeInto(arguments, "labels", options.labels);
   TakeInto(arguments, "fallback_addresses", options.fallback_addresses);

@@ -39,8 +39,9 @@ class Sequence {
 
   std::shared_ptr<PythonResult> Reconstruct(const py::object& positions, std::optional<double> time,
                                             const py::object& volumes, const py::object& ids,
-                                            const py::object& velocities) {
-    const PythonParticles particles(positions, volumes, ids, velocities);
+                                            const py::object& velocities,
+                                            const py::object& attributes) {
+    const PythonParticles particles(positions, volumes, ids, velocities, attributes);
     const auto result = results_->Take();
     absl::Status status;
     {
@@ -110,7 +111,7 @@ void DefineReconstructor(py::module_& module) {
            "fill='greedy', ...): see partiemc.reconstruct.")
       .def("reconstruct", &Sequence::Reconstruct, "positions"_a, "time"_a = py::none(),
            py::kw_only(), "volumes"_a = py::none(), "ids"_a = py::none(),
-           "velocities"_a = py::none(),
+           "velocities"_a = py::none(), "attributes"_a = py::none(),
            "The next frame; `time` defaults to the number of frames before it. See "
            "partiemc.reconstruct for the arrays. Raises partiemc.Error; such a frame leaves no "
            "trace.")

@@ -111,6 +111,15 @@ void DefineMesh(py::module_& module) {
           "(T,) uint8: 0 in the band along the rings, 1 inside.");
 }
 
+py::dict AttributesOf(const py::object& self) {
+  py::dict attributes;
+  for (const AttributeValues& one : self.cast<const PythonResult&>().frame.result.attributes) {
+    attributes[py::str(one.name)] =
+        View<float>(one.values, static_cast<std::size_t>(one.components), self);
+  }
+  return attributes;
+}
+
 template <typename T>
 auto Statistic(T FrameStatistics::*member) {
   return [member](const PythonResult& r) { return r.frame.result.statistics.*member; };
@@ -176,6 +185,10 @@ void DefineResults(py::module_& module) {
             return MeshView{self, self.cast<const PythonResult&>().frame.result.mesh};
           },
           "The inside: Mesh; empty where it was not asked for.")
+      .def_property_readonly(
+          "attributes", [](const py::object& self) { return AttributesOf(self); },
+          "A dict of what particles carry, float32 at mesh.points, whose first are rings.points; "
+          "without a mesh at rings.points. (V,), or (V, 2) or (V, 3) of a vector.")
       .def_readonly("sequence", &PythonResult::sequence,
                     "The frame's number: 1, 2, ... in a stream; 0 of partiemc.reconstruct.")
       .def_readonly("time", &PythonResult::time, "Simulation time, as the frame came with.")

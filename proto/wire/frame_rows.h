@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstring>
 #include <functional>
+#include <string_view>
+#include <vector>
 
 #include "partiemc/frame.h"
 
@@ -25,11 +27,19 @@ struct RowArray {
   }
 };
 
+/// One of Frame::attributes.
+struct AttributeRows {
+  std::string_view name;
+  int components = 1;
+  RowArray values;
+};
+
 /// A frame without its arrays, and them. A view.
 struct FrameRows {
-  /// `positions` is empty and tells the type of coordinates.
+  /// `positions` is empty and tells the type of coordinates; there are no attributes.
   Frame scalars;
   RowArray positions, ids, volumes, velocities;
+  std::vector<AttributeRows> attributes = {};
 };
 
 }  // namespace partiemc::wire

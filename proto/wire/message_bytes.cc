@@ -70,12 +70,9 @@ bool ReadSequence(CodedInputStream& input, google::protobuf::uint64& sequence, i
   return input.BytesUntilLimit() == 0;
 }
 
-// `frame` without its arrays, but with its attributes, which are messages of their own.
+// `frame` without its arrays.
 Frame ScalarsOf(const Frame& frame) {
-  Frame scalars{.positions = frame.positions,
-                .components = frame.components,
-                .attributes = frame.attributes,
-                .time = frame.time};
+  Frame scalars{.positions = frame.positions, .components = frame.components, .time = frame.time};
   std::visit([](auto& view) { view = {}; }, scalars.positions);  // Of the same type.
   return scalars;
 }
@@ -109,6 +106,38 @@ void WriteRows(const RowArray& array, CodedOutputStream& out) {
       out.WriteRaw(shared, static_cast<int>(array.row_bytes));
       ++row;
     }
+  }
+}
+
+// Of a NamedScalar, what is inside of it.
+std::uint64_t BytesOf(const AttributeRows& attribute) {
+  std::uint64_t bytes = 0;
+  if (!attribute.name.empty()) {
+    bytes += LengthFieldBytes(v1::NamedScalar::kNameFieldNumber, attribute.name.size());
+  }
+  if (attribute.values.rows > 0) {
+    bytes += LengthFieldBytes(v1::NamedScalar::kValuesFieldNumber, attribute.values.bytes());
+  }
+  return attribute.components == 1 ? bytes : bytes + 2;  // A tag, and 2 or 3.
+}
+
+void WriteAttribute(const AttributeRows& attribute, CodedOutputStream& out) {
+  out.WriteTag(LengthTag(v1::ParticleFrame::kScalarsFieldNumber));
+  out.WriteVarint64(BytesOf(attribute));
+  if (!attribute.name.empty()) {
+    out.WriteTag(LengthTag(v1::NamedScalar::kNameFieldNumber));
+    out.WriteVarint64(attribute.name.size());
+    out.WriteRaw(attribute.name.data(), static_cast<int>(attribute.name.size()));
+  }
+  if (attribute.values.rows > 0) {
+    out.WriteTag(LengthTag(v1::NamedScalar::kValuesFieldNumber));
+    out.WriteVarint64(attribute.values.bytes());
+    WriteRows(attribute.values, out);
+  }
+  if (attribute.components != 1) {
+    out.WriteTag(WireFormatLite::MakeTag(v1::NamedScalar::kComponentsFieldNumber,
+                                         WireFormatLite::WIRETYPE_VARINT));
+    out.WriteVarint32(static_cast<std::uint32_t>(attribute.components));
   }
 }
 
@@ -177,23 +206,32 @@ grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message) {
 }
 
 FrameRows RowsOf(const Frame& frame) {
+  std::vector<AttributeRows> attributes;
+  for (const Attribute& one : frame.attributes) {
+    attributes.push_back({one.name, one.components, RowsOf(one.values)});
+  }
   return {.scalars = ScalarsOf(frame),
           .positions = std::visit([](auto view) { return RowsOf(view); }, frame.positions),
           .ids = RowsOf(frame.ids),
           .volumes = RowsOf(frame.volumes),
-          .velocities = RowsOf(frame.velocities)};
+          .velocities = RowsOf(frame.velocities),
+          .attributes = std::move(attributes)};
 }
 
 FrameRequest::FrameRequest(const FrameRows& frame, std::uint64_t sequence)
     : arrays_{{{v1::ParticleFrame::kPositionsFieldNumber, frame.positions},
                {v1::ParticleFrame::kIdsFieldNumber, frame.ids},
                {v1::ParticleFrame::kVolumesFieldNumber, frame.volumes},
-               {v1::ParticleFrame::kVelocitiesFieldNumber, frame.velocities}}} {
+               {v1::ParticleFrame::kVelocitiesFieldNumber, frame.velocities}}},
+      attributes_(frame.attributes) {
   EncodeFrame(frame.scalars, scalars_);
   scalars_.set_sequence(sequence);
   frame_bytes_ = scalars_.ByteSizeLong();
   for (const Array& array : arrays_) {
     if (array.rows.rows > 0) frame_bytes_ += LengthFieldBytes(array.field, array.rows.bytes());
+  }
+  for (const AttributeRows& attribute : attributes_) {
+    frame_bytes_ += LengthFieldBytes(v1::ParticleFrame::kScalarsFieldNumber, BytesOf(attribute));
   }
 }
 
@@ -213,6 +251,7 @@ grpc::ByteBuffer FrameRequest::ToBytes() const {
       out.WriteVarint64(array.rows.bytes());
       WriteRows(array.rows, out);
     }
+    for (const AttributeRows& attribute : attributes_) WriteAttribute(attribute, out);
   }  // Whose end gives back what is left of the last piece.
   return bytes;
 }

@@ -57,7 +57,7 @@ class FrameRequest {
   /// Of its ParticleFrame alone: what Limits.max_frame_bytes counts.
   std::uint64_t frame_bytes() const { return frame_bytes_; }
 
-  /// Copies each array once, from where it is to the memory that is sent, attributes twice.
+  /// Copies each array once, from where it is to the memory that is sent.
   /// Requires: frame_bytes() < 2^31 - 16.
   grpc::ByteBuffer ToBytes() const;
 
@@ -69,6 +69,7 @@ class FrameRequest {
 
   v1::ParticleFrame scalars_;  // All but the arrays.
   std::array<Array, 4> arrays_;
+  std::vector<AttributeRows> attributes_;
   std::uint64_t frame_bytes_ = 0;
 };
 

@@ -46,11 +46,15 @@ void ExpectSameAsMessage(int components, std::size_t particles) {
   const auto volumes = Numbers<float>(particles);
   const auto ids = Numbers<std::uint64_t>(particles);
   const auto velocities = Numbers<float>(positions.size());
+  const auto spin = Numbers<float>(3 * particles);
+  const std::string long_name(64, 'n');
+  const std::vector<Attribute> attributes = {{"p", 1, volumes}, {long_name, 3, spin}, {"", 2, {}}};
   const Frame frame{.positions = std::span<const T>(positions),
                     .components = components,
                     .volumes = volumes,
                     .ids = ids,
                     .velocities = velocities,
+                    .attributes = attributes,
                     .time = 0.25};
   v1::ReconstructRequest expected;
   EncodeFrame(frame, *expected.mutable_frame());

@@ -24,7 +24,8 @@ __all__ = ["Error", "Mesh", "Reconstructor", "Result", "Rings", "Stream", "Watch
            "reconstruct", "server", "streams", "watch"]
 
 
-def reconstruct(positions, *, volumes=None, ids=None, velocities=None, **parameters):
+def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attributes=None,
+                **parameters):
     """Reconstructs one frame in this process. Result.
 
     positions: (N, 2) float32 or float64, world units; (N, 3) for particles in a plane parallel to
@@ -32,6 +33,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, **paramet
     volumes: (N,) areas that particles stand for, world units squared; spacing squared if None.
     ids: (N,) integers of 32 or 64 bits, the same for a particle in every frame.
     velocities: as positions, world units per unit of time.
+    attributes: what else is wanted at the vertices (Result.attributes), a dict of names and (N,),
+        (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}.
     spacing: distance of particles, world units; estimated if None, then the outline is less true.
     threads: that compute; one per processor if None.
     placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
@@ -45,7 +48,7 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, **paramet
     the other, a Reconstructor keeps outlines steady, tracks rings and is faster. Raises Error.
     """
     return Reconstructor(**parameters).reconstruct(positions, volumes=volumes, ids=ids,
-                                                   velocities=velocities)
+                                                   velocities=velocities, attributes=attributes)
 
 
 def connect(address=None, *, latest=False, **options):
@@ -55,6 +58,8 @@ def connect(address=None, *, latest=False, **options):
 
     latest: send never waits; of frames that come while the stream is busy only the newest is sent.
     name: by which others watch the stream. labels: a dict of strings, shown where it is listed.
+    attributes: names of what results have at their vertices, of the attributes given to send;
+        "velocity" are the velocities.
     normals, echo_particles: whether results have normals, and watchers get the particles.
     tls, ca_file, cert_file, key_file, token, token_file: as the command line has them; those of the
         environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...) unless given.

@@ -1,5 +1,5 @@
 from types import TracebackType
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Tuple, Type, TypedDict, Union
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Type, TypedDict, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,6 +62,8 @@ class Result:
     @property
     def mesh(self) -> Mesh: ...
     @property
+    def attributes(self) -> Dict[str, NDArray[np.float32]]: ...
+    @property
     def sequence(self) -> int: ...
     @property
     def time(self) -> float: ...
@@ -105,7 +107,8 @@ class Reconstructor:
     def reconstruct(
         self, positions: Positions, time: Optional[float] = ..., *,
         volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
-        velocities: Optional[Positions] = ...) -> Result: ...
+        velocities: Optional[Positions] = ...,
+        attributes: Optional[Mapping[str, Positions]] = ...) -> Result: ...
     def reset(self) -> None: ...
     @property
     def parameters(self) -> Dict[str, Any]: ...
@@ -119,7 +122,8 @@ class Stream:
     def send(
         self, positions: Positions, time: Optional[float] = ..., *,
         volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
-        velocities: Optional[Positions] = ...) -> Optional[int]: ...
+        velocities: Optional[Positions] = ...,
+        attributes: Optional[Mapping[str, Positions]] = ...) -> Optional[int]: ...
     def receive(self, wait: Optional[float] = ...) -> Optional[Result]: ...
     def map(
         self, frames: Iterable[Positions], times: Optional[Iterable[float]] = ...
@@ -157,7 +161,8 @@ class Watch:
 
 def reconstruct(
     positions: Positions, *, volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
-    velocities: Optional[Positions] = ..., spacing: Optional[float] = ...,
+    velocities: Optional[Positions] = ...,
+    attributes: Optional[Mapping[str, Positions]] = ..., spacing: Optional[float] = ...,
     threads: Optional[int] = ..., placement: Optional[str] = ..., fill: Optional[str] = ...,
     plane: Optional[str] = ..., spacing_rule: Optional[str] = ...,
     kernel_radius: Optional[float] = ..., cell_size: Optional[float] = ...,

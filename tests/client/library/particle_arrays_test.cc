@@ -178,6 +178,40 @@ TEST(ParticleArrays, CoordinatesOfTwoKindsTravelAsDouble) {
               Bytes(Frame{.positions = std::span<const double>(expected)}));
 }
 
+TEST(ParticleArrays, AttributesAreThoseOfAFrameWhereverTheyLie) {
+  const std::vector<double> x = {0, 1}, y = {2, 3}, mixed = {.1, .2, .3, .4};
+  const std::vector<float> p = {5, 6}, expected_p = {6, 5}, expected_v = {.1f, .3f, .2f, .4f},
+                           expected_xy = {0, 2, 1, 3};
+  const std::vector<AttributeArrays> attributes = {{"p", {&p[1], -4}},
+                                                   {"v", mixed.data(), &mixed[2]}};
+  const std::vector<Attribute> interleaved = {{"p", 1, expected_p}, {"v", 2, expected_v}};
+  const std::vector<double> xy(expected_xy.begin(), expected_xy.end());
+  EXPECT_TRUE(
+      Bytes(ParticleArrays{.count = 2, .x = x.data(), .y = y.data(), .attributes = attributes}) ==
+      Bytes(Frame{.positions = std::span<const double>(xy), .attributes = interleaved}));
+  const std::vector<AttributeArrays> incomplete = {{"v", {}, x.data()}};
+  const auto rows = RowsOf({.count = 2, .x = x.data(), .y = y.data(), .attributes = incomplete}, 0);
+  ASSERT_TRUE(FindViolation(rows.status()));
+  EXPECT_EQ(FindViolation(rows.status())->field, "attributes[v].x");
+}
+
+TEST(ParticleArrays, AttributesAreWrittenIntoTheMessageWithoutAnotherCopy) {
+  const Scene<double> scene(1000, 0);
+  const std::vector<double> numbers(3 * scene.bodies.size(), 1.5);
+  const std::vector<AttributeArrays> attributes = {
+      {"v", {&numbers[0], 24}, {&numbers[1], 24}, {&numbers[2], 24}}};
+  ParticleArrays arrays = scene.AsBodies();
+  arrays.attributes = attributes;
+  const auto rows = RowsOf(arrays, 0);
+  ASSERT_TRUE(rows.ok());
+  const std::size_t before = allocated_bytes;
+  const auto request = EncodeFrameRequest(*rows, 1, {});
+  const std::size_t taken = allocated_bytes - before;
+  ASSERT_TRUE(request.ok());
+  EXPECT_GT(request->Length(), 42u * scene.bodies.size());
+  EXPECT_LT(taken, request->Length() + request->Length() / 100);
+}
+
 // Of all that operator new gives meanwhile, the message takes everything.
 TEST(ParticleArrays, AreWrittenIntoTheMessageWithoutAnotherCopy) {
   const Scene<double> scene(1000, 0);

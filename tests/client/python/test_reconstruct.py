@@ -85,6 +85,39 @@ class Results(unittest.TestCase):
     def setUp(self):
         self.result = partiemc.reconstruct(block(), spacing=1)
 
+    def test_attributes_come_back_at_the_vertices(self):
+        particles = block()
+        x, y = particles.T
+        wide = numpy.zeros((len(particles), 3), numpy.float32)
+        wide[:, 1] = 3 * x - y
+        plain = partiemc.reconstruct(particles, spacing=1)
+        self.assertEqual(plain.attributes, {})
+        result = partiemc.reconstruct(
+            particles, spacing=1, attributes={"pressure": wide[:, 1], "flow": (y, -x)})
+        self.assertEqual(digests(result), digests(plain))
+        pressure, flow = result.attributes["pressure"], result.attributes["flow"]
+        at_x, at_y = result.mesh.points.T
+        self.assertEqual((pressure.dtype, pressure.shape, flow.shape),
+                         (numpy.float32, at_x.shape, (len(at_x), 2)))
+        error = 0.01 * numpy.ptp(3 * x - y)
+        self.assertLess(numpy.abs(pressure - (3 * at_x - at_y)).max(), error)
+        self.assertLess(numpy.abs(flow - numpy.stack((at_y, -at_x), axis=1)).max(), error)
+        self.assertFalse(pressure.flags.writeable)
+        outline = partiemc.reconstruct(particles, spacing=1, fill="none",
+                                       attributes={"pressure": wide[:, 1]})
+        points = outline.rings.points
+        self.assertEqual(outline.attributes["pressure"].tolist(), pressure[:len(points)].tolist())
+
+    def test_wrong_attributes_are_told(self):
+        particles = block()
+        for given, reason in (([1, 2], "UNSUPPORTED"), ({1: particles[:, 0]}, "UNSUPPORTED"),
+                              ({"p": particles[1:, 0]}, "COUNT"),
+                              ({"p": numpy.zeros((len(particles), 4))}, "COUNT"),
+                              ({"p": numpy.full(len(particles), numpy.nan)}, "NOT_FINITE")):
+            with self.assertRaises(partiemc.Error) as raised:
+                partiemc.reconstruct(particles, spacing=1, attributes=given)
+            self.assertEqual(raised.exception.reason, reason, raised.exception)
+
     def test_shapes_and_values_are_as_documented(self):
         rings, mesh = self.result.rings, self.result.mesh
         self.assertEqual(len(rings), 2)

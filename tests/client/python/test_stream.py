@@ -80,6 +80,23 @@ class Streams(unittest.TestCase):
             partiemc.connect(self.address, name="in-parts", parts=2, part=2)
         self.assertEqual((caught.exception.field, caught.exception.value), ("part", "2"))
 
+    def test_attributes_travel_too(self):
+        particles = block()
+        x, y = particles.T
+        asked = {"p": x + 2 * y, "unused": x}
+        expected = partiemc.reconstruct(particles, spacing=1, attributes={
+            "velocity": (y, x), "p": x + 2 * y})
+        with partiemc.connect(self.address, spacing=1, attributes=["velocity", "p"]) as stream:
+            stream.send(particles, velocities=(y, x), attributes=asked)
+            result = stream.receive()
+            self.assertEqual(list(result.attributes), ["velocity", "p"])
+            for name, values in expected.attributes.items():
+                self.assertTrue((result.attributes[name] == values).all())
+            stream.send(particles, attributes={"p": x})
+            with self.assertRaises(partiemc.Error) as raised:
+                stream.receive()
+            self.assertEqual(raised.exception.reason, "NO_SUCH_ATTRIBUTE")
+
     def test_sending_allocates_nothing_of_numpys(self):
         wide = numpy.zeros((300_000, 7))
         wide[:, 0], wide[:, 3] = numpy.divmod(numpy.arange(len(wide)), 600)

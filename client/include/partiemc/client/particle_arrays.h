@@ -11,6 +11,8 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -48,6 +50,12 @@ class StridedView {
 using Reals = StridedView<float, double>;
 using Ids = StridedView<std::uint64_t, std::int64_t, std::uint32_t, std::int32_t>;
 
+/// One of Frame::attributes: a number, or a vector of two or three.
+struct AttributeArrays {
+  std::string_view name;  ///< As of Attribute.
+  Reals x, y = {}, z = {};
+};
+
 /// What Frame is for interleaved arrays. Views must outlive the call that they are given to only;
 /// it copies each number once, to where it is sent from.
 struct ParticleArrays {
@@ -63,6 +71,8 @@ struct ParticleArrays {
   Ids ids;  ///< Negative ones count as those above 2^63.
   /// As many of them as of coordinates, or none.
   Reals velocity_x, velocity_y, velocity_z;
+  /// Rounded to float.
+  std::span<const AttributeArrays> attributes = {};
 };
 
 }  // namespace partiemc::client
