@@ -80,7 +80,8 @@ void SetCoordinates(partiemc_particles* particles, const T* coordinates, std::si
 
 }  // namespace
 
-absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles) {
+absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
+                                                std::vector<client::AttributeArrays>& attributes) {
   if (particles == nullptr) {
     return Invalid(kReasonCount, "particles", "NULL", "must be given");
   }
@@ -97,6 +98,23 @@ absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* partic
     if (auto read = Read(*array, given.count, field, *numbers); !read.ok()) return read;
   }
   if (auto read = Read(given.ids, given.count, "ids", arrays.ids); !read.ok()) return read;
+  if (given.attribute_count > 0 && given.attributes == nullptr) {
+    return Invalid(kReasonCount, "attributes", "NULL",
+                   absl::StrCat("must be ", given.attribute_count, " of them"));
+  }
+  attributes.resize(given.attribute_count);
+  for (std::size_t k = 0; k < given.attribute_count; ++k) {
+    const partiemc_attribute& from = given.attributes[k];
+    const std::string name = from.name == nullptr ? "" : from.name;
+    const std::string field = absl::StrCat("attributes[", name, "].");
+    attributes[k].name = from.name == nullptr ? std::string_view() : from.name;
+    for (const auto& [array, axis, numbers] :
+         {std::tuple(&from.x, "x", &attributes[k].x), std::tuple(&from.y, "y", &attributes[k].y),
+          std::tuple(&from.z, "z", &attributes[k].z)}) {
+      if (auto read = Read(*array, given.count, field + axis, *numbers); !read.ok()) return read;
+    }
+  }
+  arrays.attributes = attributes;
   return arrays;
 }
 

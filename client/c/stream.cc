@@ -9,9 +9,11 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "client/c/errors.h"
 #include "client/c/particles.h"
 #include "client/c/structs.h"
@@ -33,6 +35,8 @@ struct partiemc_stream {
   std::unique_ptr<LatestSender> latest;  // Ends before the stream. Null without `latest`.
   bool shows_normals = false;
   Event event;
+  std::vector<partiemc_values> values;                             // Of the event.
+  std::vector<partiemc::client::AttributeArrays> sent_attributes;  // Of the sender's thread.
 };
 
 namespace partiemc::c {
@@ -62,6 +66,11 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   return parameters;
 }
 
+std::vector<std::string> NamesOf(const char* list) {
+  if (list == nullptr) return {};
+  return absl::StrSplit(list, ',', absl::SkipEmpty());
+}
+
 // What is not given is that of the environment.
 client::Credentials CredentialsOf(const partiemc_options& options) {
   client::Credentials result = client::CredentialsFromEnvironment();
@@ -85,7 +94,8 @@ client::StreamOptions StreamOptionsOf(const partiemc_options& options,
   result.parameters = parameters;
   result.outputs = {.mesh = parameters.fill != Fill::kNone,
                     .normals = options.normals != 0,
-                    .echo_particles = options.echo_particles != 0};
+                    .echo_particles = options.echo_particles != 0,
+                    .attributes = NamesOf(options.attributes)};
   result.credentials = CredentialsOf(options);
   result.connect_timeout = Milliseconds(options.connect_timeout, result.connect_timeout);
   result.deadline = Milliseconds(options.deadline, result.deadline);
@@ -107,7 +117,9 @@ absl::Status Open(const char* address, const partiemc_options& options, partiemc
         "parts: needs an address and no `latest`: parts of a frame meet at a server");
   }
   if (address == nullptr) {
-    auto stream = LocalStream::Open({.parameters = *parameters, .threads = options.threads});
+    auto stream = LocalStream::Open({.parameters = *parameters,
+                                     .attributes = NamesOf(options.attributes),
+                                     .threads = options.threads});
     if (!stream.ok()) return stream.status();
     opened.stream = *std::move(stream);
   } else {
@@ -124,7 +136,7 @@ absl::Status Open(const char* address, const partiemc_options& options, partiemc
 absl::Status Send(partiemc_stream& stream, const partiemc_particles* particles, double time,
                   std::uint64_t* sequence) {
   if (sequence != nullptr) *sequence = 0;
-  const auto arrays = ArraysOf(particles);
+  const auto arrays = ArraysOf(particles, stream.sent_attributes);
   if (!arrays.ok()) return arrays.status();
   if (stream.latest != nullptr) return stream.latest->OfferArrays(*arrays, time);
   const auto sent = stream.stream->SendArrays(*arrays, time);
@@ -142,7 +154,8 @@ static_assert(sizeof(RingMeasures) == sizeof(partiemc_ring) &&
               offsetof(RingMeasures, identity) == offsetof(partiemc_ring, identity));
 static_assert(kNoRing == PARTIEMC_NO_RING && sizeof(TriangleClass) == 1);
 
-void AddResult(const client::FrameResult& frame, bool shows_normals, partiemc_event& event) {
+void AddResult(const client::FrameResult& frame, bool shows_normals,
+               std::vector<partiemc_values>& values, partiemc_event& event) {
   const auto& [rings, mesh, attributes, statistics] = frame.result;
   event.ring_count = rings.RingCount();
   event.point_count = rings.PointCount();
@@ -164,13 +177,19 @@ void AddResult(const client::FrameResult& frame, bool shows_normals, partiemc_ev
   event.milliseconds = frame.times.total_ms;
   event.rings_digest = frame.rings_digest;
   event.mesh_digest = frame.mesh_digest;
+  values.clear();
+  for (const AttributeValues& one : attributes) {
+    values.push_back({one.name.c_str(), one.components, one.values.data()});
+  }
+  event.attribute_count = values.size();
+  event.attributes = values.data();
 }
 
 partiemc_event Empty(std::int32_t kind) {
   return {.kind = kind, .message = "", .reason = "", .field = "", .value = "", .rule = ""};
 }
 
-partiemc_event ViewOf(const partiemc_stream& stream) {
+partiemc_event ViewOf(partiemc_stream& stream) {
   const Event& event = stream.event;
   partiemc_event view = Empty(PARTIEMC_NOTICE);
   view.sequence = event.sequence;
@@ -188,7 +207,7 @@ partiemc_event ViewOf(const partiemc_stream& stream) {
     view.kind = PARTIEMC_RESULT;
     view.message = "";
     view.time = event.time;
-    AddResult(event.frame, stream.shows_normals, view);
+    AddResult(event.frame, stream.shows_normals, stream.values, view);
   }
   return view;
 }

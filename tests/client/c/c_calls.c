@@ -332,6 +332,41 @@ static void try_options(const char* address) {
   fill(0);
 }
 
+static void try_attributes(const char* address) {
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  options.spacing = 1;
+  options.attributes = "velocity,p";
+  partiemc_stream* stream = NULL;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+  partiemc_particles particles = plain();
+  particles.velocity_x = (partiemc_array){y, sizeof(float), PARTIEMC_FLOAT32};
+  particles.velocity_y = (partiemc_array){x, sizeof(float), PARTIEMC_FLOAT32};
+  const partiemc_attribute carried[] = {
+      {"unused", {y, sizeof(float), PARTIEMC_FLOAT32}, {0}, {0}},
+      {"p", {&xyz[0][0], sizeof xyz[0], PARTIEMC_FLOAT64}, {0}, {0}}};
+  particles.attributes = carried;
+  particles.attribute_count = 2;
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_RESULT && event.attribute_count == 2);
+  EXPECT(strcmp(event.attributes[0].name, "velocity") == 0 && event.attributes[0].components == 2);
+  EXPECT(strcmp(event.attributes[1].name, "p") == 0 && event.attributes[1].components == 1);
+  for (size_t k = 0; k < event.mesh_point_count; ++k) {
+    EXPECT(fabs(event.attributes[1].values[k] - event.mesh_points[2 * k]) < .01 * kSide);
+    EXPECT(fabs(event.attributes[0].values[2 * k] - event.mesh_points[2 * k + 1]) < .01 * kSide);
+    EXPECT(fabs(event.attributes[0].values[2 * k + 1] - event.mesh_points[2 * k]) < .01 * kSide);
+  }
+  particles.attribute_count = 1; /* There is no "p" any more. */
+  EXPECT(partiemc_reconstruct(stream, &particles, 1, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_REFUSAL && strcmp(event.reason, "NO_SUCH_ATTRIBUTE") == 0);
+  particles.attributes = NULL;
+  EXPECT(partiemc_reconstruct(stream, &particles, 2, &event) == PARTIEMC_INVALID_ARGUMENT);
+  EXPECT(strcmp(partiemc_last_error()->field, "attributes") == 0);
+  partiemc_close(stream);
+}
+
 int main(int argc, char** argv) {
   const char* address = argc > 1 ? argv[1] : NULL;
   EXPECT(partiemc_last_error()->code == PARTIEMC_OK && partiemc_last_error()->message[0] == 0);
@@ -340,6 +375,7 @@ int main(int argc, char** argv) {
   try_window(address);
   try_refusals(address);
   try_latest(address);
+  try_attributes(address);
   try_parts(address);
   try_sizes(address);
   try_options(address);

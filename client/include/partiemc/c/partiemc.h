@@ -94,6 +94,8 @@ typedef struct partiemc_options {
                               may send its parts. */
   double part_timeout;     /* Seconds after which a frame that lacks a part is refused
                               (PARTS_MISSING); 0: 10. */
+  const char* attributes;  /* Names, separated by commas, of what particles carry that is wanted at
+                              the vertices, too; "velocity" are the velocities. NULL: nothing. */
 } partiemc_options;
 /* Every option at its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -130,6 +132,13 @@ typedef struct partiemc_array {
   int32_t type;
 } partiemc_array;
 
+/* What particles carry besides: a number each in x, or a vector in x and y, or x, y and z; of
+ * PARTIEMC_FLOAT32 or PARTIEMC_FLOAT64, rounded to float. This struct will not grow. */
+typedef struct partiemc_attribute {
+  const char* name; /* 1 to 64 bytes of printable ASCII. */
+  partiemc_array x, y, z;
+} partiemc_attribute;
+
 /* The particles of one frame. Arrays must stay until the call that gets them returns; it copies
  * each number once, to where it is sent from. */
 typedef struct partiemc_particles {
@@ -141,6 +150,9 @@ typedef struct partiemc_particles {
   partiemc_array ids;     /* Optional: the same for a particle in every frame. */
   /* Optional: world units per unit of time, as many as there are coordinates. */
   partiemc_array velocity_x, velocity_y, velocity_z;
+  /* Optional: what the options name is looked at. */
+  const partiemc_attribute* attributes;
+  size_t attribute_count;
 } partiemc_particles;
 /* No particles and no arrays. `size` is sizeof(partiemc_particles). */
 void partiemc_particles_init(partiemc_particles* particles, size_t size);
@@ -197,6 +209,14 @@ enum {
 
 #define PARTIEMC_NO_RING 0xffffffffu
 
+/* What particles carry, at the vertices. This struct will not grow. */
+typedef struct partiemc_values {
+  const char* name;
+  int32_t components;  /* 1 to 3. */
+  const float* values; /* Of each point of the mesh, whose first are those of the rings; without a
+                          mesh of each point of the rings. */
+} partiemc_values;
+
 /* One answer. Pointers are valid until the next call on this stream that fills an event; arrays
  * without elements may be NULL. Strings are never NULL. */
 typedef struct partiemc_event {
@@ -227,6 +247,9 @@ typedef struct partiemc_event {
   double spacing, cell_size;          /* As used in this frame, world units. */
   double milliseconds;                /* That the frame was computed for. */
   uint64_t rings_digest, mesh_digest; /* Equal digests mean equal bits. */
+
+  size_t attribute_count; /* As the options name them, in their order. */
+  const partiemc_values* attributes;
 } partiemc_event;
 /* Nothing. `size` is sizeof(partiemc_event). */
 void partiemc_event_init(partiemc_event* event, size_t size);
