@@ -23,11 +23,12 @@ class LiveDamBreak(DamBreak2D):
                            help="Never wait for the server: leave frames out where it is behind")
 
     def post_step(self, solver):
-        if solver.count % self.options.every:
+        # PySPH counts the step, and adds its length to the time, after this.
+        if (solver.count + 1) % self.options.every:
             return
         fluid = self.particles[0]  # Views of PySPH's own memory; `send` copies each once.
-        self.stream.send((fluid.x, fluid.y), solver.t, volumes=fluid.m / fluid.rho,
-                         velocities=(fluid.u, fluid.v))
+        self.stream.send((fluid.x, fluid.y), solver.t + solver.dt,
+                         volumes=fluid.m / fluid.rho, velocities=(fluid.u, fluid.v))
 
 
 def receive(stream):

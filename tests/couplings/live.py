@@ -66,9 +66,14 @@ def run(command, server, kill_after=None, **environment):
     many, stays away for a while, and comes back."""
     running = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True,
                                env={**os.environ, **environment})
+    with running, running.stdout:
+        return _answers(running, server, kill_after)
+
+
+def _answers(running, server, kill_after):
     answers = []
     for line in running.stdout:
-        if LINE.fullmatch(line):  # PySPH has more to say.
+        if line.startswith("t = "):  # PySPH has more to say.
             answers.append(Answer(line))
         if len(answers) == kill_after:
             kill_after = None
@@ -78,7 +83,7 @@ def run(command, server, kill_after=None, **environment):
             time.sleep(0.2)
             server.start()
     if running.wait() != 0:
-        raise RuntimeError(f"{command[0]} ended with {running.returncode}")
+        raise RuntimeError(f"{running.args[0]} ended with {running.returncode}")
     return answers
 
 
