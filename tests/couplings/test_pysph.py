@@ -2,6 +2,9 @@
 
 import os
 import pathlib
+import re
+import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -51,6 +54,15 @@ class DamBreak(unittest.TestCase):
             self.assertEqual(answer.rings, 1)
             self.assertEqual(len(frame["volumes"]), 2278)
             self.assertAlmostEqual(answer.area / frame["volumes"].sum(), 1, delta=0.02)
+
+    def test_the_script_of_the_page_reads_what_pysph_has_written(self):
+        page = (COUPLINGS / "README.md").read_text()
+        script, = [block for block in re.findall("```python\n(.*?)```", page, re.S)
+                   if "dam_break_2d_output" in block]
+        (Run.folder / "dam_break_2d_output").symlink_to(Run.folder / "run")
+        ran = subprocess.run([sys.executable, "-c", script], cwd=Run.folder, capture_output=True,
+                             text=True)
+        self.assertEqual(len(ran.stdout.splitlines()), 1 + len(Run.frames), ran.stderr)
 
     def test_latest_leaves_frames_out_but_not_the_last(self):
         times = [answer.time for answer in Run.latest]

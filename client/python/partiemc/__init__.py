@@ -80,6 +80,8 @@ def watch(address, name, **options):
     mode: "latest", the newest frame whenever there is room for one, or "every", every frame from now
         on; who falls behind for long is disconnected.
     credits: frames on their way or waiting to be received.
+    from_sequence: go back in the stream: begin with the frame of this number, 0 with the oldest that
+        the server still holds, and follow from there; none is left out before the newest is reached.
     tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
         deadline, give_up_after: as of connect. Raises Error.
 
