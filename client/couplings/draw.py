@@ -20,11 +20,11 @@ import partiemc
 HERE = pathlib.Path(__file__).parent
 # The stream's name, the simulation's options, the times that are drawn, and what the picture shows.
 PICTURES = {
-    "pysph_dam_break": ("dam-break", ["--every", "50", "--max-steps", "9000", "--disable-output",
-                                      "--quiet"], [0.1, 0.4, 0.7, 1.0], (0, 0, 4.1, 2.1)),
-    "lammps_column": ("column", ["--every", "100", "--steps", "40000"], [0, 8, 16, 40],
-                      (0, 0, 80, 51)),
-    "numpy_drops": ("drops", ["--every", "10", "--steps", "800"], [0.1, 0.3, 0.5, 0.8],
+    "pysph_dam_break": ("dam-break", ["--every", "50", "--max-steps", "14000", "--disable-output",
+                                      "--quiet"], [0.1, 0.4, 0.7, 1.2], (0, 0, 4.1, 2.1)),
+    "lammps_column": ("column", ["--every", "100", "--steps", "40000"], [0, 5, 10, 40],
+                      (0, 0, 121, 51)),
+    "numpy_drops": ("drops", ["--every", "10", "--steps", "800"], [0.1, 0.3, 0.5, 0.7],
                     (-1.4, -1.6, 1.4, 1.6)),
 }
 
