@@ -20,7 +20,7 @@ import partiemc
 HERE = pathlib.Path(__file__).parent
 # The stream's name, the simulation's options, the times that are drawn, and what the picture shows.
 PICTURES = {
-    "pysph_dam_break": ("dam-break", ["--every", "50", "--max-steps", "14000", "--disable-output",
+    "pysph_dam_break": ("dam-break", ["--every", "50", "--tf", "1.25", "--disable-output",
                                       "--quiet"], [0.1, 0.4, 0.7, 1.2], (0, 0, 4.1, 2.1)),
     "lammps_column": ("column", ["--every", "100", "--steps", "40000"], [0, 5, 10, 40],
                       (0, 0, 121, 51)),

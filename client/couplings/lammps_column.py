@@ -45,7 +45,7 @@ def receive(stream):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--server", default="127.0.0.1:50051", help="HOST:PORT or unix:PATH")
+    parser.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
     parser.add_argument("--every", type=int, default=20, help="Steps from frame to frame")
     parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--latest", action="store_true",

@@ -74,7 +74,7 @@ def show(result):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--server", default="127.0.0.1:50051", help="HOST:PORT or unix:PATH")
+    parser.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
     parser.add_argument("--every", type=int, default=10, help="Steps from frame to frame")
     parser.add_argument("--steps", type=int, default=1500)
     options = parser.parse_args()

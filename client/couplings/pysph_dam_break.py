@@ -17,7 +17,7 @@ from pysph.examples.dam_break_2d import DamBreak2D
 class LiveDamBreak(DamBreak2D):
     def add_user_options(self, group):
         super().add_user_options(group)
-        group.add_argument("--server", default="127.0.0.1:50051", help="HOST:PORT or unix:PATH")
+        group.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
         group.add_argument("--every", type=int, default=20, help="Steps from frame to frame")
         group.add_argument("--latest", action="store_true",
                            help="Never wait for the server: leave frames out where it is behind")
