@@ -20,8 +20,8 @@ import partiemc
 HERE = pathlib.Path(__file__).parent
 # The stream's name, the simulation's options, the times that are drawn, and what the picture shows.
 PICTURES = {
-    "pysph_dam_break": ("dam-break", ["--every", "50", "--tf", "1.25", "--disable-output",
-                                      "--quiet"], [0.1, 0.4, 0.7, 1.2], (0, 0, 4.1, 2.1)),
+    "pysph_dam_break": ("dam-break", ["--every", "50", "--tf", "0.96", "--disable-output",
+                                      "--quiet"], [0.1, 0.4, 0.7, 0.95], (0, 0, 4.1, 2.1)),
     "lammps_column": ("column", ["--every", "100", "--steps", "40000"], [0, 5, 10, 40],
                       (0, 0, 121, 51)),
     "numpy_drops": ("drops", ["--every", "10", "--steps", "800"], [0.1, 0.3, 0.5, 0.7],
@@ -40,6 +40,8 @@ def watched(address, name, times, coupling):
         for result in watch:
             if len(kept) < len(times) and result.time >= times[len(kept)] - 1e-9:
                 kept.append(result)
+    if len(kept) < len(times):
+        sys.exit(f"{name} ended before t = {times[len(kept)]}")
     return kept
 
 

@@ -2,6 +2,7 @@
 //
 // A collapsing column of grains (lammps_column.in), computed by LAMMPS as a library and streamed
 // while it runs: what a simulator in C++ does that has LAMMPS or a solver of its own linked in.
+// Under mpirun each process sends the grains that it has.
 #include <lammps/library.h>
 
 #include <cinttypes>
@@ -49,6 +50,7 @@ absl::Status Receive(client::Stream& stream) {
     const auto received = stream.Receive(event);
     if (!received.ok()) return received.status();
     if (*received == client::Received::kEnd) return absl::OkStatus();
+    if (event.kind == client::Event::Kind::kPartTaken) continue;  // Results come to process 0.
     if (event.kind != client::Event::Kind::kResult) {
       std::fprintf(stderr, "%s\n", event.message.c_str());
       continue;
@@ -74,9 +76,16 @@ int main(int argc, char** argv) {
   void* const simulation = lammps_open_no_mpi(8, const_cast<char**>(arguments), nullptr);
   lammps_file(simulation, script.c_str());
 
-  auto stream = client::Stream::Open(
-      address,
-      {.name = "column", .parameters = {.spacing = 1.0}, .outputs = {.echo_particles = true}});
+  const int ranks = lammps_extract_setting(simulation, "world_size");
+  const int rank = lammps_extract_setting(simulation, "world_rank");
+  client::FrameParts parts;
+  if (ranks > 1) {
+    parts = {.parts = static_cast<std::uint32_t>(ranks), .part = static_cast<std::uint32_t>(rank)};
+  }
+  auto stream = client::Stream::Open(address, {.name = "column",
+                                               .parameters = {.spacing = 1.0},
+                                               .outputs = {.echo_particles = true},
+                                               .parts = parts});
   if (!stream.ok()) return Fail(stream.status());
   Live live{.simulation = simulation, .stream = stream->get()};
   live.step_length = *static_cast<double*>(lammps_extract_global(simulation, "dt"));
@@ -88,6 +97,7 @@ int main(int argc, char** argv) {
   if (!live.status.ok()) (*stream)->Cancel();
   receiver.join();
   lammps_close(simulation);
+  lammps_mpi_finalize();
   if (!live.status.ok()) return Fail(live.status);
   return received.ok() ? 0 : Fail(received);
 }

@@ -3,9 +3,10 @@
 
     partiemc-server &
     client/couplings/lammps_column.py --every 50 --steps 5000
+    mpirun -np 4 client/couplings/lammps_column.py --every 50 --steps 5000
 
 `fix external` of the input script calls `send` between two steps, so any script becomes live by one
-line of its own and the lines of `main`.
+line of its own and the lines of `main`. Of several processes each sends the grains that it has.
 """
 
 import argparse
@@ -39,6 +40,8 @@ class Sender:
 
 def receive(stream):
     for result in stream:
+        if result is None:  # Results come to process 0.
+            continue
         print(f"t = {result.time!r}: {len(result.rings)} rings, area {result.area!r}, "
               f"{result.rings_digest:016x} {result.mesh_digest:016x}", flush=True)
 
@@ -54,10 +57,12 @@ def main():
     simulation = lammps.lammps(cmdargs=["-log", "none", "-screen", "none", "-var", "every",
                                         str(options.every)])
     simulation.file(str(SCRIPT))
+    rank, ranks = (simulation.extract_setting(name) for name in ("world_rank", "world_size"))
+    parts = {"part": rank, "parts": ranks} if ranks > 1 else {}
     # The stream ends before the thread that receives from it is waited for.
     with ThreadPoolExecutor(1) as receiver, partiemc.connect(
             options.server, latest=options.latest, name="column", spacing=1.0,
-            echo_particles=True) as stream:
+            echo_particles=True, **parts) as stream:
         received = receiver.submit(receive, stream)
         sender = Sender(simulation, stream)
         simulation.set_fix_external_callback("live", sender)
@@ -66,6 +71,7 @@ def main():
             raise sender.error
         stream.finish()
         received.result()
+    simulation.finalize()  # Of MPI, which wants to hear of the end of every process.
 
 
 if __name__ == "__main__":

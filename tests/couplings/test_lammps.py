@@ -1,7 +1,12 @@
 """LAMMPS, from Python and as a library of a C++ program, live through a server that is killed."""
 
 import os
+import pathlib
+import re
+import shutil
 import subprocess
+import sys
+import tempfile
 import unittest
 
 from live import COUPLINGS, Server, digests, run, skip_unless
@@ -36,6 +41,18 @@ def expected():
     return found
 
 
+def digests_of_dump(path):
+    """Of the frames that LAMMPS has written, each sorted by id."""
+    frames = re.split("ITEM: ATOMS id x y *\n", pathlib.Path(path).read_text())[1:]
+    sequence = partiemc.Reconstructor(spacing=1.0)
+    found = []
+    for frame in frames:
+        rows = numpy.array([line.split() for line in frame.split("ITEM:")[0].splitlines()], float)
+        result = sequence.reconstruct(rows[:, 1:], ids=rows[:, 0].astype(numpy.int64))
+        found.append(digests(result))
+    return found
+
+
 class Column(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -58,6 +75,27 @@ class Column(unittest.TestCase):
         if not os.environ.get("LAMMPS_COLUMN"):
             self.skipTest("liblammps-dev is not installed")
         self.check([os.environ["LAMMPS_COLUMN"], COUPLINGS / "lammps_column.in", None, EVERY, STEPS])
+
+    def test_four_processes_give_the_digests_of_their_grains_as_one_frame(self):
+        if shutil.which("mpirun") is None:
+            self.skipTest("Open MPI is not installed")
+        with tempfile.TemporaryDirectory() as folder, Server() as server:
+            script, dump = f"{folder}/column.in", f"{folder}/column.txt"
+            text = (COUPLINGS / "lammps_column.in").read_text()
+            with open(script, "w") as file:
+                file.write(f"{text}dump seen all custom 100 {dump} id x y\n"
+                           "dump_modify seen sort id format float %.17g\n")
+            command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-np", "4"]
+            python = (f"import sys; sys.path.insert(0, {str(COUPLINGS)!r}); import lammps_column;"
+                      f"lammps_column.SCRIPT = {script!r}; lammps_column.main()")
+            answers = run([*command, sys.executable, "-c", python, "--server", server.address,
+                           "--every", "100", "--steps", "4000"], server)
+            self.assertEqual([answer.digests for answer in answers], digests_of_dump(dump))
+            if os.environ.get("LAMMPS_COLUMN"):
+                answers = run([*command, os.environ["LAMMPS_COLUMN"], script, server.address, "100",
+                               "4000"], server)
+                self.assertEqual([answer.digests for answer in answers], digests_of_dump(dump))
+        self.assertEqual(len(answers), 41)
 
     def test_latest_leaves_frames_out_but_not_the_last(self):
         with Server() as server:
