@@ -7,10 +7,12 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
 #include "client/cli/frame_outputs.h"
+#include "client/cli/stream_recorder.h"
 #include "client/input/base/text.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
@@ -78,7 +80,7 @@ std::string Detail(const WatchedFrame& frame, std::uint64_t dropped) {
 }
 
 Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& outputs,
-                 Progress& progress) {
+                 std::optional<StreamRecorder>& recorder, Progress& progress) {
   Ended ended;
   WatchedFrame frame;
   for (std::uint64_t count = 0; flags.frames == 0 || count < flags.frames;) {
@@ -102,11 +104,51 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
       progress.Note(Concat("partiemc: ", OneLine(frame.rejoined), "; missed: at most ",
                            Plural(frame.gap, "frame")));
     }
-    const absl::Status status = outputs.Write(RecordOf(frame));
+    absl::Status status = outputs.Write(RecordOf(frame));
+    if (status.ok() && recorder) status = recorder->Add(frame);
     if (!status.ok()) return ended.With(kFailed, OneLine(status));
     progress.Update(++count, Detail(frame, ended.dropped));
   }
   return ended;
+}
+
+// What --record asks of the other flags.
+void CompleteRecording(WatchFlags& flags, bool has_mode) {
+  if (flags.record.empty()) return;
+  if (!std::string_view(flags.record).ends_with(".pemc")) {
+    throw CLI::ValidationError(
+        Concat("--record: '", flags.record, "'; must end in .pemc, the recording's own format"));
+  }
+  if (has_mode && flags.mode != "every") {
+    throw CLI::ValidationError(
+        Concat("--record: with --mode ", flags.mode, "; must have every frame, --mode every"));
+  }
+  flags.mode = "every";
+  if (flags.from.empty()) flags.from = kOldest;
+}
+
+absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
+  const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
+  return Watcher::Open(servers.front(), flags.stream,
+                       {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
+                        .credits = flags.credits,
+                        .from_sequence = FromSequence(flags.from),
+                        .credentials = flags.server.credentials,
+                        .fallback_addresses = {servers.begin() + 1, servers.end()},
+                        .rejoin = {.give_up_after = Milliseconds(flags.rejoin_seconds)},
+                        .deadline = Milliseconds(flags.deadline_seconds)});
+}
+
+void PrintSummary(const Summary& summary, const Ended& ended, double seconds) {
+  if (summary.frame_count() == 0) return;
+  std::fputs(summary.Table(seconds).c_str(), stdout);
+  std::fputs(Concat("dropped frames: ", ended.dropped, "\n").c_str(), stdout);
+  if (ended.gaps > 0) {
+    std::fputs(Concat("missed while the stream was lost ", ended.gaps, " times: at most ",
+                      Plural(ended.in_gaps, "frame"), "\n")
+                   .c_str(),
+               stdout);
+  }
 }
 
 }  // namespace
@@ -119,12 +161,13 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->description("Server: HOST:PORT or unix:PATH; several, where the stream may be on any")
       ->multi_option_policy(CLI::MultiOptionPolicy::Join)
       ->delimiter(',');
-  verb->add_option("--mode", flags.mode,
-                   "latest: the newest frame whenever there is room, others are dropped and "
-                   "counted; every: all of them, or be disconnected for falling behind")
-      ->check(CLI::IsMember({"latest", "every"}))
-      ->type_name("MODE")
-      ->capture_default_str();
+  auto* const mode =
+      verb->add_option("--mode", flags.mode,
+                       "latest: the newest frame whenever there is room, others are dropped and "
+                       "counted; every: all of them, or be disconnected for falling behind")
+          ->check(CLI::IsMember({"latest", "every"}))
+          ->type_name("MODE")
+          ->capture_default_str();
   verb->add_option("--from", flags.from,
                    "Go back: begin with frame N, or with the oldest that the server still holds, "
                    "and follow from there; frames are numbered from 1")
@@ -162,6 +205,10 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->capture_default_str();
   verb->add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
       ->type_name("FILE");
+  verb->add_option("--record", flags.record,
+                   "Write what the producer sent as a recording, FILE.pemc, which replays to the "
+                   "same bits; turns on --mode every, and --from oldest unless told otherwise")
+      ->type_name("FILE");
   verb->add_flag("--quiet", flags.quiet, "No progress and no table");
   verb->footer(
       "A watcher never slows the stream. One that joins late gets the newest frame at once, or\n"
@@ -174,7 +221,9 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       "  partiemc watch dam-break --mode every --output-dir out --format geojson,svg\n"
       "  partiemc watch dam-break --from oldest --mode every --stats dam.csv\n"
       "  partiemc watch dam-break --frames 1 --quiet --output-dir now\n"
+      "  partiemc watch dam-break --record dam.pemc\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 4 server or its stream, 130 interrupted.");
+  verb->parse_complete_callback([&flags, mode] { CompleteRecording(flags, mode->count() > 0); });
   return verb;
 }
 
@@ -186,17 +235,14 @@ int Watch(const WatchFlags& flags) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
-  const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
-  const auto watcher =
-      Watcher::Open(servers.front(), flags.stream,
-                    {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
-                     .credits = flags.credits,
-                     .from_sequence = FromSequence(flags.from),
-                     .credentials = flags.server.credentials,
-                     .fallback_addresses = {servers.begin() + 1, servers.end()},
-                     .rejoin = {.give_up_after = Milliseconds(flags.rejoin_seconds)},
-                     .deadline = Milliseconds(flags.deadline_seconds)});
+  const auto watcher = OpenWatcher(flags);
   if (!watcher.ok()) return ComplainOfServer(watcher.status());
+  std::optional<StreamRecorder> recorder;
+  if (!flags.record.empty()) {
+    auto created = StreamRecorder::Create(flags.record, flags.stream, (*watcher)->stream());
+    if (!created.ok()) return Complain(kFailed, created.status());
+    recorder = *std::move(created);
+  }
 
   Progress::Options progress_options = Progress::ForStandardError();
   progress_options.quiet = flags.quiet;
@@ -209,22 +255,15 @@ int Watch(const WatchFlags& flags) {
                          " are no longer held; begins there"));
   }
   const Clock::time_point start = Clock::now();
-  const Ended ended = ReceiveAll(flags, **watcher, *outputs, progress);
+  const Ended ended = ReceiveAll(flags, **watcher, *outputs, recorder, progress);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   progress.Finish();
 
-  const absl::Status finished = outputs->Finish();
+  absl::Status finished = outputs->Finish();
+  if (finished.ok() && recorder) finished = recorder->Finish();
   if (!finished.ok()) return Complain(kFailed, finished);
-  if (!flags.quiet && outputs->summary().frame_count() > 0) {
-    std::fputs(outputs->summary().Table(seconds).c_str(), stdout);
-    std::fputs(Concat("dropped frames: ", ended.dropped, "\n").c_str(), stdout);
-    if (ended.gaps > 0) {
-      std::fputs(Concat("missed while the stream was lost ", ended.gaps, " times: at most ",
-                        Plural(ended.in_gaps, "frame"), "\n")
-                     .c_str(),
-                 stdout);
-    }
-  }
+  if (!flags.quiet) PrintSummary(outputs->summary(), ended, seconds);
+  if (!flags.quiet && recorder) std::fputs(recorder->Summary().c_str(), stdout);
   return ended.word.empty() ? ended.code : Complain(ended.code, ended.word);
 }
 

@@ -24,6 +24,7 @@ struct WatchFlags {
   std::string output_dir;
   std::string format = "geojson";
   std::string stats;
+  std::string record;  ///< A recording to write; empty: none.
   bool quiet = false;
 };
 

@@ -1,6 +1,7 @@
 #include "client/library/watch_call.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 #include <variant>
 
@@ -15,21 +16,27 @@ v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
 
-// The two coordinates of `plane`, particle by particle.
-void ProjectParticles(const Frame& frame, Plane plane, std::vector<double>& xy) {
-  const auto components = static_cast<std::size_t>(frame.components);
+// The two coordinates of `plane`, particle by particle, of vectors of `components`.
+template <typename From, typename To>
+void Project(std::span<const From> vectors, std::size_t components, Plane plane,
+             std::vector<To>& xy) {
   const std::size_t first = components == 3 && plane == Plane::kYz ? 1 : 0;
   const std::size_t second = components == 3 && plane != Plane::kXy ? 2 : 1;
-  std::visit(
-      [&](auto positions) {
-        const std::size_t count = positions.size() / components;
-        xy.resize(2 * count);
-        for (std::size_t i = 0; i < count; ++i) {
-          xy[2 * i] = static_cast<double>(positions[i * components + first]);
-          xy[2 * i + 1] = static_cast<double>(positions[i * components + second]);
-        }
-      },
-      frame.positions);
+  const std::size_t count = vectors.size() / components;
+  xy.resize(2 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    xy[2 * i] = static_cast<To>(vectors[i * components + first]);
+    xy[2 * i + 1] = static_cast<To>(vectors[i * components + second]);
+  }
+}
+
+void TakeParticles(const Frame& echoed, Plane plane, WatchedFrame& frame) {
+  const auto components = static_cast<std::size_t>(echoed.components);
+  std::visit([&](auto positions) { Project(positions, components, plane, frame.particles); },
+             echoed.positions);
+  Project(echoed.velocities, components, plane, frame.particle_velocities);
+  frame.particle_ids.assign(echoed.ids.begin(), echoed.ids.end());
+  frame.particle_volumes.assign(echoed.volumes.begin(), echoed.volumes.end());
 }
 
 }  // namespace
@@ -155,12 +162,18 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.dropped = message.frame().dropped();
   frame.oldest_sequence = message.frame().oldest_sequence();
   frame.particles.clear();
+  frame.particle_ids.clear();
+  frame.particle_volumes.clear();
+  frame.particle_velocities.clear();
   if (result.particles().empty()) return absl::OkStatus();
   particles_.set_position_format(result.particle_format());
   particles_.mutable_positions()->swap(*result.mutable_particles());
+  particles_.mutable_ids()->swap(*result.mutable_particle_ids());
+  particles_.mutable_volumes()->swap(*result.mutable_particle_volumes());
+  particles_.mutable_velocities()->swap(*result.mutable_particle_velocities());
   const auto particles = wire::DecodeFrame(particles_);
   if (!particles.ok()) return Broken("sent particles that cannot be read");
-  ProjectParticles(*particles, stream_.parameters.plane, frame.particles);
+  TakeParticles(*particles, stream_.parameters.plane, frame);
   return absl::OkStatus();
 }
 

@@ -137,6 +137,7 @@ client::WatcherOptions TakeWatcherOptions(py::dict arguments) {
     }
   }
   TakeInto(arguments, "credits", options.credits);
+  TakeInto(arguments, "from_sequence", options.from_sequence);
   TakeInto(arguments, "fallback_addresses", options.fallback_addresses);
   TakeTime(arguments, "connect_timeout", options.connect_timeout);
   TakeTime(arguments, "deadline", options.deadline);

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 namespace partiemc::wire {
 namespace {
@@ -80,20 +81,29 @@ WatchedBytes::WatchedBytes(grpc::ByteBuffer& response) {
 }
 
 void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame) {
-  constexpr int kPath[] = {v1::ReconstructRequest::kFrameFieldNumber,
-                           v1::ParticleFrame::kPositionsFieldNumber};
-  const auto positions = Find(request, kPath);
-  if (!positions || frame.positions().empty()) return;  // A frame without particles.
-  const std::string head = Written([&](CodedOutputStream& out) {
-    out.WriteTag(VarintTag(v1::ReconstructedFrame::kParticleFormatFieldNumber));
+  if (frame.positions().empty()) return;  // A frame without particles.
+  using From = v1::ParticleFrame;
+  using To = v1::ReconstructedFrame;
+  static constexpr int kArrays[][2] = {
+      {From::kPositionsFieldNumber, To::kParticlesFieldNumber},
+      {From::kIdsFieldNumber, To::kParticleIdsFieldNumber},
+      {From::kVolumesFieldNumber, To::kParticleVolumesFieldNumber},
+      {From::kVelocitiesFieldNumber, To::kParticleVelocitiesFieldNumber},
+  };
+  AppendOwn(Written([&](CodedOutputStream& out) {
+    out.WriteTag(VarintTag(To::kParticleFormatFieldNumber));
     out.WriteVarint32(static_cast<std::uint32_t>(frame.position_format()));
-    out.WriteTag(LengthTag(v1::ReconstructedFrame::kParticlesFieldNumber));
-    out.WriteVarint64(positions->length);
-  });
-  slices_.emplace_back(head);
-  size_ += head.size();
-  memory_ += head.size();
-  Append(request, positions->offset, positions->length);
+  }));
+  for (const auto& [from, to] : kArrays) {
+    const int path[] = {v1::ReconstructRequest::kFrameFieldNumber, from};
+    const auto array = Find(request, path);
+    if (!array || array->length == 0) continue;
+    AppendOwn(Written([&](CodedOutputStream& out) {
+      out.WriteTag(LengthTag(to));
+      out.WriteVarint64(array->length);
+    }));
+    Append(request, array->offset, array->length);
+  }
 }
 
 grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped,
@@ -120,6 +130,12 @@ grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped,
   return {slices.data(), slices.size()};
 }
 
+void WatchedBytes::AppendOwn(const std::string& bytes) {
+  slices_.emplace_back(bytes);
+  size_ += bytes.size();
+  memory_ += bytes.size();
+}
+
 void WatchedBytes::Append(const grpc::ByteBuffer& whole, std::size_t offset, std::size_t length) {
   std::vector<grpc::Slice> slices;
   if (!whole.Dump(&slices).ok()) return;
@@ -128,7 +144,7 @@ void WatchedBytes::Append(const grpc::ByteBuffer& whole, std::size_t offset, std
     if (offset < slice.size() && length > 0) {
       const std::size_t end = std::min(slice.size(), offset + length);
       slices_.push_back(slice.sub(offset, end));
-      memory_ += slice.size();
+      if (std::exchange(counted_, slice.begin()) != slice.begin()) memory_ += slice.size();
       length -= end - offset;
       offset = end;
     }

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "partiemc/v1/reconstruction.pb.h"
@@ -21,8 +22,8 @@ class WatchedBytes {
   /// Requires: a frame, without particles.
   explicit WatchedBytes(grpc::ByteBuffer& response);
 
-  /// Adds the positions of the frame in `request`, the bytes of a ReconstructRequest that was
-  /// parsed into `frame`, by sharing their memory.
+  /// Adds positions, ids, volumes and velocities of the frame in `request`, the bytes of a
+  /// ReconstructRequest that was parsed into `frame`, by sharing their memory.
   void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
 
   /// Of the serialised ReconstructedFrame.
@@ -37,10 +38,12 @@ class WatchedBytes {
   grpc::ByteBuffer ToResponse(std::uint64_t dropped, std::uint64_t oldest_sequence) const;
 
  private:
+  void AppendOwn(const std::string& bytes);
   void Append(const grpc::ByteBuffer& whole, std::size_t offset, std::size_t length);
 
   std::vector<grpc::Slice> slices_;
   std::size_t size_ = 0, memory_ = 0;
+  const std::uint8_t* counted_ = nullptr;  // The piece of memory that was counted last.
 };
 
 }  // namespace partiemc::wire

@@ -81,6 +81,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"CLI11", {"libcli11-dev"}},
       {"gRPC", {"libgrpc++-dev", "protobuf-compiler-grpc"}},
       {"GTest", {"libgtest-dev", "libgmock-dev"}},
+      {"lammps", {"liblammps-dev"}},
       {"libzstd", {"libzstd-dev"}},  // The name that pkg-config knows it by.
       {"nlohmann_json", {"nlohmann-json3-dev"}},
       {"partiemc", {}},
@@ -185,7 +186,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
        {"client/",
         "",
         {std::string(kPublicHeaders), "library", "c", "python", "output", "input", "recording",
-         "evaluation", "cli"},
+         "evaluation", "cli", "couplings"},
         {}},
        {"client/input/",
         "",

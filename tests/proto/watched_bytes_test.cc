@@ -70,15 +70,25 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   v1::ReconstructRequest request;
   request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
   request.mutable_frame()->set_positions(std::string(2'500'000, 'x'));
+  request.mutable_frame()->set_ids(std::string(1'500'000, 'i'));
   request.mutable_frame()->set_volumes("volumes");
+  request.mutable_frame()->set_velocities(std::string(10, 'v'));
   grpc::ByteBuffer sent = ToBytes(request);
   WatchedBytes bytes(answer);
   bytes.EchoParticles(sent, request.frame());
   v1::ReconstructedFrame seen = Seen(bytes, 0).frame();
   EXPECT_EQ(seen.particle_format(), v1::POSITION_FORMAT_FLOAT32_2);
   EXPECT_TRUE(seen.particles() == request.frame().positions());
+  EXPECT_TRUE(seen.particle_ids() == request.frame().ids());
+  EXPECT_EQ(seen.particle_volumes(), "volumes");
+  EXPECT_EQ(seen.particle_velocities(), std::string(10, 'v'));
+  EXPECT_GE(bytes.memory(), bytes.size());
+  EXPECT_LE(bytes.memory(), answer.Length() + sent.Length() + 100);  // Nothing is counted twice.
   seen.clear_particle_format();
   seen.clear_particles();
+  seen.clear_particle_ids();
+  seen.clear_particle_volumes();
+  seen.clear_particle_velocities();
   EXPECT_TRUE(seen.SerializeAsString() == frame.SerializeAsString());
 }
 

@@ -21,7 +21,7 @@ from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Watch, server,
                       version as __version__)
 
 __all__ = ["Error", "Mesh", "Reconstructor", "Result", "Rings", "Stream", "Watch", "connect",
-           "reconstruct", "server", "streams", "watch"]
+           "read_pysph", "reconstruct", "server", "streams", "watch"]
 
 
 def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attributes=None,
@@ -85,12 +85,33 @@ def watch(address, name, **options):
     mode: "latest", the newest frame whenever there is room for one, or "every", every frame from now
         on; who falls behind for long is disconnected.
     credits: frames on their way or waiting to be received.
+    from_sequence: go back in the stream: begin with the frame of this number, 0 with the oldest that
+        the server still holds, and follow from there; none is left out before the newest is reached.
     tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
         deadline, give_up_after: as of connect. Raises Error.
 
     Iteration ends with the stream. Each Result tells in `dropped` how many did not come.
     """
     return Watch(address, name, options)
+
+
+def read_pysph(path, *, array="fluid"):
+    """Frames of a PySPH run, in the order of their steps: an iterator of dicts.
+
+    path: the folder of a run, with NAME_0.hdf5, NAME_100.hdf5, ... or the same as .npz; or one file.
+    array: the particle array that is wanted.
+
+    A frame is a dict for Reconstructor.reconstruct(**frame) or Stream.send(**frame): `positions`
+    and `velocities`, (x, y), (N,) float64 each, with z as a third where it is not the same for all;
+    `time`; `volumes`, mass by density, where both are in the file; `ids` where PySPH's global ids
+    are all different. Ghosts and particles of other processes are left out.
+
+    A file is read when its frame is asked for; HDF5 takes h5py. NPZ files hold a pickle, of which
+    nothing but arrays and what is built into Python is accepted. Raises Error.
+    """
+    from . import _pysph
+
+    return _pysph.read(path, array)
 
 
 def _map(self, frames, times=None):

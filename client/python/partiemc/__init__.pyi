@@ -1,3 +1,4 @@
+from os import PathLike
 from types import TracebackType
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Type, TypedDict, Union
 
@@ -159,6 +160,7 @@ class Watch:
     @property
     def end(self) -> str: ...
 
+def read_pysph(path: Union[str, "PathLike[str]"], *, array: str = ...) -> Iterator[Dict[str, Any]]: ...
 def reconstruct(
     positions: Positions, *, volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
     velocities: Optional[Positions] = ...,

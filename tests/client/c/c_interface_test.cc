@@ -85,17 +85,21 @@ TEST(CInterface, EveryCallDoesWhatTheHeaderSaysWithAServer) {
   EXPECT_EQ(ran.out, "all is as the header says\n");
 }
 
-TEST(CInterface, TheExampleGivesTheDigestsOfReplay) {
+TEST(CInterface, TheExampleDrawsAndGivesTheDigestsOfReplay) {
+  const support::TemporaryFolder folder;
+  const std::string picture = folder.Path("outline.svg");
   const std::vector<std::string> expected = DigestsOfReplay();
   EXPECT_THAT(expected, SizeIs(5));
-  const Ran local = RunFile(C_EXAMPLE, {});
+  const Ran local = RunFile(C_EXAMPLE, {picture});
   EXPECT_EQ(local.exit_code, 0) << local.error;
   EXPECT_EQ(DigestsOf(local.out), expected);
   const ServerProgram server;
-  const Ran remote = RunFile(C_EXAMPLE, {server.address()});
+  const Ran remote = RunFile(C_EXAMPLE, {folder.Path("remote.svg"), server.address()});
   EXPECT_EQ(remote.out, local.out);
+  EXPECT_THAT(Content(picture), testing::MatchesRegex("<svg .*<path d='M[-0-9. LMe]*Z'/></svg>\n"));
+  EXPECT_EQ(Content(folder.Path("remote.svg")), Content(picture));
 
-  const Ran nowhere = RunFile(C_EXAMPLE, {"unix:/nowhere.sock"});
+  const Ran nowhere = RunFile(C_EXAMPLE, {picture, "unix:/nowhere.sock"});
   EXPECT_EQ(nowhere.exit_code, 14);  // UNAVAILABLE.
   EXPECT_THAT(nowhere.error, HasSubstr("/nowhere.sock"));
 }

