@@ -1,5 +1,6 @@
 #include "client/cli/stream_recorder.h"
 
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
