@@ -203,6 +203,11 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->needs(output_dir)
       ->type_name("LIST")
       ->capture_default_str();
+  verb->add_option("--color-by", flags.color_by,
+                   "Colour the pictures of svg by this attribute of the stream; of a vector its "
+                   "length")
+      ->type_name("NAME")
+      ->needs(output_dir);
   verb->add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
       ->type_name("FILE");
   verb->add_option("--record", flags.record,
@@ -229,8 +234,10 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
 
 int Watch(const WatchFlags& flags) {
   CatchInterrupts();  // Before there are temporary files to take away.
-  auto outputs = FrameOutputs::Create(
-      {.output_dir = flags.output_dir, .format = flags.format, .stats = flags.stats});
+  auto outputs = FrameOutputs::Create({.output_dir = flags.output_dir,
+                                       .format = flags.format,
+                                       .stats = flags.stats,
+                                       .color_by = flags.color_by});
   if (!outputs.ok()) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());

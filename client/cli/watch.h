@@ -23,6 +23,7 @@ struct WatchFlags {
   double rejoin_seconds = 30;  ///< 0: a watch that is lost is over.
   std::string output_dir;
   std::string format = "geojson";
+  std::string color_by;
   std::string stats;
   std::string record;  ///< A recording to write; empty: none.
   bool quiet = false;
