@@ -98,8 +98,8 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
     const int path[] = {v1::ReconstructRequest::kFrameFieldNumber, from};
     const auto array = Find(request, path);
     if (!array || array->length == 0) continue;
-    AppendOwn(Written([&](CodedOutputStream& out) {
-      out.WriteTag(LengthTag(to));
+    AppendOwn(Written([&, field = to](CodedOutputStream& out) {
+      out.WriteTag(LengthTag(field));
       out.WriteVarint64(array->length);
     }));
     Append(request, array->offset, array->length);
