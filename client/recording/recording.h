@@ -52,9 +52,9 @@ class RecordingWriter {
   ~RecordingWriter();
 
   /// Appends a frame: time, positions, ids, volumes, velocities and attributes; its index is its
-  /// place in the recording. A frame without a time gets its index as time and loses its velocities, which tell
-  /// nothing without one.
-  /// Errors: INVALID_ARGUMENT (float32 is not enough); those of AtomicFile.
+  /// place in the recording. A frame without a time gets its index as time and loses its
+  /// velocities, which tell nothing without one. Errors: INVALID_ARGUMENT (float32 is not enough);
+  /// those of AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
   absl::Status Finish();

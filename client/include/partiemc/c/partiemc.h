@@ -81,9 +81,9 @@ typedef struct partiemc_options {
   double deadline;        /* Seconds for each answer; 0: 30. */
   double give_up_after;   /* Seconds to mend a lost connection for; 0: 30. Negative: the stream
                              ends with its connection. */
-  double send_timeout;    /* Seconds for partiemc_send to get a place in the window, whatever becomes
-                             of the connection: DEADLINE_EXCEEDED then, and the stream goes on; 0:
-                             as long as the stream lives. */
+  double send_timeout; /* Seconds for partiemc_send to get a place in the window, whatever becomes
+                          of the connection: DEADLINE_EXCEEDED then, and the stream goes on; 0:
+                          as long as the stream lives. */
   /* Of a simulator of many processes, each of which opens the stream of the same `name`, and sends
    * its particles of each frame, also none. Part 0 gets the results, the others PARTIEMC_PART_TAKEN
    * for each frame. The frame is that of all particles, in the order of ids where they have ids,
@@ -204,7 +204,7 @@ enum {
   PARTIEMC_NOTICE = 2,      /* A word of the server in `message`. */
   PARTIEMC_NOTHING_YET = 3, /* The time to wait is over. */
   PARTIEMC_END = 4,         /* partiemc_finish was called and every frame has been answered. */
-  PARTIEMC_PART_TAKEN = 5   /* Part 0 has the answer to frame `sequence`, of which this was a part. */
+  PARTIEMC_PART_TAKEN = 5 /* Part 0 has the answer to frame `sequence`, of which this was a part. */
 };
 
 #define PARTIEMC_NO_RING 0xffffffffu
