@@ -160,8 +160,7 @@ using BandPaths = std::array<std::string, kColorBands>;
 
 void AppendTriangle(const std::array<Corner, 3>& triangle, const Picture& picture,
                     BandPaths& paths) {
-  const auto [low, high] =
-      std::ranges::minmax({triangle[0].share, triangle[1].share, triangle[2].share});
+  const auto [low, high] = std::minmax({triangle[0].share, triangle[1].share, triangle[2].share});
   std::vector<Corner> rest(triangle.begin(), triangle.end());
   for (std::size_t band = BandOf(low); band <= BandOf(high); ++band) {
     const double top = static_cast<double>(band + 1) / kColorBands;
