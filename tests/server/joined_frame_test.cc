@@ -34,8 +34,9 @@ std::vector<Particle> RandomParticles(std::size_t count, std::uint64_t id_mask) 
                     .heat = 2.f * static_cast<float>(k)};
   }
   std::ranges::sort(particles, {}, &Particle::id);
-  const auto last = std::ranges::unique(particles, {}, &Particle::id);
-  particles.erase(last.begin(), last.end());
+  const auto last = std::unique(particles.begin(), particles.end(),
+                                [](const Particle& a, const Particle& b) { return a.id == b.id; });
+  particles.erase(last, particles.end());
   return particles;
 }
 
