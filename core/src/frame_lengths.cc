@@ -80,8 +80,7 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
       cell_size, is_provisional};
 }
 
-absl::StatusOr<double> LightestVolume(const Frame& frame, double spacing, Doubts& doubts) {
-  const double usual = spacing * spacing;
+absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts) {
   if (frame.volumes.empty()) return usual;
   double lightest = std::numeric_limits<double>::infinity();
   std::size_t large = 0, small = 0;
@@ -91,7 +90,7 @@ absl::StatusOr<double> LightestVolume(const Frame& frame, double spacing, Doubts
       return ViolationError(
           absl::StatusCode::kInvalidArgument,
           {std::string(kReasonOutOfRange), absl::StrCat("volumes[", k, "]"), ShortestNumber(volume),
-           absl::StrCat("must be within a factor of 1e6 of the squared spacing, ",
+           absl::StrCat("must be within a factor of 1e6 of that of a particle by the spacing, ",
                         ShortestNumber(usual))});
     }
     lightest = std::min(lightest, volume);
@@ -112,7 +111,7 @@ absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& length
     doubts.Add(Doubt::kSpacingProvisional);
     return absl::OkStatus();
   }
-  if (ContradictsSpacing(bins, scale)) doubts.Add(Doubt::kSpacingContradicted);
+  if (!scale.is_slice && ContradictsSpacing(bins, scale)) doubts.Add(Doubt::kSpacingContradicted);
   return fine;
 }
 

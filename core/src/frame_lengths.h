@@ -28,12 +28,13 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);
 
-/// The smallest volume of the frame, h^2 where particles have none. Adds the doubt that volumes
-/// give reason for. Errors: INVALID_ARGUMENT for a volume that is too far from h^2.
-absl::StatusOr<double> LightestVolume(const Frame& frame, double spacing, Doubts& doubts);
+/// The smallest volume of the frame, `usual` where particles have none: h^2, of a slice h^3. Adds
+/// the doubt that volumes give reason for. Errors: INVALID_ARGUMENT for a volume that is too far
+/// from the usual one.
+absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
 
 /// Adds the doubts that the bins give reason for. Errors: see CheckResolution (resolution.h); none
-/// where lengths are provisional.
+/// where lengths are provisional. Particles of a slab tell nothing of their spacing.
 absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& lengths,
                           const Scale& scale, const ParticleBins& bins, Doubts& doubts);
 

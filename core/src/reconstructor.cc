@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
+#include "field/slice_field.h"
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
 #include "partiemc/status.h"
@@ -88,14 +89,15 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   return size;
 }
 
-// Stage 1, once the frame is checked and its lengths are known; `lengths` stay empty where nothing
-// tells them. Errors: see Reconstruct.
+// Stage 1, which checks the frame: sets `seen` to what the stages see of it, of a slice its slab.
+// `lengths` stay empty where nothing tells them. Errors: see Reconstruct.
 absl::Status SortParticles(const ReconstructionParameters& parameters, const FrameLimits& limits,
                            const Frame& frame, const State& state, Workspace::Buffers& b,
-                           std::optional<Lengths>& lengths, Scale& scale,
+                           Frame& seen, std::optional<Lengths>& lengths, Scale& scale,
                            FrameStatistics& statistics) {
-  absl::Status status = CheckFrame(frame, parameters.plane, limits, b.distinct_ids);
+  absl::Status status = CheckFrame(frame, parameters, limits, b.distinct_ids);
   if (!status.ok()) return status;
+  seen = frame;
   statistics.particles = frame.ParticleCount();
   auto decided = DecideLengths(parameters, frame, state, b.spacing);
   if (!decided.ok()) return decided.status();
@@ -106,18 +108,28 @@ absl::Status SortParticles(const ReconstructionParameters& parameters, const Fra
   }
   statistics.spacing = lengths->spacing;
   statistics.cell_size = lengths->cell_size;
-  const auto lightest = LightestVolume(frame, lengths->spacing, statistics.doubts);
+  const double spacing = lengths->spacing;
+  const double usual = parameters.slice ? spacing * spacing * spacing : spacing * spacing;
+  const auto lightest = LightestVolume(frame, usual, statistics.doubts);
   if (!lightest.ok()) return lightest.status();
-  scale = MakeScale(parameters, lengths->spacing, lengths->cell_size, *lightest);
-  status = BinParticles(frame, parameters.plane, scale, limits, b.bins);
+  scale = MakeScale(parameters, spacing, lengths->cell_size, *lightest);
+  if (parameters.slice) {
+    b.slab.Take(frame, *parameters.slice, parameters.kernel_radius * spacing);
+    seen = b.slab.AsFrame();
+  }
+  status = BinParticles(seen, parameters.plane, scale, limits, b.bins);
   if (!status.ok()) return status;
-  return JudgeLengths(frame, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
+  if (parameters.slice) SetHeights(b.slab.heights(), scale, b.bins);
+  return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
 }
 
 // The stages up to the rings.
 void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
                StageObserver* observer, Workspace::Buffers& b) {
-  InStage(observer, Stage::kField, [&] { SampleField(b.bins, scale, b.level_set); });
+  InStage(observer, Stage::kField, [&] {
+    scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
+                   : SampleField(b.bins, scale, b.level_set);
+  });
   InStage(observer, Stage::kCrossings,
           [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
   InStage(observer, Stage::kRings, [&] {
@@ -197,29 +209,31 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
 absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
                                                Workspace::Buffers& b, Result& result,
                                                const FrameControl& control) const {
+  Frame seen;
   std::optional<Lengths> lengths;
   Scale scale;
   absl::Status status = InStage(control.observer, Stage::kBins, [&] {
-    return SortParticles(parameters_, limits_, frame, state, b, lengths, scale, result.statistics);
+    return SortParticles(parameters_, limits_, frame, state, b, seen, lengths, scale,
+                         result.statistics);
   });
   if (!status.ok() || !lengths) return status;
-  status = Reserve(control.memory, {.particles = frame.ParticleCount(),
+  status = Reserve(control.memory, {.particles = seen.ParticleCount(),
                                     .tiles = b.bins.tiles.size(),
-                                    .attribute_values = AttributeValuesOf(frame)});
+                                    .attribute_values = AttributeValuesOf(seen)});
   if (!status.ok()) return status;
   FindRings(parameters_, scale, control.observer, b);
-  status = Reserve(control.memory, SizeOf(parameters_, frame, b));
+  status = Reserve(control.memory, SizeOf(parameters_, seen, b));
   if (!status.ok()) return status;
   // No component is ever tangled (repair.h). Were that wrong, it would cost the frame that
   // component, not everything.
   for (;;) {
-    const auto tangled = Outline(parameters_, frame, scale, state, control.observer, b, result);
+    const auto tangled = Outline(parameters_, seen, scale, state, control.observer, b, result);
     if (tangled.empty()) break;
     DropComponents(b.bins, tangled, b.crossings, b.ring_scratch, b.topology);
   }
-  if (!frame.attributes.empty()) {
+  if (!seen.attributes.empty()) {
     InStage(control.observer, Stage::kAttributes, [&] {
-      InterpolateAttributes(frame, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
+      InterpolateAttributes(seen, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
                             result.attributes);
     });
   }

@@ -10,6 +10,7 @@
 #include "crossings/crossings.h"
 #include "field/field.h"
 #include "frame/distinct_ids.h"
+#include "frame/slab.h"
 #include "frame/spacing.h"
 #include "identities/identities.h"
 #include "mesh/mesh.h"
@@ -24,6 +25,7 @@ namespace partiemc {
 struct Workspace::Buffers {
   DistinctIdsScratch distinct_ids;
   SpacingScratch spacing;
+  Slab slab;
   ParticleBins bins;
   LevelSet level_set;
   Crossings crossings;

@@ -125,6 +125,45 @@ TEST_P(WarmFrame, AllocatesNothing) {
   EXPECT_GT(result.rings.RingCount(), 1u);
 }
 
+TEST(WarmSlice, AllocatesNothing) {
+  ReconstructionParameters parameters{.spacing = 1, .slice = SlicePlane{.origin = {0, 0, 4}}};
+  const auto reconstructor = Reconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  std::vector<double> xyz;
+  std::vector<float> pressure, volumes;
+  std::vector<std::uint64_t> ids;
+  for (int k = 0; k < 40 * 40 * 12; ++k) {
+    xyz.insert(xyz.end(), {k % 40 + 0.5, k / 40 % 40 + 0.25, k / 1600 + 0.5});
+    pressure.push_back(static_cast<float>(k));
+    volumes.push_back(1);
+    ids.push_back(static_cast<std::uint64_t>(k));
+  }
+  const std::vector<Attribute> attributes = {{"pressure", 1, pressure}};
+  State state;
+  Workspace workspace;
+  Result result;
+  std::size_t before = 0;
+  tbb::task_arena arena(1);
+  for (int frame = 0; frame < 6; ++frame) {
+    before = allocations;
+    arena.execute([&] {
+      ASSERT_TRUE(reconstructor
+                      ->Reconstruct({.positions = std::span<const double>(xyz),
+                                     .components = 3,
+                                     .volumes = volumes,
+                                     .ids = ids,
+                                     .attributes = attributes},
+                                    state, workspace, result)
+                      .ok());
+    });
+    if (frame == 0) {
+      EXPECT_GT(allocations, before) << "nothing is counted";
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_EQ(result.rings.RingCount(), 1u);
+}
+
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
   for (const Placement placement : AllPlacements()) {

@@ -270,7 +270,7 @@ std::vector<BadFrame> BadFrames() {
 
 absl::Status Check(const Frame& frame, Plane plane, const FrameLimits& limits) {
   DistinctIdsScratch scratch;
-  return CheckFrame(frame, plane, limits, scratch);
+  return CheckFrame(frame, {.plane = plane}, limits, scratch);
 }
 
 class BadFrameTest : public testing::TestWithParam<BadFrame> {};

@@ -29,10 +29,11 @@ struct Frame {
   std::variant<std::span<const float>, std::span<const double>> positions;
 
   /// 2 (x, y) or 3 (x, y, z). With 3, all particles must lie in one plane parallel to the one
-  /// that ReconstructionParameters::plane names.
+  /// that ReconstructionParameters::plane names, unless there is a `slice`, which wants 3.
   int components = 2;
 
   /// Area that each particle stands for, in world units squared, positive and finite. Empty: h^2.
+  /// With a `slice` its volume, cubed, and h^3.
   std::span<const float> volumes = {};
 
   /// What the same particle has in every frame; no two particles of a frame share one. Empty: none.

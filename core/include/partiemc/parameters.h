@@ -1,6 +1,7 @@
 // The parameters of a reconstruction: fixed for a stream, checked once when it opens.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -54,6 +55,19 @@ struct VirtualPlaneSteps {
 /// Which two of three coordinates span the plane of the particles.
 enum class Plane : std::uint8_t { kXy, kXz, kYz };
 
+/// A plane through particles in space, on which the outline is the section of the body.
+struct SlicePlane {
+  /// A point of the plane, in world units: where the coordinates of results are 0.
+  std::array<double, 3> origin{};
+  /// Any length but 0. Along z, results have the axes x and y; along -y, x and z; along x, y and z;
+  /// else the first axis is x as the plane sees it, or y where the normal leans to x more than to y
+  /// and z, and the second stands upright on it, so that the normal points at whoever sees the
+  /// first on the right of the second.
+  std::array<double, 3> normal{0, 0, 1};
+
+  friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
+};
+
 struct ReconstructionParameters {
   Placement placement = Placement::kVirtualPlane;
   Fill fill = Fill::kGreedy;
@@ -100,6 +114,12 @@ struct ReconstructionParameters {
 
   /// The plane of positions with three components; positions with two are taken as they are.
   Plane plane = Plane::kXy;
+
+  /// Positions have three components and fill space: the outline is that of a section. Distances
+  /// are those of space, h^3 takes the place of h^2, volumes are volumes; particles farther from
+  /// the plane than the kernel reaches do not count. Wants `spacing`, and any placement but
+  /// `farthest-particle`; `plane` does not matter (core/METHOD.md, "Slices").
+  std::optional<SlicePlane> slice = std::nullopt;
 
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;

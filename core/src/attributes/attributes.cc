@@ -44,12 +44,19 @@ class Buckets {
   int shift_ = 0;
 };
 
+// Of a value of a particle: weighted, and that times D_x, D_y and D_z.
+using Carried = std::array<double, 4>;
+
 // Sums over particles around a vertex, D = x_i - x over the kernel radius, and then the value there
 // of a plane through what they carry.
 class PlaneFit {
  public:
-  void Add(double weight, double dx, double dy) {
+  void Add(double weight, double dx, double dy, double dz) {
     sum_ += weight;
+    z_ += weight * dz;
+    xz_ += weight * dx * dz;
+    yz_ += weight * dy * dz;
+    zz_ += weight * dz * dz;
     x_ += weight * dx;
     y_ += weight * dy;
     xx_ += weight * dx * dx;
@@ -57,20 +64,27 @@ class PlaneFit {
     yy_ += weight * dy * dy;
   }
 
-  // What the three sums of a carried value, of weight, weight D_x and weight D_y, count: the first
-  // row of the inverse of the moments.
-  std::array<double, 3> Shares() const {
+  // What the sums of a carried value count: the first row of the inverse of the moments. The height
+  // is eliminated first; in the plane there is none, and what is taken off is 0.
+  Carried Shares() const {
     if (sum_ == 0) return {};
-    const double xx = xx_ + kSlopeRidge * sum_, yy = yy_ + kSlopeRidge * sum_;
-    const double determinant = xx * yy - xy_ * xy_;
-    const double along_x = (x_ * yy - y_ * xy_) / determinant;
-    const double along_y = (y_ * xx - x_ * xy_) / determinant;
-    const double constant = 1 / (sum_ - x_ * along_x - y_ * along_y);
-    return {constant, -along_x * constant, -along_y * constant};
+    const double zz = zz_ + kSlopeRidge * sum_;
+    const double sum = sum_ - z_ * z_ / zz;
+    const double x = x_ - z_ * xz_ / zz, y = y_ - z_ * yz_ / zz;
+    const double xx = xx_ + kSlopeRidge * sum_ - xz_ * xz_ / zz;
+    const double yy = yy_ + kSlopeRidge * sum_ - yz_ * yz_ / zz;
+    const double xy = xy_ - xz_ * yz_ / zz;
+    const double determinant = xx * yy - xy * xy;
+    const double along_x = (x * yy - y * xy) / determinant;
+    const double along_y = (y * xx - x * xy) / determinant;
+    const double constant = 1 / (sum - x * along_x - y * along_y);
+    const double along_z = (z_ - along_x * xz_ - along_y * yz_) / zz;
+    return {constant, -along_x * constant, -along_y * constant, -along_z * constant};
   }
 
  private:
-  double sum_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
+  double sum_ = 0, x_ = 0, y_ = 0, z_ = 0;
+  double xx_ = 0, xy_ = 0, yy_ = 0, xz_ = 0, yz_ = 0, zz_ = 0;
 };
 
 class Interpolation {
@@ -122,9 +136,6 @@ class Interpolation {
   }
 
  private:
-  // Of a value of a particle: weighted, and that times D_x and D_y.
-  using Carried = std::array<double, 3>;
-
   std::int32_t TileAlong(double world) const {
     return static_cast<std::int32_t>(std::floor(world / scale_.cell_size / kTileSize));
   }
@@ -148,11 +159,12 @@ class Interpolation {
       const BinnedParticle& particle = bins_.particles[i];
       const double weight = bins_.weight.empty() ? scale_.uniform_weight : double{bins_.weight[i]};
       scratch_.particles[--offsets[buckets_.Of(particle)]] = {
-          particle.x, particle.y, static_cast<float>(weight), particle.source};
+          particle.x, particle.y, bins_.height.empty() ? 0 : bins_.height[i],
+          static_cast<float>(weight), particle.source};
     }
   }
 
-  // Calls visit(particle, k w, D_x, D_y) for the particles that a kernel at a point reaches.
+  // Calls visit(particle, k w, D_x, D_y, D_z) for the particles that a kernel at a point reaches.
   template <typename Visit>
   void ForEachAround(std::uint32_t tile, Point point, const Visit& visit) const {
     const double radius = scale_.kernel_radius;
@@ -172,9 +184,10 @@ class Interpolation {
         for (std::uint32_t i = offsets[left]; i < offsets[right + 1]; ++i) {
           const CarryingParticle& particle = scratch_.particles[i];
           const double dx = (particle.x - x) / radius, dy = (particle.y - y) / radius;
-          const double within = 1 - dx * dx - dy * dy;
+          const double dz = particle.height / radius;
+          const double within = 1 - dx * dx - dy * dy - dz * dz;
           if (within <= 0) continue;
-          visit(particle, particle.weight * within * within * within, dx, dy);
+          visit(particle, particle.weight * within * within * within, dx, dy, dz);
         }
       }
     }
@@ -190,27 +203,30 @@ class Interpolation {
       const TileCoordinate& at = bins_.tiles[tile];
       const Point point{world.x / scale_.cell_size - double{kTileSize} * at.x,
                         world.y / scale_.cell_size - double{kTileSize} * at.y};
-      ForEachAround(tile, point,
-                    [&](const CarryingParticle& particle, double weight, double dx, double dy) {
-                      fit.Add(weight, dx, dy);
-                      Carried* sums = carried.data();
-                      for (const Attribute& attribute : frame_.attributes) {
-                        const float* value =
-                            &attribute.values[particle.source * std::size_t(attribute.components)];
-                        for (int c = 0; c < attribute.components; ++c, ++sums) {
-                          const double weighted = weight * value[c];
-                          (*sums)[0] += weighted;
-                          (*sums)[1] += weighted * dx;
-                          (*sums)[2] += weighted * dy;
-                        }
-                      }
-                    });
+      ForEachAround(
+          tile, point,
+          [&](const CarryingParticle& particle, double weight, double dx, double dy, double dz) {
+            fit.Add(weight, dx, dy, dz);
+            Carried* sums = carried.data();
+            for (const Attribute& attribute : frame_.attributes) {
+              const float* value =
+                  &attribute.values[particle.source * std::size_t(attribute.components)];
+              for (int c = 0; c < attribute.components; ++c, ++sums) {
+                const double weighted = weight * value[c];
+                (*sums)[0] += weighted;
+                (*sums)[1] += weighted * dx;
+                (*sums)[2] += weighted * dy;
+                (*sums)[3] += weighted * dz;
+              }
+            }
+          });
     }
-    const auto [constant, along_x, along_y] = fit.Shares();
+    const auto [constant, along_x, along_y, along_z] = fit.Shares();
     const Carried* sums = carried.data();
     for (AttributeValues& attribute : values) {
       for (int c = 0; c < attribute.components; ++c, ++sums) {
-        const double value = constant * (*sums)[0] + along_x * (*sums)[1] + along_y * (*sums)[2];
+        const double value = constant * (*sums)[0] + along_x * (*sums)[1] + along_y * (*sums)[2] +
+                             along_z * (*sums)[3];
         attribute.values[vertex * attribute.components + c] =
             static_cast<float>(std::clamp(value, -kLargest, kLargest));
       }

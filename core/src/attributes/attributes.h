@@ -15,6 +15,7 @@ namespace partiemc {
 /// A particle that vertices may be near to.
 struct CarryingParticle {
   float x, y;            ///< Cells, relative to its tile.
+  float height;          ///< Above the plane of a slice; else 0.
   float weight;          ///< w of the field.
   std::uint32_t source;  ///< Index in the frame.
 };
@@ -33,7 +34,8 @@ struct AttributeScratch {
 /// A value is that at the vertex of the plane (value over x and y) that fits the particles around
 /// best, by least squares with the weights of the field, w k (paper, Eq. 1; Lancaster and
 /// Salkauskas, Math. Comp. 37, 1981): a mean with the same kernel, without its error at the rim,
-/// where all particles lie on one side. What is linear in the frame is so at the vertices. Slopes
+/// where all particles lie on one side. What is linear in the frame is so at the vertices. Of a
+/// slice the kernel is that of space, and the value linear in the height, too. Slopes
 /// that particles hardly tell, as of two in a drop, are drawn towards 0. 0 where no particle
 /// is within the kernel radius.
 ///

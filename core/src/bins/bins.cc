@@ -223,7 +223,9 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
     for (const auto& [axis, value] :
          {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
       if (IsNearOrigin(value * units_per_world)) continue;
-      return InvalidFrame(kReasonOutOfRange, CoordinateField("positions", k, axis),
+      // Particles of a slab have other places in the frame, and other axes.
+      return InvalidFrame(kReasonOutOfRange,
+                          scale.is_slice ? "positions" : CoordinateField("positions", k, axis),
                           ShortestNumber(value),
                           absl::StrCat("must be within 2^30 cells of ",
                                        ShortestNumber(scale.cell_size), " from the origin"));
@@ -256,11 +258,13 @@ void ParticleBins::Clear() {
   offsets.clear();
   particles.clear();
   weight.clear();
+  height.clear();
 }
 
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
                           const FrameLimits& limits, ParticleBins& bins) {
   bins.tiles.Clear();
+  bins.height.clear();
   BinScratch& scratch = bins.scratch;
   const std::size_t count = frame.ParticleCount();
   scratch.home.resize(count);
@@ -296,8 +300,8 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   const std::uint32_t particles = PlaceParticles(scratch);
   bins.particles.resize(particles);
   bins.weight.resize(frame.volumes.empty() ? 0 : particles);
-  const double weight_per_world_volume =
-      scale.weight_per_volume / scale.cell_size / scale.cell_size;
+  double weight_per_world_volume = scale.weight_per_volume / scale.cell_size / scale.cell_size;
+  if (scale.is_slice) weight_per_world_volume /= scale.cell_size;
   for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
     FillTiles(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
   });
@@ -307,6 +311,13 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   }
   SetOffsets(bins);
   return absl::OkStatus();
+}
+
+void SetHeights(std::span<const double> heights, const Scale& scale, ParticleBins& bins) {
+  bins.height.resize(bins.particles.size());
+  for (std::size_t k = 0; k < bins.particles.size(); ++k) {
+    bins.height[k] = static_cast<float>(heights[bins.particles[k].source] / scale.cell_size);
+  }
 }
 
 }  // namespace partiemc

@@ -61,6 +61,7 @@ struct ParticleBins {
   std::vector<std::uint32_t> offsets;     ///< Tile t has particles [offsets[t], offsets[t + 1]).
   std::vector<BinnedParticle> particles;  ///< Tile after tile.
   std::vector<float> weight;              ///< By particle: w of the field; empty if all are equal.
+  std::vector<float> height;  ///< By particle of a slice: cells above its plane; else empty.
   BinScratch scratch;
 
   std::uint32_t CountOf(std::size_t tile) const { return offsets[tile + 1] - offsets[tile]; }
@@ -74,5 +75,9 @@ struct ParticleBins {
 /// of the frame: count, prefix sum, fill. Cost: linear.
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
                           const FrameLimits& limits, ParticleBins& bins);
+
+/// Tells bins, which hold the particles of a slab, their heights: by particle of that frame, in
+/// world units.
+void SetHeights(std::span<const double> heights, const Scale& scale, ParticleBins& bins);
 
 }  // namespace partiemc

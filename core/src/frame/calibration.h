@@ -9,4 +9,8 @@ namespace partiemc {
 /// axis-aligned lattice (core/METHOD.md, "Calibration") times the factor of the placement.
 double CalibratedReferenceRadius(Placement placement, double kernel_radius);
 
+/// The same for slices of particles in space, of any placement: balls and tori cut at many heights
+/// want no factor (core/METHOD.md, "Slices").
+double CalibratedSliceRadius(double kernel_radius);
+
 }  // namespace partiemc

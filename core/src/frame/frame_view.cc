@@ -207,12 +207,16 @@ absl::Status Validate(const FrameLimits& limits) {
   return check("max_tiles", limits.max_tiles, FrameLimits::kMostTiles);
 }
 
-absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits,
-                        DistinctIdsScratch& scratch) {
+absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& parameters,
+                        const FrameLimits& limits, DistinctIdsScratch& scratch) {
   const std::size_t values = std::visit([](auto view) { return view.size(); }, frame.positions);
   if (frame.components != 2 && frame.components != 3) {
     return InvalidFrame(kReasonOutOfRange, "components", absl::StrCat(frame.components),
                         "must be 2 or 3");
+  }
+  if (parameters.slice && frame.components != 3) {
+    return InvalidFrame(kReasonOutOfRange, "components", absl::StrCat(frame.components),
+                        "must be 3 for a slice: x, y and z");
   }
   if (values % frame.components != 0) {
     return InvalidFrame(kReasonCount, "positions", absl::StrCat(values, " values"),
@@ -226,8 +230,8 @@ absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limi
          absl::StrCat("must be at most ", limits.max_particles, " in one frame")});
   }
   if (absl::Status status = CheckCoordinates(frame); !status.ok()) return status;
-  if (frame.components == 3 && frame.ParticleCount() > 0) {
-    if (absl::Status status = CheckPlanar(frame, plane); !status.ok()) return status;
+  if (frame.components == 3 && frame.ParticleCount() > 0 && !parameters.slice) {
+    if (absl::Status status = CheckPlanar(frame, parameters.plane); !status.ok()) return status;
   }
   if (absl::Status status = CheckVolumes(frame); !status.ok()) return status;
   if (absl::Status status = CheckIds(frame, scratch); !status.ok()) return status;

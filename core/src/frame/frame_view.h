@@ -97,10 +97,10 @@ absl::Status InvalidFrame(std::string_view reason, std::string field, std::strin
 /// The same of what its particles carry besides.
 absl::Status CheckAttributes(const Frame& frame);
 
-/// OK if every number of the frame is usable: coordinates finite and in one plane, volumes
-/// positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a Violation that names
-/// the first particle at fault.
-absl::Status CheckFrame(const Frame& frame, Plane plane, const FrameLimits& limits,
-                        DistinctIdsScratch& scratch);
+/// OK if every number of the frame is usable: coordinates finite and, without a slice, in one
+/// plane, volumes positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a
+/// Violation that names the first particle at fault.
+absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& parameters,
+                        const FrameLimits& limits, DistinctIdsScratch& scratch);
 
 }  // namespace partiemc

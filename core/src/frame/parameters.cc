@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "frame/calibration.h"
@@ -19,6 +20,9 @@ constexpr auto kAllPlacements = [] {
   std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
   return placements;
 }();
+// Of a slice's plane. Squares and products stay finite.
+constexpr double kMaxCoordinate = 1e69, kMinNormal = 1e-60;
+
 constexpr std::array kFills = {Fill::kNone, Fill::kGrid, Fill::kGreedy, Fill::kConforming,
                                Fill::kPolygon};
 
@@ -40,6 +44,37 @@ std::string_view NameOf(const std::array<std::string_view, kCount>& names, Enum 
 }
 
 bool Within(double value, double low, double high) { return value >= low && value <= high; }
+
+absl::Status CheckSlice(const ReconstructionParameters& p) {
+  constexpr std::string_view kAxes = "xyz";
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (const auto& [name, value] :
+         {std::pair("origin", p.slice->origin[k]), std::pair("normal", p.slice->normal[k])}) {
+      if (std::abs(value) <= kMaxCoordinate) continue;
+      return OutOfRange(absl::StrCat("slice.", name, "_", std::string(1, kAxes[k])), value,
+                        "must be finite and at most 1e69 in magnitude");
+    }
+  }
+  const auto& normal = p.slice->normal;
+  if (std::max({std::abs(normal[0]), std::abs(normal[1]), std::abs(normal[2])}) < kMinNormal) {
+    return OutOfRange("slice.normal", 0, "must have a component of 1e-60 or more in magnitude");
+  }
+  const auto violation = [](std::string field, std::string value, std::string rule) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(kReasonOutOfRange), "parameters." + std::move(field),
+                           std::move(value), std::move(rule)});
+  };
+  if (!p.spacing) {
+    return violation("spacing", "absent",
+                     "must be given for a slice: particles beside the plane do not tell it");
+  }
+  if (TraitsOf(p.placement).takes_particles) {
+    return violation("placement", std::string(Name(p.placement)),
+                     "must be another one for a slice: its vertices would be particles, which lie "
+                     "beside the plane");
+  }
+  return absl::OkStatus();
+}
 
 }  // namespace
 
@@ -66,13 +101,20 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
     return OutOfRange("min_component_area", p.min_component_area,
                       "must be 0 or more squared spacings, and finite");
   }
-  return absl::OkStatus();
+  return p.slice ? CheckSlice(p) : absl::OkStatus();
 }
 
 ReconstructionParameters Resolve(ReconstructionParameters parameters) {
   if (!parameters.reference_radius) {
     parameters.reference_radius =
-        CalibratedReferenceRadius(parameters.placement, parameters.kernel_radius);
+        parameters.slice
+            ? CalibratedSliceRadius(parameters.kernel_radius)
+            : CalibratedReferenceRadius(parameters.placement, parameters.kernel_radius);
+  }
+  // These are of the plane: a ring of a section does not tell how the body bends across it, the
+  // layer that supports it leans, and volumes are not its area.
+  if (parameters.slice) {
+    parameters.steps.curvature = parameters.steps.support = parameters.steps.area = false;
   }
   if (!parameters.clean) parameters.clean = TraitsOf(parameters.placement).cleans;
   return parameters;

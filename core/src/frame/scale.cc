@@ -7,6 +7,8 @@ namespace {
 
 // The kernel (1 - s^2)^3 integrates to pi R^2 / 4 over the plane.
 constexpr double kFourOverPi = 1.27323954473516268615;
+// Over space it integrates to 64 pi R^3 / 315.
+constexpr double kSpaceNorm = 315.0 / 64 / 3.14159265358979323846;
 
 // The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 = 0.9 / beta^2 is
 // 0.10 at beta = 3, above what the void between two components has, below a lone particle's f.
@@ -26,6 +28,8 @@ constexpr double kGapSpreadPerReference = 2.4;
 constexpr double kSpreadSlope = 0.45;
 // Slope of f across a flat boundary, measured in 1 / R: makes F a length on both branches.
 constexpr double kBoundarySlope = 1.164;
+// In space it is the kernel's integral over a plane through its middle, times its norm.
+constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 
 }  // namespace
 
@@ -36,14 +40,21 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
   scale.spacing = spacing / cell_size;
   scale.kernel_radius = parameters.kernel_radius * scale.spacing;
   scale.reference_radius = *parameters.reference_radius * scale.spacing;
-  scale.weight_per_volume = kFourOverPi / (scale.kernel_radius * scale.kernel_radius);
+  scale.is_slice = parameters.slice.has_value();
+  const double radius_square = scale.kernel_radius * scale.kernel_radius;
+  scale.weight_per_volume = scale.is_slice ? kSpaceNorm / (radius_square * scale.kernel_radius)
+                                           : kFourOverPi / radius_square;
   scale.uniform_weight = scale.weight_per_volume * scale.spacing * scale.spacing;
-  const double lightest_weight =
-      scale.weight_per_volume * (lightest_volume / cell_size / cell_size);
+  double lightest_weight = scale.weight_per_volume * (lightest_volume / cell_size / cell_size);
+  if (scale.is_slice) {
+    scale.uniform_weight *= scale.spacing;
+    lightest_weight /= cell_size;
+  }
   const double beta = parameters.kernel_radius;
   scale.guard = std::min(kGuardFactor / (beta * beta), kGuardShareOfLightest * lightest_weight);
   scale.saturation = kSaturation;
-  scale.guard_slope = scale.kernel_radius / kBoundarySlope;
+  scale.guard_slope =
+      scale.kernel_radius / (scale.is_slice ? kBoundarySlopeInSpace : kBoundarySlope);
   const double reference = scale.reference_radius / scale.kernel_radius;
   scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);
   scale.gap_slope = scale.kernel_radius / kSpreadSlope;

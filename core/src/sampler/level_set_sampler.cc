@@ -18,6 +18,9 @@ constexpr std::uint32_t kNoRun = 0xffffffff;
 // After so many tiles positions along x begin anew.
 constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
 
+// Of differences of the spread, in kernel radii.
+constexpr double kGapStep = 1.0 / 1024;
+
 }  // namespace
 
 // Marks the cells of each tile that are asked for, and those that a kernel reaches from them.
@@ -106,6 +109,7 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   chosen_end_.resize(tiles_.size());
   source_.resize(tells_sources ? particle_count : 0);
   weight_.resize(bins.weight.empty() ? 0 : particle_count + kRowPadding);
+  height_.resize(bins.height.empty() ? 0 : particle_count);
 }
 
 // Tells a tile where the buckets around it are.
@@ -176,11 +180,74 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
       y_[to] = bins.particles[particle].y;
       if (!source_.empty()) source_[to] = bins.particles[particle].source;
       if (!bins.weight.empty()) weight_[to] = bins.weight[particle];
+      if (!bins.height.empty()) height_[to] = bins.height[particle];
     }
   });
 }
 
+// Calls visit(offset, 1 - s^2, weight) for the particles of a slice that reach a point.
+template <typename Visit>
+void LevelSetSampler::ForEachInSpace(std::uint32_t tile, double x, double y, Visit visit) const {
+  const double inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius);
+  ForEachNear(tile, x, y, scale_.kernel_radius, [&](double px, double py, std::uint32_t particle) {
+    const SpaceOffset to{px - x, py - y, height_[particle]};
+    const double square = to.x * to.x + to.y * to.y + to.height * to.height;
+    const double within = 1 - square * inverse_square;
+    if (within <= 0) return;
+    visit(to, within, weight_.empty() ? scale_.uniform_weight : weight_[particle]);
+  });
+}
+
+SliceSums LevelSetSampler::SliceSumsAt(std::uint32_t tile, double x, double y) const {
+  SliceSums sums;
+  ForEachInSpace(tile, x, y, [&](const SpaceOffset& to, double within, double weight) {
+    sums.Add(to, within, weight);
+  });
+  return sums;
+}
+
+FieldSample LevelSetSampler::SampleSlice(std::uint32_t tile, double x, double y) const {
+  SliceSums sums;
+  SliceSlopes slopes;
+  ForEachInSpace(tile, x, y, [&](const SpaceOffset& to, double within, double weight) {
+    sums.Add(to, within, weight);
+    slopes.Add(to, within, weight);
+  });
+  FieldSample sample{.density = sums.density, .value = sums.Value(scale_)};
+  sample.has_support = sums.kernel > 0;
+  sample.phi = scale_.kernel_radius - scale_.reference_radius;
+  if (!sample.has_support) return sample;
+  sample.mean_x = sums.x / sums.kernel;
+  sample.mean_y = sums.y / sums.kernel;
+  sample.phi = sums.Phi(scale_);
+  sample.spread = sums.Spread(scale_);
+  const Point phi = slopes.OfPhi(sums, scale_);
+  sample.phi_x = phi.x;
+  sample.phi_y = phi.y;
+  Point gradient = phi;
+  if (sample.value != sample.phi) {
+    // Guard and saturation fall with the density alike.
+    const Point density = slopes.OfDensity(scale_);
+    gradient = {-scale_.guard_slope * density.x, -scale_.guard_slope * density.y};
+    if (sample.value == (sample.spread - scale_.gap_spread) * scale_.gap_slope) {
+      // Few points lie in gaps: central differences will do.
+      const double step = kGapStep * scale_.kernel_radius;
+      const auto spread = [&](double dx, double dy) {
+        const SliceSums beside = SliceSumsAt(tile, x + dx, y + dy);
+        return beside.kernel > 0 ? beside.Spread(scale_) : sample.spread;
+      };
+      const double slope = scale_.gap_slope / (2 * step);
+      gradient = {slope * (spread(step, 0) - spread(-step, 0)),
+                  slope * (spread(0, step) - spread(0, -step))};
+    }
+  }
+  sample.gradient_x = gradient.x;
+  sample.gradient_y = gradient.y;
+  return sample;
+}
+
 FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) const {
+  if (scale_.is_slice) return SampleSlice(tile, x, y);
   const Point point{x, y};
   PointQuery query;
   query.points = {&point, 1};
@@ -202,6 +269,16 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
 
 void LevelSetSampler::Sample(std::span<const FieldPoints> groups,
                              std::span<FieldSamples> samples) const {
+  if (scale_.is_slice) {
+    for (std::size_t q = 0; q < groups.size(); ++q) {
+      for (std::size_t k = 0; k < groups[q].count; ++k) {
+        const auto& [x, y] = groups[q].points[k];
+        const FieldSample at = SampleSlice(groups[q].tile, x, y);
+        samples[q][k] = {at.value, at.gradient_x, at.gradient_y};
+      }
+    }
+    return;
+  }
   std::array<PointQuery, kQueriesAtOnce> queries;
   for (std::size_t q = 0; q < groups.size(); ++q) {
     queries[q].points = std::span(groups[q].points).first(groups[q].count);

@@ -11,6 +11,7 @@
 #include "bins/bins.h"
 #include "bins/masked_particles.h"
 #include "crossings/crossings.h"
+#include "field/slice_formula.h"
 #include "frame/scale.h"
 #include "sampler/neighbour_grid.h"
 #include "sampler/point_kernels.h"
@@ -126,6 +127,10 @@ class LevelSetSampler {
   void FindRuns(const ParticleBins& bins, bool tells_sources);
   void LinkRuns(const TileDirectory& directory, std::uint32_t tile);
   void SortRun(const ParticleBins& bins, const Run& run);
+  template <typename Visit>
+  void ForEachInSpace(std::uint32_t tile, double x, double y, Visit visit) const;
+  FieldSample SampleSlice(std::uint32_t tile, double x, double y) const;
+  SliceSums SliceSumsAt(std::uint32_t tile, double x, double y) const;
 
   Scale scale_;
   NeighbourGrid grid_;
@@ -141,7 +146,7 @@ class LevelSetSampler {
   };
   std::vector<Chosen> chosen_;
   std::vector<std::uint32_t> chosen_end_;
-  std::vector<float> x_, y_, weight_;
+  std::vector<float> x_, y_, weight_, height_;
   std::vector<std::uint32_t> source_;
 };
 
