@@ -279,6 +279,11 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (message.has_min_component_particles()) {
     parameters.min_component_particles = message.min_component_particles();
   }
+  if (message.has_slice()) {
+    const v1::SlicePlane& slice = message.slice();
+    parameters.slice = {.origin = {slice.origin_x(), slice.origin_y(), slice.origin_z()},
+                        .normal = {slice.normal_x(), slice.normal_y(), slice.normal_z()}};
+  }
   return parameters;
 }
 
@@ -298,6 +303,15 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   message.set_plane(ToWire(parameters.plane));
   message.set_min_component_area(parameters.min_component_area);
   message.set_min_component_particles(parameters.min_component_particles);
+  if (!parameters.slice) return;
+  v1::SlicePlane& slice = *message.mutable_slice();
+  const auto& [origin, normal] = *parameters.slice;
+  slice.set_origin_x(origin[0]);
+  slice.set_origin_y(origin[1]);
+  slice.set_origin_z(origin[2]);
+  slice.set_normal_x(normal[0]);
+  slice.set_normal_y(normal[1]);
+  slice.set_normal_z(normal[2]);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

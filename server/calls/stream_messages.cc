@@ -165,6 +165,11 @@ absl::Status StreamMessages::OpenStream(const v1::OpenStream& open,
   if (!parameters.ok()) return parameters.status();
   const auto outputs = wire::DecodeOutputs(open.outputs(), open.has_outputs());
   if (!outputs.ok()) return outputs.status();
+  if (parameters->slice && outputs->echo_particles) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(wire::kReasonUnsupported), "outputs.echo_particles", "true",
+                           "must be false with a slice, whose particles are not in its plane"});
+  }
   auto session = Session::Open(*parameters, limits_.frame);
   if (!session.ok()) return session.status();
   const std::string token = open.has_resume() ? open.resume().stream_token() : NewStreamToken();

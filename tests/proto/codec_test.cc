@@ -69,6 +69,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.clean = false;
   parameters.min_component_area = 2.5;
   parameters.min_component_particles = 3'000'000'000'000;
+  parameters.slice = {.origin = {1, 2, 3}, .normal = {4, 5, 6}};
   v1::ReconstructionParameters message;
   EncodeParameters(parameters, message);
   const auto decoded = DecodeParameters(message);

@@ -147,7 +147,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(9, BlobParameters());
+  std::vector<ReconstructionParameters> others(10, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -157,6 +157,7 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[6].normal_memory = false;
   others[7].clean = false;
   others[8].min_component_particles = 1;
+  others[9].slice = SlicePlane{};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);

@@ -162,6 +162,13 @@ TEST_F(CallRefused, UNSUPPORTED) {
   open.mutable_open()->mutable_parameters()->set_placement(static_cast<v1::Placement>(99));
   ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
                "parameters.placement: 99; must be a value that this version knows");
+  v1::ReconstructRequest sliced = OpenRequest();
+  sliced.mutable_open()->mutable_parameters()->mutable_slice()->set_normal_z(1);
+  sliced.mutable_open()->mutable_outputs()->set_rings(true);
+  sliced.mutable_open()->mutable_outputs()->set_echo_particles(true);
+  ExpectOfOpen(sliced, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
+               "outputs.echo_particles: true; must be false with a slice, whose particles are not "
+               "in its plane");
 }
 
 TEST_F(CallRefused, NAME) {
