@@ -57,6 +57,11 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   if (options.spacing != 0) parameters.spacing = options.spacing;
   if (options.kernel_radius != 0) parameters.kernel_radius = options.kernel_radius;
   if (options.cell_size != 0) parameters.cell_size = options.cell_size;
+  if (options.slice != nullptr) {
+    parameters.slice.emplace();
+    std::copy_n(options.slice, 3, parameters.slice->origin.begin());
+    std::copy_n(options.slice + 3, 3, parameters.slice->normal.begin());
+  }
   absl::Status named;
   if (options.placement != nullptr)
     named.Update(SetByName(options.placement, parameters.placement));

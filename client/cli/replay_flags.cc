@@ -124,6 +124,12 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
                  "default what the recording knows, else first-frame")
       ->type_name("S|RULE")
       ->group(kGroup);
+  app.add_option("--slice", flags.slice,
+                 "Of particles in space the section with a plane: x=C, y=C, z=C, or six numbers, a "
+                 "point of it and its normal; wants --spacing")
+      ->type_name("z=C|OX,OY,OZ,NX,NY,NZ")
+      ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
+      ->group(kGroup);
   app.add_option("--kernel-radius", flags.kernel_radius, "Kernel radius")
       ->type_name("R")
       ->capture_default_str()

@@ -30,6 +30,7 @@ struct ReplayFlags {
 
   std::string placement = "virtual-plane";
   std::string fill = "greedy";
+  std::string slice;    ///< "z=0.5" or six numbers; empty: none.
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: as the input says.
   double kernel_radius = 3;
   double cell_size = 1;

@@ -1,5 +1,7 @@
 #include "client/cli/replay_parameters.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -21,14 +23,54 @@ std::string Names(std::span<const Value> values) {
   return names;
 }
 
+std::optional<double> Number(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+// Numbers with commas between them.
+std::optional<std::array<double, 6>> SixNumbers(std::string_view text) {
+  std::array<double, 6> numbers{};
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const std::size_t comma = text.find(',');
+    if ((comma == std::string_view::npos) != (k + 1 == numbers.size())) return std::nullopt;
+    const auto number = Number(text.substr(0, comma));
+    if (!number) return std::nullopt;
+    numbers[k] = *number;
+    text.remove_prefix(std::min(comma, text.size() - 1) + 1);
+  }
+  return numbers;
+}
+
+// Nothing for what is neither of the two forms of --slice.
+std::optional<SlicePlane> SliceOf(std::string_view text) {
+  if (text.size() > 2 && text[1] == '=' && text[0] >= 'x' && text[0] <= 'z') {
+    const auto at = Number(text.substr(2));
+    if (!at) return std::nullopt;
+    const auto axis = static_cast<std::size_t>(text[0] - 'x');
+    SlicePlane slice{.normal = {}};
+    slice.origin[axis] = *at;
+    // So that the picture has the two other axes in their order.
+    slice.normal[axis] = axis == 1 ? -1 : 1;
+    return slice;
+  }
+  const auto numbers = SixNumbers(text);
+  if (!numbers) return std::nullopt;
+  SlicePlane slice;
+  std::copy_n(numbers->begin(), 3, slice.origin.begin());
+  std::copy_n(numbers->begin() + 3, 3, slice.normal.begin());
+  return slice;
+}
+
 }  // namespace
 
 std::optional<double> PositiveNumber(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  if (!(value > 0 && std::isfinite(value))) return std::nullopt;
-  return value;
+  const auto value = Number(text);
+  return value && *value > 0 ? value : std::nullopt;
 }
 
 absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
@@ -56,6 +98,12 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
     parameters.spacing = PositiveNumber(flags.spacing);
     if (!parameters.spacing) {
       return WrongFlag("--spacing", flags.spacing, "a positive length, first-frame or every-frame");
+    }
+  }
+  if (!flags.slice.empty()) {
+    parameters.slice = SliceOf(flags.slice);
+    if (!parameters.slice) {
+      return WrongFlag("--slice", flags.slice, "x=C, y=C, z=C or OX,OY,OZ,NX,NY,NZ");
     }
   }
   if (flags.clean == "on" || flags.clean == "off") {

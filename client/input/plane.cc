@@ -38,8 +38,12 @@ bool HasThreeAxes(const ParticleRows& rows) {
   return rows.has_position[0] && rows.has_position[1] && rows.has_position[2];
 }
 
-std::array<std::size_t, 2> AxesWithout(std::size_t dropped) {
-  return {dropped == 0 ? std::size_t{1} : 0, dropped == 2 ? std::size_t{1} : 2};
+constexpr std::array<std::size_t, 3> kAllAxes = {0, 1, 2};
+
+// The two others.
+std::span<const std::size_t> AxesWithout(std::size_t dropped) {
+  static constexpr std::array<std::array<std::size_t, 2>, 3> kOthers = {{{1, 2}, {0, 2}, {0, 1}}};
+  return kOthers[dropped];
 }
 
 void TellOnce(bool& told, const ParticleRows& rows, std::string_view what,
@@ -48,14 +52,19 @@ void TellOnce(bool& told, const ParticleRows& rows, std::string_view what,
 }
 
 std::string PlaneName(std::size_t dropped) {
-  const auto [first, second] = AxesWithout(dropped);
-  return Concat(kAxisNames[first], "-", kAxisNames[second]);
+  const auto axes = AxesWithout(dropped);
+  return Concat(kAxisNames[axes[0]], "-", kAxisNames[axes[1]]);
 }
 
 }  // namespace
 
-absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& frame,
-                                      std::vector<std::string>& notices) {
+absl::StatusOr<PlaneProjection::Axes> PlaneProjection::AxesFor(const ParticleRows& rows,
+                                                               std::vector<std::string>& notices) {
+  if (in_space_) {
+    if (HasThreeAxes(rows)) return kAllAxes;
+    return absl::FailedPreconditionError(
+        Concat(rows.source, ": has two coordinates; must have x, y and z for a slice"));
+  }
   std::size_t dropped = 2;
   if (HasThreeAxes(rows)) {
     if (absl::Status status = plane_ ? CheckStaysInPlane(rows) : Decide(rows, notices);
@@ -70,22 +79,28 @@ absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& f
       notices.push_back(Concat("the particles lie in the ", PlaneName(dropped), " plane"));
     }
   }
-  const std::array<std::size_t, 2> axes = AxesWithout(dropped);
-  const std::vector<double>& x = rows.positions[axes[0]];
-  const std::vector<double>& y = rows.positions[axes[1]];
-  frame.positions.resize(2 * rows.count);
-  for (std::size_t i = 0; i < rows.count; ++i) {
-    frame.positions[2 * i] = x[i];
-    frame.positions[2 * i + 1] = y[i];
+  return AxesWithout(dropped);
+}
+
+absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& frame,
+                                      std::vector<std::string>& notices) {
+  const auto axes = AxesFor(rows, notices);
+  if (!axes.ok()) return axes.status();
+  const std::size_t components = axes->size();
+  frame.components = static_cast<int>(components);
+  frame.positions.resize(components * rows.count);
+  for (std::size_t c = 0; c < components; ++c) {
+    const std::vector<double>& along = rows.positions[(*axes)[c]];
+    for (std::size_t i = 0; i < rows.count; ++i) frame.positions[components * i + c] = along[i];
   }
-  if (HasThreeAxes(rows)) {
+  if (HasThreeAxes(rows) && components == 2) {
     // A spoiled particle stays spoiled, also where only the dropped coordinate is not finite.
-    const std::vector<double>& off_plane = rows.positions[dropped];
+    const std::vector<double>& off_plane = rows.positions[3 - (*axes)[0] - (*axes)[1]];
     for (std::size_t i = 0; i < rows.count; ++i) {
       if (!std::isfinite(off_plane[i])) frame.positions[2 * i] = off_plane[i];
     }
   }
-  CopyOptionalArrays(rows, axes, frame, notices);
+  CopyOptionalArrays(rows, *axes, frame, notices);
   frame.float32 = rows.float32;
   frame.time = rows.time;
   frame.source = rows.source;
@@ -113,8 +128,9 @@ absl::Status PlaneProjection::Decide(const ParticleRows& rows, std::vector<std::
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(absl::StrFormat(
-      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): PartiEMC reconstructs 2D data; slice it "
-      "first",
+      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): of particles in one plane, its outline "
+      "is drawn; with "
+      "--slice z=0, for example, that of its section",
       rows.source, intervals[0].Extent(), intervals[1].Extent(), intervals[2].Extent()));
 }
 
@@ -135,15 +151,14 @@ absl::Status PlaneProjection::CheckStaysInPlane(const ParticleRows& rows) {
              ShortestNumber(off_plane.high), "; PartiEMC reconstructs 2D data in one plane"));
 }
 
-void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows,
-                                         const std::array<std::size_t, 2>& axes,
-                                         RecordedFrame& frame, std::vector<std::string>& notices) {
+void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows, Axes axes, RecordedFrame& frame,
+                                         std::vector<std::string>& notices) {
   frame.velocities.clear();
-  if (rows.has_velocity[axes[0]] && rows.has_velocity[axes[1]]) {
-    frame.velocities.resize(2 * rows.count);
+  const bool has_all = std::all_of(axes.begin(), axes.end(),
+                                   [&](std::size_t axis) { return rows.has_velocity[axis]; });
+  if (has_all) {
     for (std::size_t i = 0; i < rows.count; ++i) {
-      frame.velocities[2 * i] = rows.velocities[axes[0]][i];
-      frame.velocities[2 * i + 1] = rows.velocities[axes[1]][i];
+      for (const std::size_t axis : axes) frame.velocities.push_back(rows.velocities[axis][i]);
     }
     const bool usable = std::all_of(frame.velocities.begin(), frame.velocities.end(),
                                     [](float velocity) { return std::isfinite(velocity); });

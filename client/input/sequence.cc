@@ -35,7 +35,8 @@ struct Recording {
 
 class FileSequence final : public Sequence {
  public:
-  explicit FileSequence(Recording recording) : recording_(std::move(recording)) {}
+  FileSequence(Recording recording, bool in_space)
+      : recording_(std::move(recording)), projection_(in_space) {}
 
   // Shows at once what is wrong with the first file. Needed before Next.
   absl::Status OpenFirstFile() { return OpenNextFile(); }
@@ -241,7 +242,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   if (!format.ok()) return format.status();
   recording.format = *format;
   if (absl::Status status = TakeTimes(directory, recording); !status.ok()) return status;
-  auto sequence = std::make_unique<FileSequence>(std::move(recording));
+  auto sequence = std::make_unique<FileSequence>(std::move(recording), options.in_space);
   if (absl::Status status = sequence->OpenFirstFile(); !status.ok()) return status;
   return sequence;
 }

@@ -21,15 +21,20 @@ struct RecordedFrame {
   std::size_t index = 0;       ///< 0-based index in the input, also when a range is selected.
   std::optional<double> time;  ///< Times file, else the frame's own time; a time step is no time.
   std::string source;          ///< File, and the frame within it, for messages.
-  std::vector<double> positions;  ///< x, y interleaved, world units; NaN and infinity as recorded.
-  bool float32 = false;        ///< The recording holds float32, so that `positions` lost nothing.
-  std::vector<float> volumes;  ///< Area per particle, all positive and finite; empty if none.
+  int components = 2;          ///< 3 with SequenceOptions::in_space.
+  /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
+  std::vector<double> positions;
+  bool float32 = false;  ///< The recording holds float32, so that `positions` lost nothing.
+  std::vector<float>
+      volumes;  ///< Area (in space volume) per particle, all positive and finite; empty if none.
   std::vector<std::uint64_t> ids;  ///< Unique within the frame; empty if none.
-  std::vector<float> velocities;   ///< vx, vy interleaved, as `positions`, finite; empty if none.
+  std::vector<float> velocities;   ///< Interleaved as `positions`, finite; empty if none.
   /// Those that were asked for; of a recording of our own, all that it has.
   std::vector<ParticleAttribute> attributes;
 
-  std::size_t ParticleCount() const { return positions.size() / 2; }
+  std::size_t ParticleCount() const {
+    return positions.size() / static_cast<std::size_t>(components);
+  }
 };
 
 /// What to read of an input. All of it is text as a person writes it on a command line; what cannot
@@ -51,6 +56,9 @@ struct SequenceOptions {
   /// What else is wanted of each particle: columns of these names, or arrays of two or three
   /// components; "velocity" are `velocities`. A file that lacks one is refused.
   std::vector<std::string> attributes = {};
+
+  /// Keep all three coordinates, of particles that fill space. A file of two is refused.
+  bool in_space = false;
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if it is one.

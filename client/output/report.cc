@@ -202,6 +202,14 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
   if (parameters.placement == Placement::kFarthestParticle) {
     lines.emplace_back("surface offset", spacings(parameters.surface_offset));
   }
+  if (parameters.slice) {
+    const auto text = [](const std::array<double, 3>& v) {
+      return Concat("(", ShortestNumber(v[0]), ", ", ShortestNumber(v[1]), ", ",
+                    ShortestNumber(v[2]), ")");
+    };
+    lines.emplace_back("slice", Concat("through ", text(parameters.slice->origin), ", normal ",
+                                       text(parameters.slice->normal)));
+  }
   lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
   if (parameters.min_component_area > 0) {

@@ -3,10 +3,12 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "client/python/errors.h"
@@ -69,6 +71,34 @@ void TakeTime(py::dict& arguments, const char* name,
   time = given;
 }
 
+// ("z", 0.5), or a point and a normal.
+void TakeSlice(py::dict& arguments, std::optional<SlicePlane>& slice) {
+  const auto given = Take<py::object>(arguments, "slice");
+  if (!given) return;
+  const auto refuse = [&] {
+    Raise(Invalid("UNSUPPORTED", "slice", py::repr(*given).cast<std::string>(),
+                  "must be (axis, coordinate), (\"z\", 0.5) say, or two triples: a point of the "
+                  "plane, and its normal"));
+  };
+  try {
+    const auto pair = given->cast<std::pair<py::object, py::object>>();
+    slice.emplace();
+    if (py::isinstance<py::str>(pair.first)) {
+      const auto axis = std::string_view("xyz").find(pair.first.cast<std::string>());
+      if (axis == std::string_view::npos) return refuse();
+      slice->normal = {};
+      slice->origin[axis] = pair.second.cast<double>();
+      // So that results have the two other axes in their order.
+      slice->normal[axis] = axis == 1 ? -1 : 1;
+    } else {
+      slice->origin = pair.first.cast<std::array<double, 3>>();
+      slice->normal = pair.second.cast<std::array<double, 3>>();
+    }
+  } catch (const py::cast_error&) {
+    refuse();
+  }
+}
+
 }  // namespace
 
 ReconstructionParameters TakeParameters(py::dict arguments) {
@@ -86,6 +116,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "clean", parameters.clean);
   TakeInto(arguments, "min_component_area", parameters.min_component_area);
   TakeInto(arguments, "min_component_particles", parameters.min_component_particles);
+  TakeSlice(arguments, parameters.slice);
   return parameters;
 }
 
@@ -153,6 +184,13 @@ void ExpectNothingElse(const py::dict& arguments, const char* function) {
 }
 
 py::dict Told(const ReconstructionParameters& parameters) {
+  py::object slice = py::none();
+  if (parameters.slice) {
+    const auto triple = [](const std::array<double, 3>& v) {
+      return py::make_tuple(v[0], v[1], v[2]);
+    };
+    slice = py::make_tuple(triple(parameters.slice->origin), triple(parameters.slice->normal));
+  }
   const auto named = [](auto value) { return std::string(Name(value)); };
   using namespace py::literals;
   return py::dict(
@@ -162,7 +200,7 @@ py::dict Told(const ReconstructionParameters& parameters) {
       "cell_size"_a = parameters.cell_size, "reference_radius"_a = parameters.reference_radius,
       "surface_offset"_a = parameters.surface_offset, "normal_memory"_a = parameters.normal_memory,
       "clean"_a = parameters.clean, "min_component_area"_a = parameters.min_component_area,
-      "min_component_particles"_a = parameters.min_component_particles);
+      "min_component_particles"_a = parameters.min_component_particles, "slice"_a = slice);
 }
 
 }  // namespace partiemc::python

@@ -116,6 +116,7 @@ bool FrameFeeder::Pace(std::size_t sent) {
 
 Frame FrameFeeder::View(const RecordedFrame& recorded) {
   Frame frame{.positions = std::span<const double>(recorded.positions),
+              .components = recorded.components,
               .volumes = recorded.volumes,
               .ids = recorded.ids};
   // Without a time, velocities tell nothing of the way from frame to frame.
@@ -140,7 +141,7 @@ void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
       if (one.name == name) attributes_.push_back({one.name, one.components, one.values});
     }
     if (name == kVelocityAttribute && !recorded.time && !recorded.velocities.empty()) {
-      attributes_.push_back({kVelocityAttribute, 2, recorded.velocities});
+      attributes_.push_back({kVelocityAttribute, recorded.components, recorded.velocities});
     }
   }
 }

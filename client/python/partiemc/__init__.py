@@ -41,6 +41,9 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     fill: "greedy", "conforming", "polygon", "grid" or "none".
     kernel_radius, cell_size, reference_radius: lengths in spacings.
     plane: "xy", "xz" or "yz", of (N, 3) positions.
+    slice: (N, 3) positions fill space, and the outline is that of a section: ("z", 0.5), or
+        ((x, y, z), (nx, ny, nz)), a point of the plane and its normal. Wants spacing; volumes are
+        volumes. Of ("z", c) points are (x, y), of ("y", c) (x, z), of ("x", c) (y, z).
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
+Vector = Tuple[float, float, float]
+Slice = Union[Tuple[str, float], Tuple[Vector, Vector]]
 Positions = Union[ArrayLike, Tuple[NDArray[Any], NDArray[Any]],
                   Tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]
 
@@ -104,7 +106,7 @@ class Reconstructor:
         cell_size: Optional[float] = ..., reference_radius: Optional[float] = ...,
         surface_offset: Optional[float] = ..., normal_memory: Optional[bool] = ...,
         clean: Optional[bool] = ..., min_component_area: Optional[float] = ...,
-        min_component_particles: Optional[int] = ...) -> None: ...
+        min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...) -> None: ...
     def reconstruct(
         self, positions: Positions, time: Optional[float] = ..., *,
         volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
@@ -171,7 +173,7 @@ def reconstruct(
     reference_radius: Optional[float] = ..., surface_offset: Optional[float] = ...,
     normal_memory: Optional[bool] = ..., clean: Optional[bool] = ...,
     min_component_area: Optional[float] = ...,
-    min_component_particles: Optional[int] = ...) -> Result: ...
+    min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...) -> Result: ...
 def connect(address: Optional[str] = ..., *, latest: bool = ..., **options: Any) -> Stream: ...
 def watch(address: Optional[str], name: str, **options: Any) -> Watch: ...
 def streams(address: Optional[str] = ..., **credentials: Any) -> List[Dict[str, Any]]: ...

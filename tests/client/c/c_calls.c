@@ -367,6 +367,39 @@ static void try_attributes(const char* address) {
   partiemc_close(stream);
 }
 
+/* The block, as one layer of a wall that stands on it. */
+static void try_slice(const char* address) {
+  enum { kLayers = 9 };
+  static double wall[kLayers * kCount][3];
+  for (size_t k = 0; k < (size_t)kLayers * kCount; ++k) {
+    wall[k][0] = xyz[k % kCount][0];
+    wall[k][1] = xyz[k % kCount][1];
+    wall[k][2] = (double)(k / kCount);
+  }
+  const double plane[] = {0, 0, 4.3, 0, 0, 1};
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  options.spacing = 1;
+  options.slice = plane;
+  partiemc_stream* stream = NULL;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+  partiemc_particles particles;
+  partiemc_particles_init(&particles, sizeof particles);
+  particles.count = (size_t)kLayers * kCount;
+  particles.x = (partiemc_array){&wall[0][0], sizeof wall[0], PARTIEMC_FLOAT64};
+  particles.y = (partiemc_array){&wall[0][1], sizeof wall[0], PARTIEMC_FLOAT64};
+  particles.z = (partiemc_array){&wall[0][2], sizeof wall[0], PARTIEMC_FLOAT64};
+  partiemc_event event;
+  partiemc_event_init(&event, sizeof event);
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_RESULT && event.ring_count == 1);
+  EXPECT(fabs(event.area / (kSide * kSide) - 1) < .05);
+  particles.z.type = PARTIEMC_NONE;
+  EXPECT(partiemc_reconstruct(stream, &particles, 1, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_REFUSAL && strcmp(event.field, "components") == 0);
+  partiemc_close(stream);
+}
+
 int main(int argc, char** argv) {
   const char* address = argc > 1 ? argv[1] : NULL;
   EXPECT(partiemc_last_error()->code == PARTIEMC_OK && partiemc_last_error()->message[0] == 0);
@@ -376,6 +409,7 @@ int main(int argc, char** argv) {
   try_refusals(address);
   try_latest(address);
   try_attributes(address);
+  try_slice(address);
   try_parts(address);
   try_sizes(address);
   try_options(address);

@@ -58,7 +58,7 @@ TEST(Plane, TheConstantAxisIsDroppedAndItsVelocityWithIt) {
 
 TEST(Plane, ThreeDimensionsAreRefusedWithTheirExtents) {
   ExpectRefused(Project({{0, 0, 0}, {4, 2, 1}}).status, absl::StatusCode::kFailedPrecondition,
-                {"frame.csv: is 3D", "4 x 2 x 1", "slice it first"});
+                {"frame.csv: is 3D", "4 x 2 x 1", "--slice z=0"});
 }
 
 TEST(Plane, FlatMeansAMillionthOfTheExtent) {
@@ -105,6 +105,22 @@ TEST(Plane, TwoComponentsNeedNoDecision) {
   ASSERT_TRUE(projection.Project(rows, frame, notices).ok());
   EXPECT_THAT(frame.positions, ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(frame.velocities, ElementsAre(10, 12, 10, 12));
+}
+
+TEST(Plane, InSpaceAllAxesStay) {
+  ParticleRows rows = Rows({{1, 2, 50}, {3, 4, -60}});
+  PlaneProjection projection(true);
+  RecordedFrame frame;
+  std::vector<std::string> notices;
+  ASSERT_TRUE(projection.Project(rows, frame, notices).ok());
+  EXPECT_EQ(frame.components, 3);
+  EXPECT_EQ(frame.ParticleCount(), 2u);
+  EXPECT_THAT(frame.positions, ElementsAre(1, 2, 50, 3, 4, -60));
+  EXPECT_EQ(frame.velocities.size(), rows.has_velocity[2] ? 6u : 0u);
+  rows.has_position[2] = false;
+  const absl::Status flat = projection.Project(rows, frame, notices);
+  EXPECT_EQ(flat.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(flat.message(), "frame.csv: has two coordinates; must have x, y and z for a slice");
 }
 
 }  // namespace

@@ -17,17 +17,24 @@ def block(shift=0.0, side=30, dtype=numpy.float64):
     return numpy.stack([columns[inside] + shift, rows[inside]], axis=1).astype(dtype)
 
 
+def ball(centre=(10, 20, 30), radius=12):
+    """A ball of particles in space, spacing 1: (N, 3)."""
+    axis = numpy.arange(-radius, radius + 1.0)
+    nodes = numpy.stack(numpy.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
+    return nodes[(nodes ** 2).sum(axis=1) < radius ** 2] + numpy.array(centre)
+
+
 def digests(result):
     return f"{result.rings_digest:016x} {result.mesh_digest:016x}"
 
 
-def digests_of_replay(frames, spacing=1.0):
+def digests_of_replay(frames, spacing=1.0, flags=()):
     """What `partiemc replay` makes of the same frames."""
     with tempfile.TemporaryDirectory() as folder:
         for k, frame in enumerate(frames):
             numpy.save(f"{folder}/frame_{k:03}.npy", frame)
         subprocess.run([os.environ["PARTIEMC_PROGRAM"], "replay", f"{folder}/frame_*.npy", "--local",
-                        "--spacing", str(spacing), "--stats", f"{folder}/statistics.csv"],
+                        "--spacing", str(spacing), "--stats", f"{folder}/statistics.csv", *flags],
                        check=True, capture_output=True)
         with open(f"{folder}/statistics.csv", newline="") as file:
             return [f"{row['rings_digest']} {row['mesh_digest']}" for row in csv.DictReader(file)]

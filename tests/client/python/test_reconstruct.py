@@ -11,7 +11,7 @@ import unittest
 import numpy
 import partiemc
 
-from scenes import block, digests, digests_of_replay
+from scenes import ball, block, digests, digests_of_replay
 
 
 class Layouts(unittest.TestCase):
@@ -44,6 +44,27 @@ class Layouts(unittest.TestCase):
                          digests(partiemc.reconstruct(block(), spacing=1)))
         self.assertEqual(digests(partiemc.reconstruct(block().astype(int), spacing=1)),
                          digests(partiemc.reconstruct(block(), spacing=1)))
+
+    def test_slices_have_the_axes_that_they_tell(self):
+        positions = ball()
+        centre = {"x": (20, 30), "y": (10, 30), "z": (10, 20)}
+        for axis, at in zip("xyz", (10, 20, 30)):
+            section = partiemc.reconstruct(positions, spacing=1, slice=(axis, at + 4))
+            self.assertEqual(len(section.rings.offsets), 2)
+            self.assertLess(abs(section.area / (numpy.pi * (12 ** 2 - 4 ** 2)) - 1), 0.02)
+            middle = section.rings.points.mean(axis=0)
+            self.assertLess(abs(middle - centre[axis]).max(), 0.3, axis)
+
+    def test_slices_give_the_digests_of_replay(self):
+        positions = ball()
+        normal = (1.0, -2.0, 0.5)
+        section = partiemc.reconstruct(positions, spacing=1, slice=((10, 20, 30), normal))
+        flags = ["--slice", "10,20,30,1,-2,.5"]
+        self.assertEqual([digests(section)], digests_of_replay([positions], flags=flags))
+        flat = partiemc.Reconstructor(spacing=1, slice=("z", 30))
+        self.assertEqual(flat.parameters["slice"], ((0, 0, 30), (0, 0, 1)))
+        self.assertEqual([digests(flat.reconstruct(positions))],
+                         digests_of_replay([positions], flags=["--slice", "z=30"]))
 
     def test_a_sequence_gives_the_digests_of_replay(self):
         frames = [block(0.3 * k) for k in range(8)]
@@ -258,6 +279,13 @@ class Errors(unittest.TestCase):
         self.assert_refused("COUNT", "velocities", velocities=numpy.zeros((count, 3)))
         self.assert_refused("COUNT", "velocities", velocities=numpy.zeros((count - 1, 2)))
         self.assert_refused("OUT_OF_RANGE", "parameters.spacing", spacing=-1)
+        self.assert_refused("UNSUPPORTED", "slice", slice=("w", 1))
+        self.assert_refused("UNSUPPORTED", "slice", slice=((0, 0), (0, 0, 1)))
+        self.assert_refused("UNSUPPORTED", "slice", slice=3)
+        self.assert_refused("OUT_OF_RANGE", "parameters.slice.normal", spacing=1,
+                            slice=((0, 0, 0), (0, 0, 0)))
+        self.assert_refused("OUT_OF_RANGE", "parameters.spacing", spacing=None, slice=("z", 0))
+        self.assert_refused("OUT_OF_RANGE", "components", spacing=1, slice=("z", 0))
         error = self.assert_refused("UNSUPPORTED", "parameters.fill", fill="mostly")
         self.assertIn("greedy", error.rule)
 

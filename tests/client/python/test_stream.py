@@ -11,7 +11,7 @@ import unittest
 import numpy
 import partiemc
 
-from scenes import Server, block, digests, digests_of_replay, readme
+from scenes import Server, ball, block, digests, digests_of_replay, readme
 
 
 class Streams(unittest.TestCase):
@@ -33,6 +33,23 @@ class Streams(unittest.TestCase):
         self.assertEqual([result.sequence for result in results], list(range(1, 21)))
         self.assertEqual([result.time for result in results], list(range(20)))
         self.assertEqual(results[3].rings.normals.shape, (0, 2))
+
+    def test_slices_are_those_of_this_process(self):
+        frames = [ball(centre=(10, 20, 30 + k)) for k in range(6)]
+        ids = numpy.arange(len(frames[0]))
+        sliced = {"spacing": 1, "slice": ("z", 33)}
+        with partiemc.connect(self.address, **sliced) as stream:
+            results = []
+            for frame in frames:
+                stream.send(frame, ids=ids)
+                results.append(stream.receive())
+        here = partiemc.Reconstructor(**sliced)
+        expected = [here.reconstruct(frame, ids=ids) for frame in frames]
+        self.assertEqual([digests(each) for each in results], [digests(each) for each in expected])
+        self.assertEqual({int(each.rings.identities[0]) for each in results}, {1})
+        with self.assertRaises(partiemc.Error) as refused:
+            partiemc.connect(self.address, echo_particles=True, **sliced)
+        self.assertIn("outputs.echo_particles", str(refused.exception))
 
     def test_two_threads_get_the_same(self):
         frames = [numpy.asfortranarray(block(0.3 * k)) for k in range(20)]

@@ -96,6 +96,11 @@ typedef struct partiemc_options {
                               (PARTS_MISSING); 0: 10. */
   const char* attributes;  /* Names, separated by commas, of what particles carry that is wanted at
                               the vertices, too; "velocity" are the velocities. NULL: nothing. */
+  const double* slice;     /* Six numbers: a point of a plane and its normal. Particles then have x,
+                              y and z and fill space, and the outline is that of the section, in
+                              coordinates along the plane from that point on: x and y of a normal
+                              along z, x and z of one along -y, y and z of one along x. Wants
+                              `spacing`; volumes are volumes. NULL: no slice. */
 } partiemc_options;
 /* Every option at its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -145,8 +150,9 @@ typedef struct partiemc_particles {
   size_t size;
   size_t count;
   partiemc_array x, y;    /* World units, finite. */
-  partiemc_array z;       /* Optional: all particles then lie in a plane that `plane` names. */
-  partiemc_array volumes; /* Optional: area of each, world units squared. */
+  partiemc_array z;       /* Optional: all particles then lie in a plane that `plane` names, or fill
+                             space for a `slice`. */
+  partiemc_array volumes; /* Optional: area of each, world units squared; for a slice cubed. */
   partiemc_array ids;     /* Optional: the same for a particle in every frame. */
   /* Optional: world units per unit of time, as many as there are coordinates. */
   partiemc_array velocity_x, velocity_y, velocity_z;
