@@ -126,7 +126,8 @@ int Serve(const CommandLine& line) {
   int signal = 0;
   sigwait(&signals, &signal);
   LogEvent(spdlog::level::info, std::string("draining after ") + strsignal(signal), {});
-  std::thread(CutDrainShort, signals, line.grace).detach();
+  std::thread(CutDrainShort, signals, line.drain_delay + line.grace).detach();
+  if (line.drain_delay.count() > 0) (*server)->SendAway(line.drain_delay);
   (*server)->Drain(line.grace);
   server->reset();
   // Drained in the very moment in which it is cut short.

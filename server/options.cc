@@ -46,6 +46,7 @@ struct Raw {
   std::string port_file;
   std::uint64_t max_frame_bytes = 0;
   double grace_seconds = 4;
+  double drain_delay = 0;
   double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
   std::string token_file;
   std::string checkpoint_key_file;
@@ -83,11 +84,19 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
       ->envname("PARTIEMC_THREADS");
   app.add_option(
          "--grace-seconds", raw.grace_seconds,
-         "After SIGTERM, cancel what is not done within this time, and end a second after it")
+         "Once it drains, cancel what is not done within this time, and end a second after it")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->type_name("SECONDS")
       ->envname("PARTIEMC_GRACE_SECONDS");
+  app.add_option("--drain-delay", raw.drain_delay,
+                 "After SIGTERM, serve on for this time before it drains, while health checks say "
+                 "no, so that proxies send nobody new; in its second half streams are told to go, "
+                 "one after the other")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str()
+      ->type_name("SECONDS")
+      ->envname("PARTIEMC_DRAIN_DELAY");
 }
 
 void AddSecurity(CLI::App& app, Raw& raw) {
@@ -332,6 +341,7 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
   raw.line.log_format = raw.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
   if (!raw.port_file.empty()) raw.line.port_file = raw.port_file;
   raw.line.grace = Milliseconds(raw.grace_seconds);
+  raw.line.drain_delay = Milliseconds(raw.drain_delay);
   ServerLimits& limits = raw.line.server.limits;
   limits.idle.streaming = Milliseconds(raw.idle_seconds);
   limits.max_frame_bytes =

@@ -16,6 +16,8 @@ struct CommandLine {
   ServerOptions server;
   /// Finished frames are delivered and streams are ended within this time of SIGTERM.
   std::chrono::milliseconds grace{4000};
+  /// For so long after SIGTERM the server serves on, and is no longer ready (Server::SendAway).
+  std::chrono::milliseconds drain_delay{0};
   /// Where the address that was bound is written, once the server serves.
   std::optional<std::string> port_file;
   /// The same of the gateway.

@@ -261,7 +261,7 @@ absl::Status Server::OpenGateway() {
                                                .limits = options_.limits,
                                                .tls = options_.tls ? tls_identity_.get() : nullptr,
                                                .metrics = *metrics_,
-                                               .draining = [this] { return registry_.draining(); },
+                                               .draining = [this] { return leaves_.load(); },
                                                .ping_interval = options_.keepalive.interval,
                                                .ping_timeout = options_.keepalive.timeout});
   if (!web.ok()) return web.status();
@@ -298,10 +298,21 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
   return server_->InProcessChannel(arguments);
 }
 
+void Server::StopBeingReady() {
+  leaves_ = true;
+  health_->SetServing(false);
+}
+
+void Server::SendAway(std::chrono::milliseconds delay) {
+  StopBeingReady();
+  std::this_thread::sleep_for(delay / 2);
+  registry_.SendAway(delay - delay / 2);
+}
+
 void Server::Drain(std::chrono::milliseconds grace) {
   // Cutting those who do not take their answers takes a moment of the grace time too.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
-  health_->SetServing(false);
+  StopBeingReady();
   registry_.Drain();
   calls_.Drain();
   // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and

@@ -2,6 +2,7 @@
 // drain.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -97,6 +98,11 @@ class Server {
   /// To this server without a socket, for tests and embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
+  /// Serves on for `delay`, while health checks say that it does not, so that proxies send nobody
+  /// new; in its second half the streams are told to go elsewhere, one after the other, so that
+  /// they do not all come there in the same moment. Drain comes next.
+  void SendAway(std::chrono::milliseconds delay);
+
   /// Takes no new call, tells the streams, answers what they have sent, ends watches, and stops.
   /// What is not done shortly before the end of `grace` is cancelled; connections without a call of
   /// ours are not waited for. Returns when nothing goes on any more.
@@ -109,6 +115,7 @@ class Server {
   absl::Status Listen();
   absl::Status OpenGateway();
   void AddGauges();
+  void StopBeingReady();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
   const ServerOptions options_;
@@ -131,6 +138,7 @@ class Server {
   std::unique_ptr<Methods> methods_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<HealthService> health_;
+  std::atomic<bool> leaves_ = false;  // As the gateway's health says.
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<WebGateway> web_;
   // The last two stop before what they load into and read from goes.

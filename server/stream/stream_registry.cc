@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <random>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -288,6 +289,21 @@ std::vector<std::shared_ptr<StreamStateMachine>> StreamRegistry::Machines() cons
   machines.reserve(entries_.size());
   for (const auto& [key, entry] : entries_) machines.push_back(entry.machine);
   return machines;
+}
+
+void StreamRegistry::SendAway(std::chrono::milliseconds within) {
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<std::shared_ptr<StreamStateMachine>> machines;
+  {
+    const std::lock_guard lock(mutex_);
+    machines = Machines();
+  }
+  for (std::size_t k = 0; k < machines.size(); ++k) {
+    machines[k]->Drain();
+    machines[k].reset();
+    std::this_thread::sleep_until(begin + within * (k + 1) / machines.size());
+  }
+  std::this_thread::sleep_until(begin + within);
 }
 
 void StreamRegistry::Drain() {

@@ -113,6 +113,9 @@ class StreamRegistry {
                                   const Caller& caller = {}) const;
   std::size_t OpenCount() const;
 
+  /// Drains the machines that are here now, one after the other within this time. Who comes
+  /// meanwhile is let in.
+  void SendAway(std::chrono::milliseconds within);
   /// Lets nobody in any more and drains every machine.
   void Drain();
   bool draining() const;

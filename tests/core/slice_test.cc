@@ -144,36 +144,38 @@ AreaErrors ErrorsOf(const Body& body, int extent, double radius, double jitter,
   return errors;
 }
 
-void ExpectWithinAPercent(const AreaErrors& errors) {
+void ExpectWithinAPercent(const std::string& name, const AreaErrors& errors) {
   for (std::size_t k = 0; k < kHeights.size(); ++k) {
     EXPECT_LT(std::abs(errors.mean[k]), 0.01) << "at " << kHeights[k] << " radii";
   }
   std::string figures;
   for (const double mean : errors.mean) figures += std::to_string(100 * mean) + " ";
-  testing::Test::RecordProperty("mean_percent", figures);
-  testing::Test::RecordProperty("largest_percent", std::to_string(100 * errors.largest));
+  testing::Test::RecordProperty(name + "_mean_percent", figures);
+  testing::Test::RecordProperty(name + "_largest_percent", std::to_string(100 * errors.largest));
 }
 
 TEST(Slice, AreasOfABallAreThoseOfItsDiscs) {
   for (const double jitter : {0.0, 0.15}) {
     SCOPED_TRACE(jitter);
-    ExpectWithinAPercent(ErrorsOf(Ball(20), 20, 20, jitter, 1,
+    ExpectWithinAPercent(jitter > 0 ? "shaken_ball" : "ball",
+                         ErrorsOf(Ball(20), 20, 20, jitter, 1,
                                   [](double z) { return std::numbers::pi * (400 - z * z); }));
   }
 }
 
 TEST(Slice, AreasOfATorusAreThoseOfItsRings) {
-  ExpectWithinAPercent(ErrorsOf(Torus(40, 20), 60, 20, 0, 2, [](double z) {
-    return 4 * std::numbers::pi * 40 * std::sqrt(400 - z * z);
-  }));
+  ExpectWithinAPercent("torus", ErrorsOf(Torus(40, 20), 60, 20, 0, 2, [](double z) {
+                         return 4 * std::numbers::pi * 40 * std::sqrt(400 - z * z);
+                       }));
 }
 
 TEST(Slice, OtherPlacementsCutTheSameBall) {
   for (const Placement placement : {Placement::kMarchingSquares, Placement::kQef}) {
     SCOPED_TRACE(Name(placement));
-    ExpectWithinAPercent(ErrorsOf(
-        Ball(20), 20, 20, 0, 1, [](double z) { return std::numbers::pi * (400 - z * z); },
-        placement));
+    ExpectWithinAPercent(placement == Placement::kQef ? "qef" : "squares",
+                         ErrorsOf(
+                             Ball(20), 20, 20, 0, 1,
+                             [](double z) { return std::numbers::pi * (400 - z * z); }, placement));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -156,6 +157,51 @@ TEST_F(Drain, ACallThatHasNotOpenedIsToldToGoElsewhere) {
     EXPECT_EQ(client->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
   }
   EXPECT_EQ(other.reason(), "DRAINING");
+  ExpectGoodEnd();
+}
+
+// Streams that are told to go one after the other, while whoever comes is served.
+TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
+  constexpr unsigned kStreams = 5;
+  Serve("30", {"--drain-delay", "3"});
+  std::vector<std::unique_ptr<StreamClient>> clients;
+  for (unsigned i = 0; i < kStreams; ++i) {
+    clients.push_back(std::make_unique<StreamClient>(Channel()));
+    ASSERT_TRUE(clients.back()->SendAndReceive(OpenRequest()).has_opened());
+  }
+  const auto health_stub = health::Health::NewStub(Channel());
+  const auto is_serving = [&] {
+    grpc::ClientContext context;
+    health::HealthCheckResponse response;
+    return health_stub->Check(&context, {}, &response).ok() &&
+           response.status() == health::HealthCheckResponse::SERVING;
+  };
+  ASSERT_TRUE(is_serving());
+  Terminate();
+  while (is_serving()) std::this_thread::yield();
+  // It is not ready any more, and serves.
+  EXPECT_TRUE(clients.back()->SendAndReceive(BlobRequest(1, 3, 0)).has_frame());
+  // Each in its turn, in the order in which they came.
+  StreamClient late(Channel());
+  std::atomic<unsigned> gone = 0;
+  std::vector<std::thread> readers;
+  std::array<unsigned, kStreams> place{};
+  for (unsigned i = 0; i < kStreams; ++i) {
+    readers.emplace_back([&, i] {
+      EXPECT_TRUE(clients[i]->Receive().has_notice());
+      EXPECT_EQ(clients[i]->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+      EXPECT_EQ(clients[i]->reason(), "DRAINING");
+      place[i] = gone++;
+      if (i == 0) {
+        EXPECT_TRUE(late.SendAndReceive(OpenRequest()).has_opened());
+        EXPECT_TRUE(late.SendAndReceive(BlobRequest(1, 3, 0)).has_frame());
+      }
+    });
+  }
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_THAT(place, ::testing::ElementsAre(0, 1, 2, 3, 4));
+  EXPECT_TRUE(late.Receive().has_notice());
+  EXPECT_EQ(late.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
   ExpectGoodEnd();
 }
 
