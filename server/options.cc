@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/base/machine_memory.h"
+#include "server/base/machine_limits.h"
 
 namespace partiemc::server {
 namespace {
@@ -76,8 +76,10 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
                  "Write the address that was bound to this file once the server serves")
       ->type_name("FILE")
       ->envname("PARTIEMC_PORT_FILE");
-  app.add_option("--threads", raw.line.server.threads,
-                 "Threads that compute, all streams together; results do not depend on it")
+  app.add_option(
+         "--threads", raw.line.server.threads,
+         "Threads that compute, all streams together (default: one for each processor that this "
+         "machine or container has); results do not depend on it")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str()
       ->type_name("N")
@@ -358,7 +360,7 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   CLI::App app(kDescription, "partiemc-server");
   app.footer(kFooter);
   Raw raw;
-  raw.line.server.threads = std::max(1u, std::thread::hardware_concurrency());
+  raw.line.server.threads = AvailableProcessors(std::thread::hardware_concurrency());
   raw.line.server.limits.memory_budget = AvailableMemory() / 2;
   AddServingOptions(app, raw);
   AddSecurity(app, raw);

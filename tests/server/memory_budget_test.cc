@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/base/machine_memory.h"
+#include "server/base/machine_limits.h"
 #include "server/memory_transport.h"
 #include "server/moving_blob.h"
 #include "support/temporary_folder.h"
@@ -202,7 +202,7 @@ TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
   }
 }
 
-class MachineMemory : public ::testing::Test {
+class MachineLimits : public ::testing::Test {
  protected:
   void Write(const std::string& path, const std::string& text) const {
     std::filesystem::create_directories(std::filesystem::path(root_ + path).parent_path());
@@ -212,14 +212,14 @@ class MachineMemory : public ::testing::Test {
   const std::string root_ = folder_.path();
 };
 
-TEST_F(MachineMemory, IsThatOfTheMachineWhereNoGroupLimitsIt) {
+TEST_F(MachineLimits, IsThatOfTheMachineWhereNoGroupLimitsIt) {
   Write("/proc/meminfo", "MemTotal:       1000 kB\nMemFree: 5 kB\n");
   Write("/proc/self/cgroup", "0::/a\n");
   Write("/sys/fs/cgroup/a/memory.max", "max\n");
   EXPECT_EQ(AvailableMemory(root_), 1'024'000u);
 }
 
-TEST_F(MachineMemory, IsTheLeastOfTheGroupsThatTheProcessIsIn) {
+TEST_F(MachineLimits, IsTheLeastOfTheGroupsThatTheProcessIsIn) {
   Write("/proc/meminfo", "MemTotal:       1000 kB\n");
   Write("/proc/self/cgroup", "0::/a/b\n");
   Write("/sys/fs/cgroup/a/b/memory.max", "900000\n");
@@ -227,15 +227,37 @@ TEST_F(MachineMemory, IsTheLeastOfTheGroupsThatTheProcessIsIn) {
   EXPECT_EQ(AvailableMemory(root_), 800'000u);
 }
 
-TEST_F(MachineMemory, KnowsTheGroupsOfTheFirstVersionAsAContainerSeesThem) {
+TEST_F(MachineLimits, KnowsTheGroupsOfTheFirstVersionAsAContainerSeesThem) {
   Write("/proc/meminfo", "MemTotal:       1000 kB\n");
   Write("/proc/self/cgroup", "4:memory:/outside/of/here\n3:cpu:/\n0::/\n");
   Write("/sys/fs/cgroup/memory/memory.limit_in_bytes", "700000\n");
   EXPECT_EQ(AvailableMemory(root_), 700'000u);
 }
 
-TEST_F(MachineMemory, IsUnlimitedWhereNothingIsKnown) {
+TEST_F(MachineLimits, IsUnlimitedWhereNothingIsKnown) {
   EXPECT_EQ(AvailableMemory(root_), std::numeric_limits<std::uint64_t>::max());
+}
+
+TEST_F(MachineLimits, ProcessorsAreTheQuotaOfTheGroupsThatTheProcessIsInRoundedUp) {
+  EXPECT_EQ(AvailableProcessors(8, root_), 8u);
+  EXPECT_EQ(AvailableProcessors(0, root_), 1u) << "the system may not know";
+  Write("/proc/self/cgroup", "0::/a/b\n");
+  Write("/sys/fs/cgroup/a/b/cpu.max", "max 100000\n");
+  EXPECT_EQ(AvailableProcessors(8, root_), 8u);
+  Write("/sys/fs/cgroup/a/cpu.max", "250000 100000\n");
+  EXPECT_EQ(AvailableProcessors(8, root_), 3u);
+  EXPECT_EQ(AvailableProcessors(2, root_), 2u);
+  Write("/sys/fs/cgroup/a/b/cpu.max", "20000 100000\n");
+  EXPECT_EQ(AvailableProcessors(8, root_), 1u);
+}
+
+TEST_F(MachineLimits, ProcessorsOfTheFirstVersion) {
+  Write("/proc/self/cgroup", "4:memory:/\n3:cpu,cpuacct:/outside\n0::/\n");
+  Write("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1\n");
+  Write("/sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(AvailableProcessors(8, root_), 8u);
+  Write("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "400000\n");
+  EXPECT_EQ(AvailableProcessors(8, root_), 4u);
 }
 
 }  // namespace

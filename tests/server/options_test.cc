@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "server/base/machine_memory.h"
+#include "server/base/machine_limits.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::server {

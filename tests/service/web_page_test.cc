@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class WebPage : public WebDoorTest {
+class WebPage : public WebGatewayTest {
  protected:
   WebPage() {
     std::filesystem::create_directories(folder_.Path("page/assets"));
@@ -95,7 +95,7 @@ TEST_F(WebPage, NothingOutsideOfTheFolderIsReached) {
   }
 }
 
-TEST_F(WebDoorTest, WithoutAPageTheServerSaysHowToGetOne) {
+TEST_F(WebGatewayTest, WithoutAPageTheServerSaysHowToGetOne) {
   options_.web->root = "/nowhere";
   Serve();
   const HttpReply reply = Ask(web(), "GET", "/");

@@ -25,7 +25,7 @@ std::string Announcement(std::uint64_t bytes) {
   return head + "mask";
 }
 
-TEST_F(WebDoorTest, GarbageInsteadOfAMessageEndsTheCallWithItsReason) {
+TEST_F(WebGatewayTest, GarbageInsteadOfAMessageEndsTheCallWithItsReason) {
   Serve();
   for (const char* path : {"/v1/watch", "/v1/reconstruct"}) {
     WebSocketClient text(web(), path), binary(web(), path), after_end(web(), path);
@@ -43,7 +43,7 @@ TEST_F(WebDoorTest, GarbageInsteadOfAMessageEndsTheCallWithItsReason) {
   EXPECT_GE(Refusals("bad_message"), 2);
 }
 
-TEST_F(WebDoorTest, WhatIsNoWebSocketIsCut) {
+TEST_F(WebGatewayTest, WhatIsNoWebSocketIsCut) {
   Serve();
   const std::vector<std::pair<const char*, std::string>> all = {
       {"not masked", std::string("\x82\x05hello", 7)},
@@ -60,11 +60,12 @@ TEST_F(WebDoorTest, WhatIsNoWebSocketIsCut) {
     client.pipe().Send(bytes);
     EXPECT_TRUE(client.pipe().IsClosedWithin(60'000)) << what;
   }
-  EXPECT_EQ(Refusals("bad_message"), all.size());
+  // The connection is closed before its end is counted.
+  EXPECT_TRUE(Eventually([&] { return Refusals("bad_message") == all.size(); }));
   EXPECT_TRUE(Eventually([&] { return Connections() == 0; }));
 }
 
-TEST_F(WebDoorTest, AMessageThatIsAnnouncedTooLargeIsRefusedBeforeItComes) {
+TEST_F(WebGatewayTest, AMessageThatIsAnnouncedTooLargeIsRefusedBeforeItComes) {
   Serve();
   for (const std::uint64_t bytes : {std::uint64_t{1'000'000'000}, std::uint64_t{1} << 62}) {
     for (const char* path : {"/v1/watch", "/v1/reconstruct"}) {
@@ -86,7 +87,7 @@ TEST_F(WebDoorTest, AMessageThatIsAnnouncedTooLargeIsRefusedBeforeItComes) {
   EXPECT_EQ(Refusals("too_large"), 5);
 }
 
-TEST_F(WebDoorTest, ABodyThatIsAnnouncedOrBecomesTooLargeIsRefused) {
+TEST_F(WebGatewayTest, ABodyThatIsAnnouncedOrBecomesTooLargeIsRefused) {
   Serve();
   WebPipe announced(web());
   announced.Send(
@@ -104,7 +105,7 @@ TEST_F(WebDoorTest, ABodyThatIsAnnouncedOrBecomesTooLargeIsRefused) {
   EXPECT_EQ(Refusals("too_large"), 2);
 }
 
-TEST_F(WebDoorTest, WhatIsNoRequestOfOursIsRefusedAndCounted) {
+TEST_F(WebGatewayTest, WhatIsNoRequestOfOursIsRefusedAndCounted) {
   Serve();
   const auto answer = [&](const std::string& bytes) {
     WebPipe pipe(web());
@@ -132,7 +133,7 @@ TEST_F(WebDoorTest, WhatIsNoRequestOfOursIsRefusedAndCounted) {
   EXPECT_EQ(Refusals("malformed"), before + 5);
 }
 
-TEST_F(WebDoorTest, OfSocketsThatSayNothingTheOldestGiveWayAndCallsStay) {
+TEST_F(WebGatewayTest, OfSocketsThatSayNothingTheOldestGiveWayAndCallsStay) {
   options_.web->max_connections = 8;
   Serve();
   OpenProducer();
@@ -201,7 +202,7 @@ void ComeAndGo(const Address& web, std::mt19937& random, const std::string& fram
   if (below(2) == 0) client.pipe().Reset();
 }
 
-TEST_F(WebDoorTest, WhoeverGoesAtWhicheverPointLeavesNothingBehind) {
+TEST_F(WebGatewayTest, WhoeverGoesAtWhicheverPointLeavesNothingBehind) {
   options_.limits.max_watchers = 500;
   Serve();
   OpenProducer();

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 constexpr std::chrono::milliseconds kGrace{60'000};
 
-TEST_F(WebDoorTest, AWatcherGetsTheSameBytesOverBothDoors) {
+TEST_F(WebGatewayTest, AWatcherGetsTheSameBytesOverBothDoors) {
   Serve();
   OpenProducer();
   WebSocketClient web_watcher(web(), "/v1/watch");
@@ -70,7 +70,7 @@ std::vector<Digests> DigestsOverWeb(WebSocketClient& client, unsigned seed, std:
   return digests;
 }
 
-TEST_F(WebDoorTest, AProducerGetsTheDigestsThatItGetsOverGrpc) {
+TEST_F(WebGatewayTest, AProducerGetsTheDigestsThatItGetsOverGrpc) {
   Serve();
   WebSocketClient client(web(), "/v1/reconstruct");
   const auto digests = DigestsOverWeb(client, 5, 8);
@@ -78,7 +78,7 @@ TEST_F(WebDoorTest, AProducerGetsTheDigestsThatItGetsOverGrpc) {
   EXPECT_EQ(digests, StreamedDigests(channel_, 5, 8));
 }
 
-TEST_F(WebDoorTest, AMessageInPiecesIsTheSameMessage) {
+TEST_F(WebGatewayTest, AMessageInPiecesIsTheSameMessage) {
   Serve();
   WebSocketClient client(web(), "/v1/reconstruct");
   const auto expected = LocalDigests(2, 3);
@@ -100,7 +100,7 @@ TEST_F(WebDoorTest, AMessageInPiecesIsTheSameMessage) {
   EXPECT_EQ(client.Finish().code, 0);
 }
 
-TEST_F(WebDoorTest, AFrameThatIsTooLargeIsAnsweredAndTheStreamGoesOn) {
+TEST_F(WebGatewayTest, AFrameThatIsTooLargeIsAnsweredAndTheStreamGoesOn) {
   options_.limits.max_frame_bytes = 20'000;
   Serve();
   WebSocketClient client(web(), "/v1/reconstruct");
@@ -114,7 +114,7 @@ TEST_F(WebDoorTest, AFrameThatIsTooLargeIsAnsweredAndTheStreamGoesOn) {
   EXPECT_EQ(client.Finish().code, 0);
 }
 
-TEST_F(WebDoorTest, AHalfClosedWatchGoesOnForAsLongAsItHasCredit) {
+TEST_F(WebGatewayTest, AHalfClosedWatchGoesOnForAsLongAsItHasCredit) {
   Serve();
   OpenProducer();
   WebSocketClient watcher(web(), "/v1/watch");
@@ -129,7 +129,7 @@ TEST_F(WebDoorTest, AHalfClosedWatchGoesOnForAsLongAsItHasCredit) {
   EXPECT_EQ(watcher.Finish().code, 0);
 }
 
-TEST_F(WebDoorTest, PostsAnswerInformationAndFramesOneAfterTheOtherInAConnection) {
+TEST_F(WebGatewayTest, PostsAnswerInformationAndFramesOneAfterTheOtherInAConnection) {
   Serve();
   OpenProducer();
   WebPipe pipe(web());
@@ -159,7 +159,7 @@ TEST_F(WebDoorTest, PostsAnswerInformationAndFramesOneAfterTheOtherInAConnection
   EXPECT_THAT(Ask(*server_->metrics_address(), "GET", "/metrics").body, HasSubstr(started));
 }
 
-TEST_F(WebDoorTest, ABodyMayComeInChunksAndAfterItWasAskedFor) {
+TEST_F(WebGatewayTest, ABodyMayComeInChunksAndAfterItWasAskedFor) {
   Serve();
   const WebHeaders type = "Content-Type: application/x-protobuf\r\n";
   v1::ListStreamsRequest request;
@@ -178,7 +178,7 @@ TEST_F(WebDoorTest, ABodyMayComeInChunksAndAfterItWasAskedFor) {
   EXPECT_THAT(asked.ReceiveUntil("\r\n\r\n"), HasSubstr("200 OK"));
 }
 
-TEST_F(WebDoorTest, ErrorsAreToldWithTheirReasonOverEitherWay) {
+TEST_F(WebGatewayTest, ErrorsAreToldWithTheirReasonOverEitherWay) {
   Serve();
   const HttpReply bad = Post(web(), "/v1/frame", "xx");
   EXPECT_EQ(bad.status, 400u);
@@ -197,7 +197,7 @@ TEST_F(WebDoorTest, ErrorsAreToldWithTheirReasonOverEitherWay) {
   EXPECT_THAT(end.text, HasSubstr("\"rule\": \"must be the name of an open stream"));
 }
 
-TEST_F(WebDoorTest, OneStreamTooManyIsRefused) {
+TEST_F(WebGatewayTest, OneStreamTooManyIsRefused) {
   options_.limits.max_streams = 1;
   Serve();
   OpenProducer();
@@ -208,7 +208,7 @@ TEST_F(WebDoorTest, OneStreamTooManyIsRefused) {
   EXPECT_EQ(end.close_code, 4008u);
 }
 
-TEST_F(WebDoorTest, WhoStaysSilentIsEndedAndTold) {
+TEST_F(WebGatewayTest, WhoStaysSilentIsEndedAndTold) {
   options_.limits.idle.opening = std::chrono::milliseconds(20);
   options_.limits.unary.request = std::chrono::milliseconds(20);
   Serve();
@@ -223,7 +223,7 @@ TEST_F(WebDoorTest, WhoStaysSilentIsEndedAndTold) {
   EXPECT_THAT(pipe.ReceiveAll(), HasSubstr("IDLE"));
 }
 
-TEST_F(WebDoorTest, AProducerThatIsGoneLeavesItsStreamAndItsWatchersAreTold) {
+TEST_F(WebGatewayTest, AProducerThatIsGoneLeavesItsStreamAndItsWatchersAreTold) {
   Serve();
   auto producer = std::make_unique<WebSocketClient>(web(), "/v1/reconstruct");
   producer->SendMessage(OpenRequest("tank"));
@@ -245,7 +245,7 @@ TEST_F(WebDoorTest, AProducerThatIsGoneLeavesItsStreamAndItsWatchersAreTold) {
   }));
 }
 
-TEST_F(WebDoorTest, ASilentClientIsAskedForASignOfLifeAndEndedWithoutOne) {
+TEST_F(WebGatewayTest, ASilentClientIsAskedForASignOfLifeAndEndedWithoutOne) {
   options_.keepalive = {std::chrono::milliseconds(100), std::chrono::milliseconds(200)};
   Serve();
   OpenProducer();
@@ -265,7 +265,7 @@ TEST_F(WebDoorTest, ASilentClientIsAskedForASignOfLifeAndEndedWithoutOne) {
   EXPECT_EQ(Refusals("timeout"), 1);
 }
 
-TEST_F(WebDoorTest, ADrainDeliversWhatIsDoneAndSaysGoodbye) {
+TEST_F(WebGatewayTest, ADrainDeliversWhatIsDoneAndSaysGoodbye) {
   Serve();
   OpenProducer();
   WebSocketClient watcher(web(), "/v1/watch"), stream(web(), "/v1/reconstruct");
@@ -289,7 +289,7 @@ TEST_F(WebDoorTest, ADrainDeliversWhatIsDoneAndSaysGoodbye) {
   EXPECT_FALSE(WebPipe(web()).is_open());
 }
 
-TEST_F(WebDoorTest, AServerThatStopsAtOnceEndsItsCalls) {
+TEST_F(WebGatewayTest, AServerThatStopsAtOnceEndsItsCalls) {
   Serve();
   OpenProducer();
   std::vector<std::unique_ptr<WebSocketClient>> watchers;
@@ -410,7 +410,7 @@ TEST_F(WebSecurity, AClientNeedsACertificateWhereOneIsAskedFor) {
   EXPECT_EQ(status(stranger_.Issue("client")), 0u);
 }
 
-TEST(WebAddress, ADoorThatOthersReachNeedsTlsOrToBeWanted) {
+TEST(WebAddress, AGatewayThatOthersReachNeedsTlsOrToBeWanted) {
   ServerOptions options = TestOptions();
   options.web.emplace().address = {.host = "0.0.0.0", .port = 0, .unix_path = {}};
   const auto open = Server::Start(options);

@@ -12,9 +12,9 @@
 
 namespace partiemc::server {
 
-class WebDoorTest : public ::testing::Test {
+class WebGatewayTest : public ::testing::Test {
  protected:
-  WebDoorTest() {
+  WebGatewayTest() {
     options_.web.emplace().address = {.host = "127.0.0.1", .port = 0, .unix_path = {}};
     options_.metrics = Address{.host = "127.0.0.1", .port = 0, .unix_path = {}};
   }

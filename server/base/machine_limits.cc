@@ -1,0 +1,98 @@
+#include "server/base/machine_limits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <string_view>
+
+namespace partiemc::server {
+namespace {
+
+constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
+
+// The number that the file begins with; "max" is none.
+std::uint64_t NumberIn(const std::string& path) {
+  std::ifstream file(path);
+  std::uint64_t number = 0;
+  return file >> number ? number : kUnlimited;
+}
+
+// Calls visit(folder) for a group and those that it is in, up to the folder `top`.
+template <typename Visit>
+void ForEachFolder(const std::string& top, std::string group, Visit visit) {
+  for (;;) {
+    visit(top + group);
+    const auto slash = group.rfind('/');
+    if (slash == std::string::npos) return;
+    group.resize(slash);
+  }
+}
+
+// Calls visit(version, folder) for the groups of this process that a controller looks after, and
+// those that they are in. "0::/a/b" for version 2, "4:memory:/a/b" or "3:cpu,cpuacct:/" for version
+// 1, whose groups inside of a container are named as seen from outside: what is not there limits
+// nothing, its top is looked at in any case.
+template <typename Visit>
+void ForEachGroup(const std::string& root, std::string_view controller, Visit visit) {
+  std::ifstream groups(root + "/proc/self/cgroup");
+  for (std::string line; std::getline(groups, line);) {
+    const auto first = line.find(':');
+    const auto second = first == std::string::npos ? first : line.find(':', first + 1);
+    if (second == std::string::npos) continue;
+    const std::string controllers = line.substr(first + 1, second - first - 1);
+    const std::string group = line.substr(second + 1);
+    const std::string top = root + "/sys/fs/cgroup";
+    if (controllers.empty()) {
+      ForEachFolder(top, group, [&](const std::string& folder) { visit(2, folder); });
+    } else if (("," + controllers + ",").find("," + std::string(controller) + ",") !=
+               std::string::npos) {
+      ForEachFolder(top + "/" + std::string(controller), group,
+                    [&](const std::string& folder) { visit(1, folder); });
+    }
+  }
+}
+
+// The time of processors that a group may use, over the time in which it may; infinite where
+// nothing limits it.
+double QuotaOf(int version, const std::string& folder) {
+  double quota = -1, period = 0;
+  if (version == 2) {
+    // "150000 100000", or "max 100000".
+    std::ifstream file(folder + "/cpu.max");
+    if (!(file >> quota >> period)) return std::numeric_limits<double>::infinity();
+  } else {
+    std::ifstream(folder + "/cpu.cfs_quota_us") >> quota;
+    std::ifstream(folder + "/cpu.cfs_period_us") >> period;
+  }
+  return quota > 0 && period > 0 ? quota / period : std::numeric_limits<double>::infinity();
+}
+
+std::uint64_t PhysicalMemory(const std::string& root) {
+  std::ifstream file(root + "/proc/meminfo");
+  std::string name;
+  std::uint64_t kilobytes = 0;
+  // "MemTotal:       16316412 kB" is the first line.
+  return file >> name >> kilobytes && name == "MemTotal:" ? kilobytes * 1024 : kUnlimited;
+}
+
+}  // namespace
+
+std::uint64_t AvailableMemory(const std::string& root) {
+  std::uint64_t memory = PhysicalMemory(root);
+  ForEachGroup(root, "memory", [&](int version, const std::string& folder) {
+    const char* const file = version == 2 ? "/memory.max" : "/memory.limit_in_bytes";
+    memory = std::min(memory, NumberIn(folder + file));
+  });
+  return memory;
+}
+
+unsigned AvailableProcessors(unsigned processors, const std::string& root) {
+  double available = std::max(processors, 1u);
+  ForEachGroup(root, "cpu", [&](int version, const std::string& folder) {
+    available = std::min(available, QuotaOf(version, folder));
+  });
+  return static_cast<unsigned>(std::ceil(available));
+}
+
+}  // namespace partiemc::server
