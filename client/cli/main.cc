@@ -6,6 +6,7 @@
 #include "client/cli/convert.h"
 #include "client/cli/evaluate.h"
 #include "client/cli/info.h"
+#include "client/cli/load/load.h"
 #include "client/cli/replay/replay.h"
 #include "client/cli/replay_flags.h"
 #include "client/cli/streams.h"
@@ -38,12 +39,14 @@ int main(int argc, char** argv) {
   partiemc::client::WatchFlags watch;
   partiemc::client::QueryFlags streams;
   partiemc::client::QueryFlags info;
+  partiemc::client::LoadFlags load;
   partiemc::client::ConvertFlags convert;
   partiemc::client::EvaluateFlags evaluate;
   const CLI::App* replay_verb = AddReplay(app, replay);
   const CLI::App* watch_verb = AddWatch(app, watch);
   const CLI::App* streams_verb = AddStreams(app, streams);
   const CLI::App* info_verb = AddInfo(app, info);
+  const CLI::App* load_verb = AddLoad(app, load);
   const CLI::App* evaluate_verb = AddEvaluate(app, evaluate);
   AddConvert(app, convert);
   try {
@@ -57,6 +60,7 @@ int main(int argc, char** argv) {
   if (watch_verb->parsed()) return Watch(watch);
   if (streams_verb->parsed()) return Streams(streams);
   if (info_verb->parsed()) return Info(info);
+  if (load_verb->parsed()) return Load(load);
   if (evaluate_verb->parsed()) return Evaluate(evaluate);
   return Convert(convert);
 }

@@ -20,6 +20,7 @@ partiemc_manual_page(partiemc-replay "reconstructs a recorded sequence" client p
 partiemc_manual_page(partiemc-watch "shows what a live stream gives" client partiemc watch)
 partiemc_manual_page(partiemc-streams "lists the streams of a server" client partiemc streams)
 partiemc_manual_page(partiemc-info "asks a server for version and limits" client partiemc info)
+partiemc_manual_page(partiemc-load "measures what a server bears" client partiemc load)
 partiemc_manual_page(partiemc-convert "turns any input into a recording" client partiemc convert)
 get_property(pages GLOBAL PROPERTY PARTIEMC_MANUAL_PAGES)
 add_custom_target(partiemc_manual ALL DEPENDS ${pages})

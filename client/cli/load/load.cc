@@ -1,0 +1,415 @@
+#include "client/cli/load/load.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "CLI/CLI.hpp"
+#include "absl/strings/str_format.h"
+#include "client/cli/console.h"
+#include "client/cli/load/latencies.h"
+#include "client/cli/load/server_figures.h"
+#include "client/output/text.h"
+#include "common/json_text.h"
+#include "partiemc/client/stream.h"
+#include "partiemc/client/watcher.h"
+
+namespace partiemc::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Compared with each other, until they tell the same.
+constexpr std::chrono::seconds kWindow(2);
+// Frames of each stream are made before the clock starts, and come again and again.
+constexpr int kFrames = 16;
+// More than are ever in flight.
+constexpr std::size_t kRemembered = 4096;
+
+double Milliseconds(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+// A disc of particles with spacing 1 that goes round in a circle, a spacing from frame to frame.
+std::vector<std::vector<float>> MakeFrames(int particles) {
+  const double radius = std::sqrt(particles / 3.14159265358979);
+  std::vector<std::vector<float>> frames(kFrames);
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const double angle = 2 * 3.14159265358979 * frame / kFrames;
+    const double away = kFrames / (2 * 3.14159265358979);
+    std::vector<float>& xy = frames[frame];
+    const int reach = static_cast<int>(radius) + 2;
+    // In the order of rows, as many as are wanted: the disc of the radius has some more or less.
+    for (int j = -reach; j <= reach && xy.size() < 2 * static_cast<std::size_t>(particles); ++j) {
+      for (int i = -reach; i <= reach && xy.size() < 2 * static_cast<std::size_t>(particles); ++i) {
+        if (i * i + j * j > (radius + 0.5) * (radius + 0.5)) continue;
+        xy.push_back(static_cast<float>(i + away * std::cos(angle)));
+        xy.push_back(static_cast<float>(j + away * std::sin(angle)));
+      }
+    }
+  }
+  return frames;
+}
+
+// What all threads share.
+struct Shared {
+  const LoadFlags& flags;
+  std::vector<std::vector<float>> frames;
+  std::vector<std::uint64_t> ids;
+  Latencies answers, watches;
+  std::atomic<std::uint64_t> answered = 0, late = 0, refused = 0;
+  std::atomic<bool> stop = false;
+  std::mutex mutex;
+  absl::Status error;  // The first one.
+
+  void Fail(const absl::Status& status) {
+    const std::lock_guard lock(mutex);
+    if (error.ok()) error = status;
+    stop = true;
+  }
+  absl::Status Error() {
+    const std::lock_guard lock(mutex);
+    return error;
+  }
+};
+
+class LoadedStream {
+ public:
+  LoadedStream(Shared& shared, int number)
+      : shared_(shared), number_(number), name_(Concat("load-", getpid(), "-", number)) {}
+
+  const std::string& name() const { return name_; }
+
+  absl::Status Open() {
+    StreamOptions options{.name = name_, .credentials = shared_.flags.server.credentials};
+    options.parameters.spacing = 1;
+    auto stream = Stream::Open(shared_.flags.server.address, options);
+    if (!stream.ok()) return stream.status();
+    stream_ = *std::move(stream);
+    return absl::OkStatus();
+  }
+
+  void Start(Clock::time_point start) {
+    // Streams are out of step, as simulators are.
+    start_ = start + PeriodTimes(static_cast<double>(number_) / shared_.flags.streams);
+    sender_ = std::thread([this] { Send(); });
+    receiver_ = std::thread([this] { Receive(); });
+  }
+
+  void Join() {
+    sender_.join();
+    receiver_.join();
+  }
+
+  // When the producer had the answer to a frame; nothing while it has not.
+  std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
+    const auto at = answered_at_[sequence % kRemembered].load();
+    if (at == Clock::duration::rep{0}) return std::nullopt;
+    return Clock::time_point(Clock::duration(at));
+  }
+
+ private:
+  using Times = std::array<std::atomic<Clock::duration::rep>, kRemembered>;
+
+  Clock::duration PeriodTimes(double count) const {
+    if (shared_.flags.rate <= 0) return {};
+    return std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(count / shared_.flags.rate));
+  }
+
+  void Send() {
+    for (std::uint64_t k = 0; !shared_.stop; ++k) {
+      Clock::time_point due = Clock::now();
+      if (shared_.flags.rate > 0) {
+        due = start_ + PeriodTimes(static_cast<double>(k));
+        std::this_thread::sleep_until(due);
+      }
+      due_[(k + 1) % kRemembered] = due.time_since_epoch().count();
+      const std::vector<float>& frame = shared_.frames[k % kFrames];
+      const auto sent = stream_->Send(
+          {.positions = std::span<const float>(frame), .ids = shared_.ids}, static_cast<double>(k));
+      if (!sent.ok()) {
+        shared_.Fail(sent.status());
+        break;
+      }
+    }
+    stream_->FinishSending().IgnoreError();
+  }
+
+  void Receive() {
+    Event event;
+    for (;;) {
+      const auto got = stream_->Receive(event);
+      if (!got.ok()) return shared_.Fail(got.status());
+      if (*got == Received::kEnd) return;
+      if (event.kind == Event::Kind::kRefusal) ++shared_.refused;
+      if (event.kind != Event::Kind::kResult) continue;
+      const auto now = Clock::now();
+      answered_at_[event.sequence % kRemembered] = now.time_since_epoch().count();
+      const Clock::time_point due{Clock::duration(due_[event.sequence % kRemembered].load())};
+      shared_.answers.Add(Milliseconds(now - due));
+      ++shared_.answered;
+      // Late: the next one was due before.
+      if (shared_.flags.rate > 0 && now > due + PeriodTimes(1)) ++shared_.late;
+    }
+  }
+
+  Shared& shared_;
+  const int number_;
+  const std::string name_;
+  std::unique_ptr<Stream> stream_;
+  Clock::time_point start_;
+  Times due_{}, answered_at_{};
+  std::thread sender_, receiver_;
+};
+
+// Receives what a stream shows, from when it has frames until it ends.
+void WatchStream(Shared& shared, const LoadedStream& stream) {
+  const auto watcher = Watcher::Open(shared.flags.server.address, stream.name(),
+                                     {.credentials = shared.flags.server.credentials});
+  if (!watcher.ok()) return shared.Fail(watcher.status());
+  WatchedFrame frame;
+  while (!shared.stop) {
+    const auto got = (*watcher)->Receive(frame, std::chrono::milliseconds(200));
+    if (!got.ok()) {
+      if (!shared.stop) shared.Fail(got.status());
+      return;
+    }
+    if (*got == Received::kEnd) return;
+    if (*got != Received::kEvent) continue;
+    const auto now = Clock::now();
+    // A watcher may have it first.
+    const auto answered = stream.AnsweredAt(frame.sequence);
+    shared.watches.Add(answered ? std::max(Milliseconds(now - *answered), 0.0) : 0.0);
+  }
+}
+
+double CpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double MemoryMb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+// What is told in the end: of all windows but the first, in which buffers grow.
+struct Figures {
+  double seconds = 0;
+  bool settled = false;
+  Percentiles answers, watches;
+  std::uint64_t frames = 0, late = 0, refused = 0;
+  double client_cpu_ms = 0;  // A frame.
+  double client_memory_mb = 0;
+  std::optional<double> server_cpu_ms, server_memory_mb;
+};
+
+// Waits for answers until percentiles have settled, time is over, or somebody ends it.
+absl::StatusOr<Figures> Measure(Shared& shared) {
+  const LoadFlags& flags = shared.flags;
+  const bool tells = !flags.quiet && isatty(STDERR_FILENO) != 0;
+  const auto begin = Clock::now();
+  std::vector<double> answers, watches;
+  Percentiles before;
+  Figures figures;
+  std::uint64_t frames_before = 0, late_before = 0;
+  double cpu_before = 0;
+  std::optional<ServerFigures> server_before;
+  Clock::time_point measured_from;
+  for (int window = 0;; ++window) {
+    const auto end = begin + (window + 1) * kWindow;
+    while (Clock::now() < end && !shared.stop && !Interrupted()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    if (auto status = shared.Error(); !status.ok()) return status;
+    std::vector<double> times = shared.answers.Take(), watched = shared.watches.Take();
+    if (window == 0) {
+      measured_from = Clock::now();
+      frames_before = shared.answered;
+      late_before = shared.late;
+      cpu_before = CpuSeconds();
+      if (!flags.metrics.empty()) {
+        const auto server = AskFigures(flags.metrics);
+        if (!server.ok()) return server.status();
+        server_before = *server;
+      }
+    } else {
+      answers.insert(answers.end(), times.begin(), times.end());
+      watches.insert(watches.end(), watched.begin(), watched.end());
+    }
+    const Percentiles now = PercentilesOf(times);
+    if (tells) {
+      std::fprintf(stderr, "\r%4.0f s: %zu answers, p50 %.1f ms, p99 %.1f ms   ",
+                   Milliseconds(Clock::now() - begin) / 1000, now.count, now.p50, now.p99);
+    }
+    figures.settled = window >= 2 && HaveSettled(before, now);
+    before = now;
+    const bool is_over =
+        Clock::now() + kWindow / 2 > begin + std::chrono::duration_cast<Clock::duration>(
+                                                 std::chrono::duration<double>(flags.seconds));
+    if (figures.settled || Interrupted() || (is_over && window > 0)) break;
+  }
+  if (tells) std::fprintf(stderr, "\n");
+  figures.seconds = Milliseconds(Clock::now() - measured_from) / 1000;
+  figures.answers = PercentilesOf(answers);
+  figures.watches = PercentilesOf(watches);
+  figures.frames = shared.answered - frames_before;
+  figures.late = shared.late - late_before;
+  figures.refused = shared.refused;
+  const double per_frame = 1000 / std::max<double>(1, static_cast<double>(figures.frames));
+  figures.client_cpu_ms = (CpuSeconds() - cpu_before) * per_frame;
+  figures.client_memory_mb = MemoryMb();
+  if (server_before) {
+    const auto server = AskFigures(flags.metrics);
+    if (!server.ok()) return server.status();
+    figures.server_cpu_ms = (server->cpu_seconds - server_before->cpu_seconds) * per_frame;
+    figures.server_memory_mb = server->memory_bytes / (1 << 20);
+  }
+  return figures;
+}
+
+std::string TextOf(const LoadFlags& flags, const Figures& figures) {
+  const double reached = static_cast<double>(figures.frames) / figures.seconds;
+  std::string text = absl::StrFormat(
+      "%d streams of %d particles%s, %s; %d watchers\n%s after %.0f s of measuring\n\n"
+      "                     p50      p90      p99      max\n",
+      flags.streams, flags.particles, flags.no_ids ? "" : " with ids",
+      flags.rate > 0 ? absl::StrFormat("%g frames/s each", flags.rate) : "as fast as they go",
+      flags.watchers, figures.settled ? "settled" : "NOT settled", figures.seconds);
+  const auto row = [&](const char* name, const Percentiles& p) {
+    absl::StrAppendFormat(&text, "%-15s %8.2f %8.2f %8.2f %8.2f\n", name, p.p50, p.p90, p.p99,
+                          p.max);
+  };
+  row("answers, ms", figures.answers);
+  if (flags.watchers > 0) row("watchers, ms", figures.watches);
+  absl::StrAppendFormat(&text, "\n%.1f frames/s reached", reached);
+  if (flags.rate > 0) {
+    absl::StrAppendFormat(&text, " of %.1f, %d late (answered after the next one was due)",
+                          flags.rate * flags.streams, figures.late);
+  }
+  absl::StrAppendFormat(&text, "; %d refused\nclient: %.2f ms of processor time a frame, %.0f MB\n",
+                        figures.refused, figures.client_cpu_ms, figures.client_memory_mb);
+  if (figures.server_cpu_ms) {
+    absl::StrAppendFormat(&text, "server: %.2f ms of processor time a frame, %.0f MB\n",
+                          *figures.server_cpu_ms, *figures.server_memory_mb);
+  }
+  return text;
+}
+
+std::string JsonOf(const LoadFlags& flags, const Figures& figures) {
+  const auto percentiles = [](const Percentiles& p) {
+    return Concat("{\"count\":", p.count, ",\"p50_ms\":", p.p50, ",\"p90_ms\":", p.p90,
+                  ",\"p99_ms\":", p.p99, ",\"max_ms\":", p.max, "}");
+  };
+  const auto number = [](std::optional<double> value) { return value ? Concat(*value) : "null"; };
+  return Concat(
+      "{\"streams\":", flags.streams, ",\"particles\":", flags.particles, ",\"rate\":", flags.rate,
+      ",\"watchers\":", flags.watchers, ",\"ids\":", flags.no_ids ? "false" : "true",
+      ",\"settled\":", figures.settled ? "true" : "false", ",\"seconds\":", figures.seconds,
+      ",\"frames\":", figures.frames, ",\"late\":", figures.late, ",\"refused\":", figures.refused,
+      ",\"answers\":", percentiles(figures.answers), ",\"watches\":", percentiles(figures.watches),
+      ",\"client_cpu_ms\":", figures.client_cpu_ms,
+      ",\"client_memory_mb\":", figures.client_memory_mb,
+      ",\"server_cpu_ms\":", number(figures.server_cpu_ms),
+      ",\"server_memory_mb\":", number(figures.server_memory_mb), "}\n");
+}
+
+}  // namespace
+
+CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
+  CLI::App* verb = app.add_subcommand("load", "Measure what a server bears");
+  AddServerFlags(*verb, flags.server, "Server");
+  verb->add_option("--streams", flags.streams, "Streams at once")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str()
+      ->type_name("N");
+  verb->add_option("--particles", flags.particles, "Particles of each frame")
+      ->check(CLI::Range(1, 10'000'000))
+      ->capture_default_str()
+      ->type_name("N");
+  verb->add_option("--rate", flags.rate,
+                   "Frames a second of each stream; 0: the next one as soon as there is room")
+      ->check(CLI::Range(0.0, 100'000.0))
+      ->capture_default_str()
+      ->type_name("FPS");
+  verb->add_option("--watchers", flags.watchers, "Watchers, spread over the streams")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N");
+  verb->add_flag("--no-ids", flags.no_ids, "Particles have no ids");
+  verb->add_option("--seconds", flags.seconds,
+                   "At most so long; it ends before, once the median and the 99th percentile of "
+                   "two seconds are those of the two before")
+      ->check(CLI::Range(4.0, 1e6))
+      ->capture_default_str()
+      ->type_name("S");
+  verb->add_option("--metrics", flags.metrics,
+                   "The server's --metrics: tells its processor time and memory, too")
+      ->type_name("HOST:PORT");
+  verb->add_flag("--json", flags.json, "Print an object instead of a table");
+  verb->add_flag("--quiet", flags.quiet, "Say nothing while it runs");
+  verb->footer(
+      "An answer's time counts from when its frame was due, so that a server that falls behind\n"
+      "shows it; a watcher's from when the producer had the answer. Exit code 0: nothing failed\n"
+      "or was refused.\n"
+      "Examples:\n"
+      "  partiemc-server --metrics 127.0.0.1:9464 &\n"
+      "  partiemc load --streams 8 --metrics 127.0.0.1:9464\n"
+      "  partiemc load --streams 1 --particles 1000000 --rate 0\n"
+      "  partiemc load --streams 1 --watchers 50 --json");
+  return verb;
+}
+
+int Load(const LoadFlags& flags) {
+  Shared shared{.flags = flags, .frames = MakeFrames(flags.particles)};
+  for (std::size_t k = 0; !flags.no_ids && 2 * k < shared.frames[0].size(); ++k) {
+    shared.ids.push_back(k);
+  }
+  if (!flags.metrics.empty()) {
+    if (const auto server = AskFigures(flags.metrics); !server.ok()) {
+      return ComplainOfServer(server.status());
+    }
+  }
+  CatchInterrupts();
+  std::vector<std::unique_ptr<LoadedStream>> streams;
+  for (int k = 0; k < flags.streams; ++k) {
+    streams.push_back(std::make_unique<LoadedStream>(shared, k));
+    if (auto status = streams.back()->Open(); !status.ok()) return ComplainOfServer(status);
+  }
+  const auto start = Clock::now();
+  for (const auto& stream : streams) stream->Start(start);
+  std::vector<std::thread> watchers;
+  for (int k = 0; k < flags.watchers; ++k) {
+    watchers.emplace_back(
+        [&shared, &stream = *streams[k % streams.size()]] { WatchStream(shared, stream); });
+  }
+  const auto figures = Measure(shared);
+  shared.stop = true;
+  for (const auto& stream : streams) stream->Join();
+  for (std::thread& watcher : watchers) watcher.join();
+  if (!figures.ok()) return ComplainOfServer(figures.status());
+  const std::string text = flags.json ? JsonOf(flags, *figures) : TextOf(flags, *figures);
+  std::fputs(text.c_str(), stdout);
+  if (Interrupted()) return kInterrupted;
+  return figures->refused == 0 ? kGood : kFailed;
+}
+
+}  // namespace partiemc::client
