@@ -1,5 +1,8 @@
 #include "partiemc/reconstructor.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -37,7 +40,47 @@ auto InStage(StageObserver* observer, Stage stage, Run run) {
 void MakeEmpty(Result& result) {
   result.Clear();
   result.attributes.clear();
+  result.sections.clear();
 }
+
+void Prepare(std::size_t attributes, std::size_t sections, Result& result) {
+  result.Clear();
+  result.attributes.resize(attributes);
+  result.sections.resize(sections);
+  for (Result& section : result.sections) section.attributes.resize(attributes);
+}
+
+// `parameters` of a stream, not resolved, as they are for a section.
+ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const Section& section) {
+  parameters.sections.clear();
+  if (section.slice) parameters.slice = section.slice;
+  parameters.isovalue = section.isovalue;
+  return parameters;
+}
+
+// What outlines of a frame reserve, one after the other: what is done stays.
+class OutlineMemory {
+ public:
+  explicit OutlineMemory(MemoryGuard* guard) : guard_(guard) {}
+
+  // RESOURCE_EXHAUSTED if there is no room for an outline of this size beside those that are done.
+  absl::Status Reserve(const FrameSize& size) {
+    last_ = WorkspaceBytes(size);
+    const std::uint64_t bytes = done_ + last_;
+    if (guard_ == nullptr || guard_->Reserve(bytes)) return absl::OkStatus();
+    return ViolationError(
+        absl::StatusCode::kResourceExhausted,
+        {std::string(kReasonOutOfMemory), "positions",
+         absl::StrCat(size.tiles, " tiles of 32 x 32 cells"),
+         absl::StrCat("must not take ", (bytes >> 20) + 1,
+                      " MiB, which there is no room for: reach fewer tiles, or try again later")});
+  }
+  void Done() { done_ += last_; }
+
+ private:
+  MemoryGuard* const guard_;
+  std::uint64_t done_ = 0, last_ = 0;
+};
 
 // What the stages have not told themselves.
 void Summarise(const Workspace::Buffers& b, Result& result) {
@@ -60,18 +103,6 @@ void Untrack(Rings& rings) {
   rings.parent_offsets.assign(1, 0);
 }
 
-// RESOURCE_EXHAUSTED if `guard` has no room for a frame of this size.
-absl::Status Reserve(MemoryGuard* guard, const FrameSize& size) {
-  const std::uint64_t bytes = WorkspaceBytes(size);
-  if (guard == nullptr || guard->Reserve(bytes)) return absl::OkStatus();
-  return ViolationError(
-      absl::StatusCode::kResourceExhausted,
-      {std::string(kReasonOutOfMemory), "positions",
-       absl::StrCat(size.tiles, " tiles of 32 x 32 cells"),
-       absl::StrCat("must not take ", (bytes >> 20) + 1,
-                    " MiB, which there is no room for: reach fewer tiles, or try again later")});
-}
-
 std::uint64_t AttributeValuesOf(const Frame& frame) {
   std::uint64_t values = 0;
   for (const Attribute& attribute : frame.attributes) values += attribute.components;
@@ -89,14 +120,12 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   return size;
 }
 
-// Stage 1, which checks the frame: sets `seen` to what the stages see of it, of a slice its slab.
-// `lengths` stay empty where nothing tells them. Errors: see Reconstruct.
+// Stage 1 of a frame that CheckFrame has passed: sets `seen` to what the stages see of it, of a
+// slice its slab. `lengths` stay empty where nothing tells them. Errors: see Reconstruct.
 absl::Status SortParticles(const ReconstructionParameters& parameters, const FrameLimits& limits,
                            const Frame& frame, const State& state, Workspace::Buffers& b,
                            Frame& seen, std::optional<Lengths>& lengths, Scale& scale,
                            FrameStatistics& statistics) {
-  absl::Status status = CheckFrame(frame, parameters, limits, b.distinct_ids);
-  if (!status.ok()) return status;
   seen = frame;
   statistics.particles = frame.ParticleCount();
   auto decided = DecideLengths(parameters, frame, state, b.spacing);
@@ -117,7 +146,7 @@ absl::Status SortParticles(const ReconstructionParameters& parameters, const Fra
     b.slab.Take(frame, *parameters.slice, parameters.kernel_radius * spacing);
     seen = b.slab.AsFrame();
   }
-  status = BinParticles(seen, parameters.plane, scale, limits, b.bins);
+  absl::Status status = BinParticles(seen, parameters.plane, scale, limits, b.bins);
   if (!status.ok()) return status;
   if (parameters.slice) SetHeights(b.slab.heights(), scale, b.bins);
   return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
@@ -170,6 +199,78 @@ std::span<const std::uint32_t> Outline(const ReconstructionParameters& parameter
   return b.tangled;
 }
 
+// What an outline is made of. `is_first` of a frame: it is checked then.
+struct OutlineTask {
+  const ReconstructionParameters& parameters;
+  const FrameLimits& limits;
+  const Frame& frame;
+  const State& previous;
+  StageObserver* observer;
+  bool is_first;
+};
+
+// One outline of the frame. Errors: see Reconstruct.
+absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
+                                Workspace::Buffers& b, NextState& next, Result& result) {
+  const ReconstructionParameters& parameters = task.parameters;
+  StageObserver* const observer = task.observer;
+  Frame seen;
+  std::optional<Lengths> lengths;
+  Scale scale;
+  next.is_kept = false;
+  absl::Status status = InStage(observer, Stage::kBins, [&] {
+    absl::Status checked = task.is_first
+                               ? CheckFrame(task.frame, parameters, task.limits, b.distinct_ids)
+                               : absl::OkStatus();
+    return checked.ok() ? SortParticles(parameters, task.limits, task.frame, task.previous, b, seen,
+                                        lengths, scale, result.statistics)
+                        : checked;
+  });
+  if (!status.ok() || !lengths) return status;
+  status = memory.Reserve({.particles = seen.ParticleCount(),
+                           .tiles = b.bins.tiles.size(),
+                           .attribute_values = AttributeValuesOf(seen)});
+  if (!status.ok()) return status;
+  FindRings(parameters, scale, observer, b);
+  status = memory.Reserve(SizeOf(parameters, seen, b));
+  if (!status.ok()) return status;
+  // No component is ever tangled (repair.h). Were that wrong, it would cost the frame that
+  // component, not everything.
+  for (;;) {
+    const auto tangled = Outline(parameters, seen, scale, task.previous, observer, b, result);
+    if (tangled.empty()) break;
+    DropComponents(b.bins, tangled, b.crossings, b.ring_scratch, b.topology);
+  }
+  if (!seen.attributes.empty()) {
+    InStage(observer, Stage::kAttributes, [&] {
+      InterpolateAttributes(seen, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
+                            result.attributes);
+    });
+  }
+  Summarise(b, result);
+  if (lengths->is_provisional) {
+    Untrack(result.rings);
+    return absl::OkStatus();
+  }
+  next.is_kept = true;
+  next.state.cell_size = lengths->cell_size;
+  next.state.spacing = lengths->spacing;
+  next.state.area_offset = b.next_area_offset;
+  std::swap(next.state.normals, b.next_normals);
+  std::swap(next.state.history, b.next_history);
+  return absl::OkStatus();
+}
+
+// Has `state` remember what an outline leaves; `next` takes its buffers.
+void Keep(NextState& next, State& state) {
+  if (!next.is_kept) return;
+  state.cell_size = next.state.cell_size;
+  state.spacing = next.state.spacing;
+  state.area_offset = next.state.area_offset;
+  std::swap(state.normals, next.state.normals);
+  std::swap(state.history, next.state.history);
+}
+
 }  // namespace
 
 Workspace::Workspace() : buffers_(std::make_unique<Buffers>()) {}
@@ -177,18 +278,24 @@ Workspace::~Workspace() = default;
 Workspace::Workspace(Workspace&&) noexcept = default;
 Workspace& Workspace::operator=(Workspace&&) noexcept = default;
 
+Reconstructor::Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits)
+    : parameters_(Resolve(parameters)), limits_(limits) {
+  for (const Section& section : parameters.sections) {
+    sections_.push_back(Resolve(ParametersOf(parameters, section)));
+  }
+}
+
 absl::StatusOr<Reconstructor> Reconstructor::Create(const ReconstructionParameters& parameters,
                                                     const FrameLimits& limits) {
   if (absl::Status status = Validate(parameters); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
-  return Reconstructor(Resolve(parameters), limits);
+  return Reconstructor(parameters, limits);
 }
 
 absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Workspace& workspace,
                                         Result& result, const FrameControl& control) const {
   const CancellationScope scope(control.cancelled);
-  result.Clear();
-  result.attributes.resize(frame.attributes.size());
+  Prepare(frame.attributes.size(), sections_.size(), result);
   absl::Status status;
   try {
     status = ReconstructOrThrow(frame, state, workspace.buffers(), result, control);
@@ -209,44 +316,28 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
 absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
                                                Workspace::Buffers& b, Result& result,
                                                const FrameControl& control) const {
-  Frame seen;
-  std::optional<Lengths> lengths;
-  Scale scale;
-  absl::Status status = InStage(control.observer, Stage::kBins, [&] {
-    return SortParticles(parameters_, limits_, frame, state, b, seen, lengths, scale,
-                         result.statistics);
-  });
-  if (!status.ok() || !lengths) return status;
-  status = Reserve(control.memory, {.particles = seen.ParticleCount(),
-                                    .tiles = b.bins.tiles.size(),
-                                    .attribute_values = AttributeValuesOf(seen)});
+  b.next_states.resize(std::max(b.next_states.size(), 1 + sections_.size()));
+  OutlineMemory memory(control.memory);
+  const State unseen;
+  const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
+                               std::size_t outline, Result& into) {
+    absl::Status status =
+        ReconstructOutline({parameters, limits_, frame, previous, control.observer, outline == 0},
+                           memory, b, b.next_states[outline], into);
+    memory.Done();
+    return status;
+  };
+  absl::Status status = reconstruct(parameters_, state, 0, result);
+  for (std::size_t k = 0; status.ok() && k < sections_.size(); ++k) {
+    const State& previous = k < state.sections.size() ? state.sections[k] : unseen;
+    status = reconstruct(sections_[k], previous, k + 1, result.sections[k]);
+  }
   if (!status.ok()) return status;
-  FindRings(parameters_, scale, control.observer, b);
-  status = Reserve(control.memory, SizeOf(parameters_, seen, b));
-  if (!status.ok()) return status;
-  // No component is ever tangled (repair.h). Were that wrong, it would cost the frame that
-  // component, not everything.
-  for (;;) {
-    const auto tangled = Outline(parameters_, seen, scale, state, control.observer, b, result);
-    if (tangled.empty()) break;
-    DropComponents(b.bins, tangled, b.crossings, b.ring_scratch, b.topology);
+  state.sections.resize(sections_.size());
+  Keep(b.next_states[0], state);
+  for (std::size_t k = 0; k < sections_.size(); ++k) {
+    Keep(b.next_states[k + 1], state.sections[k]);
   }
-  if (!seen.attributes.empty()) {
-    InStage(control.observer, Stage::kAttributes, [&] {
-      InterpolateAttributes(seen, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
-                            result.attributes);
-    });
-  }
-  Summarise(b, result);
-  if (lengths->is_provisional) {
-    Untrack(result.rings);
-    return absl::OkStatus();
-  }
-  state.cell_size = lengths->cell_size;
-  state.spacing = lengths->spacing;
-  state.area_offset = b.next_area_offset;
-  std::swap(state.normals, b.next_normals);
-  std::swap(state.history, b.next_history);
   return absl::OkStatus();
 }
 

@@ -16,11 +16,18 @@
 #include "mesh/mesh.h"
 #include "normals/normals.h"
 #include "partiemc/reconstructor.h"
+#include "partiemc/state.h"
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
 
 namespace partiemc {
+
+// What an outline leaves for the next frame, until all outlines of this one are done.
+struct NextState {
+  bool is_kept = false;  // Else the stream remembers what it did.
+  State state;
+};
 
 struct Workspace::Buffers {
   DistinctIdsScratch distinct_ids;
@@ -43,6 +50,7 @@ struct Workspace::Buffers {
   MeshScratch mesh_scratch;
   AttributeScratch attribute_scratch;
   std::vector<std::uint32_t> tangled;  // Outer rings that could not be triangulated.
+  std::vector<NextState> next_states;  // By outline: the stream's own, then its sections.
 };
 
 }  // namespace partiemc

@@ -38,7 +38,8 @@ bool IsInside(const Point& a, const Point& b, const Point& p) {
 
 // Every vertex against every side of every triangle and every segment of every ring.
 std::size_t CountTJunctionsByBruteForce(const Result& result) {
-  const auto& [rings, mesh, attributes, statistics] = result;
+  const Rings& rings = result.rings;
+  const Mesh& mesh = result.mesh;
   std::vector<std::pair<Point, Point>> sides;
   for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
     sides.emplace_back(PointAt(mesh.points, mesh.triangles[k]),

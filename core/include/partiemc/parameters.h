@@ -2,10 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "partiemc/virtual_plane_constants.h"
@@ -68,6 +70,15 @@ struct SlicePlane {
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
+/// One more outline of the same particles, with the same parameters but for what stands here.
+struct Section {
+  /// Absent: that of the parameters. Wants one there: particles fill space or lie in a plane.
+  std::optional<SlicePlane> slice = std::nullopt;
+  std::optional<double> isovalue = std::nullopt;  ///< Absent: the outline of the body.
+
+  friend bool operator==(const Section&, const Section&) = default;
+};
+
 struct ReconstructionParameters {
   Placement placement = Placement::kVirtualPlane;
   Fill fill = Fill::kGreedy;
@@ -120,6 +131,19 @@ struct ReconstructionParameters {
   /// the plane than the kernel reaches do not count. Wants `spacing`, and any placement but
   /// `farthest-particle`; `plane` does not matter (core/METHOD.md, "Slices").
   std::optional<SlicePlane> slice = std::nullopt;
+
+  static constexpr double kMinIsovalue = 0.01, kMaxIsovalue = 10;
+
+  /// The outline is the isoline of the density at this value, in [0.01, 10], in place of the level
+  /// set: the density, sum V_i W, is about 1 inside of bodies and 1/2 on a flat boundary.
+  /// `reference_radius` does not matter then, and vertices stay on the isoline. Any placement but
+  /// `farthest-particle` (core/METHOD.md, "Isolines of the density").
+  std::optional<double> isovalue = std::nullopt;
+
+  /// More outlines of each frame (Result::sections), at most 16. Each costs a frame of its own,
+  /// but for the checks.
+  static constexpr std::size_t kMaxSections = 16;
+  std::vector<Section> sections = {};
 
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -40,8 +41,8 @@ class MemoryGuard {
   virtual ~MemoryGuard() = default;
 
   /// Whether the workspace and the result may grow to `bytes` in all, for one frame. Called by the
-  /// thread that called Reconstruct, twice for each frame, each time before anything of it is
-  /// allocated: with what its tiles need at least, then with all that it needs.
+  /// thread that called Reconstruct, twice for each outline of a frame, each time before anything
+  /// of it is allocated: with what its tiles need at least, then with all that it needs.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 
@@ -66,11 +67,11 @@ class Reconstructor {
   /// same bits for any number of threads.
   /// Errors: INVALID_ARGUMENT (a coordinate that is not finite, a wrong count, an id twice,
   /// particles outside one plane), RESOURCE_EXHAUSTED (more particles or tiles than the limits
-  /// allow, or more memory than `control.memory` does), OUT_OF_RANGE (float32 too coarse for the
-  /// spacing), each with a Violation; CANCELLED, by
-  /// `control.cancelled`. `state` is then as it was and `result` is empty. So they are when memory
-  /// runs out (std::bad_alloc); then, and after CANCELLED, `workspace` is as good as new.
-  /// Cost: linear in particles and tiles; n log n in the points of the rings.
+  /// allow in an outline, or more memory than `control.memory` does), OUT_OF_RANGE (float32 too
+  /// coarse for the spacing), each with a Violation; CANCELLED, by `control.cancelled`. `state` is
+  /// then as it was and `result` is empty. So they are when memory runs out (std::bad_alloc); then,
+  /// and after CANCELLED, `workspace` is as good as new. Cost: linear in particles and tiles; n log
+  /// n in the points of the rings.
   absl::Status Reconstruct(const Frame& frame, State& state, Workspace& workspace, Result& result,
                            const FrameControl& control = {}) const;
 
@@ -78,13 +79,13 @@ class Reconstructor {
   const ReconstructionParameters& parameters() const { return parameters_; }
 
  private:
-  Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits)
-      : parameters_(parameters), limits_(limits) {}
+  Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits);
 
   absl::Status ReconstructOrThrow(const Frame& frame, State& state, Workspace::Buffers& buffers,
                                   Result& result, const FrameControl& control) const;
 
   ReconstructionParameters parameters_;
+  std::vector<ReconstructionParameters> sections_;  // Resolved.
   FrameLimits limits_;
 };
 

@@ -117,7 +117,11 @@ struct Result {
   Mesh mesh;                                ///< Empty for Fill::kNone.
   std::vector<AttributeValues> attributes;  ///< In the order of the frame's.
   FrameStatistics statistics;
+  /// The other outlines of the frame, one for each of ReconstructionParameters::sections: each as
+  /// if it were the only one.
+  std::vector<Result> sections;
 
+  /// Keeps `attributes` and `sections`, each without its contents.
   void Clear();
   friend bool operator==(const Result&, const Result&) = default;
 };
@@ -126,5 +130,15 @@ struct Result {
 /// bits (proto/PROTOCOL.md gives the definition, so that any client can compute them).
 std::uint64_t DigestRings(const Rings& rings);
 std::uint64_t DigestMesh(const Mesh& mesh);
+
+/// Both of one outline, whatever was left out of its result since.
+struct OutlineDigests {
+  std::uint64_t rings = 0, mesh = 0;
+
+  friend bool operator==(const OutlineDigests&, const OutlineDigests&) = default;
+};
+
+/// Of each of a result's sections.
+std::vector<OutlineDigests> DigestSections(const Result& result);
 
 }  // namespace partiemc

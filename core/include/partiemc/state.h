@@ -81,12 +81,14 @@ struct State {
   /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
   std::vector<CellNormal> normals;
   RingHistory history;
+  /// The same of each section (ReconstructionParameters::sections).
+  std::vector<State> sections;
 
   friend bool operator==(const State&, const State&) = default;
 };
 
 /// Bytes with a version and a checksum; the same on every machine. Size: 88 bytes, 16 per normal,
-/// 32 per ring, 16 per run and 20 per sample.
+/// 32 per ring, 16 per run and 20 per sample; with sections 24 bytes, and 8 and the state of each.
 std::string Serialize(const State& state);
 
 /// The number of them, without writing any.

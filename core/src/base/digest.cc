@@ -51,4 +51,12 @@ std::uint64_t DigestMesh(const Mesh& mesh) {
   return digest.value();
 }
 
+std::vector<OutlineDigests> DigestSections(const Result& result) {
+  std::vector<OutlineDigests> digests;
+  for (const Result& section : result.sections) {
+    digests.push_back({DigestRings(section.rings), DigestMesh(section.mesh)});
+  }
+  return digests;
+}
+
 }  // namespace partiemc

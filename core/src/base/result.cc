@@ -23,6 +23,7 @@ void Result::Clear() {
   mesh.Clear();
   for (AttributeValues& attribute : attributes) attribute.values.clear();
   statistics = {};
+  for (Result& section : sections) section.Clear();
 }
 
 }  // namespace partiemc

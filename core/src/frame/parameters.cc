@@ -45,33 +45,80 @@ std::string_view NameOf(const std::array<std::string_view, kCount>& names, Enum 
 
 bool Within(double value, double low, double high) { return value >= low && value <= high; }
 
-absl::Status CheckSlice(const ReconstructionParameters& p) {
+absl::Status Refused(std::string field, std::string value, std::string rule) {
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonOutOfRange), "parameters." + std::move(field),
+                         std::move(value), std::move(rule)});
+}
+
+// `of` is empty or the path of a section.
+absl::Status CheckSlice(const std::string& of, const SlicePlane& slice) {
   constexpr std::string_view kAxes = "xyz";
   for (std::size_t k = 0; k < 3; ++k) {
     for (const auto& [name, value] :
-         {std::pair("origin", p.slice->origin[k]), std::pair("normal", p.slice->normal[k])}) {
+         {std::pair("origin", slice.origin[k]), std::pair("normal", slice.normal[k])}) {
       if (std::abs(value) <= kMaxCoordinate) continue;
-      return OutOfRange(absl::StrCat("slice.", name, "_", std::string(1, kAxes[k])), value,
+      return OutOfRange(absl::StrCat(of, "slice.", name, "_", std::string(1, kAxes[k])), value,
                         "must be finite and at most 1e69 in magnitude");
     }
   }
-  const auto& normal = p.slice->normal;
+  const auto& normal = slice.normal;
   if (std::max({std::abs(normal[0]), std::abs(normal[1]), std::abs(normal[2])}) < kMinNormal) {
-    return OutOfRange("slice.normal", 0, "must have a component of 1e-60 or more in magnitude");
+    return OutOfRange(absl::StrCat(of, "slice.normal"), 0,
+                      "must have a component of 1e-60 or more in magnitude");
   }
-  const auto violation = [](std::string field, std::string value, std::string rule) {
-    return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), "parameters." + std::move(field),
-                           std::move(value), std::move(rule)});
-  };
-  if (!p.spacing) {
-    return violation("spacing", "absent",
-                     "must be given for a slice: particles beside the plane do not tell it");
+  return absl::OkStatus();
+}
+
+absl::Status CheckIsovalue(const std::string& of, double isovalue) {
+  using P = ReconstructionParameters;
+  if (Within(isovalue, P::kMinIsovalue, P::kMaxIsovalue)) return absl::OkStatus();
+  return OutOfRange(absl::StrCat(of, "isovalue"), isovalue,
+                    "must be in [0.01, 10]: the density is about 1 inside of bodies");
+}
+
+// What sections want of the rest is wanted once.
+absl::Status CheckOutlines(const ReconstructionParameters& p) {
+  bool is_isoline = p.isovalue.has_value();
+  if (p.slice) {
+    if (auto status = CheckSlice("", *p.slice); !status.ok()) return status;
   }
-  if (TraitsOf(p.placement).takes_particles) {
-    return violation("placement", std::string(Name(p.placement)),
-                     "must be another one for a slice: its vertices would be particles, which lie "
-                     "beside the plane");
+  if (p.isovalue) {
+    if (auto status = CheckIsovalue("", *p.isovalue); !status.ok()) return status;
+  }
+  if (p.sections.size() > p.kMaxSections) {
+    return Refused("sections", absl::StrCat(p.sections.size()),
+                   absl::StrCat("must be at most ", p.kMaxSections));
+  }
+  for (std::size_t k = 0; k < p.sections.size(); ++k) {
+    const Section& section = p.sections[k];
+    const std::string of = absl::StrCat("sections[", k, "].");
+    if (section.slice && !p.slice) {
+      return Refused(of + "slice", "present",
+                     "must come with parameters.slice: particles fill space or lie in a plane");
+    }
+    if (section.slice) {
+      if (auto status = CheckSlice(of, *section.slice); !status.ok()) return status;
+    }
+    if (section.isovalue) {
+      is_isoline = true;
+      if (auto status = CheckIsovalue(of, *section.isovalue); !status.ok()) return status;
+    }
+  }
+  if (p.slice && !p.spacing) {
+    return Refused("spacing", "absent",
+                   "must be given for a slice: particles beside the plane do not tell it");
+  }
+  if (!TraitsOf(p.placement).takes_particles) return absl::OkStatus();
+  if (p.slice) {
+    return Refused("placement", std::string(Name(p.placement)),
+                   "must be another one for a slice: its vertices would be particles, which lie "
+                   "beside the plane");
+  }
+  if (is_isoline) {
+    return Refused("placement", std::string(Name(p.placement)),
+                   "must be another one for an isovalue: its vertices would be particles, which "
+                   "lie beside the isoline");
   }
   return absl::OkStatus();
 }
@@ -101,7 +148,7 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
     return OutOfRange("min_component_area", p.min_component_area,
                       "must be 0 or more squared spacings, and finite");
   }
-  return p.slice ? CheckSlice(p) : absl::OkStatus();
+  return CheckOutlines(p);
 }
 
 ReconstructionParameters Resolve(ReconstructionParameters parameters) {
@@ -116,7 +163,14 @@ ReconstructionParameters Resolve(ReconstructionParameters parameters) {
   if (parameters.slice) {
     parameters.steps.curvature = parameters.steps.support = parameters.steps.area = false;
   }
-  if (!parameters.clean) parameters.clean = TraitsOf(parameters.placement).cleans;
+  // An isoline is where the density has its value, and nowhere else.
+  if (parameters.isovalue) {
+    VirtualPlaneSteps& steps = parameters.steps;
+    steps.curvature = steps.support = steps.smoothing = steps.area = false;
+  }
+  if (!parameters.clean) {
+    parameters.clean = TraitsOf(parameters.placement).cleans && !parameters.isovalue;
+  }
   return parameters;
 }
 

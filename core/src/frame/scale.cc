@@ -55,6 +55,8 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
   scale.saturation = kSaturation;
   scale.guard_slope =
       scale.kernel_radius / (scale.is_slice ? kBoundarySlopeInSpace : kBoundarySlope);
+  // The two branches of F that the density decides are then the same one, which decides all.
+  if (parameters.isovalue) scale.guard = scale.saturation = *parameters.isovalue;
   const double reference = scale.reference_radius / scale.kernel_radius;
   scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);
   scale.gap_slope = scale.kernel_radius / kSpreadSlope;

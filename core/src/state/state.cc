@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/byte_string.h"
+#include "partiemc/parameters.h"
 #include "partiemc/status.h"
 #include "state/state_parts.h"
 
@@ -18,7 +19,11 @@ namespace {
 
 // Layout, little-endian: magic, version, cell size, spacing (0: none), area offset, time (kAbsent:
 // none), identities given, a count of each of kKinds, then these, checksum.
-constexpr std::uint32_t kMagic = 0x53504d45;  // "EMPS"
+//
+// With sections there are several states: another magic, version, their number, then of each, the
+// stream's own first, the number of its bytes and these; checksum.
+constexpr std::uint32_t kMagic = 0x53504d45;          // "EMPS"
+constexpr std::uint32_t kSectionsMagic = 0x4d504d45;  // "EMPM"
 constexpr std::uint32_t kVersion = 5;
 constexpr std::uint64_t kAbsent = 0x7ff8000000000000;  // Not a number.
 constexpr std::size_t kNormalBytes = 4 + 4 + 4 + 4;
@@ -36,6 +41,7 @@ constexpr std::array<Kind, 4> kKinds = {{{"normals", kNormalBytes},
 using Counts = std::array<std::uint64_t, kKinds.size()>;
 
 constexpr std::size_t kHeaderBytes = 4 + 4 + 5 * 8 + 8 * kKinds.size();
+constexpr std::size_t kSectionsHeaderBytes = 4 + 4 + 8;
 
 bool IsLength(double value) { return value >= 1e-62 && value <= 1e62; }
 
@@ -81,6 +87,14 @@ std::uint64_t BytesOf(const Counts& counts) {
   return bytes;
 }
 
+// Of all bytes before the last ones, which it is. Requires: there are so many.
+absl::Status CheckSum(std::string_view bytes) {
+  const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
+  std::string_view tail = bytes.substr(body.size());
+  if (TakeNumber<std::uint64_t>(tail) == ChecksumOf(body)) return absl::OkStatus();
+  return CorruptState("a wrong checksum", "must be what Serialize wrote");
+}
+
 // Takes the counts of what fills the bytes after them. Each is bounded before it is multiplied.
 absl::StatusOr<Counts> TakeCounts(std::string_view& rest) {
   Counts counts;
@@ -116,15 +130,17 @@ absl::Status CorruptState(std::string value, std::string rule) {
       {std::string(kReasonCorruptState), "state", std::move(value), std::move(rule)});
 }
 
-std::size_t SerializedBytes(const State& state) {
+namespace {
+
+std::size_t OwnBytes(const State& state) {
   return kHeaderBytes + BytesOf(CountsOf(state)) + kChecksumBytes;
 }
 
-std::string Serialize(const State& state) {
-  std::string bytes;
+// Without its sections.
+void PutOwn(const State& state, std::string& bytes) {
+  const std::size_t start = bytes.size();
   const RingHistory& history = state.history;
   const Counts counts = CountsOf(state);
-  bytes.reserve(SerializedBytes(state));
   PutNumber(kMagic, bytes);
   PutNumber(kVersion, bytes);
   PutNumber(state.cell_size.value_or(0), bytes);
@@ -140,17 +156,15 @@ std::string Serialize(const State& state) {
     PutNumber(normal.y, bytes);
   }
   PutHistory(history, bytes);
-  PutNumber(ChecksumOf(bytes), bytes);
-  return bytes;
+  PutNumber(ChecksumOf(std::string_view(bytes).substr(start)), bytes);
 }
 
-absl::StatusOr<State> ParseState(std::string_view bytes) {
+absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   const std::size_t size = bytes.size();
   if (size < kHeaderBytes + kChecksumBytes) {
     return CorruptState(absl::StrCat(size, " bytes"),
                         absl::StrCat("must have at least ", kHeaderBytes + kChecksumBytes));
   }
-  std::string_view tail = bytes.substr(size - kChecksumBytes);
   const std::string_view body = bytes.substr(0, size - kChecksumBytes);
   std::string_view rest = body;
   if (TakeNumber<std::uint32_t>(rest) != kMagic) {
@@ -160,9 +174,7 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
     return CorruptState(absl::StrCat("version ", version),
                         absl::StrCat("must be version ", kVersion));
   }
-  if (TakeNumber<std::uint64_t>(tail) != ChecksumOf(body)) {
-    return CorruptState("a wrong checksum", "must be what Serialize wrote");
-  }
+  if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   State state;
   if (const auto cell_size = TakeNumber<double>(rest); cell_size != 0) state.cell_size = cell_size;
   if (const auto spacing = TakeNumber<double>(rest); spacing != 0) state.spacing = spacing;
@@ -186,6 +198,79 @@ absl::StatusOr<State> ParseState(std::string_view bytes) {
   if (absl::Status status = TakeNormals(rest, state.normals); !status.ok()) return status;
   if (absl::Status status = TakeHistory(rest, state.history); !status.ok()) return status;
   return state;
+}
+
+absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
+  const std::size_t size = bytes.size();
+  if (size < kSectionsHeaderBytes + kChecksumBytes) {
+    return CorruptState(absl::StrCat(size, " bytes"), "must be what Serialize wrote");
+  }
+  const std::string_view body = bytes.substr(0, size - kChecksumBytes);
+  if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
+  std::string_view rest = body.substr(4);
+  if (const auto version = TakeNumber<std::uint32_t>(rest); version != kVersion) {
+    return CorruptState(absl::StrCat("version ", version),
+                        absl::StrCat("must be version ", kVersion));
+  }
+  const auto count = TakeNumber<std::uint64_t>(rest);
+  if (count < 2 || count > 1 + ReconstructionParameters::kMaxSections) {
+    return CorruptState(absl::StrCat(count, " states"),
+                        absl::StrCat("must be 2 to ", 1 + ReconstructionParameters::kMaxSections));
+  }
+  State state;
+  for (std::uint64_t k = 0; k < count; ++k) {
+    if (rest.size() < 8) return CorruptState("states cut off", "must be what Serialize wrote");
+    const auto own = TakeNumber<std::uint64_t>(rest);
+    if (own > rest.size()) return CorruptState("states cut off", "must be what Serialize wrote");
+    auto parsed = ParseOwn(rest.substr(0, own));
+    if (!parsed.ok()) return parsed;
+    rest.remove_prefix(own);
+    if (k == 0) {
+      state = *std::move(parsed);
+    } else {
+      state.sections.push_back(*std::move(parsed));
+    }
+  }
+  if (!rest.empty()) {
+    return CorruptState(absl::StrCat(rest.size(), " bytes too many"),
+                        "must be what Serialize wrote");
+  }
+  return state;
+}
+
+}  // namespace
+
+std::size_t SerializedBytes(const State& state) {
+  if (state.sections.empty()) return OwnBytes(state);
+  std::size_t bytes = kSectionsHeaderBytes + 8 + OwnBytes(state) + kChecksumBytes;
+  for (const State& section : state.sections) bytes += 8 + OwnBytes(section);
+  return bytes;
+}
+
+std::string Serialize(const State& state) {
+  std::string bytes;
+  bytes.reserve(SerializedBytes(state));
+  if (state.sections.empty()) {
+    PutOwn(state, bytes);
+    return bytes;
+  }
+  PutNumber(kSectionsMagic, bytes);
+  PutNumber(kVersion, bytes);
+  PutNumber(std::uint64_t{state.sections.size() + 1}, bytes);
+  const auto put = [&](const State& own) {
+    PutNumber(std::uint64_t{OwnBytes(own)}, bytes);
+    PutOwn(own, bytes);
+  };
+  put(state);
+  for (const State& section : state.sections) put(section);
+  PutNumber(ChecksumOf(bytes), bytes);
+  return bytes;
+}
+
+absl::StatusOr<State> ParseState(std::string_view bytes) {
+  std::string_view rest = bytes;
+  const bool has_sections = rest.size() >= 4 && TakeNumber<std::uint32_t>(rest) == kSectionsMagic;
+  return has_sections ? ParseWithSections(bytes) : ParseOwn(bytes);
 }
 
 }  // namespace partiemc
