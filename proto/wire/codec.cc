@@ -90,6 +90,22 @@ std::optional<Plane> FromWire(v1::Plane plane) {
   }
 }
 
+SlicePlane FromWire(const v1::SlicePlane& slice) {
+  return {.origin = {slice.origin_x(), slice.origin_y(), slice.origin_z()},
+          .normal = {slice.normal_x(), slice.normal_y(), slice.normal_z()}};
+}
+
+v1::SlicePlane ToWire(const SlicePlane& plane) {
+  v1::SlicePlane slice;
+  slice.set_origin_x(plane.origin[0]);
+  slice.set_origin_y(plane.origin[1]);
+  slice.set_origin_z(plane.origin[2]);
+  slice.set_normal_x(plane.normal[0]);
+  slice.set_normal_y(plane.normal[1]);
+  slice.set_normal_z(plane.normal[2]);
+  return slice;
+}
+
 v1::SpacingRule ToWire(SpacingRule rule) {
   return rule == SpacingRule::kFirstFrame ? v1::SPACING_RULE_FIRST_FRAME
                                           : v1::SPACING_RULE_EVERY_FRAME;
@@ -279,10 +295,12 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (message.has_min_component_particles()) {
     parameters.min_component_particles = message.min_component_particles();
   }
-  if (message.has_slice()) {
-    const v1::SlicePlane& slice = message.slice();
-    parameters.slice = {.origin = {slice.origin_x(), slice.origin_y(), slice.origin_z()},
-                        .normal = {slice.normal_x(), slice.normal_y(), slice.normal_z()}};
+  if (message.has_slice()) parameters.slice = FromWire(message.slice());
+  if (message.has_isovalue()) parameters.isovalue = message.isovalue();
+  for (const v1::Section& from : message.sections()) {
+    Section& section = parameters.sections.emplace_back();
+    if (from.has_slice()) section.slice = FromWire(from.slice());
+    if (from.has_isovalue()) section.isovalue = from.isovalue();
   }
   return parameters;
 }
@@ -303,15 +321,13 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   message.set_plane(ToWire(parameters.plane));
   message.set_min_component_area(parameters.min_component_area);
   message.set_min_component_particles(parameters.min_component_particles);
-  if (!parameters.slice) return;
-  v1::SlicePlane& slice = *message.mutable_slice();
-  const auto& [origin, normal] = *parameters.slice;
-  slice.set_origin_x(origin[0]);
-  slice.set_origin_y(origin[1]);
-  slice.set_origin_z(origin[2]);
-  slice.set_normal_x(normal[0]);
-  slice.set_normal_y(normal[1]);
-  slice.set_normal_z(normal[2]);
+  if (parameters.slice) *message.mutable_slice() = ToWire(*parameters.slice);
+  if (parameters.isovalue) message.set_isovalue(*parameters.isovalue);
+  for (const Section& from : parameters.sections) {
+    v1::Section& section = *message.add_sections();
+    if (from.slice) *section.mutable_slice() = ToWire(*from.slice);
+    if (from.isovalue) section.set_isovalue(*from.isovalue);
+  }
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

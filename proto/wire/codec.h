@@ -51,6 +51,7 @@ struct ReconstructedFrame {
   FrameTimes times;
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
+  std::vector<OutlineDigests> section_digests = {};  ///< Of result.sections.
 };
 
 v1::Placement ToWire(Placement placement);
@@ -90,7 +91,8 @@ void EncodeFrame(const Frame& frame, v1::ParticleFrame& message);
 /// Writes everything but sequence, time and checkpoint, reusing the buffers of `message`. Digests
 /// are those of the whole result, whatever `outputs` leaves out.
 /// Errors: OUT_OF_RANGE with a Violation (reason RESOLUTION) when relative float32 coordinates
-/// would move a vertex by more than 1e-4 spacings; rings and mesh of `message` are then absent.
+/// would move a vertex by more than 1e-4 spacings; rings, mesh and sections of `message` are then
+/// absent.
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message);
 

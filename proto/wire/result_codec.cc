@@ -147,8 +147,7 @@ v1::Doubt ToWire(Doubt doubt) {
   return v1::DOUBT_UNSPECIFIED;
 }
 
-void EncodeStatistics(const FrameStatistics& statistics, const FrameTimes& times,
-                      v1::FrameStatistics& message) {
+void EncodeStatistics(const FrameStatistics& statistics, v1::FrameStatistics& message) {
   message.set_particles(statistics.particles);
   message.set_tiles(statistics.tiles);
   message.set_active_cells(statistics.active_cells);
@@ -167,6 +166,9 @@ void EncodeStatistics(const FrameStatistics& statistics, const FrameTimes& times
   for (const Doubt doubt : kAllDoubts) {
     if (statistics.doubts.Has(doubt)) message.add_doubts(ToWire(doubt));
   }
+}
+
+void EncodeTimes(const FrameTimes& times, v1::FrameStatistics& message) {
   message.clear_stages();
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     v1::StageTime& time = *message.add_stages();
@@ -341,8 +343,7 @@ void DecodeAttributes(const NamedAttributes& messages, std::vector<AttributeValu
   }
 }
 
-void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& statistics,
-                      FrameTimes& times) {
+void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& statistics) {
   statistics = {.particles = message.particles(),
                 .tiles = message.tiles(),
                 .active_cells = message.active_cells(),
@@ -363,6 +364,9 @@ void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& stati
       statistics.doubts.Add(doubt);
     }
   }
+}
+
+void DecodeTimes(const v1::FrameStatistics& message, FrameTimes& times) {
   times = {};
   times.total_ms = message.milliseconds();
   for (const v1::StageTime& time : message.stages()) {
@@ -392,11 +396,10 @@ absl::Status DecodeGeometry(const v1::ReconstructedFrame& message, Result& resul
   return absl::OkStatus();
 }
 
-}  // namespace
-
-absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
-                          v1::ReconstructedFrame& message) {
-  EncodeStatistics(result.statistics, times, *message.mutable_statistics());
+// All of an outline but times and sections.
+absl::Status EncodeOutline(const Result& result, const Outputs& outputs,
+                           v1::ReconstructedFrame& message) {
+  EncodeStatistics(result.statistics, *message.mutable_statistics());
   message.set_rings_digest(DigestRings(result.rings));
   message.set_mesh_digest(DigestMesh(result.mesh));
   const Point origin = outputs.relative_float32 ? MiddleOf(result) : Point{};
@@ -410,9 +413,32 @@ absl::Status EncodeResult(const Result& result, const FrameTimes& times, const O
   absl::Status status;
   if (outputs.rings) status = EncodeRings(result, outputs.normals, message);
   if (status.ok() && outputs.mesh) status = EncodeMesh(result, message);
+  return status;
+}
+
+absl::Status DecodeOutline(const v1::ReconstructedFrame& message, Result& result) {
+  DecodeStatistics(message.statistics(), result.statistics);
+  return DecodeGeometry(message, result);
+}
+
+}  // namespace
+
+absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
+                          v1::ReconstructedFrame& message) {
+  EncodeTimes(times, *message.mutable_statistics());
+  absl::Status status = EncodeOutline(result, outputs, message);
+  const int sections = static_cast<int>(result.sections.size());
+  // Those that are there keep their buffers.
+  while (message.sections_size() > sections) message.mutable_sections()->RemoveLast();
+  while (message.sections_size() < sections) message.add_sections();
+  for (int k = 0; status.ok() && k < sections; ++k) {
+    status = EncodeOutline(result.sections[static_cast<std::size_t>(k)], outputs,
+                           *message.mutable_sections(k));
+  }
   if (!status.ok()) {
     message.clear_rings();
     message.clear_mesh();
+    message.clear_sections();
   }
   return status;
 }
@@ -420,13 +446,22 @@ absl::Status EncodeResult(const Result& result, const FrameTimes& times, const O
 absl::Status DecodeResult(const v1::ReconstructedFrame& message, ReconstructedFrame& frame) {
   frame.sequence = message.sequence();
   frame.time = message.time();
+  DecodeTimes(message.statistics(), frame.times);
   frame.rings_digest = message.rings_digest();
   frame.mesh_digest = message.mesh_digest();
-  DecodeStatistics(message.statistics(), frame.result.statistics, frame.times);
-  absl::Status status = DecodeGeometry(message, frame.result);
+  absl::Status status = DecodeOutline(message, frame.result);
+  frame.result.sections.resize(static_cast<std::size_t>(message.sections_size()));
+  frame.section_digests.clear();
+  for (int k = 0; status.ok() && k < message.sections_size(); ++k) {
+    const v1::ReconstructedFrame& section = message.sections(k);
+    status = DecodeOutline(section, frame.result.sections[static_cast<std::size_t>(k)]);
+    frame.section_digests.push_back({section.rings_digest(), section.mesh_digest()});
+  }
   if (!status.ok()) {
     frame.result.Clear();
     frame.result.attributes.clear();
+    frame.result.sections.clear();
+    frame.section_digests.clear();
   }
   return status;
 }

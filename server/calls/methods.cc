@@ -226,6 +226,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   if (limits_.max_parts > 0) response.add_capabilities("parts");
   response.add_capabilities("resume");
   response.add_capabilities("slices");
+  response.add_capabilities("sections");
   response.add_capabilities("watch");
   if (limits_.history_bytes > 0) response.add_capabilities("history");
   response.set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));

@@ -33,7 +33,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Names each part, so that a new one does not compile until it is bound, too.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
                surface_offset, normal_memory, clean, steps, constants, min_component_area,
-               min_component_particles, plane, slice] = parameters;
+               min_component_particles, plane, slice, isovalue, sections] = parameters;
   const auto& [edge_vertices, normals, curvature, support, smoothing, area] = steps;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
@@ -58,9 +58,17 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   PutNumber(min_component_area, bytes);
   PutNumber(min_component_particles, bytes);
   put_small(plane);
-  if (slice) {
-    for (const double value : slice->origin) PutNumber(value, bytes);
-    for (const double value : slice->normal) PutNumber(value, bytes);
+  const auto put_slice = [&](const SlicePlane& plane_of) {
+    for (const double value : plane_of.origin) PutNumber(value, bytes);
+    for (const double value : plane_of.normal) PutNumber(value, bytes);
+  };
+  if (slice) put_slice(*slice);
+  // Nothing where there are none: checkpoints of before there were any stay good.
+  if (isovalue) PutNumber(*isovalue, bytes);
+  for (const Section& section : sections) {
+    put_small(section.slice.has_value());
+    if (section.slice) put_slice(*section.slice);
+    put_optional(section.isovalue);
   }
   return ChecksumOf(bytes);
 }

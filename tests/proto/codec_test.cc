@@ -70,6 +70,9 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.min_component_area = 2.5;
   parameters.min_component_particles = 3'000'000'000'000;
   parameters.slice = {.origin = {1, 2, 3}, .normal = {4, 5, 6}};
+  parameters.isovalue = 0.25;
+  parameters.sections = {
+      {.isovalue = 0.75}, {.slice = SlicePlane{.origin = {7, 8, 9}, .normal = {1, 2, 3}}}, {}};
   v1::ReconstructionParameters message;
   EncodeParameters(parameters, message);
   const auto decoded = DecodeParameters(message);

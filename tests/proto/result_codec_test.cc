@@ -105,6 +105,42 @@ TEST(ResultMessage, EverythingComesBackAsItWas) {
   EXPECT_EQ(frame.mesh_digest, DigestMesh(result.mesh));
 }
 
+TEST(ResultMessage, SectionsComeBackAsTheyWere) {
+  Result result = SquareWithHole();
+  Result small = SquareWithHole();
+  small.rings.points[0] -= 1;
+  small.mesh.points[0] -= 1;
+  result.sections = {small, SquareWithHole()};
+  ReconstructedFrame frame;
+  v1::ReconstructedFrame message = Encoded(result, kAll);
+  ASSERT_TRUE(DecodeResult(message, frame).ok());
+  EXPECT_EQ(frame.result, result);
+  EXPECT_EQ(frame.section_digests, DigestSections(result));
+  EXPECT_NE(frame.section_digests[0], frame.section_digests[1]);
+  // The same messages again, for fewer.
+  result.sections.pop_back();
+  ASSERT_TRUE(EncodeResult(result, SomeTimes(), kAll, message).ok());
+  EXPECT_EQ(message.SerializeAsString(), Encoded(result, kAll).SerializeAsString());
+  ASSERT_TRUE(DecodeResult(message, frame).ok());
+  EXPECT_EQ(frame.result, result);
+  // What is wrong with one is wrong with the frame.
+  message.mutable_sections(0)->mutable_rings()->mutable_offsets()->pop_back();
+  EXPECT_EQ(DecodeResult(message, frame).code(), absl::StatusCode::kDataLoss);
+  EXPECT_TRUE(frame.result.sections.empty());
+  EXPECT_EQ(frame.result.rings.RingCount(), 0u);
+}
+
+TEST(ResultMessage, ASectionTooWideForRelativeCoordinatesRefusesTheFrame) {
+  Result result = SquareWithHole();
+  result.sections = {SquareWithHole()};
+  result.sections[0].rings.points[0] = -1e6 - 0.3;
+  v1::ReconstructedFrame message = Encoded(SquareWithHole(), kAll);
+  EXPECT_EQ(EncodeResult(result, {}, {.relative_float32 = true}, message).code(),
+            absl::StatusCode::kOutOfRange);
+  EXPECT_FALSE(message.has_rings() || message.has_mesh());
+  EXPECT_EQ(message.sections_size(), 0);
+}
+
 TEST(ResultMessage, AnEmptyResultComesBackEmpty) {
   Result empty;
   empty.Clear();

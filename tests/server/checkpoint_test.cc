@@ -147,7 +147,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(10, BlobParameters());
+  std::vector<ReconstructionParameters> others(12, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -158,6 +158,8 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[7].clean = false;
   others[8].min_component_particles = 1;
   others[9].slice = SlicePlane{};
+  others[10].isovalue = 0.5;
+  others[11].sections = {{.isovalue = 0.5}};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);

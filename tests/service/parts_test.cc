@@ -85,7 +85,7 @@ TEST_F(Parts, ALostPartIsOneErrorAndTheStreamGoesOn) {
 }
 
 TEST_F(Parts, ADoubledPartALateOneAndOneOfAnotherFrameAreRefusedAndTheStreamGoesOn) {
-  Ranks ranks(*server_, "tank", 2, 200);
+  Ranks ranks(*server_, "tank", 2, 1000);
   ranks.Send(1, 1);
   ranks.Send(1, 1);
   ranks.Send(1, 100);
@@ -116,7 +116,7 @@ TEST_F(Parts, NumbersOfPartZeroThatAreWrongAreRefusedAtOnce) {
 }
 
 TEST_F(Parts, ARankThatDiesCostsOneErrorAFrameUntilItComesBack) {
-  Ranks ranks(*server_, "tank", 3, 200);
+  Ranks ranks(*server_, "tank", 3, 1000);
   ranks.SendAll(1);
   ranks.ExpectAnswered(1, expected_[0]);
   ranks[2].Cancel();

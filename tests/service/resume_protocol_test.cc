@@ -127,6 +127,45 @@ TEST_P(ResumeProtocol, AResumedStreamGivesTheDigestsOfAnUndisturbedOne) {
   }
 }
 
+TEST_P(ResumeProtocol, SectionsGoOnToo) {
+  const auto with_sections = [](v1::ReconstructRequest open) {
+    v1::ReconstructionParameters& parameters = *open.mutable_open()->mutable_parameters();
+    for (const double isovalue : {0.3, 0.7}) parameters.add_sections()->set_isovalue(isovalue);
+    return open;
+  };
+  const auto sections_of = [](const v1::ReconstructResponse& answer) {
+    std::vector<std::pair<Digests, std::string>> sections;
+    for (const v1::ReconstructedFrame& section : answer.frame().sections()) {
+      EXPECT_GT(section.statistics().area(), 0);
+      EXPECT_EQ(section.statistics().stages_size(), 0) << "times are the frame's";
+      sections.emplace_back(Digests{section.rings_digest(), section.mesh_digest()},
+                            section.rings().identities());
+    }
+    EXPECT_EQ(sections.size(), 2u);
+    return sections;
+  };
+  StreamClient undisturbed(channel_);
+  v1::ReconstructRequest other = with_sections(OpenWithCheckpoints(1));
+  other.mutable_open()->set_stream_name("undisturbed");
+  const auto own = undisturbed.SendAndReceive(other);
+  ASSERT_TRUE(own.has_opened());
+  EXPECT_EQ(own.opened().parameters().sections_size(), 2);
+  std::string token, checkpoint;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    const auto expected = undisturbed.SendAndReceive(BlobRequest(k + 1, kSeed, k));
+    StreamClient client(channel_);
+    const auto opened = client.SendAndReceive(
+        with_sections(k == 0 ? OpenWithCheckpoints(1) : Resume(checkpoint, token)));
+    ASSERT_TRUE(opened.has_opened());
+    token = opened.opened().stream_token();
+    const auto answer = client.SendAndReceive(BlobRequest(k + 1, kSeed, k));
+    ASSERT_TRUE(answer.has_frame());
+    EXPECT_EQ(sections_of(answer), sections_of(expected));
+    checkpoint = answer.checkpoint();
+  }
+  ExpectMismatch(Resume(checkpoint, token), "other parameters");
+}
+
 TEST_P(ResumeProtocol, WhoHasTheTokenTakesOverAtOnceAndTheOldCallEnds) {
   StreamClient old_call(channel_);
   const auto opened = old_call.SendAndReceive(OpenWithCheckpoints(1));
