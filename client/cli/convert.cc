@@ -65,6 +65,8 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       ->type_name("S");
   verb->add_option("--title", flags.title, "A few words on what this is, kept in the recording")
       ->type_name("TEXT");
+  verb->add_flag("--in-space", flags.sequence.in_space,
+                 "Keep all three coordinates, of particles that fill space, for --slice of replay");
   verb->add_flag("--float64", flags.float64, "Positions as float64 instead of float32");
   verb->add_option("--compression-level", flags.compression_level, "1 (fast) to 19 (small)")
       ->check(CLI::Range(1, 19))
@@ -74,6 +76,7 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       "Examples:\n"
       "  partiemc convert frames/ dam_break.pemc --spacing 0.0303\n"
       "  partiemc convert drum.lammpstrj.gz drum.pemc --select type=1 --frames 0:100\n"
+      "  partiemc convert 'tank_*.vtu' tank.pemc --in-space --spacing 0.02\n"
       "A recording holds time, position, id, volume, velocity and --attributes of the particles, "
       "compressed;\n"
       "if it is cut off, only its last frames are lost.");

@@ -25,7 +25,7 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
                      " is a recording, which has no columns and knows its times; leave it out, or "
                      "give it to `partiemc convert` with the original"));
   }
-  auto reader = RecordingReader::Open(input, options.frames);
+  auto reader = RecordingReader::Open(input, options.frames, options.in_space);
   if (!reader.ok()) return reader.status();
   const auto spacing = (*reader)->header().spacing;
   return InputSource{.frames = *std::move(reader), .spacing = spacing};

@@ -77,10 +77,10 @@ bool IsRecording(const std::string& path);
 /// delivered as they are; velocities of a frame, only where all of them are finite.
 class RecordingReader final : public Sequence {
  public:
-  /// `frames` as in SequenceOptions.
-  /// Errors: those of Sequence.
+  /// `frames` and `in_space` as in SequenceOptions. Errors: those of Sequence.
   static absl::StatusOr<std::unique_ptr<RecordingReader>> Open(const std::string& path,
-                                                               const std::string& frames);
+                                                               const std::string& frames,
+                                                               bool in_space = false);
   ~RecordingReader() override;
 
   const RecordingHeader& header() const;

@@ -27,11 +27,16 @@ absl::Status CheckBytes(const char* field, std::size_t size, std::size_t expecte
 
 absl::Status CopyPositions(const v1::ParticleFrame& message, RecordedFrame& frame) {
   const std::string& bytes = message.positions();
-  frame.float32 = message.position_format() == v1::POSITION_FORMAT_FLOAT32_2;
-  if (!frame.float32 && message.position_format() != v1::POSITION_FORMAT_FLOAT64_2) {
+  const v1::PositionFormat format = message.position_format();
+  frame.float32 =
+      format == v1::POSITION_FORMAT_FLOAT32_2 || format == v1::POSITION_FORMAT_FLOAT32_3;
+  frame.components =
+      format == v1::POSITION_FORMAT_FLOAT32_3 || format == v1::POSITION_FORMAT_FLOAT64_3 ? 3 : 2;
+  if (!frame.float32 && frame.components == 2 && format != v1::POSITION_FORMAT_FLOAT64_2) {
     return absl::DataLossError("positions have an unknown format");
   }
-  const std::size_t particle_bytes = 2 * (frame.float32 ? sizeof(float) : sizeof(double));
+  const std::size_t particle_bytes =
+      static_cast<std::size_t>(frame.components) * (frame.float32 ? sizeof(float) : sizeof(double));
   if (bytes.size() % particle_bytes != 0) {
     return absl::DataLossError(
         absl::StrCat("positions have ", bytes.size(), " bytes, no multiple of ", particle_bytes));
@@ -69,7 +74,10 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   const std::size_t count = frame.ParticleCount();
   if (status.ok()) status = CheckBytes("ids", message.ids().size(), 8 * count);
   if (status.ok()) status = CheckBytes("volumes", message.volumes().size(), 4 * count);
-  if (status.ok()) status = CheckBytes("velocities", message.velocities().size(), 8 * count);
+  if (status.ok()) {
+    status = CheckBytes("velocities", message.velocities().size(),
+                        sizeof(float) * static_cast<std::size_t>(frame.components) * count);
+  }
   if (!status.ok()) return status;
   if (absl::Status copied = CopyAttributes(message, frame); !copied.ok()) return copied;
   frame.time = message.time();
@@ -116,8 +124,8 @@ std::optional<std::size_t> CountAtTail(const std::string& path) {
 
 class RecordingReader::Impl {
  public:
-  Impl(std::string path, BlockReader blocks, input::FrameRange range)
-      : path_(std::move(path)), blocks_(std::move(blocks)), range_(range) {}
+  Impl(std::string path, BlockReader blocks, input::FrameRange range, bool in_space)
+      : path_(std::move(path)), blocks_(std::move(blocks)), range_(range), in_space_(in_space) {}
 
   absl::Status ReadHeader() {
     const auto piece = blocks_.Next(block_);
@@ -148,9 +156,9 @@ class RecordingReader::Impl {
         if (!range_.Contains(index)) continue;
         frame.index = index;
         frame.source = absl::StrCat(path_, ": frame ", index);
-        failure_ = Decode(message_, frame);
+        const absl::Status decoded = Decode(message_, frame);
+        failure_ = decoded.ok() ? CheckSpace(frame) : Located(decoded);
         if (failure_.ok()) return true;
-        failure_ = Located(failure_);
       }
     }
     if (!failure_.ok()) return failure_;
@@ -167,6 +175,15 @@ class RecordingReader::Impl {
   const std::vector<std::string>& notices() const { return notices_; }
 
  private:
+  absl::Status CheckSpace(const RecordedFrame& frame) const {
+    if (in_space_ == (frame.components == 3)) return absl::OkStatus();
+    return absl::FailedPreconditionError(
+        absl::StrCat(path_, ": frame ", frame.index, " has ",
+                     in_space_ ? "two coordinates; leave --slice or --in-space out"
+                               : "three coordinates; replay it with --slice, or convert it with "
+                                 "--in-space"));
+  }
+
   // The next message into `message_`; false at the end, which is told where it comes too early.
   absl::StatusOr<bool> Take() {
     if (block_.empty()) {
@@ -203,6 +220,7 @@ class RecordingReader::Impl {
   const std::string path_;
   BlockReader blocks_;
   const input::FrameRange range_;
+  const bool in_space_;
   RecordingHeader header_;
   std::string_view block_;  // What is left of the block that was read last.
   v1::ParticleFrame message_;
@@ -221,7 +239,8 @@ bool IsRecording(const std::string& path) {
 }
 
 absl::StatusOr<std::unique_ptr<RecordingReader>> RecordingReader::Open(const std::string& path,
-                                                                       const std::string& frames) {
+                                                                       const std::string& frames,
+                                                                       bool in_space) {
   absl::StatusOr<input::FrameRange> range = input::FrameRange{};
   if (!frames.empty()) range = input::ParseFrameRange(frames);
   if (!range.ok()) return range.status();
@@ -230,7 +249,7 @@ absl::StatusOr<std::unique_ptr<RecordingReader>> RecordingReader::Open(const std
     return absl::Status(blocks.status().code(),
                         absl::StrCat(path, ": ", blocks.status().message()));
   }
-  auto impl = std::make_unique<Impl>(path, *std::move(blocks), *range);
+  auto impl = std::make_unique<Impl>(path, *std::move(blocks), *range, in_space);
   const absl::Status header = impl->ReadHeader();
   if (!header.ok()) return header;
   return std::unique_ptr<RecordingReader>(new RecordingReader(std::move(impl)));

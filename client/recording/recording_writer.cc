@@ -32,18 +32,25 @@ void AppendDelimited(const google::protobuf::MessageLite& message, std::string& 
   google::protobuf::util::SerializeDelimitedToZeroCopyStream(message, &stream);
 }
 
-// The spacing of particles that fill their box evenly; 0 where there is no box.
-double SuggestedSpacing(const std::vector<double>& positions) {
-  double min[2] = {INFINITY, INFINITY}, max[2] = {-INFINITY, -INFINITY};
-  for (std::size_t k = 0; k < positions.size(); ++k) {
-    if (!std::isfinite(positions[k])) continue;
-    min[k % 2] = std::min(min[k % 2], positions[k]);
-    max[k % 2] = std::max(max[k % 2], positions[k]);
+// The spacing of particles that fill their box evenly, or, where that is wider, a line along it; 0
+// where there is no box.
+double SuggestedSpacing(const RecordedFrame& frame) {
+  const auto axes = static_cast<std::size_t>(frame.components);
+  const double count = static_cast<double>(frame.ParticleCount());
+  double content = 1, longest = 0;
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    double min = INFINITY, max = -INFINITY;
+    for (std::size_t k = axis; k < frame.positions.size(); k += axes) {
+      if (!std::isfinite(frame.positions[k])) continue;
+      min = std::min(min, frame.positions[k]);
+      max = std::max(max, frame.positions[k]);
+    }
+    if (!(max >= min)) return 0;
+    content *= max - min;
+    longest = std::max(longest, max - min);
   }
-  const double width = max[0] - min[0], height = max[1] - min[1];
-  const double count = static_cast<double>(positions.size()) / 2;
-  if (!(width >= 0 && height >= 0)) return 0;
-  return std::max(std::sqrt(width * height / count), std::max(width, height) / count);
+  const double each = content / count;
+  return std::max(axes == 2 ? std::sqrt(each) : std::cbrt(each), longest / count);
 }
 
 }  // namespace
@@ -103,8 +110,10 @@ class RecordingWriter::Impl {
 
  private:
   absl::Status SetPositions(const RecordedFrame& frame) {
+    const bool in_space = frame.components == 3;
     if (float64_) {
-      message_.set_position_format(v1::POSITION_FORMAT_FLOAT64_2);
+      message_.set_position_format(in_space ? v1::POSITION_FORMAT_FLOAT64_3
+                                            : v1::POSITION_FORMAT_FLOAT64_2);
       wire::AssignBytes(std::span<const double>(frame.positions), *message_.mutable_positions());
       return absl::OkStatus();
     }
@@ -116,7 +125,7 @@ class RecordingWriter::Impl {
       if (std::isfinite(frame.positions[k])) worst = std::max(worst, lost);
     }
     if (worst > 0) {
-      const double spacing = spacing_.value_or(SuggestedSpacing(frame.positions));
+      const double spacing = spacing_.value_or(SuggestedSpacing(frame));
       if (worst > kPrecisionSpacings * spacing) {
         return ViolationError(
             absl::StatusCode::kInvalidArgument,
@@ -127,7 +136,8 @@ class RecordingWriter::Impl {
                                   " are lost: write them with --float64")});
       }
     }
-    message_.set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
+    message_.set_position_format(in_space ? v1::POSITION_FORMAT_FLOAT32_3
+                                          : v1::POSITION_FORMAT_FLOAT32_2);
     wire::AssignBytes(std::span<const float>(positions_), *message_.mutable_positions());
     return absl::OkStatus();
   }

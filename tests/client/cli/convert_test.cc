@@ -2,7 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "client/cli/program.h"
 #include "client/recording/recording.h"
@@ -45,6 +49,64 @@ TEST(Convert, KeepsTheFramesAndTheParticlesThatWereAskedFor) {
   ASSERT_TRUE(*(*reader)->Next(frame));
   EXPECT_THAT(frame.positions, ElementsAre(0, 1, 0.123456789f, 1));
   EXPECT_THAT(frame.ids, ElementsAre(1, 2));
+}
+
+// A ball of five spacings' radius.
+void WriteBall(const std::string& path) {
+  std::ofstream file(path);
+  file << "x,y,z,vx,vy,vz\n";
+  for (int x = -5; x <= 5; ++x) {
+    for (int y = -5; y <= 5; ++y) {
+      for (int z = -5; z <= 5; ++z) {
+        if (x * x + y * y + z * z < 25) file << x << "," << y << "," << z << ",1,2,3\n";
+      }
+    }
+  }
+}
+
+TEST(Convert, KeepsParticlesInSpaceForSlices) {
+  const support::TemporaryFolder directory;
+  std::filesystem::create_directory(directory.Path("ball"));
+  WriteBall(directory.Path("ball/frame_0.csv"));
+  WriteBall(directory.Path("ball/frame_1.csv"));
+  std::ofstream(directory.Path("ball/times.csv")) << "0\n0.5\n";
+  const std::string recording = directory.Path("ball.pemc");
+  ASSERT_EQ(RunPartiemc({"convert", directory.Path("ball"), recording, "--in-space", "--float64",
+                         "--spacing", "1"})
+                .exit_code,
+            0);
+  const auto stats = [&](const std::string& input, const std::string& file) {
+    std::vector<std::string> flags = {"replay",  input,     "--local", "--slice",
+                                      "z=.5",    "--slice", "x=1",     "--isolines",
+                                      "0.4,0.6", "--check", "--stats", directory.Path(file)};
+    if (input != recording) flags.insert(flags.end(), {"--spacing", "1"});
+    const Ran ran = RunPartiemc(flags);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    return Content(directory.Path(file));
+  };
+  // Without the columns of milliseconds.
+  const auto digests = [](const std::string& csv) {
+    std::vector<std::string> rows;
+    std::istringstream lines(csv);
+    for (std::string line; std::getline(lines, line);) {
+      std::size_t cut = line.size();
+      for (int commas = 0; commas < 5 && cut != std::string::npos; ++commas) {
+        cut = line.rfind(',', cut - 1);
+      }
+      rows.push_back(line.substr(cut));
+    }
+    return rows;
+  };
+  const auto of_recording = digests(stats(recording, "recording.csv"));
+  EXPECT_EQ(of_recording.size(), 1u + 2 * 6) << "two slices, each with two isolines";
+  EXPECT_EQ(of_recording, digests(stats(directory.Path("ball"), "files.csv")));
+
+  const Ran flat = RunPartiemc({"replay", recording, "--local"});
+  EXPECT_EQ(flat.exit_code, 3);
+  EXPECT_THAT(flat.error, HasSubstr("has three coordinates; replay it with --slice"));
+  const Ran sliced = RunPartiemc({"replay", kDamBreak, "--local", "--slice", "z=0"});
+  EXPECT_EQ(sliced.exit_code, 3);
+  EXPECT_THAT(sliced.error, HasSubstr("has two coordinates; leave --slice"));
 }
 
 TEST(Convert, ARecordingOfARecordingIsTheSame) {

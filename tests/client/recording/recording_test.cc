@@ -117,6 +117,27 @@ void WriteBytes(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
+TEST_F(Recording, KeepsThreeCoordinates) {
+  for (const bool float64 : {false, true}) {
+    RecordedFrame frame;
+    frame.components = 3;
+    frame.time = 0.5;
+    frame.positions = {1, 2, 3, 4, 5, 6};
+    frame.velocities = {1, 0, 0, 0, 1, 0};
+    Write(Path(), {frame}, {}, {.float64 = float64});
+    const auto reader = RecordingReader::Open(Path(), "", /*in_space=*/true);
+    ASSERT_TRUE(reader.ok()) << reader.status();
+    RecordedFrame read;
+    ASSERT_TRUE(*(*reader)->Next(read));
+    EXPECT_EQ(read.components, 3);
+    EXPECT_EQ(read.float32, !float64);
+    EXPECT_TRUE(SameBits(read, frame));
+    const WhatWasRead flat = Read(Path());
+    EXPECT_EQ(flat.status.code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_THAT(std::string(flat.status.message()), HasSubstr("frame 0 has three coordinates"));
+  }
+}
+
 TEST_F(Recording, GivesBackEveryBitOfFloat32Frames) {
   const auto frames = RandomFrames(30);
   Write(Path(), frames, {.spacing = 0.25, .title = "a test"});
