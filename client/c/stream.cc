@@ -36,6 +36,7 @@ struct partiemc_stream {
   bool shows_normals = false;
   Event event;
   std::vector<partiemc_values> values;                             // Of the event.
+  std::vector<std::vector<partiemc_values>> section_values;        // Of its sections.
   std::vector<partiemc::client::AttributeArrays> sent_attributes;  // Of the sender's thread.
 };
 
@@ -52,15 +53,27 @@ std::chrono::milliseconds Milliseconds(double seconds, std::chrono::milliseconds
       static_cast<std::int64_t>(1000 * std::clamp(seconds, 0.0, kLongest)));
 }
 
+// Of six numbers; none of a null pointer.
+std::optional<SlicePlane> SliceOf(const double* numbers) {
+  if (numbers == nullptr) return std::nullopt;
+  SlicePlane slice;
+  std::copy_n(numbers, 3, slice.origin.begin());
+  std::copy_n(numbers + 3, 3, slice.normal.begin());
+  return slice;
+}
+
 absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& options) {
   ReconstructionParameters parameters;
   if (options.spacing != 0) parameters.spacing = options.spacing;
   if (options.kernel_radius != 0) parameters.kernel_radius = options.kernel_radius;
   if (options.cell_size != 0) parameters.cell_size = options.cell_size;
-  if (options.slice != nullptr) {
-    parameters.slice.emplace();
-    std::copy_n(options.slice, 3, parameters.slice->origin.begin());
-    std::copy_n(options.slice + 3, 3, parameters.slice->normal.begin());
+  parameters.slice = SliceOf(options.slice);
+  if (options.isovalue != 0) parameters.isovalue = options.isovalue;
+  for (std::size_t k = 0; k < options.section_count; ++k) {
+    const partiemc_section& from = options.sections[k];
+    Section& section = parameters.sections.emplace_back();
+    section.slice = SliceOf(from.slice);
+    if (from.isovalue != 0) section.isovalue = from.isovalue;
   }
   absl::Status named;
   if (options.placement != nullptr)
@@ -159,9 +172,11 @@ static_assert(sizeof(RingMeasures) == sizeof(partiemc_ring) &&
               offsetof(RingMeasures, identity) == offsetof(partiemc_ring, identity));
 static_assert(kNoRing == PARTIEMC_NO_RING && sizeof(TriangleClass) == 1);
 
-void AddResult(const client::FrameResult& frame, bool shows_normals,
+void AddResult(const Result& result, const OutlineDigests& digests, bool shows_normals,
                std::vector<partiemc_values>& values, partiemc_event& event) {
-  const auto& [rings, mesh, attributes, statistics] = frame.result;
+  const Rings& rings = result.rings;
+  const Mesh& mesh = result.mesh;
+  const FrameStatistics& statistics = result.statistics;
   event.ring_count = rings.RingCount();
   event.point_count = rings.PointCount();
   event.points = rings.points.data();
@@ -179,11 +194,10 @@ void AddResult(const client::FrameResult& frame, bool shows_normals,
   event.perimeter = statistics.perimeter;
   event.spacing = statistics.spacing;
   event.cell_size = statistics.cell_size;
-  event.milliseconds = frame.times.total_ms;
-  event.rings_digest = frame.rings_digest;
-  event.mesh_digest = frame.mesh_digest;
+  event.rings_digest = digests.rings;
+  event.mesh_digest = digests.mesh;
   values.clear();
-  for (const AttributeValues& one : attributes) {
+  for (const AttributeValues& one : result.attributes) {
     values.push_back({one.name.c_str(), one.components, one.values.data()});
   }
   event.attribute_count = values.size();
@@ -212,9 +226,31 @@ partiemc_event ViewOf(partiemc_stream& stream) {
     view.kind = PARTIEMC_RESULT;
     view.message = "";
     view.time = event.time;
-    AddResult(event.frame, stream.shows_normals, stream.values, view);
+    view.milliseconds = event.frame.times.total_ms;
+    view.section_count = event.frame.result.sections.size();
+    AddResult(event.frame.result, {event.frame.rings_digest, event.frame.mesh_digest},
+              stream.shows_normals, stream.values, view);
   }
   return view;
+}
+
+absl::Status ViewSection(partiemc_stream& stream, std::size_t index, partiemc_event* event) {
+  const client::FrameResult& frame = stream.event.frame;
+  const std::size_t count =
+      stream.event.kind == Event::Kind::kResult ? frame.result.sections.size() : 0;
+  if (index >= count) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("section: ", index, "; must be below the ", count, " of the last event"));
+  }
+  // Those of other sections stay where they are.
+  if (stream.section_values.size() < count) stream.section_values.resize(count);
+  partiemc_event view = Empty(PARTIEMC_RESULT);
+  view.sequence = stream.event.sequence;
+  view.time = stream.event.time;
+  AddResult(frame.result.sections[index], frame.section_digests[index], stream.shows_normals,
+            stream.section_values[index], view);
+  Give(view, event->size, event);
+  return absl::OkStatus();
 }
 
 absl::Status Receive(partiemc_stream& stream, double wait, partiemc_event* event) {
@@ -291,6 +327,10 @@ void partiemc_event_init(partiemc_event* event, size_t size) {
 
 partiemc_code partiemc_receive(partiemc_stream* stream, double wait, partiemc_event* event) {
   return Guarded([&] { return partiemc::c::Receive(*stream, wait, event); });
+}
+
+partiemc_code partiemc_event_section(partiemc_stream* stream, size_t index, partiemc_event* event) {
+  return Guarded([&] { return partiemc::c::ViewSection(*stream, index, event); });
 }
 
 partiemc_code partiemc_reconstruct(partiemc_stream* stream, const partiemc_particles* particles,

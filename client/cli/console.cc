@@ -53,7 +53,14 @@ std::string AsFlag(const absl::Status& status) {
   }
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
-  line.replace(0, kPrefix.size(), "--");
+  line.erase(0, kPrefix.size());
+  // Sections come from flags that may be given again, or are lists.
+  if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
+  for (const auto& [field, flag] :
+       {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:")}) {
+    if (line.starts_with(field)) line.replace(0, std::string_view(field).size(), flag);
+  }
+  line.insert(0, "--");
   for (std::size_t k = 0; k < line.size() && line[k] != ':'; ++k) {
     if (line[k] == '_') line[k] = '-';
   }

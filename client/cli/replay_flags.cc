@@ -19,9 +19,10 @@ absl::Status CheckCombinations(const CLI::App& app) {
     return absl::InvalidArgumentError("--format: goes with --output-dir, the place of the files");
   }
   if (app.count("--color-by") > 0 &&
-      (app.count("--attributes") == 0 || app.count("--output-dir") == 0)) {
+      (app.count("--attributes") == 0 ||
+       (app.count("--output-dir") == 0 && app.count("--report") == 0))) {
     return absl::InvalidArgumentError(
-        "--color-by: goes with --attributes, which names it, and --output-dir");
+        "--color-by: goes with --attributes, which names it, and --output-dir or --report");
   }
   if (app.count("--loop") > 0) {
     for (const char* output : {"--output-dir", "--stats", "--report"}) {
@@ -124,11 +125,19 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
                  "default what the recording knows, else first-frame")
       ->type_name("S|RULE")
       ->group(kGroup);
-  app.add_option("--slice", flags.slice,
+  app.add_option("--slice", flags.slices,
                  "Of particles in space the section with a plane: x=C, y=C, z=C, or six numbers, a "
-                 "point of it and its normal; wants --spacing")
+                 "point of it and its normal; wants --spacing. Given again: of one more plane")
       ->type_name("z=C|OX,OY,OZ,NX,NY,NZ")
+      ->allow_extra_args(false)
       ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
+      ->group(kGroup);
+  app.add_option("--isolines", flags.isolines,
+                 "Beside the outline, on each slice, isolines of the density, which is about 1 "
+                 "inside of bodies and .5 on their boundaries: a list of values in [.01, 10]")
+      ->type_name("V,...")
+      ->delimiter(',')
+      ->allow_extra_args(false)
       ->group(kGroup);
   app.add_option("--kernel-radius", flags.kernel_radius, "Kernel radius")
       ->type_name("R")
@@ -181,8 +190,10 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("LIST")
       ->capture_default_str()
       ->group(kGroup);
-  app.add_option("--color-by", flags.color_by,
-                 "Colour the pictures of svg by this one of --attributes; of a vector its length")
+  app.add_option(
+         "--color-by", flags.color_by,
+         "Colour the pictures of svg and report by this one of --attributes; of a vector its "
+         "length. Values are those at the vertices: --fill grid has most of them")
       ->type_name("NAME")
       ->group(kGroup);
   app.add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
@@ -218,6 +229,7 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
       "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
       "--rate 25\n"
+      "  partiemc replay dam_break.pemc --local --isolines .2,.5,.8 --report dam_break.html\n"
       "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "
       "watch "
       "dam\n"

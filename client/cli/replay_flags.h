@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/cli/server_flags.h"
 #include "client/input/sequence.h"
@@ -30,7 +31,8 @@ struct ReplayFlags {
 
   std::string placement = "virtual-plane";
   std::string fill = "greedy";
-  std::string slice;    ///< "z=0.5" or six numbers; empty: none.
+  std::vector<std::string> slices;  ///< "z=0.5" or six numbers each; a section for each but one.
+  std::vector<double> isolines;     ///< Of the density, of each slice.
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: as the input says.
   double kernel_radius = 3;
   double cell_size = 1;

@@ -66,6 +66,27 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
   return slice;
 }
 
+// Slice by slice: its outline, where it is not the stream's own, then its isolines.
+absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& parameters) {
+  const auto add_isolines = [&](const std::optional<SlicePlane>& slice) {
+    for (const double isovalue : flags.isolines) {
+      parameters.sections.push_back({.slice = slice, .isovalue = isovalue});
+    }
+  };
+  if (flags.slices.empty()) add_isolines(std::nullopt);
+  for (const std::string& text : flags.slices) {
+    const auto slice = SliceOf(text);
+    if (!slice) return WrongFlag("--slice", text, "x=C, y=C, z=C or OX,OY,OZ,NX,NY,NZ");
+    if (!parameters.slice) {
+      parameters.slice = slice;
+    } else {
+      parameters.sections.push_back({.slice = slice});
+    }
+    add_isolines(slice);
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 std::optional<double> PositiveNumber(std::string_view text) {
@@ -100,12 +121,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
       return WrongFlag("--spacing", flags.spacing, "a positive length, first-frame or every-frame");
     }
   }
-  if (!flags.slice.empty()) {
-    parameters.slice = SliceOf(flags.slice);
-    if (!parameters.slice) {
-      return WrongFlag("--slice", flags.slice, "x=C, y=C, z=C or OX,OY,OZ,NX,NY,NZ");
-    }
-  }
+  if (auto status = AddSections(flags, parameters); !status.ok()) return status;
   if (flags.clean == "on" || flags.clean == "off") {
     parameters.clean = flags.clean == "on";
   } else if (flags.clean != "auto") {

@@ -42,6 +42,12 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   AddFlag(flags, "--min-area", parameters.min_component_area, defaults.min_component_area);
   AddFlag(flags, "--min-particles", parameters.min_component_particles,
           defaults.min_component_particles);
+  std::string isovalues;
+  for (const Section& section : parameters.sections) {
+    if (!section.isovalue) continue;
+    AppendAll(isovalues, isovalues.empty() ? "" : ",", ShortestNumber(*section.isovalue));
+  }
+  if (!isovalues.empty()) AppendAll(flags, " --isolines ", isovalues);
   return flags;
 }
 

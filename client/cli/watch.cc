@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -31,7 +32,7 @@ std::chrono::milliseconds Milliseconds(double seconds) {
       std::chrono::duration<double>(seconds));
 }
 
-FrameRecord RecordOf(const WatchedFrame& frame) {
+FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sections_in_plane) {
   return {.index = frame.sequence - 1,  // As a replay numbers its files.
           .time = frame.time,
           .result = frame.frame.result,
@@ -39,7 +40,9 @@ FrameRecord RecordOf(const WatchedFrame& frame) {
           .stages_ms = frame.frame.times.stages_ms,
           .total_ms = frame.frame.times.total_ms,
           .rings_digest = frame.frame.rings_digest,
-          .mesh_digest = frame.frame.mesh_digest};
+          .mesh_digest = frame.frame.mesh_digest,
+          .section_digests = frame.frame.section_digests,
+          .sections_in_plane = sections_in_plane};
 }
 
 constexpr std::string_view kOldest = "oldest";
@@ -81,6 +84,7 @@ std::string Detail(const WatchedFrame& frame, std::uint64_t dropped) {
 
 Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& outputs,
                  std::optional<StreamRecorder>& recorder, Progress& progress) {
+  const std::vector<std::size_t> sections_in_plane = SectionsInPlane(watcher.stream().parameters);
   Ended ended;
   WatchedFrame frame;
   for (std::uint64_t count = 0; flags.frames == 0 || count < flags.frames;) {
@@ -104,7 +108,7 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
       progress.Note(Concat("partiemc: ", OneLine(frame.rejoined), "; missed: at most ",
                            Plural(frame.gap, "frame")));
     }
-    absl::Status status = outputs.Write(RecordOf(frame));
+    absl::Status status = outputs.Write(RecordOf(frame, sections_in_plane));
     if (status.ok() && recorder) status = recorder->Add(frame);
     if (!status.ok()) return ended.With(kFailed, OneLine(status));
     progress.Update(++count, Detail(frame, ended.dropped));

@@ -193,6 +193,7 @@ void Worker::Process(const OwnedFrame& frame, Event& event) {
   event.kind = Event::Kind::kResult;
   event.frame.rings_digest = DigestRings(event.frame.result.rings);
   event.frame.mesh_digest = DigestMesh(event.frame.result.mesh);
+  event.frame.section_digests = DigestSections(event.frame.result);
 }
 
 }  // namespace

@@ -159,6 +159,7 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.frame.times = {.stages_ms = decoded_.times.stages_ms, .total_ms = decoded_.times.total_ms};
   frame.frame.rings_digest = decoded_.rings_digest;
   frame.frame.mesh_digest = decoded_.mesh_digest;
+  std::swap(frame.frame.section_digests, decoded_.section_digests);
   frame.dropped = message.frame().dropped();
   frame.oldest_sequence = message.frame().oldest_sequence();
   frame.particles.clear();

@@ -35,6 +35,13 @@ std::string ColorOf(double share) {
   return text;
 }
 
+const AttributeValues* FindAttribute(const Result& result, const std::string& name) {
+  for (const AttributeValues& attribute : result.attributes) {
+    if (!name.empty() && attribute.name == name) return &attribute;
+  }
+  return nullptr;
+}
+
 std::vector<double> MagnitudesOf(const AttributeValues& attribute) {
   const auto components = static_cast<std::size_t>(attribute.components);
   std::vector<double> magnitudes(attribute.values.size() / components);

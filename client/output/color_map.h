@@ -17,6 +17,9 @@ inline constexpr std::size_t kColorBands = 32;
 /// "#rrggbb" of a share from 0 to 1; what lies outside has the colour of the end.
 std::string ColorOf(double share);
 
+/// The attribute of this name; none for an empty name, and where there is none.
+const AttributeValues* FindAttribute(const Result& result, const std::string& name);
+
 /// An attribute as one number a point: of a vector its length.
 std::vector<double> MagnitudesOf(const AttributeValues& attribute);
 

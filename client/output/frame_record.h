@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
 
@@ -23,7 +26,34 @@ struct FrameRecord {
   double total_ms = 0;                             ///< Wall time of the whole frame.
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
+  std::span<const OutlineDigests> section_digests = {};  ///< Of result.sections; or empty.
+  /// Sections, from 0 on, whose rings the picture of the frame shows, too, as thin lines.
+  std::span<const std::size_t> sections_in_plane = {};
+  std::size_t section = 0;  ///< 1 for the first of a frame's sections; 0: its own outline.
 };
+
+/// Section `k` of a frame, from 0 on, as a record of its own: without particles, which need not lie
+/// in its plane, and without times, which are the frame's.
+inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
+  const OutlineDigests digests =
+      k < frame.section_digests.size() ? frame.section_digests[k] : OutlineDigests();
+  return {.index = frame.index,
+          .time = frame.time,
+          .result = frame.result.sections[k],
+          .rings_digest = digests.rings,
+          .mesh_digest = digests.mesh,
+          .section = k + 1};
+}
+
+/// The sections of a stream that lie in the plane of its own outline: isolines.
+inline std::vector<std::size_t> SectionsInPlane(const ReconstructionParameters& parameters) {
+  std::vector<std::size_t> sections;
+  for (std::size_t k = 0; k < parameters.sections.size(); ++k) {
+    const auto& slice = parameters.sections[k].slice;
+    if (!slice || slice == parameters.slice) sections.push_back(k);
+  }
+  return sections;
+}
 
 /// The names of doubts, a blank between two of them.
 inline std::string DoubtsText(Doubts doubts) {

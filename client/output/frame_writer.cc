@@ -119,17 +119,27 @@ absl::StatusOr<FrameWriter> FrameWriter::Create(FrameWriterOptions options) {
 }
 
 absl::Status FrameWriter::Write(const FrameRecord& frame) const {
+  absl::Status status = WriteOutline(frame);
+  for (std::size_t k = 0; status.ok() && k < frame.result.sections.size(); ++k) {
+    status = WriteOutline(SectionOf(frame, k));
+  }
+  return status;
+}
+
+absl::Status FrameWriter::WriteOutline(const FrameRecord& frame) const {
   for (const FrameFormat format : options_.formats) {
     absl::StatusOr<std::string> bytes = EncodeFrame(format, frame, options_);
     if (!bytes.ok()) return bytes.status();
-    absl::Status status = WriteFileAtomically(PathOf(frame.index, format), *bytes);
+    absl::Status status = WriteFileAtomically(PathOf(frame, format), *bytes);
     if (!status.ok()) return status;
   }
   return absl::OkStatus();
 }
 
-std::filesystem::path FrameWriter::PathOf(std::uint64_t index, FrameFormat format) const {
-  return options_.directory / absl::StrFormat("frame_%06d.%s", index, Name(format));
+std::filesystem::path FrameWriter::PathOf(const FrameRecord& frame, FrameFormat format) const {
+  const std::string section = frame.section > 0 ? Concat("_section_", frame.section) : "";
+  return options_.directory /
+         absl::StrFormat("frame_%06d%s.%s", frame.index, section, Name(format));
 }
 
 }  // namespace partiemc::client

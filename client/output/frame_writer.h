@@ -1,6 +1,8 @@
 // Frames as files: DIR/frame_000042.geojson and its like.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -60,7 +62,8 @@ struct FrameWriterOptions {
 absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
                                         const FrameWriterOptions& options);
 
-/// Writes each frame in each format; every file appears as a whole or not at all.
+/// Writes each frame and each of its sections in each format; every file appears as a whole or not
+/// at all.
 class FrameWriter {
  public:
   /// Errors: those of AtomicFile, for the directory.
@@ -69,10 +72,13 @@ class FrameWriter {
   /// Errors: those of EncodeFrame and AtomicFile. Formats before the one that failed are written.
   absl::Status Write(const FrameRecord& frame) const;
 
-  /// DIR/frame_%06d.EXT, with more digits for an index that needs them.
-  std::filesystem::path PathOf(std::uint64_t index, FrameFormat format) const;
+  /// DIR/frame_%06d.EXT, with more digits for an index that needs them; of section K
+  /// DIR/frame_%06d_section_K.EXT.
+  std::filesystem::path PathOf(const FrameRecord& frame, FrameFormat format) const;
 
  private:
+  absl::Status WriteOutline(const FrameRecord& frame) const;
+
   explicit FrameWriter(FrameWriterOptions options) : options_(std::move(options)) {}
 
   FrameWriterOptions options_;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "absl/strings/escaping.h"
+#include "client/output/color_map.h"
 #include "client/output/html.h"
 #include "client/output/report_geometry.h"
 #include "client/output/text.h"
@@ -146,6 +147,14 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
             R"(,"rings_digest":")", DigestText(frame.rings_digest), R"(","mesh_digest":")",
             DigestText(frame.mesh_digest), R"(","box":)");
   AppendBox(out, MainBox(frame));
+  if (const AttributeValues* color = FindAttribute(result, options.color_by); color != nullptr) {
+    const ValueRange range = RangeOf(MagnitudesOf(*color));
+    out += R"(,"colors":[)";
+    AppendShown(out, range.low);
+    out += ',';
+    AppendShown(out, range.high);
+    out += ']';
+  }
   out += R"(,"measures":)";
   AppendMeasures(out, result.rings);
   out += '}';
@@ -177,6 +186,14 @@ std::string SummaryRows(const Summary& summary) {
   return out;
 }
 
+std::string Text(const SlicePlane& slice) {
+  const auto text = [](const std::array<double, 3>& v) {
+    return Concat("(", ShortestNumber(v[0]), ", ", ShortestNumber(v[1]), ", ", ShortestNumber(v[2]),
+                  ")");
+  };
+  return Concat("through ", text(slice.origin), ", normal ", text(slice.normal));
+}
+
 std::string StageNames() {
   std::string out;
   for (const std::string_view name : kStageNames) AppendAll(out, out.empty() ? "" : " ", name);
@@ -202,13 +219,15 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
   if (parameters.placement == Placement::kFarthestParticle) {
     lines.emplace_back("surface offset", spacings(parameters.surface_offset));
   }
-  if (parameters.slice) {
-    const auto text = [](const std::array<double, 3>& v) {
-      return Concat("(", ShortestNumber(v[0]), ", ", ShortestNumber(v[1]), ", ",
-                    ShortestNumber(v[2]), ")");
-    };
-    lines.emplace_back("slice", Concat("through ", text(parameters.slice->origin), ", normal ",
-                                       text(parameters.slice->normal)));
+  if (parameters.slice) lines.emplace_back("slice", Text(*parameters.slice));
+  if (parameters.isovalue) lines.emplace_back("isovalue", ShortestNumber(*parameters.isovalue));
+  for (std::size_t k = 0; k < parameters.sections.size(); ++k) {
+    const Section& section = parameters.sections[k];
+    std::string text = section.slice ? Concat("slice ", Text(*section.slice)) : "";
+    if (section.isovalue) {
+      AppendAll(text, text.empty() ? "" : ", ", "isovalue ", ShortestNumber(*section.isovalue));
+    }
+    lines.emplace_back(Concat("section ", k + 1), std::move(text));
   }
   lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
@@ -238,8 +257,9 @@ absl::StatusOr<ReportWriter> ReportWriter::Create(const std::filesystem::path& p
 }
 
 absl::Status ReportWriter::Add(const FrameRecord& frame) {
-  const std::string geometry =
-      EncodeReportGeometry(frame, {options_.max_particles, options_.max_triangles});
+  const std::string geometry = EncodeReportGeometry(frame, {.max_particles = options_.max_particles,
+                                                            .max_triangles = options_.max_triangles,
+                                                            .color_by = options_.color_by});
   return file_.Append(Concat("<script type=\"application/json\" class=\"frame-numbers\">",
                              FrameNumbers(frame, options_),
                              "</script><script type=\"text/plain\" class=\"frame-geometry\">",
@@ -254,6 +274,7 @@ absl::Status ReportWriter::Finish(const Summary& summary, double wall_seconds) {
     if (name == "summary") return SummaryRows(summary);
     if (name == "parameters") return ParameterRows(options_.parameters);
     if (name == "stages") return StageNames();
+    if (name == "color") return EscapeHtml(options_.color_by);
     return Concat(page::kGeometryJs, page::kChartsJs, page::kReportJs);
   }));
   if (!status.ok()) return status;

@@ -24,6 +24,7 @@ struct ReportOptions {
   std::size_t max_particles = 20'000;
   /// A frame with more triangles shows no mesh, and the page says so.
   std::size_t max_triangles = 300'000;
+  std::string color_by = {};  ///< As FrameWriterOptions has it.
 };
 
 /// The parameters of a reconstruction as lines for ReportOptions::parameters.

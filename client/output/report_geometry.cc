@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/output/color_map.h"
 #include "client/output/formats.h"
 
 namespace partiemc::client {
@@ -33,6 +34,9 @@ class Encoder {
     Box box;
     box.Include(frame.result.rings.points);
     box.Include(frame.result.mesh.points);
+    for (const std::size_t k : frame.sections_in_plane) {
+      box.Include(frame.result.sections[k].rings.points);
+    }
     for (std::size_t k = 0; k + 1 < frame.particles.size(); k += 2) {
       if (std::isfinite(frame.particles[k]) && std::isfinite(frame.particles[k + 1])) {
         box.Include(frame.particles[k], frame.particles[k + 1]);
@@ -153,13 +157,49 @@ void EncodeParticles(std::span<const double> particles, std::size_t max_particle
   for (const auto& point : points) encoder.Point(point);
 }
 
+void EncodeIsolines(const FrameRecord& frame, Encoder& encoder) {
+  std::uint64_t count = 0;
+  for (const std::size_t k : frame.sections_in_plane) {
+    count += frame.result.sections[k].rings.RingCount();
+  }
+  encoder.Count(count);
+  for (const std::size_t k : frame.sections_in_plane) {
+    const Rings& rings = frame.result.sections[k].rings;
+    for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+      encoder.Count(rings.offsets[ring + 1] - rings.offsets[ring]);
+    }
+  }
+  for (const std::size_t k : frame.sections_in_plane) {
+    encoder.Points(frame.result.sections[k].rings.points);
+  }
+}
+
+void EncodeColors(const Result& result, const ReportGeometryOptions& options, Encoder& encoder) {
+  const AttributeValues* const attribute = FindAttribute(result, options.color_by);
+  if (attribute == nullptr) return encoder.Count(0);
+  const std::vector<double> values = MagnitudesOf(*attribute);
+  const ValueRange range = RangeOf(values);
+  // Those of the rings come first, and are the mesh's too where it shares them.
+  const bool has_mesh = result.mesh.TriangleCount() > 0 &&
+                        result.mesh.TriangleCount() <= options.max_triangles &&
+                        values.size() == result.mesh.PointCount();
+  const std::size_t count = has_mesh ? values.size() : result.rings.PointCount();
+  if (count > values.size()) return encoder.Count(0);
+  encoder.Count(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    encoder.Byte(static_cast<std::uint8_t>(std::lround(255 * range.ShareOf(values[k]))));
+  }
+}
+
 }  // namespace
 
-std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryLimits& limits) {
+std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryOptions& options) {
   Encoder encoder(frame);
   EncodeRings(frame.result.rings, encoder);
-  EncodeMesh(frame.result, limits.max_triangles, encoder);
-  EncodeParticles(frame.particles, limits.max_particles, encoder);
+  EncodeMesh(frame.result, options.max_triangles, encoder);
+  EncodeParticles(frame.particles, options.max_particles, encoder);
+  EncodeIsolines(frame, encoder);
+  EncodeColors(frame.result, options, encoder);
   return encoder.Take();
 }
 

@@ -8,9 +8,10 @@
 
 namespace partiemc::client {
 
-struct ReportGeometryLimits {
+struct ReportGeometryOptions {
   std::size_t max_particles = 0;
   std::size_t max_triangles = 0;
+  std::string color_by = {};  ///< An attribute; empty: none.
 };
 
 /// Bytes, before base64. Integers are LEB128 varints, signed ones zigzagged; a coordinate is a
@@ -25,6 +26,10 @@ struct ReportGeometryLimits {
 ///   triangles   shared (0 or 1), count; per triangle (a - previous a) << 1 | interior as zigzag of
 ///               the difference, then b - a, c - a
 ///   particles   count; x, y differences, in an order that keeps them small
-std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryLimits& limits);
+///   isolines    count of rings; of each its points; x, y differences of all of them
+///   colours     count (0, that of the mesh's points or that of the rings'); per point one byte,
+///   its
+///               share of the frame's range of the attribute, 255 to the whole
+std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryOptions& options);
 
 }  // namespace partiemc::client

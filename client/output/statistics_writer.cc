@@ -16,11 +16,17 @@ namespace {
 constexpr std::array<std::string_view, 8> kBeforeStages = {
     "frame",          "particles", "polylines", "vertices",
     "triangles_grid", "triangles", "area",      "milliseconds"};
-constexpr std::array<std::string_view, 10> kAfterStages = {
-    "perimeter",     "self_intersections", "folded_triangles",
-    "dropped_holes", "dropped_components", "dropped_spray",
-    "rings_digest",  "mesh_digest",        "time",
-    "doubts"};
+constexpr std::array<std::string_view, 11> kAfterStages = {"perimeter",
+                                                           "self_intersections",
+                                                           "folded_triangles",
+                                                           "dropped_holes",
+                                                           "dropped_components",
+                                                           "dropped_spray",
+                                                           "rings_digest",
+                                                           "mesh_digest",
+                                                           "time",
+                                                           "doubts",
+                                                           "section"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
 // "vertices" is a count and a stage: the unit keeps the names of columns apart.
@@ -74,6 +80,7 @@ class Row {
     Digest(frame.mesh_digest);
     Number(frame.time);
     Words(DoubtsText(statistics.doubts));
+    Number(frame.section);
   }
 
   std::string Csv() const { return CsvLine(values_); }
@@ -129,6 +136,14 @@ absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem:
 }
 
 absl::Status StatisticsWriter::Add(const FrameRecord& frame) {
+  absl::Status status = AddRow(frame);
+  for (std::size_t k = 0; status.ok() && k < frame.result.sections.size(); ++k) {
+    status = AddRow(SectionOf(frame, k));
+  }
+  return status;
+}
+
+absl::Status StatisticsWriter::AddRow(const FrameRecord& frame) {
   const Row row(frame, json_);
   const bool first = std::exchange(empty_, false);
   return file_.Append(json_ ? Concat(first ? "\n" : ",\n", row.Json()) : row.Csv());

@@ -1,4 +1,4 @@
-// `--stats FILE`: one row of numbers per frame.
+// `--stats FILE`: one row of numbers per frame and section.
 #pragma once
 
 #include <filesystem>
@@ -16,11 +16,12 @@ namespace partiemc::client {
 /// area, milliseconds; one per stage, "bins_ms" to "attributes_ms" ("vertices" alone would stand
 /// there twice); perimeter, self_intersections, folded_triangles, dropped_holes,
 /// dropped_components, dropped_spray, rings_digest, mesh_digest, time, doubts (their names, a blank
-/// between two of them). Digests are 16 hexadecimal digits, times milliseconds of wall time, areas
-/// and lengths world units; `vertices` are those of the polylines.
+/// between two of them), section (0: the frame's own outline; a row for each follows it). Digests
+/// are 16 hexadecimal digits, times milliseconds of wall time, areas and lengths world units;
+/// `vertices` are those of the polylines.
 std::span<const std::string_view> StatisticsColumns();
 
-/// Writes CSV with a header line, or JSON as an array of one object per frame (a number that is
+/// Writes CSV with a header line, or JSON as an array of one object per row (a number that is
 /// not finite is null there), as the rows come. The file appears with Finish.
 class StatisticsWriter {
  public:
@@ -32,6 +33,8 @@ class StatisticsWriter {
   absl::Status Finish();
 
  private:
+  absl::Status AddRow(const FrameRecord& frame);
+
   StatisticsWriter(AtomicFile file, bool json) : file_(std::move(file)), json_(json) {}
 
   AtomicFile file_;

@@ -33,6 +33,7 @@ constexpr std::string_view kStyle =
     ".mesh{fill:none;stroke:#9dbfdc;stroke-width:.6}"
     ".particles{fill:none;stroke:#6f8597}"
     ".outline{fill:none;stroke:#0b4f86;stroke-width:2}"
+    ".isoline{fill:none;stroke:#b4521e;stroke-width:1}"
     ".bands path{stroke-width:.7}"
     ".lines path{fill:none;stroke-width:3}"
     ".legend{font:22px sans-serif;fill:#333}"
@@ -238,13 +239,6 @@ void AppendLegend(std::string& out, const std::string& name, const ValueRange& r
             kLegendBar + 20, "\" y=\"17\">", EscapeHtml(name), "</text>\n</g>\n");
 }
 
-const AttributeValues* FindAttribute(const Result& result, const std::string& name) {
-  for (const AttributeValues& attribute : result.attributes) {
-    if (!name.empty() && attribute.name == name) return &attribute;
-  }
-  return nullptr;
-}
-
 }  // namespace
 
 std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& options) {
@@ -280,6 +274,11 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   AppendAll(out, R"(<path class="outline" d=")", rings, "\"/>\n");
   if (attribute != nullptr && !inside) {
     AppendBands(out, "lines", RingsByBand(frame.result.rings, values, range, picture));
+  }
+  for (const std::size_t k : frame.sections_in_plane) {
+    if (k >= frame.result.sections.size()) continue;
+    AppendAll(out, R"(<path class="isoline" d=")",
+              RingPath(frame.result.sections[k].rings, picture), "\"/>\n");
   }
   if (attribute != nullptr) AppendLegend(out, attribute->name, range, picture.height());
   out += "</svg>\n";

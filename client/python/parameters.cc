@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "client/python/errors.h"
 #include "partiemc/client/parameter_names.h"
@@ -72,7 +73,7 @@ void TakeTime(py::dict& arguments, const char* name,
 }
 
 // ("z", 0.5), or a point and a normal.
-void TakeSlice(py::dict& arguments, std::optional<SlicePlane>& slice) {
+void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
   const auto given = Take<py::object>(arguments, "slice");
   if (!given) return;
   const auto refuse = [&] {
@@ -99,6 +100,30 @@ void TakeSlice(py::dict& arguments, std::optional<SlicePlane>& slice) {
   }
 }
 
+// Dicts of what differs.
+void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
+  const auto given = Take<std::vector<py::dict>>(arguments, "sections");
+  if (!given) return;
+  for (std::size_t k = 0; k < given->size(); ++k) {
+    py::dict left((*given)[k].attr("copy")());  // The caller's stays as it is.
+    Section& section = sections.emplace_back();
+    TakeSlice(left, section.slice);
+    TakeInto(left, "isovalue", section.isovalue);
+    if (left.empty()) continue;
+    Raise(Invalid("UNSUPPORTED", "sections[" + std::to_string(k) + "]",
+                  py::repr((*given)[k]).cast<std::string>(),
+                  "must be a dict of slice, isovalue, or both"));
+  }
+}
+
+py::object Told(const std::optional<SlicePlane>& slice) {
+  if (!slice) return py::none();
+  const auto triple = [](const std::array<double, 3>& v) {
+    return py::make_tuple(v[0], v[1], v[2]);
+  };
+  return py::make_tuple(triple(slice->origin), triple(slice->normal));
+}
+
 }  // namespace
 
 ReconstructionParameters TakeParameters(py::dict arguments) {
@@ -117,6 +142,8 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "min_component_area", parameters.min_component_area);
   TakeInto(arguments, "min_component_particles", parameters.min_component_particles);
   TakeSlice(arguments, parameters.slice);
+  TakeInto(arguments, "isovalue", parameters.isovalue);
+  TakeSections(arguments, parameters.sections);
   return parameters;
 }
 
@@ -184,12 +211,12 @@ void ExpectNothingElse(const py::dict& arguments, const char* function) {
 }
 
 py::dict Told(const ReconstructionParameters& parameters) {
-  py::object slice = py::none();
-  if (parameters.slice) {
-    const auto triple = [](const std::array<double, 3>& v) {
-      return py::make_tuple(v[0], v[1], v[2]);
-    };
-    slice = py::make_tuple(triple(parameters.slice->origin), triple(parameters.slice->normal));
+  py::list sections;
+  for (const Section& section : parameters.sections) {
+    py::dict told;
+    told["slice"] = Told(section.slice);
+    told["isovalue"] = section.isovalue;
+    sections.append(told);
   }
   const auto named = [](auto value) { return std::string(Name(value)); };
   using namespace py::literals;
@@ -200,7 +227,9 @@ py::dict Told(const ReconstructionParameters& parameters) {
       "cell_size"_a = parameters.cell_size, "reference_radius"_a = parameters.reference_radius,
       "surface_offset"_a = parameters.surface_offset, "normal_memory"_a = parameters.normal_memory,
       "clean"_a = parameters.clean, "min_component_area"_a = parameters.min_component_area,
-      "min_component_particles"_a = parameters.min_component_particles, "slice"_a = slice);
+      "min_component_particles"_a = parameters.min_component_particles,
+      "slice"_a = Told(parameters.slice), "isovalue"_a = parameters.isovalue,
+      "sections"_a = sections);
 }
 
 }  // namespace partiemc::python

@@ -150,6 +150,25 @@ std::vector<std::string> DoubtsOf(const PythonResult& result) {
   return names;
 }
 
+const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& result) {
+  std::vector<Result>& from = result.frame.result.sections;
+  if (result.sections.empty()) {
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      auto section = std::make_shared<PythonResult>();
+      section->sequence = result.sequence;
+      section->time = result.time;
+      section->frame.result = std::move(from[k]);
+      section->has_digests = k < result.frame.section_digests.size();
+      if (section->has_digests) {
+        section->frame.rings_digest = result.frame.section_digests[k].rings;
+        section->frame.mesh_digest = result.frame.section_digests[k].mesh;
+      }
+      result.sections.push_back(std::move(section));
+    }
+  }
+  return result.sections;
+}
+
 }  // namespace
 
 std::shared_ptr<PythonResult> ResultPool::Take() {
@@ -189,6 +208,9 @@ void DefineResults(py::module_& module) {
           "attributes", [](const py::object& self) { return AttributesOf(self); },
           "A dict of what particles carry, float32 at mesh.points, whose first are rings.points; "
           "without a mesh at rings.points. (V,), or (V, 2) or (V, 3) of a vector.")
+      .def_property_readonly(
+          "sections", &SectionsOf,
+          "A list of Result: the frame's other outlines, in the order of `sections`.")
       .def_readonly("sequence", &PythonResult::sequence,
                     "The frame's number: 1, 2, ... in a stream; 0 of partiemc.reconstruct.")
       .def_readonly("time", &PythonResult::time, "Simulation time, as the frame came with.")

@@ -25,6 +25,8 @@ struct PythonResult {
   std::vector<double> particles;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;
+  /// Those of `frame`, once somebody has asked for them: they have taken its results then.
+  std::vector<std::shared_ptr<PythonResult>> sections;
 };
 
 /// Results whose buffers are used again once Python has let them go. Safe to share between threads.

@@ -69,7 +69,12 @@ class Receiver {
  public:
   Receiver(const ReplayFlags& flags, FrameStream& stream, FrameFeeder& feeder,
            ReplayOutputs& outputs, Progress& progress)
-      : flags_(flags), stream_(stream), feeder_(feeder), outputs_(outputs), progress_(progress) {}
+      : flags_(flags),
+        stream_(stream),
+        feeder_(feeder),
+        outputs_(outputs),
+        progress_(progress),
+        sections_in_plane_(SectionsInPlane(stream.info().parameters)) {}
 
   /// kGood when every frame was answered, else the code of what ended the replay, which is told
   /// unless it was Ctrl-C.
@@ -120,7 +125,9 @@ class Receiver {
                                  .stages_ms = event_.frame.times.stages_ms,
                                  .total_ms = event_.frame.times.total_ms,
                                  .rings_digest = event_.frame.rings_digest,
-                                 .mesh_digest = event_.frame.mesh_digest});
+                                 .mesh_digest = event_.frame.mesh_digest,
+                                 .section_digests = event_.frame.section_digests,
+                                 .sections_in_plane = sections_in_plane_});
       }
     }
     feeder_.Recycle(std::move(frame));
@@ -129,7 +136,11 @@ class Receiver {
   }
 
   void Check(const std::string& source) {
-    const absl::Status valid = Validate(event_.frame.result, *FindFill(flags_.fill));
+    const Fill fill = *FindFill(flags_.fill);
+    absl::Status valid = Validate(event_.frame.result, fill);
+    for (const Result& section : event_.frame.result.sections) {
+      valid.Update(Validate(section, fill));
+    }
     if (valid.ok()) return;
     // farthest-particle breaks guarantees in almost every frame: one example is enough.
     const std::uint64_t told = flags_.placement == Name(Placement::kFarthestParticle) ? 1 : 10;
@@ -147,6 +158,7 @@ class Receiver {
   FrameFeeder& feeder_;
   ReplayOutputs& outputs_;
   Progress& progress_;
+  const std::vector<std::size_t> sections_in_plane_;
   Event event_;
   std::uint64_t answered_ = 0, failed_checks_ = 0;
 };
@@ -186,7 +198,8 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
 int Replay(const ReplayFlags& flags) {
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
-  const auto without_input = ParametersOf(flags, std::nullopt);
+  // Some recordings know the spacing that a slice wants.
+  const auto without_input = ParametersOf(flags, 1.0);
   if (!without_input.ok()) return Complain(kUsage, without_input.status());
 
   auto input = OpenInput(flags.input, flags.sequence);
@@ -195,7 +208,7 @@ int Replay(const ReplayFlags& flags) {
     return Complain(wrong_flag ? kUsage : kInput, input.status());
   }
   const auto parameters = ParametersOf(flags, input->spacing);
-  if (!parameters.ok()) return Complain(kInput, parameters.status());
+  if (!parameters.ok()) return Complain(kUsage, parameters.status());
   if (flags.loop) {
     input->frames = std::make_unique<LoopedInput>(*std::move(input), flags.input, flags.sequence);
   }

@@ -20,7 +20,8 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
         {.title = BaseName(flags.input),
          .subtitle = flags.local ? "reconstructed in process"
                                  : "reconstructed by the server at " + flags.server.address,
-         .parameters = DescribeParameters(Resolve(parameters))});
+         .parameters = DescribeParameters(Resolve(parameters)),
+         .color_by = flags.color_by});
     if (!report.ok()) return report.status();
     outputs.report_.emplace(*std::move(report));
   }

@@ -61,7 +61,20 @@ function decodeGeometry(base64) {
   const particles = reader.count();
   frame.particles = new Int32Array(2 * particles);
   reader.points(particles, frame.particles, 0);
+  decodeIsolines(reader, frame);
+  const colors = reader.count();
+  frame.colors = reader.bytes.subarray(reader.next, reader.next + colors);
   return frame;
+}
+
+function decodeIsolines(reader, frame) {
+  const rings = reader.count();
+  const isolines = {offsets: [0], outerOf: new Array(rings)};
+  for (let ring = 0; ring < rings; ++ring) isolines.offsets.push(isolines.offsets[ring] + reader.count());
+  const points = isolines.offsets[rings];
+  isolines.points = new Int32Array(2 * points);
+  reader.points(points, isolines.points, 0);
+  frame.isolines = {...isolines, originX: frame.originX, originY: frame.originY, step: frame.step};
 }
 
 function decodeMesh(reader, frame, ringPoints) {
@@ -112,6 +125,36 @@ function ringAt(frame, x, y) {
   return found;
 }
 
+// Colours tell so many bands of values apart: the map of client/output/color_map.cc.
+const COLOR_BANDS = 32;
+const COLOR_STOPS = ['3d006f', '282688', '03477c', '115a71', '176a6e', '0e7c67', '1e8e46', '71931f', 'a69313'];
+
+function colorOf(share) {
+  const place = Math.max(0, Math.min(1, share)) * (COLOR_STOPS.length - 1);
+  const below = Math.min(Math.floor(place), COLOR_STOPS.length - 2);
+  const channel = (stop, k) => parseInt(COLOR_STOPS[stop].slice(2 * k, 2 * k + 2), 16);
+  const mixed = [0, 1, 2].map((k) => Math.round(
+      channel(below, k) + (place - below) * (channel(below + 1, k) - channel(below, k))));
+  return `rgb(${mixed.join(' ')})`;
+}
+
+const bandOf = (share) => Math.max(0, Math.min(COLOR_BANDS - 1, Math.floor(share * COLOR_BANDS)));
+
+// The part of a convex polygon of [x, y, share] whose shares are above `bound`, for side 1, or
+// below, for -1.
+function clip(polygon, bound, side) {
+  const kept = [];
+  polygon.forEach((from, k) => {
+    const to = polygon[(k + 1) % polygon.length];
+    const isIn = side * (from[2] - bound) >= 0;
+    if (isIn) kept.push(from);
+    if (isIn === (side * (to[2] - bound) >= 0)) return;
+    const part = (bound - from[2]) / (to[2] - from[2]);
+    kept.push([from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1]), bound]);
+  });
+  return kept;
+}
+
 // World to picture: the scene is 1000 units wide, y points down.
 class Projection {
   constructor(scene) {
@@ -149,6 +192,44 @@ class Projection {
       parts.push('M', corner(3 * k), 'L', corner(3 * k + 1), 'L', corner(3 * k + 2), 'Z');
     }
     return parts.join('');
+  }
+
+  // For each band of colours the path of what lies in it: values are linear in each triangle.
+  coloredTriangles(frame, shareOf) {
+    const bands = Array.from({length: COLOR_BANDS}, () => []);
+    const corner = (k) => {
+      const point = frame.triangles[k];
+      return [this.x(frame, frame.meshPoints[2 * point]), this.y(frame, frame.meshPoints[2 * point + 1]),
+              shareOf(frame.colors[point])];
+    };
+    for (let k = 0; k < frame.triangles.length; k += 3) {
+      let rest = [corner(k), corner(k + 1), corner(k + 2)];
+      const shares = rest.map((point) => point[2]);
+      const last = bandOf(Math.max(...shares));
+      for (let band = bandOf(Math.min(...shares)); band <= last; ++band) {
+        const top = (band + 1) / COLOR_BANDS;
+        const part = band === last ? rest : clip(rest, top, -1);
+        if (part.length >= 3) {
+          bands[band].push('M', part.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join('L'), 'Z');
+        }
+        if (band < last) rest = clip(rest, top, 1);
+      }
+    }
+    return bands.map((parts) => parts.join(''));
+  }
+
+  // Each segment of the rings in the colour of its middle.
+  coloredRings(frame, shareOf) {
+    const bands = Array.from({length: COLOR_BANDS}, () => []);
+    for (let ring = 0; ring < frame.outerOf.length; ++ring) {
+      const begin = frame.offsets[ring], end = frame.offsets[ring + 1];
+      for (let k = begin; k < end; ++k) {
+        const next = k + 1 < end ? k + 1 : begin;
+        bands[bandOf(shareOf((frame.colors[k] + frame.colors[next]) / 2))].push(
+            'M', this.point(frame, frame.points, k), 'L', this.point(frame, frame.points, next));
+      }
+    }
+    return bands.map((parts) => parts.join(''));
   }
 
   particles(frame) {

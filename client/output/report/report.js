@@ -12,7 +12,8 @@ class Page {
     this.labels = this.frames.map((frame) => frame.frame);
     this.projection = new Projection(sceneOf(this.frames));
     this.picture = byId('picture');
-    this.layers = ['outline', 'mesh', 'particles', 'normals'];
+    this.layers = ['outline', 'mesh', 'particles', 'normals', 'isolines', 'colors'];
+    this.offerColors();
     this.position = 0;
     this.playing = false;
     this.charts = this.makeCharts();
@@ -25,6 +26,39 @@ class Page {
       return;
     }
     this.readHash();
+  }
+
+  // All frames share one range of colours, so that a colour means the same in each.
+  offerColors() {
+    const ranges = this.frames.map((frame) => frame.colors).filter(Boolean);
+    if (ranges.length === 0) return;
+    this.colorRange = [Math.min(...ranges.map((range) => range[0])), Math.max(...ranges.map((range) => range[1]))];
+    byId('show-colors').parentElement.hidden = false;
+    const range = byId('range');
+    range.hidden = false;
+    range.firstElementChild.textContent = shown(this.colorRange[0]);
+    range.lastElementChild.textContent = shown(this.colorRange[1]);
+    range.children[1].style.background =
+        `linear-gradient(90deg, ${COLOR_STOPS.map((stop) => '#' + stop).join(', ')})`;
+  }
+
+  drawColors(on) {
+    const geometry = this.geometry;
+    const has = on && geometry.colors.length > 0;
+    const inside = has && geometry.triangles.length > 0 && geometry.colors.length * 2 === geometry.meshPoints.length;
+    const [low, high] = this.frames[this.position].colors ?? [0, 0];
+    const [least, most] = this.colorRange ?? [0, 0];
+    const shareOf = (byte) => most > least ? (low + byte / 255 * (high - low) - least) / (most - least) : 0.5;
+    const paint = (id, bands, attributes) => byId(id).replaceChildren(...bands.flatMap((path, band) => {
+      if (!path) return [];
+      const element = document.createElementNS(this.picture.namespaceURI, 'path');
+      element.setAttribute('d', path);
+      for (const name of attributes) element.style[name] = colorOf((band + 0.5) / COLOR_BANDS);
+      return [element];
+    }));
+    this.picture.classList.toggle('colored', inside);
+    paint('colors', inside ? this.projection.coloredTriangles(geometry, shareOf) : [], ['fill', 'stroke']);
+    paint('color-lines', has && !inside ? this.projection.coloredRings(geometry, shareOf) : [], ['stroke']);
   }
 
   makeCharts() {
@@ -78,6 +112,10 @@ class Page {
     const spacing = (this.frames[this.position].spacing || 0) * this.projection.scale;
     set('inside', true, () => this.projection.rings(geometry));
     set('outline', shows('outline'), () => this.projection.rings(geometry));
+    const isolines = geometry.isolines.outerOf.length > 0;
+    if (isolines) byId('show-isolines').parentElement.hidden = false;
+    set('isolines', isolines && shows('isolines'), () => this.projection.rings(geometry.isolines));
+    this.drawColors(shows('colors'));
     set('particles', shows('particles'), () => this.projection.particles(geometry));
     byId('particles').setAttribute('stroke-width', Math.max(0.45 * spacing, 1.2));
     set('normals', shows('normals'), () => this.projection.normals(geometry, Math.max(1.5 * spacing, 6)));
@@ -322,6 +360,7 @@ class Page {
       ' ': () => this.toggle(),
       'o': () => press('show-outline'), 'm': () => press('show-mesh'),
       'p': () => press('show-particles'), 'n': () => press('show-normals'),
+      'i': () => press('show-isolines'), 'c': () => press('show-colors'),
       '+': () => this.zoom(1 / 1.5), '=': () => this.zoom(1 / 1.5), '-': () => this.zoom(1.5),
       '0': () => this.resetView(),
     };

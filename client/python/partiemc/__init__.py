@@ -44,6 +44,10 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     slice: (N, 3) positions fill space, and the outline is that of a section: ("z", 0.5), or
         ((x, y, z), (nx, ny, nz)), a point of the plane and its normal. Wants spacing; volumes are
         volumes. Of ("z", c) points are (x, y), of ("y", c) (x, z), of ("x", c) (y, z).
+    isovalue: in [0.01, 10]: the outline is the isoline of the density, which is about 1 inside of
+        bodies and 0.5 on flat boundaries, instead of the body's outline.
+    sections: a list of at most 16 dicts of slice, isovalue or both: more outlines of the particles
+        (Result.sections), with all other parameters: [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

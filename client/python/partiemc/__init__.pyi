@@ -9,6 +9,7 @@ __version__: str
 
 Vector = Tuple[float, float, float]
 Slice = Union[Tuple[str, float], Tuple[Vector, Vector]]
+Section = Dict[str, Union[Slice, float, None]]
 Positions = Union[ArrayLike, Tuple[NDArray[Any], NDArray[Any]],
                   Tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]
 
@@ -67,6 +68,8 @@ class Result:
     @property
     def attributes(self) -> Dict[str, NDArray[np.float32]]: ...
     @property
+    def sections(self) -> List[Result]: ...
+    @property
     def sequence(self) -> int: ...
     @property
     def time(self) -> float: ...
@@ -106,7 +109,8 @@ class Reconstructor:
         cell_size: Optional[float] = ..., reference_radius: Optional[float] = ...,
         surface_offset: Optional[float] = ..., normal_memory: Optional[bool] = ...,
         clean: Optional[bool] = ..., min_component_area: Optional[float] = ...,
-        min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...) -> None: ...
+        min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...,
+        isovalue: Optional[float] = ..., sections: Optional[List[Section]] = ...) -> None: ...
     def reconstruct(
         self, positions: Positions, time: Optional[float] = ..., *,
         volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
@@ -173,7 +177,8 @@ def reconstruct(
     reference_radius: Optional[float] = ..., surface_offset: Optional[float] = ...,
     normal_memory: Optional[bool] = ..., clean: Optional[bool] = ...,
     min_component_area: Optional[float] = ...,
-    min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...) -> Result: ...
+    min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...,
+    isovalue: Optional[float] = ..., sections: Optional[List[Section]] = ...) -> Result: ...
 def connect(address: Optional[str] = ..., *, latest: bool = ..., **options: Any) -> Stream: ...
 def watch(address: Optional[str], name: str, **options: Any) -> Watch: ...
 def streams(address: Optional[str] = ..., **credentials: Any) -> List[Dict[str, Any]]: ...

@@ -381,6 +381,11 @@ static void try_slice(const char* address) {
   partiemc_options_init(&options, sizeof options);
   options.spacing = 1;
   options.slice = plane;
+  /* An isoline in the same plane, and the section with an upright one. */
+  const double upright[] = {5, 0, 0, 1, 0, 0};
+  const partiemc_section sections[] = {{NULL, .6}, {upright, 0}};
+  options.sections = sections;
+  options.section_count = 2;
   partiemc_stream* stream = NULL;
   EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
   partiemc_particles particles;
@@ -394,9 +399,20 @@ static void try_slice(const char* address) {
   EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
   EXPECT(event.kind == PARTIEMC_RESULT && event.ring_count == 1);
   EXPECT(fabs(event.area / (kSide * kSide) - 1) < .05);
+  EXPECT(event.section_count == 2);
+  partiemc_event section;
+  partiemc_event_init(&section, sizeof section);
+  EXPECT(partiemc_event_section(stream, 0, &section) == PARTIEMC_OK);
+  EXPECT(section.kind == PARTIEMC_RESULT && section.sequence == event.sequence);
+  EXPECT(section.rings_digest != event.rings_digest && section.ring_count == 1);
+  EXPECT(fabs(section.area / (kSide * kSide) - 1) < .1 && section.area < event.area);
+  EXPECT(partiemc_event_section(stream, 1, &section) == PARTIEMC_OK);
+  EXPECT(fabs(section.area / (kSide * kLayers) - 1) < .1);
+  EXPECT(partiemc_event_section(stream, 2, &section) == PARTIEMC_INVALID_ARGUMENT);
   particles.z.type = PARTIEMC_NONE;
   EXPECT(partiemc_reconstruct(stream, &particles, 1, &event) == PARTIEMC_OK);
   EXPECT(event.kind == PARTIEMC_REFUSAL && strcmp(event.field, "components") == 0);
+  EXPECT(partiemc_event_section(stream, 0, &section) == PARTIEMC_INVALID_ARGUMENT);
   partiemc_close(stream);
 }
 

@@ -312,6 +312,43 @@ TEST(FrameWriter, FilesAreNumberedByTheIndexInTheInput) {
                                           "frame_12345678.geojson", "frame_12345678.obj"));
 }
 
+TEST(FrameWriter, SectionsAreFilesOfTheirOwnAndLinesInThePicture) {
+  support::TemporaryFolder directory;
+  Result result = SquareWithHoleAndIsland();
+  result.sections.resize(2);
+  AddRing(result.sections[0].rings, {1, 1, 3, 1, 3, 3}, kNoRing);
+  AddRing(result.sections[1].rings, {-7, 1, 3, 1, 3, 3}, kNoRing);
+  auto writer = FrameWriter::Create(
+      {.directory = directory / "out", .formats = {FrameFormat::kSvg, FrameFormat::kGeoJson}});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  const std::vector<std::size_t> in_plane = {0};
+  const std::vector<double> particles = {2.0, 2.0};
+  ASSERT_TRUE(
+      writer
+          ->Write(
+              {.index = 7, .result = result, .particles = particles, .sections_in_plane = in_plane})
+          .ok());
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(directory / "out")) {
+    names.push_back(entry.path().filename().string());
+  }
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre(
+                         "frame_000007.svg", "frame_000007.geojson", "frame_000007_section_1.svg",
+                         "frame_000007_section_1.geojson", "frame_000007_section_2.svg",
+                         "frame_000007_section_2.geojson"));
+  const std::string picture = ReadFile(directory / "out/frame_000007.svg");
+  std::size_t isolines = 0;
+  for (std::size_t at = picture.find("class=\"isoline\""); at != std::string::npos;
+       at = picture.find("class=\"isoline\"", at + 1)) {
+    ++isolines;
+  }
+  EXPECT_EQ(isolines, 1u);
+  EXPECT_THAT(ReadFile(directory / "out/frame_000007_section_2.geojson"), HasSubstr("-7"));
+  EXPECT_THAT(ReadFile(directory / "out/frame_000007_section_2.svg"),
+              ::testing::Not(HasSubstr("class=\"particles\"")))
+      << "they need not lie in its plane";
+}
+
 TEST(FrameWriter, ADirectoryThatGoesAwayIsToldAndLeavesNothing) {
   support::TemporaryFolder directory;
   const auto writer =

@@ -90,6 +90,9 @@ struct Decoded {
   std::vector<double> points, mesh_points, particles;
   std::vector<std::uint8_t> normals;
   std::vector<std::int64_t> triangles, interior;
+  std::vector<std::uint64_t> isoline_sizes;
+  std::vector<double> isoline_points;
+  std::vector<std::uint8_t> colors;
 };
 
 Decoded Decode(const std::string& bytes) {
@@ -131,13 +134,22 @@ Decoded Decode(const std::string& bytes) {
     out.triangles.insert(out.triangles.end(), {a, b, c});
   }
   points(reader.Count(), out.particles);
+  std::uint64_t isoline_points = 0;
+  for (std::uint64_t rings = reader.Count(); rings > 0; --rings) {
+    out.isoline_sizes.push_back(reader.Count());
+    isoline_points += out.isoline_sizes.back();
+  }
+  points(isoline_points, out.isoline_points);
+  for (std::uint64_t count = reader.Count(); count > 0; --count) {
+    out.colors.push_back(reader.Byte());
+  }
   EXPECT_TRUE(reader.AtEnd());
   return out;
 }
 
 Decoded DecodeFrame(const FrameRecord& frame, std::size_t max_particles = 1000,
-                    std::size_t max_triangles = 1000) {
-  return Decode(EncodeReportGeometry(frame, {max_particles, max_triangles}));
+                    std::size_t max_triangles = 1000, const std::string& color_by = "") {
+  return Decode(EncodeReportGeometry(frame, {max_particles, max_triangles, color_by}));
 }
 
 void ExpectNear(const std::vector<double>& found, const std::vector<double>& expected,
@@ -237,6 +249,30 @@ TEST(Report, AMissingDirectoryIsToldBeforeTheWork) {
   EXPECT_EQ(report.status().code(), absl::StatusCode::kNotFound);
 }
 
+TEST(Report, TellsTheRangeOfColoursAndTheirName) {
+  Result result = SquareWithHoleAndIsland();
+  result.attributes.resize(1);
+  result.attributes[0] = {.name = "<p>", .values = std::vector<float>(11, 1.0f)};
+  result.attributes[0].values[3] = 3;
+  const std::string page = Page({.title = "t", .color_by = "<p>"}, {{.result = result}});
+  EXPECT_EQ(json::parse(Numbers(page).at(0)).at("colors"), (json{1.0, 3.0}));
+  EXPECT_THAT(page, HasSubstr("&lt;p&gt;</label>"));
+  const std::string plain = Page({.title = "t"}, {{.result = result}});
+  EXPECT_FALSE(json::parse(Numbers(plain).at(0)).contains("colors"));
+}
+
+TEST(Report, SectionsAreAmongTheParameters) {
+  const auto lines = DescribeParameters(
+      {.slice = SlicePlane{.origin = {0, 0, 0.5}},
+       .isovalue = 0.25,
+       .sections = {{.isovalue = 0.5},
+                    {.slice = SlicePlane{.origin = {1, 2, 3}, .normal = {1, 0, 0}}}}});
+  EXPECT_THAT(lines, Contains(std::pair("slice", "through (0, 0, 0.5), normal (0, 0, 1)")));
+  EXPECT_THAT(lines, Contains(std::pair("isovalue", "0.25")));
+  EXPECT_THAT(lines, Contains(std::pair("section 1", "isovalue 0.5")));
+  EXPECT_THAT(lines, Contains(std::pair("section 2", "slice through (1, 2, 3), normal (1, 0, 0)")));
+}
+
 TEST(Report, ParametersAreDescribedUnderTheirNames) {
   const auto lines = DescribeParameters({.placement = Placement::kFarthestParticle,
                                          .fill = Fill::kGrid,
@@ -271,6 +307,42 @@ TEST(ReportGeometry, RingsMeshAndParticlesComeBackWithinHalfAStep) {
   EXPECT_THAT(decoded.interior, ElementsAre(0, 0, 1, 0, 0, 0, 0, 0, 0));
   // Rows of two spacings, x within a row.
   ExpectNear(decoded.particles, {0.1, 0.3, 1.23, 0.31, 3.1, 3.2}, half);
+}
+
+// The square, with another one around it and one of which the picture shows nothing.
+Result WithSections() {
+  Result result = SquareWithHoleAndIsland();
+  result.sections.resize(2);
+  AddRing(result.sections[0].rings, {9, 9, 10, 9, 9, 10}, kNoRing);
+  AddRing(result.sections[1].rings, {-1, -1, 5, -1, 5, 5, -1, 5}, kNoRing);
+  return result;
+}
+
+TEST(ReportGeometry, IsolinesAreTheSectionsOfTheSamePlane) {
+  const Result result = WithSections();
+  const std::vector<std::size_t> in_plane = {1};
+  const Decoded decoded = DecodeFrame({.result = result, .sections_in_plane = in_plane});
+  EXPECT_THAT(decoded.isoline_sizes, ElementsAre(4));
+  ExpectNear(decoded.isoline_points, result.sections[1].rings.points, decoded.step * 0.5001);
+  EXPECT_THAT(DecodeFrame({.result = result}).isoline_sizes, IsEmpty());
+}
+
+TEST(ReportGeometry, ColoursAreSharesOfTheRangeOfAnAttribute) {
+  Result result = SquareWithHoleAndIsland();
+  result.attributes.resize(2);
+  result.attributes[0] = {.name = "p", .values = std::vector<float>(11, 1.0f)};
+  result.attributes[0].values[3] = 3;
+  result.attributes[0].values[4] = 2;
+  result.attributes[1] = {.name = "v", .components = 2, .values = std::vector<float>(22, 0.0f)};
+  result.attributes[1].values[1] = -5;
+  const auto colors = [&](const std::string& name, std::size_t max_triangles = 1000) {
+    return DecodeFrame({.result = result}, 1000, max_triangles, name).colors;
+  };
+  EXPECT_THAT(colors("p"), ElementsAre(0, 0, 0, 255, 128, 0, 0, 0, 0, 0, 0));
+  EXPECT_EQ(colors("v")[0], 255) << "of a vector its length";
+  EXPECT_THAT(colors("q"), IsEmpty());
+  EXPECT_THAT(colors(""), IsEmpty());
+  EXPECT_EQ(colors("p", 8).size(), result.rings.PointCount()) << "without a mesh the outline";
 }
 
 TEST(ReportGeometry, NormalsAreTurnsOf256Steps) {

@@ -18,7 +18,7 @@ constexpr const char* kHeader =
     "frame,particles,polylines,vertices,triangles_grid,triangles,area,milliseconds,"
     "bins_ms,field_ms,crossings_ms,rings_ms,normals_ms,vertices_ms,identities_ms,mesh_ms,"
     "attributes_ms,perimeter,self_intersections,folded_triangles,dropped_holes,dropped_components,"
-    "dropped_spray,rings_digest,mesh_digest,time,doubts";
+    "dropped_spray,rings_digest,mesh_digest,time,doubts,section";
 
 FrameRecord Record(const Result& result) {
   return {.index = 3,
@@ -50,7 +50,21 @@ TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
   EXPECT_EQ(Written(directory / "stats.csv", {Record(result)}),
             std::string(kHeader) +
                 "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,8,9,23.5,1,2,3,4,5,"
-                "0123456789abcdef,000000000000000f,0.1,\n");
+                "0123456789abcdef,000000000000000f,0.1,,0\n");
+}
+
+TEST(Statistics, SectionsHaveRowsOfTheirOwn) {
+  support::TemporaryFolder directory;
+  Result result = SquareWithHoleAndIsland();
+  result.sections.resize(2);
+  result.sections[1].statistics.area = 77;
+  FrameRecord record = Record(result);
+  const std::vector<OutlineDigests> digests = {{1, 2}, {3, 4}};
+  record.section_digests = digests;
+  const std::string csv = Written(directory / "stats.csv", {record});
+  EXPECT_THAT(csv, HasSubstr(",0000000000000001,0000000000000002,0.1,,1\n"));
+  EXPECT_THAT(csv, HasSubstr("\n3,0,0,0,0,0,77,0,"));
+  EXPECT_THAT(csv, HasSubstr(",0000000000000003,0000000000000004,0.1,,2\n"));
 }
 
 TEST(Statistics, DoubtsAreNamedInACellOfTheirOwn) {
@@ -60,7 +74,7 @@ TEST(Statistics, DoubtsAreNamedInACellOfTheirOwn) {
   result.statistics.doubts.Add(Doubt::kSpacingProvisional);
   constexpr const char* kNames = "spacing-provisional volumes-contradict-spacing";
   EXPECT_THAT(Written(directory / "stats.csv", {Record(result)}),
-              HasSubstr(std::string(",0.1,") + kNames + "\n"));
+              HasSubstr(std::string(",0.1,") + kNames + ",0\n"));
   const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
   EXPECT_EQ(rows[0].at("doubts"), kNames);
 }

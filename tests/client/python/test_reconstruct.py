@@ -66,6 +66,25 @@ class Layouts(unittest.TestCase):
         self.assertEqual([digests(flat.reconstruct(positions))],
                          digests_of_replay([positions], flags=["--slice", "z=30"]))
 
+    def test_sections_give_the_digests_of_replay(self):
+        positions = ball()
+        sections = [{"isovalue": 0.4}, {"slice": ("x", 12)}, {"slice": ("x", 12), "isovalue": 0.4}]
+        result = partiemc.reconstruct(positions, spacing=1, slice=("z", 33), sections=sections)
+        self.assertEqual(len(result.sections), 3)
+        self.assertIs(result.sections[1], result.sections[1])
+        expected = digests_of_replay(
+            [positions], flags=["--slice", "z=33", "--slice", "x=12", "--isolines", "0.4"])
+        self.assertEqual([digests(each) for each in [result, *result.sections]], expected)
+        points = result.sections[1].rings.points
+        area = result.sections[1].area
+        del result
+        self.assertTrue(numpy.isfinite(points).all())
+        self.assertAlmostEqual(area, numpy.pi * (12 ** 2 - 2 ** 2), delta=0.02 * area)
+        self.assertEqual(sections[0], {"isovalue": 0.4})
+        told = partiemc.Reconstructor(spacing=1, isovalue=0.5, sections=sections[:1]).parameters
+        self.assertEqual(told["isovalue"], 0.5)
+        self.assertEqual(told["sections"], [{"slice": None, "isovalue": 0.4}])
+
     def test_a_sequence_gives_the_digests_of_replay(self):
         frames = [block(0.3 * k) for k in range(8)]
         sequence = partiemc.Reconstructor(spacing=1, threads=2)
@@ -282,6 +301,10 @@ class Errors(unittest.TestCase):
         self.assert_refused("UNSUPPORTED", "slice", slice=("w", 1))
         self.assert_refused("UNSUPPORTED", "slice", slice=((0, 0), (0, 0, 1)))
         self.assert_refused("UNSUPPORTED", "slice", slice=3)
+        self.assert_refused("UNSUPPORTED", "sections[1]", sections=[{}, {"isovalues": 1}])
+        self.assert_refused("OUT_OF_RANGE", "parameters.isovalue", isovalue=11)
+        self.assert_refused("OUT_OF_RANGE", "parameters.sections[0].slice",
+                            sections=[{"slice": ("z", 0)}])
         self.assert_refused("OUT_OF_RANGE", "parameters.slice.normal", spacing=1,
                             slice=((0, 0, 0), (0, 0, 0)))
         self.assert_refused("OUT_OF_RANGE", "parameters.spacing", spacing=None, slice=("z", 0))

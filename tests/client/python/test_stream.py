@@ -51,6 +51,18 @@ class Streams(unittest.TestCase):
             partiemc.connect(self.address, echo_particles=True, **sliced)
         self.assertIn("outputs.echo_particles", str(refused.exception))
 
+    def test_sections_are_those_of_this_process(self):
+        frames = [block(0.3 * k) for k in range(4)]
+        sections = [{"isovalue": 0.3}, {"isovalue": 0.7}]
+        here = partiemc.Reconstructor(spacing=1, sections=sections)
+        with partiemc.connect(self.address, spacing=1, sections=sections) as stream:
+            for result, frame in zip(stream.map(frames), frames):
+                expected = here.reconstruct(frame)
+                self.assertEqual(digests(result), digests(expected))
+                self.assertEqual([digests(each) for each in result.sections],
+                                 [digests(each) for each in expected.sections])
+                self.assertEqual(len(result.sections), 2)
+
     def test_two_threads_get_the_same(self):
         frames = [numpy.asfortranarray(block(0.3 * k)) for k in range(20)]
         with partiemc.connect(self.address, spacing=1, normals=True) as stream:

@@ -57,6 +57,13 @@ const char* partiemc_version(void);
 
 typedef struct partiemc_stream partiemc_stream;
 
+/* One more outline of the particles, with the options of the stream but for these. This struct will
+ * not grow. */
+typedef struct partiemc_section {
+  const double* slice; /* Six numbers as in partiemc_options; NULL: that of the stream. */
+  double isovalue;     /* Likewise; 0: the outline of the body. */
+} partiemc_section;
+
 typedef struct partiemc_options {
   size_t size;
   double spacing;         /* Distance of particles, world units; 0: estimated. */
@@ -101,6 +108,11 @@ typedef struct partiemc_options {
                               coordinates along the plane from that point on: x and y of a normal
                               along z, x and z of one along -y, y and z of one along x. Wants
                               `spacing`; volumes are volumes. NULL: no slice. */
+  double isovalue; /* In [.01, 10]: the outline is the isoline of the density, which is about
+                      1 inside of bodies and .5 on flat boundaries; 0: that of the body. */
+  const partiemc_section* sections; /* More outlines of each frame, at most 16, each of which costs
+                                       as much as a frame (partiemc_event_section). */
+  size_t section_count;
 } partiemc_options;
 /* Every option at its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -256,6 +268,8 @@ typedef struct partiemc_event {
 
   size_t attribute_count; /* As the options name them, in their order. */
   const partiemc_values* attributes;
+
+  size_t section_count; /* Of a result: those of the options. */
 } partiemc_event;
 /* Nothing. `size` is sizeof(partiemc_event). */
 void partiemc_event_init(partiemc_event* event, size_t size);
@@ -263,6 +277,11 @@ void partiemc_event_init(partiemc_event* event, size_t size);
 /* Waits for the next answer, at most `wait` seconds; negative: as long as it takes.
  * Errors: whatever ended the stream. */
 partiemc_code partiemc_receive(partiemc_stream* stream, double wait, partiemc_event* event);
+
+/* Fills `event` with a section of the result that the last event of the stream was, `index` below
+ * its section_count: as if it were the only outline, but for `milliseconds`, which are the frame's.
+ * Its pointers are valid for as long as those of that event. Errors: INVALID_ARGUMENT. */
+partiemc_code partiemc_event_section(partiemc_stream* stream, size_t index, partiemc_event* event);
 
 /* Sends a frame and waits for its answer, which is a result or a refusal. For programs with one
  * thread that want nothing else meanwhile. Errors: those of partiemc_send and partiemc_receive;

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -34,8 +35,9 @@ struct FrameTimes {
 struct FrameResult {
   Result result;  ///< Parts that were not asked for are empty.
   FrameTimes times;
-  std::uint64_t rings_digest = 0;  ///< DigestRings of the whole result.
-  std::uint64_t mesh_digest = 0;   ///< DigestMesh of the whole result.
+  std::uint64_t rings_digest = 0;                    ///< DigestRings of the whole result.
+  std::uint64_t mesh_digest = 0;                     ///< DigestMesh of the whole result.
+  std::vector<OutlineDigests> section_digests = {};  ///< The same of each of result.sections.
 };
 
 /// One answer. Kept by the caller and handed in again, so that its buffers are reused.
