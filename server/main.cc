@@ -122,6 +122,7 @@ int Serve(const CommandLine& line) {
             {"tls", line.server.tls ? "on" : "off"},
             {"tokens", line.server.token_file ? "on" : "off"},
             {"web", web ? web->ToString() : "off"},
+            {"nats", line.server.nats ? "on" : "off"},
             {"metrics", metrics ? metrics->ToString() : "off"}});
   int signal = 0;
   sigwait(&signals, &signal);

@@ -51,6 +51,7 @@ struct Raw {
   std::string token_file;
   std::string checkpoint_key_file;
   std::string metrics;
+  std::string nats;
   std::string web, web_port_file;
   WebOptions web_options;
   TlsFiles tls;
@@ -91,6 +92,12 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
       ->capture_default_str()
       ->type_name("SECONDS")
       ->envname("PARTIEMC_GRACE_SECONDS");
+  app.add_option("--nats", raw.nats,
+                 "Share streams with the other replicas that this server of NATS connects, "
+                 "nats://[USER:PASSWORD@]HOST[:PORT] or tls://...: each can then be watched at all "
+                 "of them. Several with commas between them")
+      ->type_name("URL")
+      ->envname("PARTIEMC_NATS");
   app.add_option("--drain-delay", raw.drain_delay,
                  "After SIGTERM, serve on for this time before it drains, while health checks say "
                  "no, so that proxies send nobody new; in its second half streams are told to go, "
@@ -330,6 +337,7 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
     raw.line.server.web = raw.web_options;
     if (!raw.web_port_file.empty()) raw.line.web_port_file = raw.web_port_file;
   }
+  if (!raw.nats.empty()) raw.line.server.nats = raw.nats;
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
   if (!raw.token_file.empty()) raw.line.server.token_file = raw.token_file;
   if (!raw.checkpoint_key_file.empty()) {

@@ -15,6 +15,8 @@
 #include "server/calls/methods.h"
 #include "server/compute/heap.h"
 #include "server/compute/worker_memory.h"
+#include "server/relay/nats_bus.h"
+#include "server/relay/relay.h"
 #include "server/rpc/call_guard.h"
 #include "server/rpc/health_service.h"
 #include "server/rpc/service.h"
@@ -83,12 +85,22 @@ IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBu
           .give_back_freed = GiveBackFreedMemory};
 }
 
+// Of a stream of another replica the newest result is kept whatever its size: to fetch it again
+// would take a moment.
+Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
+  return {.broadcaster = {.mailbox_bytes = limits.max_watcher_bytes,
+                          .kept_bytes = limits.max_watcher_bytes},
+          .watcher_bytes = limits.max_watcher_bytes,
+          .history = limits.history_bytes > 0 ? &history : nullptr,
+          .watches = limits.max_watchers};
+}
+
 // For watchers to be told that the server drains; one that does not read is cut then.
 constexpr std::chrono::milliseconds kWatchPatience(500);
 
 }  // namespace
 
-Server::Server(const ServerOptions& options)
+Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
     : options_(options),
       address_(options.address),
       authentication_(CallerQuota{.calls = options.limits.CallsOfOneCaller()}),
@@ -98,6 +110,9 @@ Server::Server(const ServerOptions& options)
       watchers_(options.limits.max_watchers),
       registry_(options.limits.max_streams, options.limits.history_bytes > 0 ? &history_ : nullptr,
                 options.limits.max_parts),
+      relay_(bus == nullptr ? nullptr
+                            : std::make_unique<Relay>(std::move(bus), registry_, dispatcher_,
+                                                      RelayLimits(options.limits, history_))),
       calls_(options.limits.max_streams),
       budget_(options.limits.FrameBudget()),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
@@ -105,7 +120,7 @@ Server::Server(const ServerOptions& options)
       intake_guard_(opening_, WatchedProcess(options, budget_, watchers_)),
       methods_(std::make_unique<Methods>(options_.limits, authentication_, opening_, registry_,
                                          calls_, budget_, pool_, watchers_, dispatcher_, history_,
-                                         checkpoint_keys_, *metrics_)),
+                                         checkpoint_keys_, *metrics_, relay_.get())),
       service_(std::make_unique<Service>(*methods_)),
       health_(std::make_unique<HealthService>(authentication_, opening_, calls_, budget_)) {}
 
@@ -115,7 +130,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     if (auto status = CheckSecurity(options, options.web->address); !status.ok()) return status;
   }
   if (auto status = CheckCanListen(options.address); !status.ok()) return status;
-  std::unique_ptr<Server> server(new Server(options));
+  std::unique_ptr<MessageBus> bus;
+  if (options.nats) {
+    auto connection = ConnectToNats(*options.nats);
+    if (!connection.ok()) return connection.status();
+    bus = *std::move(connection);
+  }
+  std::unique_ptr<Server> server(new Server(options, std::move(bus)));
   if (auto status = server->LoadFiles(); !status.ok()) return status;
   if (auto status = server->Listen(); !status.ok()) return status;
   if (options.web) {
@@ -191,6 +212,7 @@ void Server::AddGauges() {
   add("partiemc_history_bytes",
       "Results that watchers can go back to, of all streams; a part of --memory-budget of its own.",
       [this] { return history_.held(); });
+  if (relay_ != nullptr) AddRelayMetrics();
   const auto count = [this](const char* name, const char* help, std::uint64_t LogLosses::*value) {
     metrics_->AddCounter(name, help, [value] { return static_cast<double>(LossesOfLog().*value); });
   };
@@ -203,6 +225,26 @@ void Server::AddGauges() {
       [this] {
         return std::chrono::system_clock::to_time_t(tls_identity_->Get().identity->not_after);
       });
+}
+
+void Server::AddRelayMetrics() {
+  const auto add = [this](const char* name, const char* help, auto value) {
+    metrics_->AddGauge(name, help, [value] { return static_cast<double>(value()); });
+  };
+  add("partiemc_relay_connected", "Whether NATS can be reached.",
+      [this] { return relay_->connected(); });
+  add("partiemc_relay_replicas", "Other replicas that announce their streams.",
+      [this] { return relay_->replicas(); });
+  add("partiemc_relay_streams", "Streams that they announce.",
+      [this] { return relay_->remote_streams(); });
+  add("partiemc_relay_exported_streams", "Streams of this replica that others watch.",
+      [this] { return relay_->exported_streams(); });
+  add("partiemc_relay_imported_streams", "Streams of other replicas that are watched here.",
+      [this] { return relay_->imported_streams(); });
+  metrics_->AddCounter("partiemc_relay_lost_messages_total",
+                       "Messages between replicas that could not be sent, or came faster than they "
+                       "were handled; what they had is fetched again.",
+                       [this] { return static_cast<double>(relay_->lost_messages()); });
 }
 
 absl::Status Server::Listen() {
@@ -275,6 +317,8 @@ std::optional<Address> Server::web_address() const {
 }
 
 Server::~Server() {
+  // No watch waits for its stream any more.
+  if (relay_ != nullptr) relay_->Drain();
   // All of its calls end while what they use is there.
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now());
   if (server_ == nullptr) return;
@@ -321,6 +365,7 @@ void Server::Drain(std::chrono::milliseconds grace) {
   registry_.WaitUntilEmpty(deadline);
   calls_.WaitForFrames(deadline);
   dispatcher_.Flush();  // So that watchers hear of the last results before they are sent home.
+  if (relay_ != nullptr) relay_->Drain();
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
   const auto left = std::clamp<std::chrono::steady_clock::duration>(

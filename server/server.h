@@ -38,6 +38,8 @@ class ServerCredentials;
 namespace partiemc::server {
 
 class HealthService;
+class Relay;
+class MessageBus;
 class Methods;
 class Service;
 class WebGateway;
@@ -69,6 +71,8 @@ struct ServerOptions {
   /// Where the viewer's page and the methods are served over HTTP and WebSocket, with the same
   /// identity, tokens and limits.
   std::optional<WebOptions> web;
+  /// Where replicas tell each other of their streams (ConnectToNats).
+  std::optional<std::string> nats;
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
@@ -109,12 +113,13 @@ class Server {
   void Drain(std::chrono::milliseconds grace);
 
  private:
-  explicit Server(const ServerOptions& options);
+  Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus);
 
   absl::Status LoadFiles();
   absl::Status Listen();
   absl::Status OpenGateway();
   void AddGauges();
+  void AddRelayMetrics();
   void StopBeingReady();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
@@ -130,6 +135,7 @@ class Server {
   WatchDispatcher dispatcher_;
   WatchRegistry watchers_;
   StreamRegistry registry_;
+  std::unique_ptr<Relay> relay_;
   UnaryRegistry calls_;
   MemoryBudget budget_;
   ComputePool pool_;

@@ -130,6 +130,15 @@ grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped,
   return {slices.data(), slices.size()};
 }
 
+std::string WatchedBytes::ToString() const {
+  std::string bytes;
+  bytes.reserve(size_);
+  for (const grpc::Slice& slice : slices_) {
+    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  }
+  return bytes;
+}
+
 void WatchedBytes::AppendOwn(const std::string& bytes) {
   slices_.emplace_back(bytes);
   size_ += bytes.size();

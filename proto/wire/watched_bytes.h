@@ -22,6 +22,9 @@ class WatchedBytes {
   /// Requires: a frame, without particles.
   explicit WatchedBytes(grpc::ByteBuffer& response);
 
+  /// A serialised ReconstructedFrame, which nobody has looked at.
+  explicit WatchedBytes(const std::string& frame) { AppendOwn(frame); }
+
   /// Adds positions, ids, volumes and velocities of the frame in `request`, the bytes of a
   /// ReconstructRequest that was parsed into `frame`, by sharing their memory.
   void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
@@ -32,6 +35,9 @@ class WatchedBytes {
   /// What keeping it keeps from being freed: pieces of memory that have other parts of an answer or
   /// a request, too.
   std::size_t memory() const { return memory_; }
+
+  /// The serialised ReconstructedFrame, copied.
+  std::string ToString() const;
 
   /// A serialised WatchStreamResponse with the frame and these fields of WatchedFrame. Copies
   /// nothing but a few bytes of its own.

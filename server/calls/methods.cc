@@ -14,6 +14,7 @@
 #include "server/calls/stream_messages.h"
 #include "server/calls/unary_call.h"
 #include "server/calls/watch_call.h"
+#include "server/relay/stream_summary.h"
 #include "server/stream/session.h"
 #include "wire/message_bytes.h"
 
@@ -21,6 +22,9 @@ namespace partiemc::server {
 namespace {
 
 constexpr std::int32_t kMaxPageSize = 1000;
+
+// Begins the tokens of pages with streams of other replicas.
+constexpr std::string_view kRemotePage = "elsewhere:";
 
 absl::StatusOr<grpc::ByteBuffer> AnswerOrThrow(grpc::ByteBuffer& bytes, const ServerLimits& limits,
                                                Worker& worker, const std::atomic<bool>& cancelled) {
@@ -60,24 +64,6 @@ absl::Status BadPage(std::string_view reason, std::string field, std::string val
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-void EncodeSummary(const StreamSummary& stream, std::chrono::steady_clock::time_point now,
-                   v1::StreamSummary& message) {
-  const auto seconds_since = [now](std::chrono::steady_clock::time_point then) {
-    return std::chrono::duration<double>(now - then).count();
-  };
-  message.set_stream_id(stream.id);
-  message.set_stream_name(stream.description.name);
-  message.mutable_labels()->insert(stream.description.labels.begin(),
-                                   stream.description.labels.end());
-  wire::EncodeParameters(stream.description.parameters, *message.mutable_parameters());
-  message.set_last_sequence(stream.counts.last_sequence);
-  message.set_frames(stream.counts.frames);
-  message.set_frame_errors(stream.counts.frame_errors);
-  message.set_watchers(stream.description.broadcaster->watcher_count());
-  message.set_open_seconds(seconds_since(stream.opened));
-  message.set_idle_seconds(std::max(0.0, seconds_since(stream.counts.last_activity)));
-}
-
 }  // namespace
 
 std::string_view Methods::Name(Method method) {
@@ -100,7 +86,7 @@ Methods::Methods(const ServerLimits& limits, const Authentication& authenticatio
                  OpeningCalls& opening, StreamRegistry& registry, UnaryRegistry& calls,
                  MemoryBudget& budget, ComputePool& pool, WatchRegistry& watchers,
                  WatchDispatcher& dispatcher, const HistoryRoom& history,
-                 const CurrentCheckpointKeys& checkpoint_keys, Metrics& metrics)
+                 const CurrentCheckpointKeys& checkpoint_keys, Metrics& metrics, Relay* relay)
     : limits_(limits),
       authentication_(authentication),
       opening_(opening),
@@ -111,6 +97,7 @@ Methods::Methods(const ServerLimits& limits, const Authentication& authenticatio
       watchers_(watchers),
       dispatcher_(dispatcher),
       history_(history),
+      relay_(relay),
       checkpoint_keys_(checkpoint_keys),
       meters_(metrics) {}
 
@@ -126,7 +113,7 @@ std::unique_ptr<ByteCall> Methods::Begin(Method method, CallChannel& channel,
     case Method::kWatchStream:
       return std::make_unique<WatchCall>(channel, Meters(method),
                                          Admit(authentication_, origin, &Caller::CheckMayWatch),
-                                         limits_, opening_, registry_, watchers_);
+                                         limits_, opening_, registry_, watchers_, relay_);
     case Method::kListStreams:
       return Information<v1::ListStreamsRequest>(method, channel, origin, &Caller::CheckMayList,
                                                  [this](const auto& request, const Caller& caller) {
@@ -182,26 +169,51 @@ absl::StatusOr<v1::ListStreamsResponse> Methods::ListStreams(const v1::ListStrea
     return BadPage(kReasonOutOfRange, "page_size", absl::StrCat(request.page_size()),
                    "must be at least 0");
   }
-  // A token is the number of the last stream that was listed.
+  // A token is the number of the last stream that was listed or, of those of other replicas, its
+  // id.
   const std::string& token = request.page_token();
+  const bool is_local = !token.starts_with(kRemotePage);
   std::uint64_t after = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), after);
-  if (!token.empty() && (error != std::errc() || end != token.data() + token.size())) {
+  const bool is_number = error == std::errc() && end == token.data() + token.size();
+  if (!token.empty() && (is_local ? !is_number : relay_ == nullptr)) {
     return BadPage(kReasonPageToken, "page_token", absl::StrCat(token.size(), " characters"),
                    "must be the next_page_token of an answer");
   }
   const std::int32_t asked = request.page_size() > 0 ? request.page_size() : kMaxPageSize;
   const auto page_size = static_cast<std::size_t>(std::min(asked, kMaxPageSize));
+  v1::ListStreamsResponse response;
+  if (!is_local) {
+    AddRemoteStreams(token.substr(kRemotePage.size()), page_size, caller, response);
+    return response;
+  }
   const auto streams = registry_.List(after, page_size + 1, caller);
   const auto now = std::chrono::steady_clock::now();
-  v1::ListStreamsResponse response;
   for (std::size_t i = 0; i < std::min(streams.size(), page_size); ++i) {
+    if (relay_ != nullptr && relay_->WasResumedElsewhere(streams[i].lineage, streams[i].opened)) {
+      continue;  // It is listed there.
+    }
     EncodeSummary(streams[i], now, *response.add_streams());
   }
   if (streams.size() > page_size) {
     response.set_next_page_token(absl::StrCat(streams[page_size - 1].number));
+  } else if (relay_ != nullptr) {
+    AddRemoteStreams("", page_size, caller, response);
   }
   return response;
+}
+
+// Until there are `page_size` in the answer.
+void Methods::AddRemoteStreams(const std::string& after, std::size_t page_size,
+                               const Caller& caller, v1::ListStreamsResponse& response) const {
+  const std::size_t room = page_size - static_cast<std::size_t>(response.streams_size());
+  auto streams = relay_->List(after, room + 1, caller);
+  for (std::size_t i = 0; i < std::min(streams.size(), room); ++i) {
+    *response.add_streams() = std::move(*streams[i].mutable_summary());
+  }
+  if (streams.size() <= room) return;
+  const std::string last = room > 0 ? response.streams().rbegin()->stream_id() : after;
+  response.set_next_page_token(absl::StrCat(std::string(kRemotePage), last));
 }
 
 v1::GetServerInfoResponse Methods::GetServerInfo() const {
@@ -227,6 +239,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("resume");
   response.add_capabilities("slices");
   response.add_capabilities("sections");
+  if (relay_ != nullptr) response.add_capabilities("relay");
   response.add_capabilities("watch");
   if (limits_.history_bytes > 0) response.add_capabilities("history");
   response.set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));

@@ -13,6 +13,7 @@
 #include "server/calls/call_meters.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
+#include "server/relay/relay.h"
 #include "server/security/authentication.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/stream/limits.h"
@@ -37,11 +38,12 @@ class Methods {
   /// As in the .proto.
   static std::string_view Name(Method method);
 
-  /// The arguments live longer, and so do the methods than their calls.
+  /// The arguments live longer, and so do the methods than their calls. Without a `relay` there are
+  /// only the streams of this server.
   Methods(const ServerLimits& limits, const Authentication& authentication, OpeningCalls& opening,
           StreamRegistry& registry, UnaryRegistry& calls, MemoryBudget& budget, ComputePool& pool,
           WatchRegistry& watchers, WatchDispatcher& dispatcher, const HistoryRoom& history,
-          const CurrentCheckpointKeys& checkpoint_keys, Metrics& metrics);
+          const CurrentCheckpointKeys& checkpoint_keys, Metrics& metrics, Relay* relay);
 
   /// A call of `method` begins: admits its caller, before anything of a request is read, and has
   /// `channel` read, or end the call if it is refused.
@@ -57,6 +59,8 @@ class Methods {
                                         Answer answer) const;
   absl::StatusOr<v1::ListStreamsResponse> ListStreams(const v1::ListStreamsRequest& request,
                                                       const Caller& caller) const;
+  void AddRemoteStreams(const std::string& after, std::size_t page_size, const Caller& caller,
+                        v1::ListStreamsResponse& response) const;
   v1::GetServerInfoResponse GetServerInfo() const;
 
   const MethodMeters* Meters(Method method) const { return &meters_.Of(Name(method)); }
@@ -71,6 +75,7 @@ class Methods {
   WatchRegistry& watchers_;
   WatchDispatcher& dispatcher_;
   const HistoryRoom& history_;
+  Relay* const relay_;
   const CurrentCheckpointKeys& checkpoint_keys_;
   const CallMeters meters_;
 };

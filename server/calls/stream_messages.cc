@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/calls/watched_result.h"
+#include "server/relay/watched_result.h"
 #include "server/stream/stream_token.h"
 #include "server/telemetry/logging.h"
 #include "wire/message_bytes.h"

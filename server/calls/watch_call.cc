@@ -5,7 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/calls/requests.h"
-#include "server/calls/watched_result.h"
+#include "server/relay/watched_result.h"
 #include "server/telemetry/logging.h"
 #include "server/watch/result_broadcaster.h"
 #include "wire/codec.h"
@@ -32,11 +32,13 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
 
 WatchCall::WatchCall(CallChannel& channel, const MethodMeters* meters,
                      absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
-                     OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers)
+                     OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers,
+                     Relay* relay)
     : ByteCall(channel, meters, std::move(admission)),
       opening_calls_(opening),
       streams_(streams),
       watchers_(watchers),
+      relay_(relay),
       machine_(std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this),
                                                    limits.max_watcher_bytes)) {
   absl::Status status = this->admission();
@@ -79,7 +81,7 @@ void WatchCall::StartRead() {
   channel().StartRead(&request_);
 }
 
-absl::StatusOr<WatchTerms> WatchCall::Open() {
+absl::StatusOr<WatchTerms> WatchCall::ReadTerms() const {
   const v1::OpenWatch& open = parsed_.open();
   const auto mode = DecodeMode(open.mode());
   if (!mode.ok()) return mode.status();
@@ -88,25 +90,65 @@ absl::StatusOr<WatchTerms> WatchCall::Open() {
         absl::StatusCode::kInvalidArgument,
         {std::string(kReasonOutOfRange), "open.credits", "0", "must be at least 1"});
   }
-  const auto stream = streams_.Find(open.stream_name(), caller());
-  if (!stream.ok()) return stream.status();
-  if (auto status = watchers_.Open(*machine_, caller()); !status.ok()) return status;
-  const StreamDescription& description = stream->description;
-  stream_name_ = description.name;
-  v1::WatchOpened& opened = *opened_.mutable_opened();
-  opened.set_stream_id(stream->id);
-  opened.set_lineage(stream->lineage);
-  wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
-  opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
-  LogEvent(spdlog::level::info, "watch opened",
-           {{"stream", stream->id},
-            {"name", stream_name_},
-            {"mode", *mode == WatchMode::kEvery ? "every" : "latest"},
-            {"peer", channel().peer()},
-            {"client", caller().name()}});
-  WatchTerms terms{.broadcaster = description.broadcaster, .mode = *mode, .credit = open.credits()};
+  WatchTerms terms{.broadcaster = nullptr, .mode = *mode, .credit = open.credits()};
   if (open.has_from_sequence()) terms.from_sequence = open.from_sequence();
   return terms;
+}
+
+// The last line of each way is the call of Opened: after that the call may be gone.
+void WatchCall::StartOpen() {
+  auto terms = ReadTerms();
+  if (!terms.ok()) return machine_->Opened(terms.status());
+  terms_ = *std::move(terms);
+  const std::string name = parsed_.open().stream_name();
+  const auto stream = streams_.Find(name, caller());
+  const bool is_elsewhere = relay_ != nullptr && (stream.ok() ? relay_->WasResumedElsewhere(
+                                                                    stream->lineage, stream->opened)
+                                                              : absl::IsNotFound(stream.status()));
+  if (!is_elsewhere) {
+    const absl::Status status = stream.ok() ? OpenHere(*stream) : stream.status();
+    return machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
+  }
+  relay_->Find(name, terms_.from_sequence, [this](const absl::StatusOr<Relay::Found>& found) {
+    const absl::Status status = found.ok() ? OpenRemote(*found) : found.status();
+    machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
+  });
+}
+
+absl::Status WatchCall::OpenHere(const StreamSummary& stream) {
+  const StreamDescription& description = stream.description;
+  if (auto status = TakePlace(stream.id, description.name); !status.ok()) return status;
+  v1::WatchOpened& opened = *opened_.mutable_opened();
+  opened.set_lineage(stream.lineage);
+  wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
+  opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
+  terms_.broadcaster = description.broadcaster;
+  return absl::OkStatus();
+}
+
+absl::Status WatchCall::OpenRemote(const Relay::Found& found) {
+  const v1::StreamSummary& stream = found.stream.summary();
+  if (auto status = TakePlace(stream.stream_id(), stream.stream_name()); !status.ok())
+    return status;
+  v1::WatchOpened& opened = *opened_.mutable_opened();
+  opened.set_lineage(found.stream.lineage());
+  *opened.mutable_parameters() = stream.parameters();
+  *opened.mutable_labels() = stream.labels();
+  terms_.broadcaster = found.broadcaster;
+  return absl::OkStatus();
+}
+
+absl::Status WatchCall::TakePlace(const std::string& stream_id, const std::string& stream_name) {
+  if (auto status = watchers_.Open(*machine_, caller()); !status.ok()) return status;
+  stream_name_ = stream_name;
+  opened_.mutable_opened()->set_stream_id(stream_id);
+  LogEvent(spdlog::level::info, "watch opened",
+           {{"stream", stream_id},
+            {"name", stream_name_},
+            {"mode", terms_.mode == WatchMode::kEvery ? "every" : "latest"},
+            {"peer", channel().peer()},
+            {"client", caller().name()}});
+  return absl::OkStatus();
 }
 
 void WatchCall::WriteOpened(const HeldFrames& held) {
@@ -117,9 +159,10 @@ void WatchCall::WriteOpened(const HeldFrames& held) {
   Write(wire::ToBytes(opened_));
 }
 
-void WatchCall::WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+void WatchCall::WriteFrame(const Published& published, std::uint64_t dropped,
                            std::uint64_t oldest_sequence) {
-  Write(static_cast<const WatchedResult&>(frame).bytes.ToResponse(dropped, oldest_sequence));
+  const auto& result = static_cast<const WatchedResult&>(*published.frame);
+  Write(result.bytes.ToResponse(dropped, oldest_sequence));
 }
 
 void WatchCall::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {

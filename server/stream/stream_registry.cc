@@ -65,6 +65,11 @@ absl::Status CheckLabels(const std::map<std::string, std::string>& labels) {
 
 }  // namespace
 
+absl::Status NoSuchStream(const std::string& name, std::string rule) {
+  return Refused(absl::StatusCode::kNotFound, kReasonNoSuchStream, "open.stream_name", Quoted(name),
+                 std::move(rule));
+}
+
 StreamRegistry::StreamRegistry(std::uint32_t max_streams, HistoryRoom* history,
                                std::uint32_t max_parts)
     : max_streams_(max_streams),
@@ -112,6 +117,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
   entry.stream->opened = std::chrono::steady_clock::now();
   entry.stream->description = std::move(description);
   entry.token = std::move(token);
+  ++changes_;
   if (const auto& assembler = entry.stream->description.assembler; assembler != nullptr) {
     assembler->SetLeader(entry.machine);
     if (tell_earlier_look_) tell_earlier_look_();
@@ -233,6 +239,7 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& mac
       found->second.place = {};
       found->second.sends_part = false;
       summary.swap(found->second.stream);
+      ++changes_;
     }
   }
   if (summary) summary->counts = machine.counts();
@@ -258,8 +265,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
     summary.counts = machine->counts();
     return summary;
   }
-  return Refused(absl::StatusCode::kNotFound, kReasonNoSuchStream, "open.stream_name", Quoted(name),
-                 "must be the name of an open stream; ListStreams tells them");
+  return NoSuchStream(name);
 }
 
 std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count,

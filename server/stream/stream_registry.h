@@ -1,6 +1,7 @@
 // The streams of this server: who may come in, who is there, and how all are sent home.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -34,6 +35,12 @@ inline constexpr std::string_view kReasonPartsToken = "PARTS_TOKEN";
 inline constexpr std::string_view kReasonTooManyParts = "TOO_MANY_PARTS";
 /// Of a ListStreams that wants a page that is none.
 inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
+
+/// NOT_FOUND (NO_SUCH_STREAM) for who asks for a stream of this name.
+absl::Status NoSuchStream(const std::string& name,
+                          std::string rule =
+                              "must be the name of an open stream; ListStreams "
+                              "tells them");
 
 struct StreamDescription {
   std::string name;  ///< Empty: the registry makes one up.
@@ -112,6 +119,8 @@ class StreamRegistry {
   std::vector<StreamSummary> List(std::uint64_t after, std::size_t count,
                                   const Caller& caller = {}) const;
   std::size_t OpenCount() const;
+  /// Has grown whenever other streams are open than before.
+  std::uint64_t changes() const { return changes_; }
 
   /// Drains the machines that are here now, one after the other within this time. Who comes
   /// meanwhile is let in.
@@ -165,6 +174,7 @@ class StreamRegistry {
   std::condition_variable left_;
   std::map<const StreamStateMachine*, Entry> entries_;
   std::uint64_t opened_ = 0;
+  std::atomic<std::uint64_t> changes_ = 0;
   bool draining_ = false;
   std::uint64_t turned_away_ = 0;
   std::function<void()> tell_earlier_look_;

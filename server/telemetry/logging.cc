@@ -1,5 +1,6 @@
 #include "server/telemetry/logging.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <signal.h>
 #include <spdlog/pattern_formatter.h>
@@ -161,6 +162,8 @@ void SetUpLogging(const std::string& level, LogFormat format) {
   });
   static_cast<void>(registered);
   gpr_set_log_function(&LogFromGrpc);
+  // Protobuf would tell standard error of every message that is none, as often as somebody likes.
+  google::protobuf::SetLogHandler(nullptr);
 }
 
 void RefuseTraces() {

@@ -67,6 +67,12 @@ bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::ui
   return watcher_count_ != 0;
 }
 
+void ResultBroadcaster::PublishNumbered(Published published) {
+  published_ = published.number - 1;
+  const std::uint64_t sequence = published.sequence;
+  if (Publish(std::move(published.frame), sequence)) Announce();
+}
+
 void ResultBroadcaster::Announce() {
   CountWaits([&] { dispatcher_.Wake(*this); });
 }
@@ -90,7 +96,7 @@ ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMach
     Collect();
     joined.last_number = collected_;
     if (newest_.frame != nullptr) {
-      joined.held = {.any = true, .oldest = oldest_sequence_, .newest = newest_.sequence};
+      joined.held = {.any = true, .oldest = oldest_sequence(), .newest = newest_.sequence};
     }
     const Published* const held = from && history_ ? history_->FromSequence(*from) : nullptr;
     if (held != nullptr) {
@@ -124,6 +130,26 @@ Published ResultBroadcaster::Held(std::uint64_t number) {
   if (number > collected_) Collect();  // The dispatcher may not have come to it yet.
   const Published* const held = history_ ? history_->FromNumber(number) : nullptr;
   return held != nullptr ? *held : Published();
+}
+
+Published ResultBroadcaster::HeldFrom(std::uint64_t sequence) {
+  const std::lock_guard lock(mutex_);
+  Collect();
+  const Published* const held = history_ ? history_->FromSequence(sequence) : nullptr;
+  if (held != nullptr) return *held;
+  return newest_.frame != nullptr && newest_.sequence >= sequence ? newest_ : Published();
+}
+
+Published ResultBroadcaster::Newest() {
+  const std::lock_guard lock(mutex_);
+  Collect();
+  return newest_;
+}
+
+std::uint64_t ResultBroadcaster::LastNumber() {
+  const std::lock_guard lock(mutex_);
+  Collect();
+  return collected_;
 }
 
 void ResultBroadcaster::Collect() {

@@ -43,6 +43,12 @@ class ResultBroadcaster final : public Dispatched {
   /// than that of the one before. Wait-free: a lock is taken only if nobody has it. True if
   /// somebody watches: then Announce is to follow.
   [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence);
+  /// The same of a result that another server has numbered, and announced at once; numbers rise,
+  /// and those left out never come.
+  void PublishNumbered(Published published);
+  /// The results before those that are held here can be asked for from this sequence number on, of
+  /// the server that made them. 0: none can.
+  void SetOldestElsewhere(std::uint64_t sequence) { oldest_elsewhere_ = sequence; }
   /// Has watchers served with what was published. From any thread; wakes the dispatcher's, without
   /// waiting for it. Apart from Publish, so that a producer's own answer is on its way before the
   /// dispatcher writes to watchers: their writes take the same locks of gRPC.
@@ -64,8 +70,19 @@ class ResultBroadcaster final : public Dispatched {
 
   /// The first frame of at least this number in the history, offered or not; none: all are older.
   Published Held(std::uint64_t number);
+  /// Likewise of at least this sequence number.
+  Published HeldFrom(std::uint64_t sequence);
+  /// The newest one, if it is held.
+  Published Newest();
+  /// The number of the last result.
+  std::uint64_t LastNumber();
   /// The oldest sequence number that can be asked for; 0: none.
-  std::uint64_t oldest_sequence() const { return oldest_sequence_; }
+  std::uint64_t oldest_sequence() const {
+    const std::uint64_t elsewhere = oldest_elsewhere_, here = oldest_sequence_;
+    return elsewhere != 0 && (here == 0 || elsewhere < here) ? elsewhere : here;
+  }
+  /// The oldest one that is held here; 0: none.
+  std::uint64_t oldest_here() const { return oldest_sequence_; }
 
   std::uint32_t watcher_count() const { return watcher_count_; }
   /// How often the producer's thread had to sleep to publish or to announce, as the system counts
@@ -88,7 +105,7 @@ class ResultBroadcaster final : public Dispatched {
   std::uint64_t published_ = 0;  // Of the producer's thread.
   std::atomic<std::uint64_t> producer_waits_ = 0;
   std::atomic<std::uint32_t> watcher_count_ = 0;
-  std::atomic<std::uint64_t> oldest_sequence_ = 0;
+  std::atomic<std::uint64_t> oldest_sequence_ = 0, oldest_elsewhere_ = 0;
 
   std::mutex mutex_;  // Guards everything below. Publish never waits for it.
   std::vector<std::shared_ptr<WatchStateMachine>> watchers_;

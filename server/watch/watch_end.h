@@ -22,6 +22,8 @@ struct WatchEnd {
   std::string reason;
   std::string message;  ///< For a person.
   absl::Status status;  ///< Of the call.
+  /// The number of the stream's last result, where watchers may not have been offered it.
+  std::uint64_t last_number = 0;
 
   /// For the watchers of a stream that ended with `status`.
   static WatchEnd OfStream(const absl::Status& status);

@@ -39,7 +39,7 @@ void WatchStateMachine::ReadDone(const WatchRequest& request) {
     TakeRequest(request);
     open = opening_;
   });
-  if (open) Open();
+  if (open) transport_.StartOpen();
 }
 
 void WatchStateMachine::TakeRequest(const WatchRequest& request) {
@@ -63,8 +63,7 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
 
 // The watcher joins before it is told that it is in, so that it misses nothing that is published
 // after that. Nothing is written, and nothing ends, until then.
-void WatchStateMachine::Open() {
-  const absl::StatusOr<WatchTerms> terms = transport_.Open();
+void WatchStateMachine::Opened(const absl::StatusOr<WatchTerms>& terms) {
   On([&] {
     opening_ = false;
     if (!terms.ok()) {
@@ -201,6 +200,10 @@ void WatchStateMachine::MissUntil(std::uint64_t number) {
 void WatchStateMachine::StreamEnded(const WatchEnd& end) {
   On([&] {
     if (phase_ != Phase::kWatching) return;
+    if (next_held_ == 0 && offered_ != 0 && end.last_number > offered_) {
+      counts_.dropped += end.last_number - offered_;
+      offered_ = end.last_number;
+    }
     if (end.status.ok()) {
       phase_ = Phase::kEnding;
       end_ = end;
@@ -368,7 +371,7 @@ void WatchStateMachine::Perform(Actions actions) {
           transport_.WriteOpened(actions.held);
           break;
         case Write::kFrame:
-          transport_.WriteFrame(*actions.frame.frame, actions.dropped, actions.oldest_sequence);
+          transport_.WriteFrame(actions.frame, actions.dropped, actions.oldest_sequence);
           break;
         case Write::kEnded:
           transport_.WriteEnded(actions.end, actions.dropped);

@@ -49,14 +49,14 @@ class WatchTransport {
 
   /// Begins to read the next request; ends in WatchStateMachine::ReadDone or ReadEnded.
   virtual void StartRead() = 0;
-  /// Looks at the `open` that was just read, and prepares what WriteOpened sends. An error ends the
-  /// watch.
-  virtual absl::StatusOr<WatchTerms> Open() = 0;
+  /// Begins to look for the stream of the `open` that was just read, and prepares what WriteOpened
+  /// sends; ends in WatchStateMachine::Opened, from within or later.
+  virtual void StartOpen() = 0;
 
   /// Each begins to write; ends in WatchStateMachine::WriteDone.
   virtual void WriteOpened(const HeldFrames& held) = 0;
   /// `oldest_sequence`: what can be asked for now.
-  virtual void WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+  virtual void WriteFrame(const Published& published, std::uint64_t dropped,
                           std::uint64_t oldest_sequence) = 0;
   virtual void WriteEnded(const WatchEnd& end, std::uint64_t dropped) = 0;
 
@@ -106,6 +106,8 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   void ReadDone(const WatchRequest& request);
   /// ... has found that no request will come any more: what there is credit for is still written.
   void ReadEnded();
+  /// The stream was found; an error ends the watch.
+  void Opened(const absl::StatusOr<WatchTerms>& terms);
   void WriteDone(bool ok);
   /// Nobody is there any more.
   void Cancelled();
@@ -169,7 +171,6 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   template <typename Event>
   void On(Event event);
   void Perform(Actions actions);
-  void Open();
 
   WatchTransport& transport_;
   const std::size_t max_bytes_;

@@ -87,6 +87,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"partiemc", {}},
       {"PkgConfig", {"pkg-config"}},
       {"OpenSSL", {"libssl-dev"}},
+      {"nats", {"libnats-dev"}},
       {"prometheus-cpp", {"prometheus-cpp-dev"}},
       {"pybind11", {"pybind11-dev"}},
       {"Python3", {"python3-dev"}},
@@ -181,7 +182,8 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         {"frame_lengths", "reconstructor", "workspace", "workspace_bytes"}},
        {"server/",
         "",
-        {"base", "telemetry", "security", "compute", "watch", "stream", "calls", "web", "rpc"},
+        {"base", "telemetry", "security", "compute", "watch", "stream", "relay", "calls", "web",
+         "rpc"},
         {"main", "options", "server"}},
        {"client/",
         "",
@@ -251,7 +253,8 @@ Violations GrpcStaysInItsRooms(const SourceTree& tree) {
       continue;
     }
     for (const std::string& include : Includes(text)) {
-      const bool carries = path.starts_with("server/calls/") || path.starts_with("server/web/");
+      const bool carries = path.starts_with("server/calls/") || path.starts_with("server/web/") ||
+                           path.starts_with("server/relay/");
       if (carries && IsMessageOrItsBytes(include)) continue;
       if (IsMessaging(include)) violations.push_back(path + ": includes " + include);
     }

@@ -67,7 +67,7 @@ class Watch final : private server::WatchTransport {
     Require(!reading_ && !finished_, "one read at a time");
     reading_ = true;
   }
-  absl::StatusOr<server::WatchTerms> Open() override {
+  void StartOpen() override {
     Require(!is_open_, "a watch is opened once");
     is_open_ = true;
     credit_ = parsed_.open().credits();
@@ -77,14 +77,15 @@ class Watch final : private server::WatchTransport {
         .mode = is_every_ ? server::WatchMode::kEvery : server::WatchMode::kLatest,
         .credit = credit_};
     if (parsed_.open().has_from_sequence()) terms.from_sequence = parsed_.open().from_sequence();
-    return terms;
+    machine_->Opened(terms);
   }
   void WriteOpened(const server::HeldFrames& held) override {
     Require(held.oldest <= held.newest, "what is held has an order");
     Write();
   }
-  void WriteFrame(const server::WatchFrame& frame, std::uint64_t, std::uint64_t) override {
-    Require(frame.bytes() <= kMaxWatcherBytes, "a frame that is too large is not written");
+  void WriteFrame(const server::Published& published, std::uint64_t, std::uint64_t) override {
+    Require(published.frame->bytes() <= kMaxWatcherBytes,
+            "a frame that is too large is not written");
     Require(credit_-- > 0, "no frame is written without credit");
     Write();
   }

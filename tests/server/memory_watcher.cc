@@ -92,8 +92,6 @@ void MemoryWatcher::StartRead() {
   changed_.notify_all();
 }
 
-absl::StatusOr<WatchTerms> MemoryWatcher::Open() { return terms_; }
-
 void MemoryWatcher::BeginWrite() {
   if (writing_ || finished_) throw std::logic_error("two writes at once, or one after the end");
   writing_ = true;
@@ -107,11 +105,11 @@ void MemoryWatcher::WriteOpened(const HeldFrames& held) {
   BeginWrite();
 }
 
-void MemoryWatcher::WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+void MemoryWatcher::WriteFrame(const Published& published, std::uint64_t dropped,
                                std::uint64_t /*oldest_sequence*/) {
   const std::lock_guard lock(mutex_);
   BeginWrite();
-  seen_.push_back({static_cast<const NumberedFrame&>(frame).number, dropped});
+  seen_.push_back({published.sequence, dropped});
   if (paid_ == 0) {
     ++unpaid_;
   } else {

@@ -66,9 +66,9 @@ class MemoryWatcher final : private WatchTransport {
 
  private:
   void StartRead() override;
-  absl::StatusOr<WatchTerms> Open() override;
+  void StartOpen() override { machine_->Opened(terms_); }
   void WriteOpened(const HeldFrames& held) override;
-  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped,
+  void WriteFrame(const Published& published, std::uint64_t dropped,
                   std::uint64_t oldest_sequence) override;
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override;
   void Cut() override;

@@ -157,14 +157,14 @@ TEST_F(WatchTest, ADrainEndsThoseWithoutCreditAndCutsThoseWhoTakeNothing) {
 // A transport whose writes end when the test says so; it keeps what was written.
 class StepTransport final : public WatchTransport {
  public:
-  explicit StepTransport(WatchTerms terms) : terms_(std::move(terms)) {}
+  explicit StepTransport(WatchTerms terms_of_open) : terms(std::move(terms_of_open)) {}
 
   void StartRead() override {}
-  absl::StatusOr<WatchTerms> Open() override { return terms_; }
+  void StartOpen() override { opening = true; }
   void WriteOpened(const HeldFrames&) override { ++under_way; }
-  void WriteFrame(const WatchFrame& frame, std::uint64_t dropped, std::uint64_t) override {
+  void WriteFrame(const Published& published, std::uint64_t dropped, std::uint64_t) override {
     ++under_way;
-    written.push_back({static_cast<const NumberedFrame&>(frame).number, dropped});
+    written.push_back({static_cast<const NumberedFrame&>(*published.frame).number, dropped});
   }
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override {
     ++under_way;
@@ -173,15 +173,20 @@ class StepTransport final : public WatchTransport {
   void Cut() override { cut = true; }
   void Finish(const absl::Status& end) override { status = end; }
 
-  bool cut = false;
+  const WatchTerms terms;
+  bool opening = false, cut = false;
   int under_way = 0;
   std::vector<SeenFrame> written;
   std::optional<std::pair<std::string, std::uint64_t>> ended;
   std::optional<absl::Status> status;
-
- private:
-  const WatchTerms terms_;
 };
+
+// The watcher asks, and its stream is found.
+void Open(WatchStateMachine& machine, const StepTransport& transport) {
+  machine.ReadDone({WatchRequest::Kind::kOpen, 0});
+  EXPECT_TRUE(transport.opening);
+  machine.Opened(transport.terms);
+}
 
 TEST_F(WatchTest, OfWhatIsPublishedAfterItIsInAWatcherOfEveryMissesNothing) {
   for (std::uint64_t round = 0; round < 200; ++round) {
@@ -246,7 +251,7 @@ TEST_F(WatchTest, ASilentOneGivesWayAndOneThatHasOpenedDoesNot) {
   const auto open_machine = std::make_shared<WatchStateMachine>(open, kMaxBytes);
   silent_machine->Start();
   open_machine->Start();
-  open_machine->ReadDone({WatchRequest::Kind::kOpen, 0});
+  Open(*open_machine, open);
   silent_machine->GiveWay(absl::ResourceExhaustedError("others come"));
   open_machine->GiveWay(absl::ResourceExhaustedError("others come"));
   ASSERT_TRUE(silent.status.has_value());
@@ -264,7 +269,7 @@ TEST_F(WatchTest, WhereMemoryIsShortAnOpenOneEndsWithoutItsFramesAndOneThatIsWri
   for (StepTransport* const transport : {&idle, &writing, &silent}) {
     machines.push_back(std::make_shared<WatchStateMachine>(*transport, kMaxBytes));
     machines.back()->Start();
-    if (transport != &silent) machines.back()->ReadDone({WatchRequest::Kind::kOpen, 0});
+    if (transport != &silent) Open(*machines.back(), *transport);
   }
   machines[0]->WriteDone(true);
   for (const auto& machine : machines) machine->GiveUp(absl::ResourceExhaustedError("no memory"));
@@ -302,7 +307,7 @@ TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
   const auto other = std::make_shared<WatchStateMachine>(next, kMaxBytes);
   ASSERT_TRUE(registry.Enter(other).ok());
   other->Start();
-  other->ReadDone({WatchRequest::Kind::kOpen, 0});
+  Open(*other, next);
   EXPECT_EQ(registry.EndSilent(minutes(1), now + minutes(9)),
             std::chrono::steady_clock::time_point::max());
   EXPECT_FALSE(next.status.has_value());
@@ -367,7 +372,7 @@ TEST_F(WatchTest, RandomOrdersGiveWhatAPlainReferenceSays) {
     StepTransport transport({broadcaster_, mode, credit});
     const auto machine = std::make_shared<WatchStateMachine>(transport, kMaxBytes);
     machine->Start();
-    machine->ReadDone({WatchRequest::Kind::kOpen, 0});
+    Open(*machine, transport);
     Reference reference{.mode = mode, .credit = credit};
     std::uint64_t number = pick(100);
     const int length = 20 + static_cast<int>(pick(100));

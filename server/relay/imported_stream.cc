@@ -1,0 +1,228 @@
+#include "server/relay/imported_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "partiemc/status.h"
+#include "server/base/call_errors.h"
+#include "server/relay/watched_result.h"
+#include "server/stream/stream_registry.h"
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::seconds;
+
+// How often the replica that has the stream hears that it is watched here.
+constexpr seconds kWantEvery(1);
+// A fetch that has had no answer for so long will have none.
+constexpr seconds kFetchPatience(2);
+// For who has just lost his connection, or comes with others.
+constexpr seconds kLinger(5);
+
+constexpr char kNoAnswer[] =
+    "must be a stream that its replica shows: that one does not answer; "
+    "try again";
+
+}  // namespace
+
+ImportedStream::ImportedStream(RemoteStream stream, std::optional<std::uint64_t> from_sequence,
+                               WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port,
+                               Clock::time_point now)
+    : stream_(std::move(stream)),
+      from_sequence_(from_sequence),
+      limits_(limits),
+      port_(port),
+      broadcaster_(std::make_shared<ResultBroadcaster>(dispatcher, limits.broadcaster)),
+      began_(now),
+      watched_(now) {
+  if (limits_.history != nullptr) broadcaster_->BeginHistory(*limits_.history, nullptr, 1);
+  if (from_sequence_ && limits_.history != nullptr) {
+    fetch_.set_sequence(*from_sequence_);
+  } else {
+    fetch_.set_newest(true);
+  }
+  Fetch(now);
+}
+
+bool ImportedStream::IsIdle(Clock::time_point now) const {
+  return await_.empty() && broadcaster_->watcher_count() == 0 &&
+         (ended_ || now - watched_ > kLinger);
+}
+
+bool ImportedStream::Covers(std::optional<std::uint64_t> from_sequence,
+                            Clock::time_point now) const {
+  if (ended_) return false;
+  if (!from_sequence || limits_.history == nullptr) return true;
+  // What it was begun for, and could not be held, would not be held a second time.
+  if (from_sequence_ && *from_sequence_ <= *from_sequence && now - began_ < kLinger) return true;
+  const std::uint64_t here = broadcaster_->oldest_here();
+  return ready_ &&
+         ((here != 0 && here <= *from_sequence) || broadcaster_->oldest_sequence() == here);
+}
+
+void ImportedStream::Await(Ready ready) {
+  if (ready_) return ready(absl::OkStatus());
+  await_.push_back(std::move(ready));
+}
+
+// Each one has a number of its own, by which its answers are known.
+void ImportedStream::Fetch(Clock::time_point now) {
+  fetching_ = true;
+  heard_ = wanted_ = now;
+  fetch_.set_stream_id(stream_.id());
+  fetch_.set_fetch(fetch_.fetch() + 1);
+  relay::v1::RelayMessage message;
+  *message.mutable_fetch() = fetch_;
+  port_.Send(SubjectOfAsking(stream_.replica), message);
+}
+
+void ImportedStream::FetchFrom(std::uint64_t number, Clock::time_point now) {
+  fetch_.set_number(number);
+  Fetch(now);
+}
+
+void ImportedStream::SetOldest(std::uint64_t sequence) {
+  if (limits_.history != nullptr) broadcaster_->SetOldestElsewhere(sequence);
+}
+
+void ImportedStream::Came(relay::v1::Result& result, Clock::time_point now) {
+  if (ended_ || result.number() == 0) return;
+  if (result.fetch() == fetch_.fetch()) heard_ = now;
+  SetOldest(result.oldest_sequence());
+  if (result.first() && result.fetch() == fetch_.fetch()) DeliverUpTo(result.number() - 1);
+  if (next_number_ != 0 && result.number() < next_number_) return;
+  const Published published{std::make_shared<WatchedResult>(wire::WatchedBytes(result.frame())),
+                            result.number(), result.sequence()};
+  if (result.number() == next_number_) {
+    Deliver(published);
+    return DeliverWaiting(now);
+  }
+  const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
+  // Without room it is missing, and will be fetched.
+  if (waiting_bytes_ + bytes <= limits_.waiting_bytes &&
+      waiting_.emplace(published.number, published).second) {
+    waiting_bytes_ += bytes;
+  }
+  if (!fetching_) FetchFrom(next_number_, now);
+}
+
+void ImportedStream::Came(const relay::v1::FetchEnd& end, Clock::time_point now) {
+  if (ended_) return;
+  if (end.gone()) return End({std::string(kReasonProducerLost), "the producer has gone", {}});
+  if (end.fetch() == 0) {
+    if (!fetching_ && next_number_ != 0 && end.last_number() >= next_number_) {
+      FetchFrom(next_number_, now);
+    }
+    return;
+  }
+  if (!fetching_ || end.fetch() != fetch_.fetch()) return;
+  SetOldest(end.oldest_sequence());
+  const std::uint64_t last = end.next_number() == 0 ? end.last_number() : end.next_number() - 1;
+  // Something of the answer was lost; where nothing of it came, nothing will.
+  if (next_number_ != 0 && next_number_ <= last && fetch_.number() != next_number_) {
+    return FetchFrom(next_number_, now);
+  }
+  if (end.next_number() == 0) return FetchEnded(last, now);
+  DeliverUpTo(last);
+  FetchFrom(end.next_number(), now);
+}
+
+// What is missing up to there is not to be had.
+void ImportedStream::FetchEnded(std::uint64_t last_number, Clock::time_point now) {
+  fetching_ = false;
+  DeliverUpTo(last_number);
+  DeliverWaiting(now);
+  if (end_ && !fetching_) {
+    const relay::v1::StreamEnd told = *std::exchange(end_, std::nullopt);
+    return Came(told, now);
+  }
+  if (ready_ || fetching_) return;
+  ready_ = true;
+  TellWaiting(absl::OkStatus());
+}
+
+void ImportedStream::DeliverUpTo(std::uint64_t number) {
+  while (!waiting_.empty() && waiting_.begin()->first <= number) {
+    auto first = waiting_.extract(waiting_.begin());
+    waiting_bytes_ -= first.mapped().frame->bytes() + kPublishedBytes;
+    Deliver(std::move(first.mapped()));
+  }
+  next_number_ = std::max(next_number_, number + 1);
+}
+
+void ImportedStream::Deliver(Published published) {
+  if (published.number < next_number_) return;
+  next_number_ = published.number + 1;
+  broadcaster_->PublishNumbered(std::move(published));
+}
+
+void ImportedStream::DeliverWaiting(Clock::time_point now) {
+  while (!waiting_.empty() && waiting_.begin()->first <= next_number_) {
+    DeliverUpTo(waiting_.begin()->first);
+  }
+  if (!waiting_.empty() && !fetching_) FetchFrom(next_number_, now);
+}
+
+void ImportedStream::Came(const relay::v1::StreamEnd& end, Clock::time_point now) {
+  if (ended_) return;
+  if (fetching_ || next_number_ <= end.last_number()) {
+    const bool asked = fetching_;
+    end_ = end;
+    if (!asked) FetchFrom(next_number_, now);
+    return;
+  }
+  WatchEnd told{.reason = end.reason(),
+                .message = end.message(),
+                .status = {},
+                .last_number = end.last_number()};
+  // It is not this server that goes away.
+  if (end.reason() == kReasonDraining) {
+    told.reason = kReasonProducerLost;
+    told.message = "the server that had the stream is going away";
+  } else if (end.code() != 0) {
+    told.status = ViolationError(static_cast<absl::StatusCode>(end.code()),
+                                 {end.reason(), end.field(), end.value(), end.rule()});
+  }
+  End(told);
+}
+
+void ImportedStream::Reconnected(Clock::time_point now) {
+  if (ended_) return;
+  if (!fetching_) return FetchFrom(next_number_, now);
+  Fetch(now);
+}
+
+void ImportedStream::End(const WatchEnd& end) {
+  if (ended_) return;
+  ended_ = true;
+  broadcaster_->End(end);
+  TellWaiting(NoSuchStream(stream_.name()));
+}
+
+void ImportedStream::Fail(const absl::Status& status) {
+  ended_ = true;
+  broadcaster_->End({std::string(kReasonProducerLost), "its replica cannot be reached", {}});
+  TellWaiting(status);
+}
+
+void ImportedStream::TellWaiting(const absl::Status& status) {
+  for (const Ready& ready : std::exchange(await_, {})) ready(status);
+}
+
+void ImportedStream::Tick(Clock::time_point now, bool connected) {
+  if (!await_.empty() || broadcaster_->watcher_count() > 0) watched_ = now;
+  if (ended_) return;
+  if (fetching_ && now - heard_ > kFetchPatience && (connected || !ready_)) {
+    if (!ready_) return Fail(NoSuchStream(stream_.name(), kNoAnswer));
+    const std::uint64_t next = waiting_.empty() ? next_number_ : waiting_.begin()->first;
+    return FetchEnded(end_ ? end_->last_number() : next - 1, now);
+  }
+  if (!connected || now - wanted_ < kWantEvery) return;
+  wanted_ = now;
+  relay::v1::RelayMessage message;
+  message.mutable_fetch()->set_stream_id(stream_.id());
+  port_.Send(SubjectOfAsking(stream_.replica), message);
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,478 @@
+#include "server/relay/relay.h"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
+#include "server/base/call_errors.h"
+#include "server/relay/stream_summary.h"
+#include "server/telemetry/logging.h"
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr milliseconds kTickEvery(50);
+constexpr seconds kAnnounceEvery(1);
+// Three announcements missed.
+constexpr seconds kReplicaPatience(3);
+// For which all is taken for unchanged that cannot be heard.
+constexpr seconds kBusPatience(30);
+constexpr seconds kExportLease(3);
+// A stream that its replica does not announce any more has ended; its last word may be on its way.
+constexpr milliseconds kLastWord(500);
+// For others to answer whoever has just come, or a stream that has just been opened to be told.
+constexpr milliseconds kSettle(300);
+// Until the bus is connected for the first time.
+constexpr seconds kFirstConnection(2);
+constexpr milliseconds kDrainPatience(300);
+constexpr std::size_t kQueueBytes = std::size_t{64} << 20;
+// What announcements may have.
+constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
+
+// The rule that a name breaks while those of others are not known.
+constexpr char kOnlyHere[] =
+    "must be the name of an open stream of this server: NATS cannot be reached, so that those of "
+    "other replicas cannot be watched here; try again";
+
+std::string NewReplicaName() {
+  std::random_device random;
+  return absl::StrCat(absl::Hex(random(), absl::kZeroPad8), absl::Hex(random(), absl::kZeroPad8));
+}
+
+// By the clock that replicas have in common.
+std::int64_t UnixMs(std::chrono::steady_clock::time_point time) {
+  const auto ago = std::chrono::steady_clock::now() - time;
+  return std::chrono::floor<milliseconds>(
+             (std::chrono::system_clock::now() -
+              std::chrono::duration_cast<std::chrono::system_clock::duration>(ago))
+                 .time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+Relay::Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
+             const Limits& limits)
+    : replica_(NewReplicaName()),
+      limits_(limits),
+      registry_(registry),
+      dispatcher_(dispatcher),
+      bus_(std::move(bus)),
+      joiner_(std::max(kMaxMessageBytes, limits.watcher_bytes + kPieceBytes)),
+      thread_([this] { Run(); }) {
+  pthread_setname_np(thread_.native_handle(), "relay");
+}
+
+Relay::~Relay() {
+  Drain();
+  {
+    const std::lock_guard lock(queue_->mutex);
+    queue_->stopping = true;
+    queue_->came.notify_all();
+  }
+  thread_.join();
+}
+
+void Relay::Post(std::function<void()> action) {
+  const std::lock_guard lock(queue_->mutex);
+  queue_->actions.push_back(std::move(action));
+  queue_->came.notify_one();
+}
+
+bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
+  message.set_replica(replica_);
+  const bool sent =
+      SendInPieces(replica_, ++sent_, message.SerializeAsString(),
+                   [&](std::string_view piece) { return bus_->Publish(subject, piece); });
+  if (!sent) ++unsent_;
+  return sent;
+}
+
+std::uint64_t Relay::lost_messages() const {
+  const std::lock_guard lock(queue_->mutex);
+  return unsent_ + queue_->lost;
+}
+
+std::unique_ptr<MessageBus::Subscription> Relay::Listen(const std::string& subject) {
+  return bus_->Subscribe(subject, [queue = queue_](std::string_view piece) {
+    const std::lock_guard lock(queue->mutex);
+    if (queue->stopping) return;
+    if (queue->piece_bytes + piece.size() > kQueueBytes) {
+      ++queue->lost;
+      return;
+    }
+    queue->piece_bytes += piece.size();
+    queue->pieces.emplace_back(piece);
+    queue->came.notify_one();
+  });
+}
+
+void Relay::Run() {
+  for (const std::string& subject :
+       {std::string(kReplicasSubject), SubjectOfAsking(replica_), SubjectOfAnswers(replica_)}) {
+    subscriptions_.push_back(Listen(subject));
+  }
+  std::deque<std::function<void()>> actions;
+  std::deque<std::string> pieces;
+  for (;;) {
+    {
+      std::unique_lock lock(queue_->mutex);
+      queue_->came.wait_for(lock, kTickEvery, [this] {
+        return queue_->stopping || !queue_->actions.empty() || !queue_->pieces.empty();
+      });
+      if (queue_->stopping && queue_->actions.empty()) break;
+      actions.swap(queue_->actions);
+      pieces.swap(queue_->pieces);
+      queue_->piece_bytes = 0;
+    }
+    for (const auto& action : actions) action();
+    for (const std::string& piece : pieces) Take(piece);
+    actions.clear();
+    pieces.clear();
+    const auto now = Clock::now();
+    if (changed_ || now - ticked_ >= kTickEvery || draining_since_) Tick(now);
+  }
+  subscriptions_.clear();
+  imports_.clear();
+}
+
+void Relay::Tick(Clock::time_point now) {
+  ticked_ = now;
+  CheckConnection(now);
+  if (registry_.changes() != local_changes_) {
+    LookAtLocalStreams();
+    Announce(now, false, false);
+  } else if (now - announced_ >= kAnnounceEvery) {
+    Announce(now, false, false);
+  }
+  if (std::exchange(changed_, false)) EndTakenOver();
+  LookAtExports(now);
+  LookAtImports(now);
+  LookAtSearches(now);
+  if (draining_since_) GoOnDraining(now);
+}
+
+void Relay::CheckConnection(Clock::time_point now) {
+  const bool is_connected = bus_->connected();
+  if (is_connected && !connected_) {
+    connected_since_ = now;
+    directory_.Refresh(now);
+    LogEvent(spdlog::level::info, "NATS connected", {{"replica", replica_}});
+    Announce(now, true, false);
+    for (Import& import : imports_) import.stream->Reconnected(now);
+  } else if (!is_connected && connected_) {
+    disconnected_ = now;
+    told_away_ = true;
+    LogEvent(spdlog::level::warn,
+             "NATS lost: streams of other replicas stand still for their watchers here, streams of "
+             "this one for those elsewhere",
+             {});
+  }
+  if (!is_connected && !told_away_ && now - began_ > kFirstConnection) {
+    told_away_ = true;
+    LogEvent(spdlog::level::warn,
+             "NATS cannot be reached yet: only streams of this replica can be "
+             "watched here",
+             {});
+  }
+  connected_ = is_connected;
+  if (!is_connected && now - disconnected_ < kBusPatience) directory_.Refresh(now);
+  for (const std::string& replica : directory_.Expire(now - kReplicaPatience)) {
+    LogEvent(spdlog::level::warn, "replica gone", {{"replica", replica}});
+    Lost(replica);
+  }
+}
+
+void Relay::Announce(Clock::time_point now, bool asks, bool leaving) {
+  announced_ = now;
+  if (!connected_ && !bus_->connected()) return;
+  relay::v1::RelayMessage message;
+  relay::v1::Announcement& announcement = *message.mutable_announcement();
+  announcement.set_asks(asks);
+  announcement.set_leaving(leaving);
+  const auto streams = leaving ? std::vector<StreamSummary>()
+                               : registry_.List(0, std::numeric_limits<std::size_t>::max());
+  for (const StreamSummary& stream : streams) {
+    const auto found = local_.find(stream.id);
+    if (found == local_.end()) continue;  // Will be told with the change.
+    relay::v1::LiveStream& live = *announcement.add_streams();
+    EncodeSummary(stream, now, *live.mutable_summary());
+    live.set_lineage(stream.lineage);
+    live.set_opened_unix_ms(found->second.opened_unix_ms);
+  }
+  Send(kReplicasSubject, message);
+}
+
+void Relay::LookAtLocalStreams() {
+  local_changes_ = registry_.changes();
+  changed_ = true;
+  std::map<std::string, LocalStream> streams;
+  for (const StreamSummary& stream : registry_.List(0, std::numeric_limits<std::size_t>::max())) {
+    const auto known = local_.find(stream.id);
+    streams[stream.id] = known != local_.end()
+                             ? known->second
+                             : LocalStream{.broadcaster = stream.description.broadcaster,
+                                           .lineage = stream.lineage,
+                                           .opened_unix_ms = UnixMs(stream.opened)};
+  }
+  local_.swap(streams);
+}
+
+// A producer that came back elsewhere, by whichever way, has left the stream that it had here or
+// there; that one may not have noticed yet. Only its watchers are told, who find it again.
+void Relay::EndTakenOver() {
+  const WatchEnd taken_over{
+      std::string(kReasonTakenOver), "another replica has the stream now", {}};
+  for (auto& [id, local] : local_) {
+    if (local.was_told) continue;
+    const auto elsewhere = directory_.FindLineage(local.lineage);
+    if (!elsewhere || elsewhere->stream.opened_unix_ms() <= local.opened_unix_ms) continue;
+    local.was_told = true;
+    local.broadcaster->End(taken_over);
+  }
+  for (Import& import : imports_) {
+    const RemoteStream& remote = import.stream->stream();
+    const std::int64_t opened = remote.stream.opened_unix_ms();
+    const auto elsewhere = directory_.FindLineage(remote.stream.lineage());
+    const bool is_here = std::ranges::any_of(local_, [&](const auto& item) {
+      return item.second.lineage == remote.stream.lineage() && item.second.opened_unix_ms > opened;
+    });
+    if (is_here || (elsewhere && elsewhere->id() != remote.id() &&
+                    elsewhere->stream.opened_unix_ms() > opened)) {
+      import.stream->End(taken_over);
+    }
+  }
+}
+
+bool Relay::WasResumedElsewhere(std::string_view lineage, Clock::time_point opened) const {
+  const auto elsewhere = directory_.FindLineage(lineage);
+  return elsewhere && elsewhere->stream.opened_unix_ms() > UnixMs(opened);
+}
+
+std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::size_t count,
+                                               const Caller& caller) const {
+  std::map<std::string, std::int64_t> here;  // When it was opened, by lineage.
+  for (const StreamSummary& stream : registry_.List(0, std::numeric_limits<std::size_t>::max())) {
+    here[stream.lineage] = UnixMs(stream.opened);
+  }
+  return directory_.List(after, count, [&](const relay::v1::LiveStream& stream) {
+    const auto found = here.find(stream.lineage());
+    return caller.MayUse(stream.summary().stream_name()) &&
+           (found == here.end() || found->second < stream.opened_unix_ms());
+  });
+}
+
+void Relay::LookAtExports(Clock::time_point now) {
+  for (auto it = exports_.begin(); it != exports_.end();) {
+    ExportedStream& exported = *it->second;
+    const bool is_wanted = now < exported.wanted_until();
+    if (!is_wanted && exported.live()) exported.End();
+    if (is_wanted || exported.live()) {
+      ++it;
+    } else {
+      it = exports_.erase(it);
+    }
+  }
+  exported_count_ = exports_.size();
+}
+
+void Relay::LookAtImports(Clock::time_point now) {
+  for (Import& import : imports_) {
+    const RemoteStream& remote = import.stream->stream();
+    import.stream->Tick(now, connected_);
+    if (directory_.Has(remote.replica, remote.id())) {
+      import.missing_since.reset();
+    } else if (!import.missing_since) {
+      import.missing_since = now;
+    } else if (now - *import.missing_since > kLastWord) {
+      import.stream->End(
+          {std::string(kReasonProducerLost), "the producer's connection is gone", {}});
+    }
+  }
+  std::erase_if(imports_, [now](const Import& import) { return import.stream->IsIdle(now); });
+  imported_count_ = imports_.size();
+}
+
+void Relay::Lost(const std::string& replica) {
+  changed_ = true;
+  joiner_.Forget(replica);
+  for (Import& import : imports_) {
+    if (import.stream->stream().replica != replica) continue;
+    import.stream->End(
+        {std::string(kReasonProducerLost), "the server that had the stream is gone", {}});
+  }
+}
+
+void Relay::Take(const std::string& piece) {
+  const auto whole = joiner_.Add(piece);
+  relay::v1::RelayMessage message;
+  if (!whole || !message.ParseFromString(*whole) || message.replica() == replica_) return;
+  const auto now = Clock::now();
+  const auto tell = [&](const std::string& id, auto action) {
+    for (Import& import : imports_) {
+      const RemoteStream& remote = import.stream->stream();
+      if (remote.id() == id && remote.replica == message.replica()) action(*import.stream);
+    }
+  };
+  using Message = relay::v1::RelayMessage;
+  switch (message.message_case()) {
+    case Message::kAnnouncement:
+      return Take(message.replica(), message.announcement());
+    case Message::kFetch:
+      return Take(message.replica(), message.fetch());
+    case Message::kFetchEnd:
+      return tell(message.fetch_end().stream_id(),
+                  [&](ImportedStream& stream) { stream.Came(message.fetch_end(), now); });
+    case Message::kResult:
+      return tell(message.result().stream_id(),
+                  [&](ImportedStream& stream) { stream.Came(*message.mutable_result(), now); });
+    case Message::kStreamEnd:
+      return tell(message.stream_end().stream_id(),
+                  [&](ImportedStream& stream) { stream.Came(message.stream_end(), now); });
+    case Message::MESSAGE_NOT_SET:
+      break;
+  }
+}
+
+void Relay::Take(const std::string& replica, const relay::v1::Announcement& announcement) {
+  if (announcement.leaving()) {
+    directory_.Left(replica);
+    return Lost(replica);
+  }
+  const auto now = Clock::now();
+  if (directory_.Announced(replica, announcement, now)) changed_ = true;
+  if (announcement.asks()) Announce(now, false, draining_since_.has_value());
+}
+
+void Relay::Take(const std::string& replica, const relay::v1::Fetch& fetch) {
+  if (registry_.changes() != local_changes_) LookAtLocalStreams();
+  const auto local = local_.find(fetch.stream_id());
+  auto exported = exports_.find(fetch.stream_id());
+  const bool is_over = exported == exports_.end() || !exported->second->live();
+  if (local != local_.end() && is_over && !draining_since_) {
+    exported = exports_
+                   .insert_or_assign(fetch.stream_id(),
+                                     std::make_shared<ExportedStream>(
+                                         fetch.stream_id(), local->second.broadcaster,
+                                         limits_.watcher_bytes, static_cast<RelayPort&>(*this)))
+                   .first;
+    exported->second->Begin();
+  }
+  if (exported == exports_.end()) {
+    relay::v1::RelayMessage message;
+    relay::v1::FetchEnd& end = *message.mutable_fetch_end();
+    end.set_stream_id(fetch.stream_id());
+    end.set_fetch(fetch.fetch());
+    end.set_gone(true);
+    Send(SubjectOfAnswers(replica), message);
+    return;
+  }
+  exported->second->WantedUntil(Clock::now() + kExportLease);
+  exported->second->Answer(fetch, replica);
+}
+
+void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequence,
+                 FindDone done) {
+  if (refuses_) return done(DrainingError());
+  Post([this, search = Search{name, from_sequence, std::move(done), {}}]() mutable {
+    if (draining_since_) return search.done(DrainingError());
+    const auto now = Clock::now();
+    // Whoever has just come does not know the others yet.
+    const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
+    search.until = std::max(now, settled) + kSettle;
+    if (TryFind(search, now)) return;
+    if (searches_.size() >= limits_.watches) {
+      return search.done(NoSuchStream(
+          search.name, absl::StrCat("must be one of at most ", limits_.watches,
+                                    " names that are looked for at other replicas at once")));
+    }
+    searches_.push_back(std::move(search));
+  });
+}
+
+bool Relay::TryFind(const Search& search, Clock::time_point now) {
+  const auto remote = directory_.FindName(search.name);
+  // One that was resumed here is found here.
+  const auto is_here = [&](const auto& item) {
+    return item.second.lineage == remote->stream.lineage() &&
+           item.second.opened_unix_ms > remote->stream.opened_unix_ms();
+  };
+  if (!remote || std::ranges::any_of(local_, is_here)) return false;
+  Watch(*remote, search, now);
+  return true;
+}
+
+void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_point now) {
+  const auto begun = std::ranges::find_if(imports_, [&](const Import& import) {
+    return import.stream->stream().id() == remote.id() &&
+           import.stream->Covers(search.from_sequence, now);
+  });
+  ImportedStream* stream = nullptr;
+  if (begun != imports_.end()) {
+    stream = begun->stream.get();
+  } else {
+    // Listens first, so that nothing falls between what is fetched and what comes.
+    Import import;
+    import.results = Listen(SubjectOfResults(remote.id()));
+    import.stream = std::make_unique<ImportedStream>(
+        remote, search.from_sequence, dispatcher_,
+        ImportedStream::Limits{.broadcaster = limits_.broadcaster,
+                               .waiting_bytes = limits_.watcher_bytes,
+                               .history = limits_.history},
+        static_cast<RelayPort&>(*this), now);
+    stream = import.stream.get();
+    imports_.push_back(std::move(import));
+  }
+  stream->Await([done = search.done,
+                 found = Found{stream->broadcaster(), remote.stream}](const absl::Status& status) {
+    done(status.ok() ? absl::StatusOr<Found>(found) : status);
+  });
+}
+
+void Relay::LookAtSearches(Clock::time_point now) {
+  for (Search& search : std::exchange(searches_, {})) {
+    if (TryFind(search, now)) continue;
+    if (now < search.until) {
+      searches_.push_back(std::move(search));
+    } else {
+      search.done(connected_ ? NoSuchStream(search.name) : NoSuchStream(search.name, kOnlyHere));
+    }
+  }
+}
+
+void Relay::Drain() {
+  std::call_once(drain_once_, [this] {
+    refuses_ = true;
+    Post([this] { draining_since_ = Clock::now(); });
+    drained_.get_future().wait();
+  });
+}
+
+void Relay::GoOnDraining(Clock::time_point now) {
+  if (has_drained_) return;
+  for (const Search& search : std::exchange(searches_, {})) search.done(DrainingError());
+  for (Import& import : imports_) import.stream->Refuse(DrainingError());
+  const bool has_more =
+      std::ranges::any_of(exports_, [](const auto& item) { return item.second->live(); });
+  if (has_more && now - *draining_since_ < kDrainPatience) {
+    // Streams that have not ended yet end with this server.
+    if (now - *draining_since_ > kDrainPatience / 2) {
+      for (auto& [id, exported] : exports_) exported->End();
+    }
+    return;
+  }
+  Announce(now, false, true);
+  bus_->Flush();
+  has_drained_ = true;
+  drained_.set_value();
+}
+
+}  // namespace partiemc::server

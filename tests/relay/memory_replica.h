@@ -1,0 +1,64 @@
+// A replica in memory: streams, watchers and the relay, without gRPC and without a core.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "relay/memory_bus.h"
+#include "server/memory_watcher.h"
+#include "server/relay/relay.h"
+#include "server/watch/watch_dispatcher.h"
+
+namespace partiemc::server {
+
+/// What a frame of this sequence number and size holds: the same wherever it is made.
+std::string FrameBytes(std::uint64_t sequence, std::size_t bytes);
+
+class MemoryReplica {
+ public:
+  static constexpr std::size_t kWatcherBytes = std::size_t{1} << 20;
+
+  /// Its streams hold as much for who goes back; 0: nothing.
+  explicit MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes = std::uint64_t{8} << 20);
+  ~MemoryReplica();
+
+  // A producer's side. `token` tells a stream that goes on from any other.
+  void Open(const std::string& name, const std::string& token, std::uint64_t next_sequence = 1);
+  void Publish(const std::string& name, std::uint64_t sequence, std::size_t bytes = 1000);
+  void Close(const std::string& name, const absl::Status& status = absl::OkStatus());
+
+  // A watcher's.
+  absl::StatusOr<Relay::Found> Find(const std::string& name,
+                                    std::optional<std::uint64_t> from = std::nullopt);
+  /// Of a stream of another replica; null where it is not found.
+  std::unique_ptr<MemoryWatcher> Watch(const std::string& name, WatchMode mode = WatchMode::kEvery,
+                                       std::optional<std::uint64_t> from = std::nullopt,
+                                       std::uint64_t credit = std::uint64_t{1} << 40);
+  /// Of a stream of its own.
+  std::unique_ptr<MemoryWatcher> WatchOwn(const std::string& name);
+
+  Relay& relay() { return *relay_; }
+  MemoryHub::End& bus() { return *end_; }
+
+ private:
+  class Transport;
+  struct Stream {
+    std::shared_ptr<StreamStateMachine> machine;
+    std::shared_ptr<ResultBroadcaster> broadcaster;
+  };
+
+  ComputePool pool_{1};
+  MemoryBudget budget_{1000};
+  std::unique_ptr<Transport> transport_;
+  HistoryRoom history_;
+  WatchDispatcher dispatcher_;
+  StreamRegistry registry_;
+  MemoryHub::End* end_ = nullptr;
+  std::unique_ptr<Relay> relay_;
+  std::map<std::string, Stream> streams_;
+};
+
+}  // namespace partiemc::server

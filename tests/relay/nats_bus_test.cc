@@ -1,0 +1,105 @@
+// The bus with a real server of NATS.
+#include "server/relay/nats_bus.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "relay/nats_process.h"
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+bool Eventually(const std::function<bool()>& is_true) {
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!is_true()) {
+    if (std::chrono::steady_clock::now() > give_up) return false;
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  return true;
+}
+
+std::unique_ptr<MessageBus> Connect(const std::string& url) {
+  auto bus = ConnectToNats(url);
+  EXPECT_TRUE(bus.ok()) << bus.status();
+  return *std::move(bus);
+}
+
+// What came, by any thread.
+struct Heard {
+  std::mutex mutex;
+  std::vector<std::string> messages;
+
+  MessageBus::Handler Handler() {
+    return [this](std::string_view message) {
+      const std::lock_guard lock(mutex);
+      messages.emplace_back(message);
+    };
+  }
+  std::size_t count() {
+    const std::lock_guard lock(mutex);
+    return messages.size();
+  }
+};
+
+TEST(NatsBus, MessagesOfASenderKeepTheirOrderAcrossSubjectsAndDoNotComeBack) {
+  const NatsProcess nats;
+  const auto one = Connect(nats.url()), other = Connect(nats.url());
+  Heard heard, echoes;
+  const auto a = other->Subscribe("a", heard.Handler()), b = other->Subscribe("b", heard.Handler());
+  const auto echo = one->Subscribe("a", echoes.Handler());
+  other->Flush();
+  const std::string large(std::size_t{600} << 10, 'x');
+  for (int k = 0; k < 500; ++k) {
+    const std::string message = std::to_string(k) + (k % 50 == 0 ? large : "");
+    ASSERT_TRUE(one->Publish(k % 2 == 0 ? "a" : "b", message));
+  }
+  ASSERT_TRUE(Eventually([&] { return heard.count() == 500; }));
+  for (int k = 0; k < 500; ++k) EXPECT_EQ(std::stoi(heard.messages[k]), k);
+  EXPECT_EQ(echoes.count(), 0u);
+}
+
+TEST(NatsBus, ComesBackWithItsSubscriptionsAndSendsNothingOld) {
+  NatsProcess nats;
+  const auto one = Connect(nats.url()), other = Connect(nats.url());
+  Heard heard;
+  const auto a = other->Subscribe("a", heard.Handler());
+  other->Flush();
+  ASSERT_TRUE(one->Publish("a", "first"));
+  ASSERT_TRUE(Eventually([&] { return heard.count() == 1; }));
+  nats.Stop();
+  ASSERT_TRUE(Eventually([&] { return !one->connected() && !other->connected(); }));
+  EXPECT_FALSE(one->Publish("a", "lost"));
+  nats.Start();
+  ASSERT_TRUE(Eventually([&] { return one->connected() && other->connected(); }));
+  other->Flush();
+  ASSERT_TRUE(one->Publish("a", "second"));
+  ASSERT_TRUE(Eventually([&] { return heard.count() == 2; }));
+  EXPECT_EQ(heard.messages[1], "second");
+}
+
+TEST(NatsBus, ConnectsToAServerThatComesLater) {
+  NatsProcess nats;
+  nats.Stop();
+  const auto bus = Connect(nats.url());
+  EXPECT_FALSE(bus->connected());
+  nats.Start();
+  EXPECT_TRUE(Eventually([&] { return bus->connected(); }));
+}
+
+TEST(NatsBus, AUrlThatIsNoneIsRefusedWithoutItsPassword) {
+  const auto bus = ConnectToNats("nats://user:secret@host:notaport");
+  ASSERT_FALSE(bus.ok());
+  EXPECT_EQ(bus.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(std::string(bus.status().message()).find("secret"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace partiemc::server

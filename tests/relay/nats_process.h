@@ -1,0 +1,30 @@
+// nats-server as Debian has it, on a port of loopback that it keeps.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+
+namespace partiemc::server {
+
+class NatsProcess {
+ public:
+  /// Serves when it returns. A missing program fails the test.
+  NatsProcess();
+  ~NatsProcess() { Stop(); }
+  NatsProcess(const NatsProcess&) = delete;
+  NatsProcess& operator=(const NatsProcess&) = delete;
+
+  std::string url() const { return "nats://127.0.0.1:" + std::to_string(port_); }
+
+  /// kill -9.
+  void Stop();
+  /// Again, at the same port.
+  void Start();
+
+ private:
+  int port_ = 0;
+  pid_t process_ = 0;
+};
+
+}  // namespace partiemc::server

@@ -1,0 +1,379 @@
+// Watchers at one replica of streams that another one has.
+#include "server/relay/relay.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "partiemc/status.h"
+#include "relay/memory_replica.h"
+#include "server/base/call_errors.h"
+#include "server/relay/watched_result.h"
+#include "server/stream/stream_token.h"
+#include "support/random.h"
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr milliseconds kSoon(10'000);
+
+bool Eventually(const std::function<bool()>& is_true) {
+  const auto give_up = std::chrono::steady_clock::now() + kSoon;
+  while (!is_true()) {
+    if (std::chrono::steady_clock::now() > give_up) return false;
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  return true;
+}
+
+std::string ReasonOf(const absl::Status& status) {
+  const auto violation = FindViolation(status);
+  return violation ? violation->reason : status.ToString();
+}
+
+// All of them, in order, from `first` to `last`.
+void ExpectAll(const std::vector<SeenFrame>& seen, std::uint64_t first, std::uint64_t last) {
+  ASSERT_EQ(seen.size(), last - first + 1);
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    EXPECT_EQ(seen[k], (SeenFrame{first + k, 0}));
+  }
+}
+
+// Each frame is later than the one before by one more than were dropped between them.
+void ExpectAccounted(const MemoryWatcher& watcher, std::uint64_t last) {
+  const auto seen = watcher.seen();
+  ASSERT_FALSE(seen.empty());
+  for (std::size_t k = 1; k < seen.size(); ++k) {
+    EXPECT_EQ(seen[k].number, seen[k - 1].number + seen[k].dropped + 1);
+  }
+  EXPECT_EQ(seen.back().number + watcher.end_dropped(), last);
+}
+
+class RelayTest : public testing::Test {
+ protected:
+  RelayTest() {
+    has_.Open("dam", token_);
+    Both([this] { return shows_.relay().remote_streams() == 1; });
+  }
+
+  static void Both(const std::function<bool()>& know_each_other) {
+    ASSERT_TRUE(Eventually(know_each_other));
+  }
+  void Publish(std::uint64_t first, std::uint64_t last, std::size_t bytes = 1000) {
+    for (std::uint64_t k = first; k <= last; ++k) has_.Publish("dam", k, bytes);
+  }
+
+  const std::string token_ = NewStreamToken();
+  MemoryHub hub_;
+  MemoryReplica has_{hub_}, shows_{hub_};
+};
+
+TEST_F(RelayTest, TheNewestComesAtOnceAndThenEveryOther) {
+  Publish(1, 5);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  watcher->WaitForFrames(1);
+  EXPECT_TRUE(watcher->held().any);
+  EXPECT_EQ(watcher->held().newest, 5u);
+  EXPECT_EQ(watcher->held().oldest, 1u) << "frames that its replica holds can be asked for here";
+  for (std::uint64_t k = 6; k <= 50; ++k) has_.Publish("dam", k);
+  watcher->WaitForFrames(46);
+  ExpectAll(watcher->seen(), 5, 50);
+}
+
+TEST_F(RelayTest, BytesLabelsAndLineageAreThoseOfTheReplicaThatHasIt) {
+  constexpr std::size_t kLarge = 900'000;  // More than one piece.
+  has_.Publish("dam", 1, kLarge);
+  const auto found = shows_.Find("dam");
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ(found->stream.lineage(), LineageOf(token_));
+  EXPECT_EQ(found->stream.summary().labels().at("made"), "here");
+  const Published newest = found->broadcaster->Newest();
+  ASSERT_NE(newest.frame, nullptr);
+  EXPECT_EQ(newest.sequence, 1u);
+  EXPECT_EQ(static_cast<const WatchedResult&>(*newest.frame).bytes.ToString(),
+            FrameBytes(1, kLarge));
+}
+
+TEST_F(RelayTest, WhoGoesBackGetsWhatItsReplicaHoldsAndWhoGoesFurtherBackToo) {
+  Publish(1, 100);
+  const auto recent = shows_.Watch("dam", WatchMode::kEvery, 60);
+  ASSERT_NE(recent, nullptr);
+  recent->WaitForFrames(41);
+  ExpectAll(recent->seen(), 60, 100);
+  const auto all = shows_.Watch("dam", WatchMode::kLatest, 0);
+  ASSERT_NE(all, nullptr);
+  all->WaitForFrames(100);
+  ExpectAll(all->seen(), 1, 100);
+  has_.Publish("dam", 101);
+  recent->WaitForFrames(42);
+  all->WaitForFrames(101);
+  ExpectAll(recent->seen(), 60, 101);
+  ExpectAll(all->seen(), 1, 101);
+}
+
+// More than one answer to a fetch has room for.
+TEST_F(RelayTest, AHistoryOfManyMegabytesComesInParts) {
+  constexpr std::size_t kBytes = 200'000;
+  Publish(1, 38, kBytes);
+  const auto watcher = shows_.Watch("dam", WatchMode::kEvery, 1);
+  ASSERT_NE(watcher, nullptr);
+  watcher->WaitForFrames(38);
+  ExpectAll(watcher->seen(), 1, 38);
+}
+
+TEST_F(RelayTest, WhatTheBusLosesIsFetched) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  support::Random random(7);
+  std::atomic<int> lost = 0;
+  hub_.SetLoses([&](const std::string& subject, std::string_view) {
+    const bool loses = subject.starts_with("partiemc.results.") && random.Chance(0.3);
+    if (loses) ++lost;
+    return loses;
+  });
+  for (std::uint64_t k = 2; k <= 300; ++k) {
+    has_.Publish("dam", k);
+    if (k % 10 == 0) std::this_thread::sleep_for(milliseconds(1));
+  }
+  watcher->WaitForFrames(300);  // The last one too: replicas ask each other what the last one was.
+  ExpectAll(watcher->seen(), 1, 300);
+  EXPECT_GT(lost, 10);
+}
+
+TEST(RelayWithoutHistory, WhatCannotBeHadCountsAsDropped) {
+  MemoryHub hub;
+  MemoryReplica has(hub, 0), shows(hub, 0);
+  has.Open("dam", NewStreamToken());
+  has.Publish("dam", 1);
+  const auto watcher = shows.Watch("dam", WatchMode::kLatest);
+  ASSERT_NE(watcher, nullptr);
+  watcher->WaitForFrames(1);
+  hub.SetLoses([&, k = 0](const std::string& subject, std::string_view) mutable {
+    return subject.starts_with("partiemc.results.") && ++k % 3 == 0;
+  });
+  for (std::uint64_t k = 2; k <= 100; ++k) {
+    has.Publish("dam", k);
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  has.Close("dam");
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonFinished);
+  EXPECT_LT(watcher->seen().size(), 100u) << "nothing was lost";
+  ExpectAccounted(*watcher, 100);
+}
+
+TEST_F(RelayTest, WhileTheBusIsAwayNothingComesAndNothingIsMissingAfterwards) {
+  Publish(1, 10);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  std::uint64_t last = 10;
+  for (MemoryReplica* const away : {&has_, &shows_}) {
+    away->bus().SetConnected(false);
+    Publish(last + 1, last + 20);
+    last += 20;
+    EXPECT_TRUE(Eventually([&] { return !away->relay().connected(); }));
+    watcher->WaitForFrames(last - 29);
+    EXPECT_EQ(watcher->seen().back().number, last - 20);
+    away->bus().SetConnected(true);
+    watcher->WaitForFrames(last - 9);
+    ExpectAll(watcher->seen(), 10, last);
+  }
+}
+
+TEST_F(RelayTest, AnUnknownNameIsRefusedWithWhatToDo) {
+  auto found = shows_.Find("nothing");
+  EXPECT_EQ(found.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(found.status().message(),
+            "open.stream_name: \"nothing\"; must be the name of an open stream; ListStreams tells "
+            "them");
+  shows_.bus().SetConnected(false);
+  ASSERT_TRUE(Eventually([this] { return !shows_.relay().connected(); }));
+  found = shows_.Find("nothing");
+  EXPECT_EQ(ReasonOf(found.status()), kReasonNoSuchStream);
+  EXPECT_THAT(std::string(found.status().message()), HasSubstr("NATS cannot be reached"));
+}
+
+TEST_F(RelayTest, WhoAsksAReplicaThatHasJustComeIsToldAllTheSame) {
+  Publish(1, 1);
+  for (int k = 0; k < 5; ++k) {
+    MemoryReplica fresh(hub_);
+    const auto watcher = fresh.Watch("dam");
+    ASSERT_NE(watcher, nullptr) << "replica " << k;
+    watcher->WaitForFrames(1);
+  }
+}
+
+TEST_F(RelayTest, AStreamThatGoesOnElsewhereIsTakenOverForAllItsWatchers) {
+  Publish(1, 10);
+  MemoryReplica third(hub_);
+  const auto own = has_.WatchOwn("dam"), elsewhere = shows_.Watch("dam");
+  ASSERT_NE(elsewhere, nullptr);
+  elsewhere->WaitForFrames(1);
+  std::this_thread::sleep_for(milliseconds(3));  // Clocks tell milliseconds.
+  third.Open("dam", token_, 11);
+  third.Publish("dam", 11);
+  for (const auto* const watcher : {&own, &elsewhere}) {
+    EXPECT_TRUE((*watcher)->status().ok());
+    EXPECT_EQ((*watcher)->end_reason(), kReasonTakenOver);
+  }
+  // The former one has not gone yet, and is found nowhere.
+  for (MemoryReplica* const replica : {&has_, &shows_}) {
+    const auto again = replica->Watch("dam", WatchMode::kEvery, 11);
+    ASSERT_NE(again, nullptr);
+    again->WaitForFrames(1);
+    EXPECT_EQ(again->seen().front().number, 11u);
+    EXPECT_EQ(replica->relay().List("", 10, Caller()).size(), 1u);
+  }
+  EXPECT_TRUE(third.relay().List("", 10, Caller()).empty()) << "it is here, and later";
+}
+
+TEST_F(RelayTest, AStreamThatGoesOnHereIsTakenOverForThoseWhoWatchItHere) {
+  Publish(1, 10);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  std::this_thread::sleep_for(milliseconds(3));
+  shows_.Open("dam", token_, 11);
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonTakenOver);
+}
+
+TEST_F(RelayTest, AnEndIsToldAfterTheLastFrame) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  Publish(2, 40);
+  has_.Close("dam");
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonFinished);
+  ExpectAll(watcher->seen(), 1, 40);
+}
+
+TEST_F(RelayTest, AReplicaThatDrainsIsAProducerLostForThoseWhoWatchElsewhere) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  has_.Close("dam", DrainingError());
+  EXPECT_TRUE(watcher->status().ok()) << watcher->status();
+  EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
+}
+
+TEST_F(RelayTest, AFrameThatIsTooLargeToBeWatchedEndsItWithTheSameError) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  has_.Publish("dam", 2, MemoryReplica::kWatcherBytes + 1);
+  EXPECT_EQ(watcher->status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(watcher->end_reason(), kReasonWatchedBytes);
+}
+
+TEST_F(RelayTest, AReplicaThatVanishesIsGoneAfterSomeSeconds) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  has_.bus().SetConnected(false);
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
+  EXPECT_EQ(shows_.relay().replicas(), 0u);
+}
+
+TEST_F(RelayTest, OneThatLeavesIsGoneAtOnce) {
+  MemoryHub hub;
+  MemoryReplica shows(hub);
+  std::unique_ptr<MemoryWatcher> watcher;
+  {
+    MemoryReplica has(hub);
+    has.Open("dam", NewStreamToken());
+    has.Publish("dam", 1);
+    watcher = shows.Watch("dam");
+    ASSERT_NE(watcher, nullptr);
+  }
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
+  EXPECT_EQ(shows.relay().replicas(), 0u);
+}
+
+TEST_F(RelayTest, WhoWaitsForAStreamIsRefusedWhereItsReplicaDrains) {
+  std::atomic<bool> refused = false;
+  shows_.relay().Find("nothing", std::nullopt, [&](const auto& found) {
+    refused = ReasonOf(found.status()) == kReasonDraining;
+  });
+  shows_.relay().Drain();
+  EXPECT_TRUE(Eventually([&] { return refused.load(); }));
+  EXPECT_EQ(ReasonOf(shows_.Find("dam").status()), kReasonDraining);
+}
+
+TEST_F(RelayTest, NothingIsPublishedOfAStreamThatNobodyWatchesElsewhere) {
+  std::atomic<int> results = 0;
+  hub_.SetLoses([&](const std::string& subject, std::string_view) {
+    if (subject.starts_with("partiemc.results.")) ++results;
+    return false;
+  });
+  Publish(1, 20);
+  auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  EXPECT_TRUE(Eventually([this] { return has_.relay().exported_streams() == 1; }));
+  watcher.reset();
+  EXPECT_TRUE(Eventually([this] { return has_.relay().exported_streams() == 0; }));
+  EXPECT_TRUE(Eventually([this] { return shows_.relay().imported_streams() == 0; }));
+  const int before = results;
+  Publish(21, 40);
+  std::this_thread::sleep_for(milliseconds(50));
+  EXPECT_EQ(results, before);
+}
+
+TEST_F(RelayTest, ManyWatchersShareWhatIsPublishedOnce) {
+  std::atomic<int> results = 0;
+  hub_.SetLoses([&](const std::string& subject, std::string_view) {
+    if (subject.starts_with("partiemc.results.")) ++results;
+    return false;
+  });
+  Publish(1, 1);
+  MemoryReplica third(hub_);
+  std::vector<std::unique_ptr<MemoryWatcher>> watchers;
+  for (int k = 0; k < 20; ++k) watchers.push_back((k % 2 == 0 ? shows_ : third).Watch("dam"));
+  const int before = results;
+  Publish(2, 11);
+  for (const auto& watcher : watchers) {
+    ASSERT_NE(watcher, nullptr);
+    watcher->WaitForFrames(11);
+    ExpectAll(watcher->seen(), 1, 11);
+  }
+  EXPECT_EQ(results - before, 10);
+}
+
+// Whoever can write to the bus can break what is shown, but nothing else.
+TEST_F(RelayTest, GarbageOnTheBusHarmsNobody) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  const auto stranger = hub_.Connect();
+  support::Random random(3);
+  std::vector<std::string> heard;
+  const auto listens = stranger->Subscribe(
+      kReplicasSubject, [&](std::string_view message) { heard.emplace_back(message); });
+  ASSERT_TRUE(Eventually([&] { return heard.size() > 1; }));
+  const std::string id = shows_.Find("dam")->stream.summary().stream_id();
+  for (int k = 0; k < 3000; ++k) {
+    std::string message = random.Chance(0.5) ? heard[random.Below(2)] : std::string(40, 'x');
+    for (std::size_t n = 1 + random.Below(4); n > 0; --n) {
+      message[random.Below(message.size())] = static_cast<char>(random.Bits());
+    }
+    stranger->Publish(random.Chance(0.5) ? kReplicasSubject : SubjectOfResults(id), message);
+  }
+  Publish(2, 20);
+  watcher->WaitForFrames(20);
+  ExpectAll(watcher->seen(), 1, 20);
+}
+
+}  // namespace
+}  // namespace partiemc::server
