@@ -14,6 +14,8 @@
 #include <thread>
 #include <utility>
 
+#include "resume/options.h"
+
 extern char** environ;
 
 namespace partiemc::resume {
@@ -117,7 +119,10 @@ void Fleet::Start(std::size_t server, const std::string& address) {
   const std::string port_file = folder.Path("port");
   std::vector<std::string> arguments = arguments_;
   arguments.insert(arguments.end(), {"--address", address, "--port-file", port_file});
-  servers_[server] = std::make_unique<server::ServerProcess>(std::move(arguments));
+  const bool is_other = ++starts_ > size() && starts_ % 2 == 0;
+  servers_[server] = std::make_unique<server::ServerProcess>(
+      std::move(arguments),
+      server::Surroundings{.program = is_other ? GetOptions().other_server : ""});
   WaitFor([&] { return std::filesystem::exists(port_file); }, "a server");
   addresses_[server] = server::FileText(port_file);
   if (!addresses_[server].empty()) addresses_[server].pop_back();  // The end of the line.

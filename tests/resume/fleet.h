@@ -17,7 +17,8 @@ namespace partiemc::resume {
 
 class Fleet {
  public:
-  /// Each with these arguments beside its address.
+  /// Each with these arguments beside its address. Every other start is one of the other program
+  /// that the options name.
   explicit Fleet(std::size_t count, std::vector<std::string> arguments = {});
 
   std::size_t size() const { return servers_.size(); }
@@ -37,6 +38,7 @@ class Fleet {
   const std::vector<std::string> arguments_;
   std::vector<std::unique_ptr<server::ServerProcess>> servers_;
   std::vector<std::string> addresses_;
+  std::size_t starts_ = 0;
 };
 
 /// What stands between clients and servers.

@@ -20,10 +20,12 @@ namespace {
 bool Parse(int argc, char** argv) {
   Options& options = GetOptions();
   for (int k = 1; k < argc; k += 2) {
-    bool known = false;
+    bool known = std::string(argv[k]) == "--other-server" && k + 1 < argc;
+    if (known) options.other_server = argv[k + 1];
     for (const auto& [name, value] :
          {std::pair("--kills", &options.kills), std::pair("--terminations", &options.terminations),
-          std::pair("--faults", &options.faults), std::pair("--seed", &options.seed)}) {
+          std::pair("--faults", &options.faults), std::pair("--updates", &options.updates),
+          std::pair("--seed", &options.seed)}) {
       if (name != std::string(argv[k]) || k + 1 >= argc) continue;
       *value = std::strtoull(argv[k + 1], nullptr, 10);
       known = true;
@@ -39,6 +41,9 @@ bool Parse(int argc, char** argv) {
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   if (partiemc::resume::Parse(argc, argv)) return RUN_ALL_TESTS();
-  std::fputs("usage: resume_test [--kills N] [--terminations N] [--faults N] [--seed N]\n", stderr);
+  std::fputs(
+      "usage: resume_test [--kills N] [--terminations N] [--faults N] [--updates N] "
+      "[--seed N] [--other-server PROGRAM]\n",
+      stderr);
   return 2;
 }

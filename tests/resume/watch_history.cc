@@ -24,7 +24,8 @@ WatchHistory WatchAll(client::Watcher& watcher) {
                             .gap = frame.gap,
                             .rings_digest = frame.frame.rings_digest,
                             .mesh_digest = frame.frame.mesh_digest,
-                            .rejoined = !frame.rejoined.empty()});
+                            .rejoined = !frame.rejoined.empty(),
+                            .at = Clock::now()});
   }
 }
 

@@ -17,6 +17,7 @@ struct WatchedAnswer {
   std::uint64_t sequence = 0, dropped = 0, gap = 0;
   std::uint64_t rings_digest = 0, mesh_digest = 0;
   bool rejoined = false;  ///< The first after the watch had been lost.
+  Clock::time_point at;
 };
 
 struct WatchHistory {

@@ -38,7 +38,8 @@ std::string FileText(const std::string& path) {
 ServerProcess::ServerProcess(std::vector<std::string> arguments, const Surroundings& surroundings)
     : folder_(std::make_unique<support::TemporaryFolder>()) {
   const std::string output = folder_->Path("output");
-  arguments.insert(arguments.begin(), PARTIEMC_SERVER);
+  arguments.insert(arguments.begin(),
+                   surroundings.program.empty() ? PARTIEMC_SERVER : surroundings.program);
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);

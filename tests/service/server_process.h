@@ -21,6 +21,7 @@ std::string FileText(const std::string& path);
 struct Surroundings {
   std::vector<std::string> environment = {};  ///< NAME=VALUE, beside this process's own.
   int standard_error = -1;                    ///< A file descriptor; -1: in Output().
+  std::string program = {};                   ///< Empty: the one that was built with the tests.
 };
 
 /// partiemc-server with these arguments, its output in a file. Both are gone when this

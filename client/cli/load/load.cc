@@ -1,5 +1,6 @@
 #include "client/cli/load/load.h"
 
+#include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -63,6 +65,17 @@ std::vector<std::vector<float>> MakeFrames(int particles) {
   return frames;
 }
 
+double SecondsOf(clockid_t clock) {
+  timespec time{};
+  clock_gettime(clock, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+double CpuSecondsOf(std::thread& thread) {
+  clockid_t clock{};
+  return pthread_getcpuclockid(thread.native_handle(), &clock) == 0 ? SecondsOf(clock) : 0;
+}
+
 // What all threads share.
 struct Shared {
   const LoadFlags& flags;
@@ -112,6 +125,9 @@ class LoadedStream {
     sender_.join();
     receiver_.join();
   }
+
+  // Of its two threads, which do most of what gRPC does for them, too.
+  double CpuSeconds() { return CpuSecondsOf(sender_) + CpuSecondsOf(receiver_); }
 
   // When the producer had the answer to a frame; nothing while it has not.
   std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
@@ -176,9 +192,9 @@ class LoadedStream {
 };
 
 // Receives what a stream shows, from when it has frames until it ends.
-void WatchStream(Shared& shared, const LoadedStream& stream) {
-  const auto watcher = Watcher::Open(shared.flags.server.address, stream.name(),
-                                     {.credentials = shared.flags.server.credentials});
+void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& server) {
+  const auto watcher =
+      Watcher::Open(server, stream.name(), {.credentials = shared.flags.server.credentials});
   if (!watcher.ok()) return shared.Fail(watcher.status());
   WatchedFrame frame;
   while (!shared.stop) {
@@ -196,13 +212,12 @@ void WatchStream(Shared& shared, const LoadedStream& stream) {
   }
 }
 
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+double CpuSeconds() { return SecondsOf(CLOCK_PROCESS_CPUTIME_ID); }
+
+double CpuSecondsOf(const std::vector<std::unique_ptr<LoadedStream>>& streams) {
+  double seconds = 0;
+  for (const auto& stream : streams) seconds += stream->CpuSeconds();
+  return seconds;
 }
 
 double MemoryMb() {
@@ -217,13 +232,14 @@ struct Figures {
   bool settled = false;
   Percentiles answers, watches;
   std::uint64_t frames = 0, late = 0, refused = 0;
-  double client_cpu_ms = 0;  // A frame.
+  double client_cpu_ms = 0, producer_cpu_ms = 0;  // A frame.
   double client_memory_mb = 0;
   std::optional<double> server_cpu_ms, server_memory_mb;
 };
 
 // Waits for answers until percentiles have settled, time is over, or somebody ends it.
-absl::StatusOr<Figures> Measure(Shared& shared) {
+absl::StatusOr<Figures> Measure(Shared& shared,
+                                const std::vector<std::unique_ptr<LoadedStream>>& streams) {
   const LoadFlags& flags = shared.flags;
   const bool tells = !flags.quiet && isatty(STDERR_FILENO) != 0;
   const auto begin = Clock::now();
@@ -231,7 +247,7 @@ absl::StatusOr<Figures> Measure(Shared& shared) {
   Percentiles before;
   Figures figures;
   std::uint64_t frames_before = 0, late_before = 0;
-  double cpu_before = 0;
+  double cpu_before = 0, producer_cpu_before = 0;
   std::optional<ServerFigures> server_before;
   Clock::time_point measured_from;
   for (int window = 0;; ++window) {
@@ -246,6 +262,7 @@ absl::StatusOr<Figures> Measure(Shared& shared) {
       frames_before = shared.answered;
       late_before = shared.late;
       cpu_before = CpuSeconds();
+      producer_cpu_before = CpuSecondsOf(streams);
       if (!flags.metrics.empty()) {
         const auto server = AskFigures(flags.metrics);
         if (!server.ok()) return server.status();
@@ -276,6 +293,7 @@ absl::StatusOr<Figures> Measure(Shared& shared) {
   figures.refused = shared.refused;
   const double per_frame = 1000 / std::max<double>(1, static_cast<double>(figures.frames));
   figures.client_cpu_ms = (CpuSeconds() - cpu_before) * per_frame;
+  figures.producer_cpu_ms = (CpuSecondsOf(streams) - producer_cpu_before) * per_frame;
   figures.client_memory_mb = MemoryMb();
   if (server_before) {
     const auto server = AskFigures(flags.metrics);
@@ -305,8 +323,11 @@ std::string TextOf(const LoadFlags& flags, const Figures& figures) {
     absl::StrAppendFormat(&text, " of %.1f, %d late (answered after the next one was due)",
                           flags.rate * flags.streams, figures.late);
   }
-  absl::StrAppendFormat(&text, "; %d refused\nclient: %.2f ms of processor time a frame, %.0f MB\n",
-                        figures.refused, figures.client_cpu_ms, figures.client_memory_mb);
+  absl::StrAppendFormat(&text,
+                        "; %d refused\nclient: %.2f ms of processor time a frame, %.2f of them its "
+                        "producers', %.0f MB\n",
+                        figures.refused, figures.client_cpu_ms, figures.producer_cpu_ms,
+                        figures.client_memory_mb);
   if (figures.server_cpu_ms) {
     absl::StrAppendFormat(&text, "server: %.2f ms of processor time a frame, %.0f MB\n",
                           *figures.server_cpu_ms, *figures.server_memory_mb);
@@ -327,6 +348,7 @@ std::string JsonOf(const LoadFlags& flags, const Figures& figures) {
       ",\"frames\":", figures.frames, ",\"late\":", figures.late, ",\"refused\":", figures.refused,
       ",\"answers\":", percentiles(figures.answers), ",\"watches\":", percentiles(figures.watches),
       ",\"client_cpu_ms\":", figures.client_cpu_ms,
+      ",\"producer_cpu_ms\":", figures.producer_cpu_ms,
       ",\"client_memory_mb\":", figures.client_memory_mb,
       ",\"server_cpu_ms\":", number(figures.server_cpu_ms),
       ",\"server_memory_mb\":", number(figures.server_memory_mb), "}\n");
@@ -354,6 +376,12 @@ CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str()
       ->type_name("N");
+  verb->add_option(
+          "--watch-servers", flags.watch_servers,
+          "Watchers ask these in turns: other replicas of --server, which share its streams")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("ADDRESS,...");
   verb->add_flag("--no-ids", flags.no_ids, "Particles have no ids");
   verb->add_option("--seconds", flags.seconds,
                    "At most so long; it ends before, once the median and the 99th percentile of "
@@ -374,7 +402,8 @@ CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
       "  partiemc-server --metrics 127.0.0.1:9464 &\n"
       "  partiemc load --streams 8 --metrics 127.0.0.1:9464\n"
       "  partiemc load --streams 1 --particles 1000000 --rate 0\n"
-      "  partiemc load --streams 1 --watchers 50 --json");
+      "  partiemc load --streams 1 --watchers 50 --json\n"
+      "  partiemc load --streams 1 --watchers 60 --watch-servers one:50051,two:50051");
   return verb;
 }
 
@@ -397,11 +426,13 @@ int Load(const LoadFlags& flags) {
   const auto start = Clock::now();
   for (const auto& stream : streams) stream->Start(start);
   std::vector<std::thread> watchers;
+  std::vector<std::string> servers = flags.watch_servers;
+  if (servers.empty()) servers.push_back(flags.server.address);
   for (int k = 0; k < flags.watchers; ++k) {
     watchers.emplace_back(
-        [&shared, &stream = *streams[k % streams.size()]] { WatchStream(shared, stream); });
+        [&, k] { WatchStream(shared, *streams[k % streams.size()], servers[k % servers.size()]); });
   }
-  const auto figures = Measure(shared);
+  const auto figures = Measure(shared, streams);
   shared.stop = true;
   for (const auto& stream : streams) stream->Join();
   for (std::thread& watcher : watchers) watcher.join();

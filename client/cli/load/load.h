@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "client/cli/server_flags.h"
 
@@ -17,6 +18,7 @@ struct LoadFlags {
   int particles = 10'000;  ///< Of each frame.
   double rate = 30;        ///< Frames a second of each stream; 0: as fast as they are answered.
   int watchers = 0;        ///< Of all streams together.
+  std::vector<std::string> watch_servers;  ///< That they ask in turns; empty: `server`.
   bool no_ids = false;
   double seconds = 60;
   std::string metrics;
