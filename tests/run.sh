@@ -217,7 +217,8 @@ step_fuzz() {
 step_includes() {
   check "includes: configure" cmake --preset asan &&
     check "includes: headers of messages" cmake --build build/asan -j "$jobs" \
-      --target partiemc_proto partiemc_recording_proto partiemc_health_proto partiemc_rpc_proto &&
+      --target partiemc_proto partiemc_recording_proto partiemc_health_proto partiemc_rpc_proto \
+      partiemc_relay_proto &&
     check "includes" tests/architecture/compile_alone.py build/asan
 }
 
