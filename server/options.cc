@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/base/machine_limits.h"
+#include "server/stream/memory_plan.h"
 
 namespace partiemc::server {
 namespace {
@@ -43,6 +44,7 @@ constexpr char kFooter[] =
 struct Raw {
   std::string address = "127.0.0.1:50051";
   std::string health_check;
+  bool print_memory_plan = false;
   std::string port_file;
   std::uint64_t max_frame_bytes = 0;
   double grace_seconds = 4;
@@ -359,6 +361,9 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
           ? raw.max_frame_bytes
           : std::min({ServerLimits::DefaultFrameBytes(limits.frame.max_particles), kMaxFrameBytes,
                       std::max(limits.memory_budget / kFramesInBudget, kLeastFrameBytes)});
+  if (raw.print_memory_plan) {
+    return EarlyExit{0, MemoryPlan(limits, raw.line.server.threads).ToString()};
+  }
   return raw.line;
 }
 
@@ -382,6 +387,9 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
          "with --tls-cert over TLS, with --tls-client-ca showing --tls-cert to it")
       ->expected(0, 1)
       ->type_name("[ADDRESS]")
+      ->configurable(false);
+  app.add_flag("--print-memory-plan", raw.print_memory_plan,
+               "Print what memory these options may take, and leave")
       ->configurable(false);
   // CLI11 reads the environment only after the file, too late for the file's own name.
   const char* const config = std::getenv("PARTIEMC_CONFIG");

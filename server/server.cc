@@ -21,6 +21,7 @@
 #include "server/rpc/health_service.h"
 #include "server/rpc/service.h"
 #include "server/security/tls_credentials.h"
+#include "server/stream/memory_plan.h"
 #include "server/telemetry/logging.h"
 #include "server/web/web_gateway.h"
 
@@ -75,7 +76,7 @@ IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBu
                                     const WatchRegistry& watchers) {
   const std::uint64_t outside =
       ResidentBytes() + options.threads * kWorkerBytes + options.limits.AllHistoryBytes();
-  const std::uint64_t planned = budget.bytes(), more = planned / 16;
+  const std::uint64_t planned = budget.bytes(), more = planned / kPartsOfBudgetBeyond;
   return {.resident_bytes = ResidentBytes,
           .most_bytes =
               [outside, planned, more, &budget] {

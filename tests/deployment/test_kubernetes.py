@@ -88,6 +88,15 @@ def server_variables():
     return set(re.findall(r"\(Env:(PARTIEMC_[A-Z_]+)\)", text))
 
 
+def planned_mib(settings, memory_budget, threads):
+    """What the server itself says that it may take."""
+    text = subprocess.run(
+        [PROGRAM, "--print-memory-plan", "--memory-budget", str(memory_budget), "--threads",
+         str(threads)], env={**os.environ, **settings}, capture_output=True, text=True,
+        check=True).stdout
+    return float(text.splitlines()[-1].split()[0])
+
+
 def port_of(address):
     return int(address.rsplit(":", 1)[1])
 
@@ -148,6 +157,12 @@ def problems(manifests):
         found.append("no such account")
     if server["resources"]["requests"]["memory"] != server["resources"]["limits"]["memory"]:
         found.append("memory is promised that may not be there")
+    # Without flags the budget is half of the limit.
+    limits = server["resources"]["limits"]
+    mib = int(limits["memory"].removesuffix("Gi")) * 1024
+    planned = planned_mib(settings, mib * 2**20 // 2, limits["cpu"])
+    if planned > mib:
+        found.append(f"the server may take {planned:.0f} MiB, its limit is {mib}")
 
     security = {**spec["securityContext"], **server["securityContext"]}
     for key, wanted in (("runAsNonRoot", True), ("allowPrivilegeEscalation", False),
@@ -211,6 +226,7 @@ class Kubernetes(unittest.TestCase):
         planted(lambda m: m.server["readinessProbe"].update(exec={"command": ["true"]}), "readiness")
         planted(lambda m: m.pod["spec"].update(serviceAccountName="root"), "no such account")
         planted(lambda m: m.server["resources"]["requests"].update(memory="1Gi"), "memory")
+        planted(lambda m: m.server["resources"]["limits"].update(cpu="500"), "may take")
         planted(lambda m: m.server["securityContext"].pop("capabilities"), "capabilities")
         planted(lambda m: m.server["securityContext"].update(readOnlyRootFilesystem=False), "readOnly")
         planted(lambda m: m.server["volumeMounts"].pop(), "volumes")

@@ -50,6 +50,19 @@ class Environment {
   const char* name_;
 };
 
+TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
+  const auto parsed = Parse({"--print-memory-plan", "--memory-budget", "1GiB", "--threads", "3",
+                             "--max-streams", "8", "--history-bytes", "1MiB"});
+  const auto* const early = std::get_if<EarlyExit>(&parsed);
+  ASSERT_NE(early, nullptr);
+  EXPECT_EQ(early->code, 0);
+  EXPECT_THAT(early->text, HasSubstr("      48 MiB  3 compute threads"));
+  EXPECT_THAT(early->text, HasSubstr("       8 MiB  results for who goes back"));
+  EXPECT_THAT(early->text, HasSubstr("    1016 MiB  requests and answers"));
+  // 24 + 48 + 8 + 1016 + 2 x 63.5 + 64
+  EXPECT_THAT(early->text, HasSubstr("    1287 MiB  in all"));
+}
+
 TEST(CommandLineOptions, ByDefaultListenOnLoopbackWithAffordableLimits) {
   const CommandLine line = Parsed({});
   EXPECT_EQ(line.server.address.ToString(), "127.0.0.1:50051");

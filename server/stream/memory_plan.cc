@@ -1,0 +1,42 @@
+#include "server/stream/memory_plan.h"
+
+#include "absl/strings/str_format.h"
+#include "server/compute/worker_memory.h"
+
+namespace partiemc::server {
+namespace {
+
+// Measured: what the process has resident when it begins, and what gRPC holds of messages that are
+// on their way (tests/PROMISES.md).
+constexpr std::uint64_t kProgramBytes = std::uint64_t{24} << 20;
+constexpr std::uint64_t kOnTheirWayBytes = std::uint64_t{64} << 20;
+
+}  // namespace
+
+MemoryPlan::MemoryPlan(const ServerLimits& limits, unsigned threads)
+    : parts{
+          {kProgramBytes, "the program"},
+          {threads * kWorkerBytes, absl::StrFormat("%d compute threads (--threads)", threads)},
+          {limits.AllHistoryBytes(), "results for who goes back (--history-bytes, --max-streams)"},
+          {limits.FrameBudget(), "requests and answers (the rest of --memory-budget)"},
+          {limits.FrameBudget() / kPartsOfBudgetBeyond, "a frame of each stream beyond that"},
+          {limits.FrameBudget() / kPartsOfBudgetBeyond, "results that watchers have not taken"},
+          {kOnTheirWayBytes, "messages on their way"}} {}
+
+std::uint64_t MemoryPlan::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const Part& part : parts) bytes += part.bytes;
+  return bytes;
+}
+
+std::string MemoryPlan::ToString() const {
+  std::string text;
+  const auto line = [&](std::uint64_t part, const std::string& what) {
+    absl::StrAppendFormat(&text, "%8.0f MiB  %s\n", static_cast<double>(part) / (1 << 20), what);
+  };
+  for (const Part& part : parts) line(part.bytes, part.what);
+  line(bytes(), "in all: a container's limit is to be above that");
+  return text;
+}
+
+}  // namespace partiemc::server
