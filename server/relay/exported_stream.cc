@@ -36,7 +36,8 @@ void ExportedStream::StartRead() {
 void ExportedStream::StartOpen() {
   machine_->Opened(WatchTerms{.broadcaster = broadcaster_,
                               .mode = WatchMode::kEvery,
-                              .credit = std::numeric_limits<std::uint64_t>::max()});
+                              .credit = std::numeric_limits<std::uint64_t>::max(),
+                              .keeps_history = true});
 }
 
 void ExportedStream::WriteOpened(const HeldFrames&) {
@@ -46,16 +47,19 @@ void ExportedStream::WriteOpened(const HeldFrames&) {
 void ExportedStream::WriteFrame(const Published& published, std::uint64_t,
                                 std::uint64_t oldest_sequence) {
   port_.Post([self = shared_from_this(), published, oldest_sequence] {
-    self->last_published_ = published.number;
-    self->SendResult(SubjectOfResults(self->id_), published, {}, oldest_sequence);
-    self->machine_->WriteDone(true);
+    self->Try([self = self.get(), published, oldest_sequence] {
+      if (!self->SendResult(SubjectOfResults(self->id_), published, {}, oldest_sequence)) {
+        return false;
+      }
+      self->last_published_ = published.number;
+      return true;
+    });
   });
 }
 
 void ExportedStream::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
   port_.Post([self = shared_from_this(), end, dropped] {
-    self->PublishEnd(end, dropped);
-    self->machine_->WriteDone(true);
+    self->Try([self = self.get(), end, dropped] { return self->PublishEnd(end, dropped); });
   });
 }
 
@@ -64,11 +68,27 @@ void ExportedStream::Finish(const absl::Status&) {
   const std::shared_ptr<ExportedStream> last = std::move(self_);
 }
 
-void ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
+void ExportedStream::Try(std::function<bool()> send) {
+  if (send()) {
+    machine_->WriteDone(true);
+  } else {
+    unsent_ = std::move(send);
+  }
+}
+
+void ExportedStream::Retry() {
+  if (unsent_) Try(std::exchange(unsent_, nullptr));
+}
+
+void ExportedStream::End() {
+  machine_->Cancelled();
+  if (std::exchange(unsent_, nullptr)) machine_->WriteDone(false);
+}
+
+bool ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
   // The stream goes on, and whoever misses something fetches it.
-  if (end.reason == kReasonFellBehind) return;
-  relay::v1::RelayMessage message;
-  relay::v1::StreamEnd& told = *message.mutable_stream_end();
+  if (end.reason == kReasonFellBehind) return true;
+  relay::v1::StreamEnd& told = *end_.mutable_stream_end();
   told.set_stream_id(id_);
   told.set_last_number(last_published_ + dropped);
   told.set_reason(end.reason);
@@ -79,7 +99,8 @@ void ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
     told.set_value(violation->value);
     told.set_rule(violation->rule);
   }
-  port_.Send(SubjectOfResults(id_), message);
+  ended_at_ = Clock::now();
+  return port_.Send(SubjectOfResults(id_), end_);
 }
 
 bool ExportedStream::SendResult(const std::string& subject, const Published& published,
@@ -139,6 +160,7 @@ void ExportedStream::Answer(const relay::v1::Fetch& fetch, const std::string& re
   }
   end.set_oldest_sequence(broadcaster_->oldest_here());
   port_.Send(subject, message);
+  if (ended_at_) port_.Send(subject, end_);
 }
 
 }  // namespace partiemc::server

@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/relay/relay_port.h"
@@ -29,13 +31,17 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   /// Publishes from now on what comes.
   void Begin();
   /// Nobody wants it any more.
-  void End() { machine_->Cancelled(); }
+  void End();
+  /// Sends what could not be sent so far; what comes after it waits meanwhile as for any watcher.
+  void Retry();
   /// Between Begin and the end of the stream, or the last thing after End.
   bool live() const { return live_; }
 
   /// Another replica wants the results, until then.
   void WantedUntil(Clock::time_point until) { wanted_until_ = until; }
   Clock::time_point wanted_until() const { return wanted_until_; }
+  /// When its end was told, if it was: for who was away, it is told again to each that asks.
+  std::optional<Clock::time_point> ended_at() const { return ended_at_; }
   /// Answers `fetch` of this replica.
   void Answer(const relay::v1::Fetch& fetch, const std::string& replica);
 
@@ -55,7 +61,8 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   void Cut() override {}
   void Finish(const absl::Status& status) override;
 
-  void PublishEnd(const WatchEnd& end, std::uint64_t dropped);
+  void Try(std::function<bool()> send);
+  bool PublishEnd(const WatchEnd& end, std::uint64_t dropped);
   bool SendResult(const std::string& subject, const Published& published,
                   const Answering& answering, std::uint64_t oldest_sequence);
   Published First(const relay::v1::Fetch& fetch) const;
@@ -69,6 +76,9 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   std::atomic<bool> live_ = false, opened_ = false;
   Clock::time_point wanted_until_;
   std::uint64_t last_published_ = 0;  // Its number.
+  std::function<bool()> unsent_;
+  std::optional<Clock::time_point> ended_at_;
+  relay::v1::RelayMessage end_;  // From then on.
 };
 
 }  // namespace partiemc::server

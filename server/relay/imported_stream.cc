@@ -187,7 +187,7 @@ void ImportedStream::Came(const relay::v1::StreamEnd& end, Clock::time_point now
   End(told);
 }
 
-void ImportedStream::Reconnected(Clock::time_point now) {
+void ImportedStream::FetchAgain(Clock::time_point now) {
   if (ended_) return;
   if (!fetching_) return FetchFrom(next_number_, now);
   Fetch(now);

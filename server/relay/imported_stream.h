@@ -51,8 +51,8 @@ class ImportedStream {
   void Came(relay::v1::Result& result, Clock::time_point now);
   void Came(const relay::v1::FetchEnd& end, Clock::time_point now);
   void Came(const relay::v1::StreamEnd& end, Clock::time_point now);
-  /// The bus was away: what came meanwhile is missing.
-  void Reconnected(Clock::time_point now);
+  /// What has come meanwhile may be missing, the end too: asks for it.
+  void FetchAgain(Clock::time_point now);
   /// No more comes.
   void End(const WatchEnd& end);
   /// Who waits to join is told this instead.

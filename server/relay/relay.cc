@@ -26,10 +26,15 @@ constexpr seconds kReplicaPatience(3);
 // For which all is taken for unchanged that cannot be heard.
 constexpr seconds kBusPatience(30);
 constexpr seconds kExportLease(3);
-// A stream that its replica does not announce any more has ended; its last word may be on its way.
-constexpr milliseconds kLastWord(500);
-// For others to answer whoever has just come, or a stream that has just been opened to be told.
+// For which those who were away can hear that a stream has ended.
+constexpr seconds kEndKept(30);
+// A stream that its replica does not announce any more has ended: it is asked how, and has so long.
+constexpr seconds kLastWord(2);
+// For others to come, and to answer whoever has just come.
 constexpr milliseconds kSettle(300);
+// For all others to say whether they have a stream that is looked for; and how often they are
+// asked.
+constexpr milliseconds kSearchPatience(1500), kAskEvery(100);
 // Until the bus is connected for the first time.
 constexpr seconds kFirstConnection(2);
 constexpr milliseconds kDrainPatience(300);
@@ -167,7 +172,8 @@ void Relay::CheckConnection(Clock::time_point now) {
     directory_.Refresh(now);
     LogEvent(spdlog::level::info, "NATS connected", {{"replica", replica_}});
     Announce(now, true, false);
-    for (Import& import : imports_) import.stream->Reconnected(now);
+    for (Import& import : imports_) import.stream->FetchAgain(now);
+    for (auto& [id, exported] : exports_) exported->WantedUntil(now + kExportLease);
   } else if (!is_connected && connected_) {
     disconnected_ = now;
     told_away_ = true;
@@ -273,7 +279,12 @@ std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::si
 void Relay::LookAtExports(Clock::time_point now) {
   for (auto it = exports_.begin(); it != exports_.end();) {
     ExportedStream& exported = *it->second;
-    const bool is_wanted = now < exported.wanted_until();
+    // While nobody can be heard, nobody can say what he wants.
+    const bool may_be_wanted = !connected_ && now - disconnected_ < kBusPatience;
+    const bool has_news = exported.ended_at() && now - *exported.ended_at() < kEndKept;
+    const bool is_wanted = now < exported.wanted_until() || may_be_wanted || has_news;
+    // Others come back in the same moments: what waited is not to be gone before they listen.
+    if (connected_ && connected_since_ && now - *connected_since_ > kSettle) exported.Retry();
     if (!is_wanted && exported.live()) exported.End();
     if (is_wanted || exported.live()) {
       ++it;
@@ -292,6 +303,7 @@ void Relay::LookAtImports(Clock::time_point now) {
       import.missing_since.reset();
     } else if (!import.missing_since) {
       import.missing_since = now;
+      import.stream->FetchAgain(now);
     } else if (now - *import.missing_since > kLastWord) {
       import.stream->End(
           {std::string(kReasonProducerLost), "the producer's connection is gone", {}});
@@ -349,7 +361,9 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
   }
   const auto now = Clock::now();
   if (directory_.Announced(replica, announcement, now)) changed_ = true;
-  if (announcement.asks()) Announce(now, false, draining_since_.has_value());
+  if (!announcement.asks()) return;
+  if (registry_.changes() != local_changes_) LookAtLocalStreams();
+  Announce(now, false, draining_since_.has_value());
 }
 
 void Relay::Take(const std::string& replica, const relay::v1::Fetch& fetch) {
@@ -376,26 +390,31 @@ void Relay::Take(const std::string& replica, const relay::v1::Fetch& fetch) {
     return;
   }
   exported->second->WantedUntil(Clock::now() + kExportLease);
+  exported->second->Retry();
   exported->second->Answer(fetch, replica);
 }
 
 void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequence,
                  FindDone done) {
   if (refuses_) return done(DrainingError());
-  Post([this, search = Search{name, from_sequence, std::move(done), {}}]() mutable {
-    if (draining_since_) return search.done(DrainingError());
-    const auto now = Clock::now();
-    // Whoever has just come does not know the others yet.
-    const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
-    search.until = std::max(now, settled) + kSettle;
-    if (TryFind(search, now)) return;
-    if (searches_.size() >= limits_.watches) {
-      return search.done(NoSuchStream(
-          search.name, absl::StrCat("must be one of at most ", limits_.watches,
-                                    " names that are looked for at other replicas at once")));
-    }
-    searches_.push_back(std::move(search));
-  });
+  Post(
+      [this, search = Search{
+                 .name = name, .from_sequence = from_sequence, .done = std::move(done)}]() mutable {
+        if (draining_since_) return search.done(DrainingError());
+        const auto now = Clock::now();
+        // Whoever has just come does not know the others yet.
+        const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
+        search.began = now;
+        search.settled = settled + kSettle;
+        search.until = std::max(now, settled) + kSearchPatience;
+        if (TryFind(search, now)) return;
+        if (searches_.size() >= limits_.watches) {
+          return search.done(NoSuchStream(
+              search.name, absl::StrCat("must be one of at most ", limits_.watches,
+                                        " names that are looked for at other replicas at once")));
+        }
+        searches_.push_back(std::move(search));
+      });
 }
 
 bool Relay::TryFind(const Search& search, Clock::time_point now) {
@@ -438,9 +457,16 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_
 }
 
 void Relay::LookAtSearches(Clock::time_point now) {
+  // Whoever is looked for may have come a moment ago.
+  if (!searches_.empty() && connected_ && now - asked_ > kAskEvery) {
+    asked_ = now;
+    Announce(now, true, false);
+  }
   for (Search& search : std::exchange(searches_, {})) {
     if (TryFind(search, now)) continue;
-    if (now < search.until) {
+    const bool all_have_said = now > search.settled && connected_ && asked_ >= search.began &&
+                               directory_.HaveAllAnnouncedSince(asked_);
+    if (now < search.until && !all_have_said) {
       searches_.push_back(std::move(search));
     } else {
       search.done(connected_ ? NoSuchStream(search.name) : NoSuchStream(search.name, kOnlyHere));
@@ -469,6 +495,7 @@ void Relay::GoOnDraining(Clock::time_point now) {
     }
     return;
   }
+  for (auto& [id, exported] : exports_) exported->End();
   Announce(now, false, true);
   bus_->Flush();
   has_drained_ = true;

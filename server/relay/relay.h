@@ -107,7 +107,7 @@ class Relay final : private RelayPort {
     std::string name;
     std::optional<std::uint64_t> from_sequence;
     FindDone done;
-    Clock::time_point until;
+    Clock::time_point began = {}, settled = {}, until = {};
   };
 
   void Post(std::function<void()> action) override;
@@ -154,7 +154,7 @@ class Relay final : private RelayPort {
   bool told_away_ = false;  // That the bus is not connected.
   bool changed_ = false;    // Streams came or went, here or elsewhere.
   const Clock::time_point began_ = Clock::now();
-  Clock::time_point announced_, ticked_, disconnected_ = began_;
+  Clock::time_point announced_, asked_, ticked_, disconnected_ = began_;
   std::optional<Clock::time_point> connected_since_, draining_since_;
   std::promise<void> drained_;
   bool has_drained_ = false;

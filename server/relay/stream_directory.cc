@@ -21,7 +21,7 @@ bool StreamDirectory::Announced(const std::string& replica,
   const std::lock_guard lock(mutex_);
   if (replicas_.size() >= kMaxReplicas && !replicas_.contains(replica)) return false;
   Replica& known = replicas_[replica];
-  known.heard = now;
+  known.heard = known.announced = now;
   known.streams.swap(streams);
   return !std::ranges::equal(
       known.streams, streams, {}, [](const auto& item) { return item.first; },
@@ -50,6 +50,12 @@ std::vector<std::string> StreamDirectory::Expire(Clock::time_point before) {
 void StreamDirectory::Refresh(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   for (auto& [name, replica] : replicas_) replica.heard = now;
+}
+
+bool StreamDirectory::HaveAllAnnouncedSince(Clock::time_point since) const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::all_of(replicas_,
+                             [since](const auto& item) { return item.second.announced >= since; });
 }
 
 template <typename Matches>

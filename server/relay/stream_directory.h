@@ -39,6 +39,9 @@ class StreamDirectory {
   /// What was heard before counts as heard now: nothing could be heard meanwhile.
   void Refresh(Clock::time_point now);
 
+  /// Whether every one that is known has announced its streams since then.
+  bool HaveAllAnnouncedSince(Clock::time_point since) const;
+
   /// The stream of that name that was opened last.
   std::optional<RemoteStream> FindName(std::string_view name) const;
   /// The stream with this lineage that was opened last.
@@ -54,7 +57,7 @@ class StreamDirectory {
  private:
   struct Replica {
     std::map<std::string, relay::v1::LiveStream> streams;  // By their ids.
-    Clock::time_point heard;
+    Clock::time_point heard, announced;
   };
 
   template <typename Matches>

@@ -73,6 +73,7 @@ void WatchStateMachine::Opened(const absl::StatusOr<WatchTerms>& terms) {
       owes_opened_ = true;
       mode_ = terms->mode;
       credit_ = terms->credit;
+      keeps_history_ = terms->keeps_history;
       Join(*terms);
     }
   });
@@ -277,7 +278,7 @@ std::size_t WatchStateMachine::held_bytes() const {
 
 bool WatchStateMachine::goes_back() const {
   const std::lock_guard lock(mutex_);
-  return next_held_ != 0;
+  return next_held_ != 0 || keeps_history_;
 }
 
 void WatchStateMachine::DropPending() {

@@ -32,6 +32,9 @@ struct WatchTerms {
   std::uint64_t credit = 1;
   /// The frames that are held from this sequence number on come first; else the newest one.
   std::optional<std::uint64_t> from_sequence = {};
+  /// The history stays when the stream has ended, for as long as the broadcaster does: others may
+  /// ask for it.
+  bool keeps_history = false;
 };
 
 /// What a request turned out to be.
@@ -133,7 +136,7 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   WatchCounts counts() const;
   /// Of the frames that the watcher has not taken yet.
   std::size_t held_bytes() const;
-  /// Whether it still takes frames out of the stream's history.
+  /// Whether it still takes frames out of the stream's history, or wants it kept for others.
   bool goes_back() const;
 
  private:
@@ -182,6 +185,7 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   WatchEnd end_;  // From kEnding on.
   std::shared_ptr<ResultBroadcaster> broadcaster_;
   WatchMode mode_ = WatchMode::kLatest;
+  bool keeps_history_ = false;
   std::uint64_t credit_ = 0;
   bool half_closed_ = false;
   std::deque<Published> pending_;  // Not yet written.

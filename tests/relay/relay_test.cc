@@ -258,6 +258,38 @@ TEST_F(RelayTest, AnEndIsToldAfterTheLastFrame) {
   ExpectAll(watcher->seen(), 1, 40);
 }
 
+TEST_F(RelayTest, AnEndWhileTheBusIsAwayIsToldOnceItIsBack) {
+  Publish(1, 10);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  watcher->WaitForFrames(1);
+  has_.bus().SetConnected(false);
+  ASSERT_TRUE(Eventually([this] { return !has_.relay().connected(); }));
+  Publish(11, 40);
+  has_.Close("dam");
+  std::this_thread::sleep_for(milliseconds(200));
+  has_.bus().SetConnected(true);
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonFinished);
+  ExpectAll(watcher->seen(), 10, 40);
+}
+
+TEST_F(RelayTest, WhoIsAwayWhileAStreamEndsHearsHowAndHowMuchIsMissing) {
+  Publish(1, 10);
+  const auto watcher = shows_.Watch("dam", WatchMode::kLatest);
+  ASSERT_NE(watcher, nullptr);
+  watcher->WaitForFrames(1);
+  shows_.bus().SetConnected(false);
+  ASSERT_TRUE(Eventually([this] { return !shows_.relay().connected(); }));
+  Publish(11, 40);
+  has_.Close("dam");
+  std::this_thread::sleep_for(milliseconds(200));
+  shows_.bus().SetConnected(true);
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonFinished);
+  ExpectAccounted(*watcher, 40);
+}
+
 TEST_F(RelayTest, AReplicaThatDrainsIsAProducerLostForThoseWhoWatchElsewhere) {
   Publish(1, 1);
   const auto watcher = shows_.Watch("dam");
