@@ -109,8 +109,11 @@ void WatchCall::StartOpen() {
     const absl::Status status = stream.ok() ? OpenHere(*stream) : stream.status();
     return machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
   }
-  relay_->Find(name, terms_.from_sequence, [this](const absl::StatusOr<Relay::Found>& found) {
-    const absl::Status status = found.ok() ? OpenRemote(*found) : found.status();
+  relay_->Find(name, terms_.from_sequence, [this, name](const absl::StatusOr<Relay::Found>& found) {
+    absl::Status status = found.ok() ? OpenRemote(*found) : found.status();
+    if (absl::IsNotFound(status)) {  // It may have come here meanwhile.
+      if (const auto here = streams_.Find(name, caller()); here.ok()) status = OpenHere(*here);
+    }
     machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
   });
 }

@@ -71,6 +71,7 @@ Relay::Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDis
       registry_(registry),
       dispatcher_(dispatcher),
       bus_(std::move(bus)),
+      queue_(std::make_shared<RelayQueue>(kQueueBytes)),
       joiner_(std::max(kMaxMessageBytes, limits.watcher_bytes + kPieceBytes)),
       thread_([this] { Run(); }) {
   pthread_setname_np(thread_.native_handle(), "relay");
@@ -78,19 +79,11 @@ Relay::Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDis
 
 Relay::~Relay() {
   Drain();
-  {
-    const std::lock_guard lock(queue_->mutex);
-    queue_->stopping = true;
-    queue_->came.notify_all();
-  }
+  queue_->Stop();
   thread_.join();
 }
 
-void Relay::Post(std::function<void()> action) {
-  const std::lock_guard lock(queue_->mutex);
-  queue_->actions.push_back(std::move(action));
-  queue_->came.notify_one();
-}
+void Relay::Post(std::function<void()> action) { queue_->Post(std::move(action)); }
 
 bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
   message.set_replica(replica_);
@@ -101,47 +94,14 @@ bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
   return sent;
 }
 
-std::uint64_t Relay::lost_messages() const {
-  const std::lock_guard lock(queue_->mutex);
-  return unsent_ + queue_->lost;
-}
-
-std::unique_ptr<MessageBus::Subscription> Relay::Listen(const std::string& subject) {
-  return bus_->Subscribe(subject, [queue = queue_](std::string_view piece) {
-    const std::lock_guard lock(queue->mutex);
-    if (queue->stopping) return;
-    if (queue->piece_bytes + piece.size() > kQueueBytes) {
-      ++queue->lost;
-      return;
-    }
-    queue->piece_bytes += piece.size();
-    queue->pieces.emplace_back(piece);
-    queue->came.notify_one();
-  });
-}
-
 void Relay::Run() {
   for (const std::string& subject :
        {std::string(kReplicasSubject), SubjectOfAsking(replica_), SubjectOfAnswers(replica_)}) {
-    subscriptions_.push_back(Listen(subject));
+    subscriptions_.push_back(queue_->Listen(*bus_, subject));
   }
-  std::deque<std::function<void()>> actions;
-  std::deque<std::string> pieces;
-  for (;;) {
-    {
-      std::unique_lock lock(queue_->mutex);
-      queue_->came.wait_for(lock, kTickEvery, [this] {
-        return queue_->stopping || !queue_->actions.empty() || !queue_->pieces.empty();
-      });
-      if (queue_->stopping && queue_->actions.empty()) break;
-      actions.swap(queue_->actions);
-      pieces.swap(queue_->pieces);
-      queue_->piece_bytes = 0;
-    }
-    for (const auto& action : actions) action();
-    for (const std::string& piece : pieces) Take(piece);
-    actions.clear();
-    pieces.clear();
+  for (RelayQueue::Work work; queue_->Take(kTickEvery, work); work = {}) {
+    for (const auto& action : work.actions) action();
+    for (const std::string& piece : work.messages) Take(piece);
     const auto now = Clock::now();
     if (changed_ || now - ticked_ >= kTickEvery || draining_since_) Tick(now);
   }
@@ -199,7 +159,7 @@ void Relay::CheckConnection(Clock::time_point now) {
 
 void Relay::Announce(Clock::time_point now, bool asks, bool leaving) {
   announced_ = now;
-  if (!connected_ && !bus_->connected()) return;
+  if (has_drained_ || (!connected_ && !bus_->connected())) return;
   relay::v1::RelayMessage message;
   relay::v1::Announcement& announcement = *message.mutable_announcement();
   announcement.set_asks(asks);
@@ -440,7 +400,7 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_
   } else {
     // Listens first, so that nothing falls between what is fetched and what comes.
     Import import;
-    import.results = Listen(SubjectOfResults(remote.id()));
+    import.results = queue_->Listen(*bus_, SubjectOfResults(remote.id()));
     import.stream = std::make_unique<ImportedStream>(
         remote, search.from_sequence, dispatcher_,
         ImportedStream::Limits{.broadcaster = limits_.broadcaster,

@@ -4,10 +4,8 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <future>
 #include <map>
@@ -26,13 +24,14 @@
 #include "server/relay/message_bus.h"
 #include "server/relay/pieces.h"
 #include "server/relay/relay_port.h"
+#include "server/relay/relay_queue.h"
 #include "server/relay/stream_directory.h"
 #include "server/stream/stream_registry.h"
 
 namespace partiemc::server {
 
 /// The public part is safe from any thread; all else is done by the relay's own. What others send
-/// is put into a bounded queue, and lost where that is full: whoever misses something fetches it.
+/// and there is no room for in its queue is lost: whoever misses something fetches it.
 class Relay final : private RelayPort {
  public:
   using Clock = std::chrono::steady_clock;
@@ -79,19 +78,9 @@ class Relay final : private RelayPort {
   std::size_t exported_streams() const { return exported_count_; }
   std::size_t imported_streams() const { return imported_count_; }
   /// Of other replicas, that came faster than they were handled, or could not be sent.
-  std::uint64_t lost_messages() const;
+  std::uint64_t lost_messages() const { return unsent_ + queue_->lost_messages(); }
 
  private:
-  // What the relay's thread is to do. Handlers of the bus share it: they may outlive the relay.
-  struct Queue {
-    std::mutex mutex;  // Guards everything below.
-    std::condition_variable came;
-    std::deque<std::function<void()>> actions;
-    std::deque<std::string> pieces;  // Of messages, in their order.
-    std::size_t piece_bytes = 0;
-    std::uint64_t lost = 0;
-    bool stopping = false;
-  };
   struct LocalStream {
     std::shared_ptr<ResultBroadcaster> broadcaster;
     std::string lineage;
@@ -113,7 +102,6 @@ class Relay final : private RelayPort {
   void Post(std::function<void()> action) override;
   bool Send(const std::string& subject, relay::v1::RelayMessage& message) override;
 
-  std::unique_ptr<MessageBus::Subscription> Listen(const std::string& subject);
   void Run();
   void Tick(Clock::time_point now);
   void CheckConnection(Clock::time_point now);
@@ -137,7 +125,7 @@ class Relay final : private RelayPort {
   WatchDispatcher& dispatcher_;
   StreamDirectory directory_;
   const std::unique_ptr<MessageBus> bus_;
-  const std::shared_ptr<Queue> queue_ = std::make_shared<Queue>();
+  const std::shared_ptr<RelayQueue> queue_;
   std::atomic<bool> connected_ = false, refuses_ = false;
   std::atomic<std::size_t> exported_count_ = 0, imported_count_ = 0;
   std::atomic<std::uint64_t> unsent_ = 0;

@@ -9,17 +9,6 @@
 
 namespace partiemc::server {
 
-// The registry needs machines only by their identity.
-class MemoryReplica::Transport final : public StreamTransport, public StreamHandler {
- public:
-  void StartRead(std::size_t) override {}
-  void StartWrite(Outgoing, std::size_t) override {}
-  absl::Status Open(std::size_t, const StreamStateMachine&) override { return absl::OkStatus(); }
-  Answered Answer(std::size_t, Worker&, const std::atomic<bool>&) override { return {}; }
-  void Cut() override {}
-  void Finish(const absl::Status&) override {}
-};
-
 std::string FrameBytes(std::uint64_t sequence, std::size_t bytes) {
   std::string text(bytes, '\0');
   for (std::size_t k = 0; k < bytes; ++k) text[k] = static_cast<char>(sequence * 31 + k * k);
@@ -27,8 +16,7 @@ std::string FrameBytes(std::uint64_t sequence, std::size_t bytes) {
 }
 
 MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes)
-    : transport_(std::make_unique<Transport>()),
-      history_(history_bytes, 8 * history_bytes),
+    : history_(history_bytes, 8 * history_bytes),
       registry_(16, history_bytes > 0 ? &history_ : nullptr) {
   auto end = hub.Connect();
   end_ = end.get();
@@ -44,8 +32,7 @@ MemoryReplica::~MemoryReplica() { relay_.reset(); }
 void MemoryReplica::Open(const std::string& name, const std::string& token,
                          std::uint64_t next_sequence) {
   Stream& stream = streams_[name];
-  stream.machine =
-      std::make_shared<StreamStateMachine>(*transport_, *transport_, pool_, budget_, 1);
+  stream.machine = std::make_shared<StreamStateMachine>(transport_, transport_, pool_, budget_, 1);
   stream.broadcaster = std::make_shared<ResultBroadcaster>(
       dispatcher_,
       ResultBroadcaster::Limits{.mailbox_bytes = kWatcherBytes, .kept_bytes = kWatcherBytes});

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "relay/memory_bus.h"
+#include "server/closed_transport.h"
 #include "server/memory_watcher.h"
 #include "server/relay/relay.h"
 #include "server/watch/watch_dispatcher.h"
@@ -44,7 +45,6 @@ class MemoryReplica {
   MemoryHub::End& bus() { return *end_; }
 
  private:
-  class Transport;
   struct Stream {
     std::shared_ptr<StreamStateMachine> machine;
     std::shared_ptr<ResultBroadcaster> broadcaster;
@@ -52,7 +52,7 @@ class MemoryReplica {
 
   ComputePool pool_{1};
   MemoryBudget budget_{1000};
-  std::unique_ptr<Transport> transport_;
+  ClosedTransport transport_;
   HistoryRoom history_;
   WatchDispatcher dispatcher_;
   StreamRegistry registry_;

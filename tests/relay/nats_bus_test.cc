@@ -90,8 +90,15 @@ TEST(NatsBus, ConnectsToAServerThatComesLater) {
   nats.Stop();
   const auto bus = Connect(nats.url());
   EXPECT_FALSE(bus->connected());
+  Heard heard;
+  const auto a = bus->Subscribe("a", heard.Handler());
+  ASSERT_NE(a, nullptr);
   nats.Start();
-  EXPECT_TRUE(Eventually([&] { return bus->connected(); }));
+  ASSERT_TRUE(Eventually([&] { return bus->connected(); }));
+  bus->Flush();
+  const auto other = Connect(nats.url());
+  ASSERT_TRUE(other->Publish("a", "first"));
+  EXPECT_TRUE(Eventually([&] { return heard.count() == 1; }));
 }
 
 TEST(NatsBus, AUrlThatIsNoneIsRefusedWithoutItsPassword) {

@@ -334,6 +334,16 @@ TEST_F(RelayTest, OneThatLeavesIsGoneAtOnce) {
   EXPECT_EQ(shows.relay().replicas(), 0u);
 }
 
+TEST_F(RelayTest, ThatItLeavesIsTheLastThatIsHeardOfAReplica) {
+  MemoryReplica leaves(hub_);
+  ASSERT_TRUE(Eventually([&] { return shows_.relay().replicas() == 2; }));
+  leaves.relay().Drain();
+  leaves.Open("late", NewStreamToken());
+  std::this_thread::sleep_for(milliseconds(1200));  // Longer than announcements are apart.
+  EXPECT_EQ(shows_.relay().replicas(), 1u);
+  EXPECT_EQ(shows_.relay().remote_streams(), 1u);
+}
+
 TEST_F(RelayTest, WhoWaitsForAStreamIsRefusedWhereItsReplicaDrains) {
   std::atomic<bool> refused = false;
   shows_.relay().Find("nothing", std::nullopt, [&](const auto& found) {

@@ -10,23 +10,11 @@
 #include <thread>
 
 #include "partiemc/status.h"
+#include "server/closed_transport.h"
 #include "server/stream/stream_token.h"
 
 namespace partiemc::server {
 namespace {
-
-// A transport that is never opened: the registry needs machines only by their identity.
-class ClosedTransport final : public StreamTransport, public StreamHandler {
- public:
-  void StartRead(std::size_t) override {}
-  void StartWrite(Outgoing, std::size_t) override {}
-  absl::Status Open(std::size_t, const StreamStateMachine&) override { return absl::OkStatus(); }
-  Answered Answer(std::size_t, Worker&, const std::atomic<bool>&) override { return {}; }
-  void Cut() override {}
-  void Finish(const absl::Status& status) override { finished = status; }
-
-  std::optional<absl::Status> finished;
-};
 
 class Registry : public ::testing::Test {
  protected:
