@@ -1,9 +1,10 @@
 #!/bin/bash
-# Builds the image from the Dockerfile without a container engine and tries it: the server answers
-# its health check and a replay, in the clear and as compose.tls.yaml has it, runs as a non-root
-# user, and leaves within 5 s of SIGTERM with exit code 0. Needs root; installs the packages of the
-# set `image` where they are missing. The base system is kept in build/image; every container and
-# image is removed at the end.
+# Builds both images of the Dockerfile without a container engine and tries them as compose.yaml and
+# compose.tls.yaml have them, on read-only roots and without a privilege: the server answers its
+# health check, a replay of the client's image, a browser and Prometheus, listens on loopback unless
+# told otherwise, and leaves within 5 s of SIGTERM with exit code 0. Needs root; installs the
+# packages of the set `image` where they are missing. The base system is kept in build/image; every
+# container and image is removed at the end.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -15,7 +16,8 @@ fail() {
 docker/install.sh image
 
 readonly work=$PWD/build/image
-readonly base=$work/bookworm base_image=docker.io/library/debian:bookworm-slim image=partiemc:test
+readonly base=$work/bookworm base_image=localhost/bookworm
+readonly max_megabytes=160  # What the server's image may add to the base.
 mkdir -p "$work"
 export BUILDAH_ISOLATION=chroot
 
@@ -37,16 +39,17 @@ choose_driver() {
   fail "buildah can use neither overlay nor vfs under $work"
 }
 
-unshare_pid=
+unshare_pid=''
+volume=''
 cleanup() {
   [[ -z $unshare_pid ]] || kill -KILL "$unshare_pid" 2>/dev/null || true
   "${buildah[@]}" rm --all >/dev/null 2>&1 || true
   "${buildah[@]}" rmi --all --force >/dev/null 2>&1 || true
   umount "$store"/*/overlay 2>/dev/null || true
-  rm -rf "$store"
+  rm -rf "$store" "$volume"
 }
 
-# The name that the Dockerfile takes its base from, made from Debian's packages.
+# Stands for the base that the Dockerfile names, for which it takes a registry.
 make_base() {
   if [[ ! -d $base ]]; then
     echo "debootstrap: a minimal Debian 12 in ${base#"$PWD/"}"
@@ -63,40 +66,105 @@ make_base() {
   "${buildah[@]}" commit -q --rm "$scratch" "$base_image" >/dev/null
 }
 
-build_image() {
-  SECONDS=0
-  if ! "${buildah[@]}" bud --pull-never --format docker -f docker/Dockerfile -t "$image" . \
-    >"$work/build.log" 2>&1; then
-    tail -n 40 "$work/build.log" >&2
-    fail "the image does not build; the whole output is in ${work#"$PWD/"}/build.log"
-  fi
-  echo "built in $SECONDS s: $("${buildah[@]}" images --format '{{.Size}}' "$image")"
+build_images() {
+  local target options=() began=$SECONDS
+  [[ -z ${NODE_EXTRA_CA_CERTS:-} ]] || options=(
+    --volume "$NODE_EXTRA_CA_CERTS:/authority.pem:ro"
+    --build-arg NODE_EXTRA_CA_CERTS=/authority.pem)
+  for target in server client; do
+    if ! "${buildah[@]}" bud --pull-never --layers --format docker --build-arg "BASE=$base_image" \
+      "${options[@]}" -f docker/Dockerfile --target "$target" -t "partiemc-$target" . \
+      >"$work/build.log" 2>&1; then
+      tail -n 40 "$work/build.log" >&2
+      fail "the image does not build; the whole output is in ${work#"$PWD/"}/build.log"
+    fi
+  done
+  echo "both images built in $((SECONDS - began)) s"
 }
 
-# configured FIELD: what the image says about itself, one value a line.
+# configured IMAGE FIELD: what an image says about itself, one value a line.
 configured() {
-  "${buildah[@]}" inspect --type image --format "$1" "$image" | sed '/^$/d'
+  "${buildah[@]}" inspect --type image --format "$2" "$1" | sed '/^$/d'
+}
+lines_of() {
+  configured "$1" "{{with .Docker.Config.$2}}{{range .}}{{println .}}{{end}}{{end}}"
 }
 
-# What an engine does at `run`: own mounts, processes (the program is number 1 among them) and
-# network, the image's environment and user.
+# The root file system of a new container of an image.
+root_of() {
+  "${buildah[@]}" mount "$("${buildah[@]}" from --pull-never "$1")"
+}
+
+# added_megabytes ROOT: what an image adds to its base.
+added_megabytes() {
+  local all base_alone
+  all=$(du -sx --block-size=MB "$1" | cut -d M -f 1)
+  base_alone=$(du -sx --block-size=MB "$base" | cut -d M -f 1)
+  echo $((all - base_alone))
+}
+
+# What compose.yaml, with compose.tls.yaml on top where that is named, says of a service: its
+# environment or its command, one a line.
+composed() {
+  /usr/bin/python3 - "$@" <<'PYTHON'
+import sys, yaml
+
+key, service, *files = sys.argv[1:]
+found = {} if key == "environment" else []
+for file in files:
+    value = yaml.safe_load(open(f"docker/{file}"))["services"][service].get(key)
+    if value is not None:
+        found = {**found, **value} if key == "environment" else value
+for line in found if key == "command" else (f"{name}={text}" for name, text in found.items()):
+    print(line)
+PYTHON
+}
+
+# What an engine does at `run` with read_only, cap_drop ALL and no-new-privileges, once there are
+# namespaces: ROOT with its /proc read-only, VOLUME at /data where there is one, no capability.
+readonly contained='
+  root=$1 volume=$2 && shift 2
+  mount --rbind "$root" "$root"
+  [[ -z $volume ]] || mount --bind "$volume" "$root/data"
+  mount -o remount,bind,ro "$root"
+  exec env -i "$@"'
+# unprivileged ROOT USER: the words that go before a program.
+unprivileged() {
+  words=(chroot "$1" setpriv --reuid="$2" --regid="$2" --clear-groups --no-new-privs
+    --bounding-set=-all --inh-caps=-all --ambient-caps=-all)
+}
+
+# The program is number 1 in its container.
 start_server() {
-  unshare --mount --pid --net --fork --kill-child --mount-proc="$root/proc" \
-    bash -c 'ip link set lo up && exec "$@"' bash \
-    env -i "${environment[@]}" chroot --userspec="$user:$user" "$root" "${command[@]}" &
+  local attempt words
+  unprivileged "$server_root" "$server_user"
+  unshare --mount --pid --net --fork --kill-child --mount-proc="$server_root/proc" \
+    bash -c "set -e; ip link set lo up; $contained" bash "$server_root" "" \
+    "${server_environment[@]}" "${words[@]}" "${command[@]}" &
   unshare_pid=$!
   for ((attempt = 0; attempt < 300; ++attempt)); do
     kill -0 "$unshare_pid" 2>/dev/null || fail "the server ended before it was healthy"
-    server=$(pgrep -P "$unshare_pid") && in_container "${check[@]:1}" 2>/dev/null && return
+    server=$(pgrep -P "$unshare_pid") && in_server "${check[@]:1}" 2>/dev/null && return
     sleep 0.1
   done
   fail "the server is not healthy after 30 s"
 }
 
 # What an engine does at `exec`.
-in_container() {
+in_server() {
+  local words
+  unprivileged "$server_root" "$server_user"
   nsenter --target "$server" --mount --pid --net \
-    env -i "${environment[@]}" chroot --userspec="$user:$user" "$root" "$@"
+    env -i "${server_environment[@]}" "${words[@]}" "$@"
+}
+
+# A container of the client's image in the server's network.
+run_client() {
+  local words
+  unprivileged "$client_root" "$client_user"
+  nsenter --target "$server" --net unshare --mount --pid --fork --kill-child \
+    --mount-proc="$client_root/proc" bash -c "set -e; $contained" bash "$client_root" "$volume" \
+    "${client_environment[@]}" "${words[@]}" partiemc "$@"
 }
 
 # Sends SIGTERM and wants exit code 0 within 5 s.
@@ -113,83 +181,124 @@ stop_server() {
 }
 
 replay() {
-  in_container partiemc replay /usr/local/share/partiemc/recordings/dam_break.pemc --quiet "$@"
+  run_client replay /usr/local/share/partiemc/recordings/dam_break.pemc --quiet "$@"
 }
 
-# What docker/compose.tls.yaml says of a service: its environment, or its command; one a line.
-composed() {
-  /usr/bin/python3 - "$@" <<'PYTHON'
-import sys, yaml
+# fetched URL: what the server answers to a request of its own network.
+fetched() {
+  nsenter --target "$server" --net /usr/bin/python3 - "$1" <<'PYTHON'
+import sys, urllib.request
 
-key, service = sys.argv[1:]
-value = yaml.safe_load(open("docker/compose.tls.yaml"))["services"][service][key]
-for line in value if key == "command" else (f"{name}={text}" for name, text in value.items()):
-    print(line)
+print(urllib.request.urlopen(sys.argv[1], timeout=5).read().decode())
 PYTHON
+}
+
+# May not write, has no capability and cannot get one, is not root.
+check_privileges() {
+  local status=/proc/$server/status uid folder
+  for folder in /data /tmp; do
+    ! in_server touch "$folder/file" 2>/dev/null || fail "the server can write to $folder"
+  done
+  uid=$(in_server id -u)
+  ((uid != 0)) || fail "commands run as root"
+  [[ $(awk '/^Uid:/ { print $2 $3 $4 $5 }' "$status") == "$uid$uid$uid$uid" ]] ||
+    fail "the server does not run as user $uid"
+  [[ $(awk '/^Cap/ && $2 !~ /^0+$/' "$status") == "" ]] || fail "the server has a capability"
+  [[ $(awk '/^NoNewPrivs:/ { print $2 }' "$status") == 1 ]] || fail "the server may get privileges"
+  echo "runs as user $uid on a read-only root, without capabilities"
+}
+
+# check_packages ROOT: the list of packages is that of the image.
+check_packages() {
+  local list=$1/usr/local/share/partiemc/packages.tsv
+  diff <(cut -f 1 "$list") <(chroot "$1" dpkg-query --show --showformat='${Package}\n') ||
+    fail "the list of packages is not that of the image"
 }
 
 trap cleanup EXIT
 choose_driver
 make_base
-build_image
+build_images
 
-container=$("${buildah[@]}" from --pull-never "$image")
-root=$("${buildah[@]}" mount "$container")
-user=$(configured '{{.Docker.Config.User}}')
-lines='{{range .}}{{println .}}{{end}}'
-mapfile -t environment < <(configured "{{with .Docker.Config.Env}}$lines{{end}}")
-mapfile -t entry_point < <(configured "{{with .Docker.Config.Entrypoint}}$lines{{end}}")
-mapfile -t arguments < <(configured "{{with .Docker.Config.Cmd}}$lines{{end}}")
-command=("${entry_point[@]}" "${arguments[@]}")
-mapfile -t check < <(configured "{{with .Docker.Config.Healthcheck.Test}}$lines{{end}}")
-[[ -n $user ]] || fail "the image names no user"
-[[ ${check[0]:-} == CMD ]] || fail "the image has no health check"
-echo "runs as $user: ${command[*]}; health check: ${check[*]:1}"
+server_root=$(root_of partiemc-server) client_root=$(root_of partiemc-client)
+server_user=$(configured partiemc-server '{{.Docker.Config.User}}')
+client_user=$(configured partiemc-client '{{.Docker.Config.User}}')
+mapfile -t image_environment < <(lines_of partiemc-server Env)
+mapfile -t client_environment < <(lines_of partiemc-client Env)
+mapfile -t command < <(lines_of partiemc-server Entrypoint; lines_of partiemc-server Cmd)
+mapfile -t check < <(lines_of partiemc-server Healthcheck.Test)
+[[ -n $server_user && -n $client_user ]] || fail "an image names no user"
+[[ ${check[0]:-} == CMD ]] || fail "the server's image has no health check"
+[[ $(lines_of partiemc-client Entrypoint) == partiemc ]] || fail "the client's image runs no client"
+readonly title='{{index .Docker.Config.Labels "org.opencontainers.image.title"}}'
+for image in partiemc-server partiemc-client; do
+  [[ -n $(configured "$image" "$title") ]] || fail "$image has no title"
+done
+check_packages "$server_root"
+check_packages "$client_root"
+megabytes=$(added_megabytes "$server_root")
+echo "over the base: server $megabytes MB, client $(added_megabytes "$client_root") MB"
+((megabytes <= max_megabytes)) || fail "more than $max_megabytes MB"
+echo "server: ${command[*]}; health check: ${check[*]:1}"
 
-if unshare --net env -i "${environment[@]}" chroot --userspec="$user:$user" "$root" \
-  "${check[@]:1}" 2>/dev/null; then
+# A volume that the client's user may write, as an engine makes it from the image's /data.
+volume=$(mktemp -d "$work/volume.XXXXXX")
+chown "$(stat -c %u:%g "$client_root/data")" "$volume"
+
+server_environment=("${image_environment[@]}")
+unprivileged "$server_root" "$server_user"
+if unshare --net env -i "${server_environment[@]}" "${words[@]}" "${check[@]:1}" 2>/dev/null; then
   fail "the health check passes without a server"
 fi
-
 start_server
-echo "healthy"
-uid=$(in_container id -u)
-[[ $uid != 0 ]] || fail "commands run as root"
-[[ $(awk '/^Uid:/ { print $2 $3 $4 $5 }' "/proc/$server/status") == "$uid$uid$uid$uid" ]] ||
-  fail "the server does not run as user $uid"
-echo "server and commands run as user $uid"
-clear=(--server 127.0.0.1:50051)
-replay "${clear[@]}" --output-dir /data/frames --format geojson
-frames=$(in_container find /data/frames -name '*.geojson' -size +0 | wc -l)
-((frames > 0)) || fail "the replay left no frames"
-echo "replay: $frames frames"
+listens=$(nsenter --target "$server" --net ss --no-header --listening --tcp --numeric)
+[[ $(awk '{ print $4 }' <<<"$listens") =~ ^(\[::ffff:127.0.0.1]|127.0.0.1):50051$ ]] ||
+  fail "without a setting the server listens elsewhere than on loopback: $listens"
+stop_server "by default"
+
+# As compose.yaml has it; beside it what it leaves out, on loopback.
+mapfile -t composed < <(composed environment server compose.yaml)
+server_environment=("${image_environment[@]}" "${composed[@]}" PARTIEMC_METRICS=127.0.0.1:9464
+  PARTIEMC_WEB=127.0.0.1:8080)
+mapfile -t replayed < <(composed command replay compose.yaml)
+echo "127.0.0.1 server" | tee -a "$server_root/etc/hosts" >>"$client_root/etc/hosts"
+start_server
+check_privileges
+run_client "${replayed[@]}" >/dev/null
+frames=$(find "$volume/frames" -name '*.geojson' -size +0 | wc -l)
+counted=$(fetched http://127.0.0.1:9464/metrics | awk '/^partiemc_frames_total/ { print $2 }')
+((frames > 0 && frames == counted)) || fail "$frames frames replayed, $counted in the metrics"
+[[ -s $volume/report.html && -s $volume/statistics.csv ]] || fail "the replay left no report"
+echo "replay: $frames frames, as many in the metrics"
+[[ $(fetched http://127.0.0.1:8080/) == *"<title>PartiEMC"* ]] || fail "the page is not served"
 stop_server "when idle"
 
 start_server
-replay "${clear[@]}" --rate 2 >/dev/null 2>&1 &
+replay --server server:50051 --rate 2 >/dev/null 2>&1 &
 client=$!
 sleep 2
 kill -0 "$client" 2>/dev/null || fail "the replay at two frames a second is over too early"
 stop_server "under an open stream"
 wait "$client" || true
 
-# As docker/compose.tls.yaml has it.
-docker/try_tls.sh "$root/tls"
-echo "127.0.0.1 server" >>"$root/etc/hosts"
-image_environment=("${environment[@]}")
-mapfile -t composed < <(composed environment server)
-environment=("${image_environment[@]}" "${composed[@]}")
-mapfile -t arguments < <(composed command server)
-command=("${entry_point[@]}" "${arguments[@]}")
+# As compose.tls.yaml has it on top.
+docker/try_tls.sh "$server_root/tls"
+mkdir -p "$client_root/tls"
+cp -a "$server_root"/tls/{ca.pem,tokens} "$client_root/tls"
+mapfile -t composed < <(composed environment server compose.yaml compose.tls.yaml)
+server_environment=("${image_environment[@]}" "${composed[@]}")
 start_server
 echo "healthy over TLS"
-environment=("${image_environment[@]}")
-! replay "${clear[@]}" 2>/dev/null || fail "a server with TLS takes a replay in the clear"
-mapfile -t composed < <(composed environment replay)
-environment+=("${composed[@]}")
+! replay --server 127.0.0.1:50051 2>/dev/null ||
+  fail "a server with TLS takes a replay in the clear"
+mapfile -t composed < <(composed environment replay compose.yaml compose.tls.yaml)
+client_environment+=("${composed[@]}")
 replay --server server:50051
-! in_container env -u PARTIEMC_TOKEN_FILE partiemc info --server server:50051 >/dev/null 2>&1 ||
+mapfile -t client_environment < <(printf '%s\n' "${client_environment[@]}" |
+  grep -v ^PARTIEMC_TOKEN)
+refusal=$(run_client info --server server:50051 2>&1 >/dev/null) &&
   fail "a server with tokens answers who has none"
+[[ $refusal == *"authorization: absent"* ]] || fail "who has no token is told: $refusal"
 echo "replay over TLS, with a token"
 stop_server "over TLS"
-echo "test_image.sh: passed"
+echo "test_image.sh: passed in $SECONDS s"
