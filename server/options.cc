@@ -53,7 +53,7 @@ struct Raw {
   std::string token_file;
   std::string checkpoint_key_file;
   std::string metrics;
-  std::string nats;
+  std::string nats, advertise;
   std::string web, web_port_file;
   WebOptions web_options;
   TlsFiles tls;
@@ -100,6 +100,11 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
                  "of them. Several with commas between them")
       ->type_name("URL")
       ->envname("PARTIEMC_NATS");
+  app.add_option("--advertise", raw.advertise,
+                 "With --nats: where clients reach this server. A replica that drains tells its "
+                 "streams the addresses of the others, and clients of this project go there")
+      ->type_name("HOST:PORT")
+      ->envname("PARTIEMC_ADVERTISE");
   app.add_option("--drain-delay", raw.drain_delay,
                  "After SIGTERM, serve on for this time before it drains, while health checks say "
                  "no, so that proxies send nobody new; in its second half streams are told to go, "
@@ -340,6 +345,16 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
     if (!raw.web_port_file.empty()) raw.line.web_port_file = raw.web_port_file;
   }
   if (!raw.nats.empty()) raw.line.server.nats = raw.nats;
+  if (!raw.advertise.empty()) {
+    const auto advertised = ParseAddress(raw.advertise);
+    if (!advertised.ok())
+      return Wrong("--advertise: " + std::string(advertised.status().message()));
+    if (!advertised->unix_path.empty() || advertised->port == 0) {
+      return Wrong("--advertise must be HOST:PORT, with the port that clients connect to");
+    }
+    if (raw.nats.empty()) return Wrong("--advertise needs --nats: by it replicas are told of it");
+    raw.line.server.advertised_address = raw.advertise;
+  }
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
   if (!raw.token_file.empty()) raw.line.server.token_file = raw.token_file;
   if (!raw.checkpoint_key_file.empty()) {

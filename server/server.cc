@@ -113,7 +113,8 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                 options.limits.max_parts),
       relay_(bus == nullptr ? nullptr
                             : std::make_unique<Relay>(std::move(bus), registry_, dispatcher_,
-                                                      RelayLimits(options.limits, history_))),
+                                                      RelayLimits(options.limits, history_),
+                                                      options.advertised_address)),
       calls_(options.limits.max_streams),
       budget_(options.limits.FrameBudget()),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
@@ -242,10 +243,11 @@ void Server::AddRelayMetrics() {
       [this] { return relay_->exported_streams(); });
   add("partiemc_relay_imported_streams", "Streams of other replicas that are watched here.",
       [this] { return relay_->imported_streams(); });
-  metrics_->AddCounter("partiemc_relay_lost_messages_total",
-                       "Messages between replicas that could not be sent, or came faster than they "
-                       "were handled; what they had is fetched again.",
-                       [this] { return static_cast<double>(relay_->lost_messages()); });
+  metrics_->AddCounter(
+      "partiemc_relay_lost_messages_total",
+      "Attempts to send a message to other replicas that failed, and messages that "
+      "came faster than they were handled; what they had is sent or fetched again.",
+      [this] { return static_cast<double>(relay_->lost_messages()); });
 }
 
 absl::Status Server::Listen() {
@@ -346,11 +348,15 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
 void Server::StopBeingReady() {
   leaves_ = true;
   health_->SetServing(false);
+  if (relay_ == nullptr) return;
+  relay_->WillDrain();
+  registry_.SetElsewhere(relay_->Addresses());
 }
 
 void Server::SendAway(std::chrono::milliseconds delay) {
   StopBeingReady();
   std::this_thread::sleep_for(delay / 2);
+  if (relay_ != nullptr) registry_.SetElsewhere(relay_->Addresses());  // Others may drain as well.
   registry_.SendAway(delay - delay / 2);
 }
 

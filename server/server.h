@@ -73,6 +73,8 @@ struct ServerOptions {
   std::optional<WebOptions> web;
   /// Where replicas tell each other of their streams (ConnectToNats).
   std::optional<std::string> nats;
+  /// Where clients that another replica sends away may come to; empty: none is sent here.
+  std::string advertised_address;
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;

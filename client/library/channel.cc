@@ -30,6 +30,16 @@ constexpr std::chrono::milliseconds kConnectTimeout(2000);
 // For asking gRPC why there is no connection; it knows the answer already.
 constexpr std::chrono::seconds kReasonTimeout(1);
 
+absl::StatusOr<Address> ParseTarget(const std::string& address) {
+  auto parsed = ParseAddress(address);
+  if (parsed.ok() && (!parsed->unix_path.empty() || parsed->port != 0)) return parsed;
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {.reason = std::string(kReasonOutOfRange),
+                         .field = "address",
+                         .value = absl::StrCat("'", address, "'"),
+                         .rule = "must be HOST:PORT, [IPV6]:PORT or unix:PATH"});
+}
+
 }  // namespace
 
 std::string Reason(const grpc::Status& status) {
@@ -39,16 +49,16 @@ std::string Reason(const grpc::Status& status) {
   return text.empty() ? "no answer" : text;
 }
 
+absl::Status CheckAddress(const std::string& address, const Credentials& credentials) {
+  const auto parsed = ParseTarget(address);
+  if (!parsed.ok()) return parsed.status();
+  return MakeTokenSender(credentials, *parsed).status();
+}
+
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials) {
-  const auto parsed = ParseAddress(address);
-  if (!parsed.ok() || (parsed->unix_path.empty() && parsed->port == 0)) {
-    return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {.reason = std::string(kReasonOutOfRange),
-                           .field = "address",
-                           .value = absl::StrCat("'", address, "'"),
-                           .rule = "must be HOST:PORT, [IPV6]:PORT or unix:PATH"});
-  }
+  const auto parsed = ParseTarget(address);
+  if (!parsed.ok()) return parsed.status();
   auto channel_credentials = MakeChannelCredentials(credentials);
   if (!channel_credentials.ok()) return channel_credentials.status();
   auto token_sender = MakeTokenSender(credentials, *parsed);

@@ -20,6 +20,9 @@ namespace partiemc::client {
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials);
 
+/// What MakeChannel would say of the address, and of sending the token there.
+absl::Status CheckAddress(const std::string& address, const Credentials& credentials);
+
 /// Waits until `channel` is connected. A refused connection is tried again until the time is over.
 /// Errors: UNAVAILABLE, "no server at ADDRESS (WHY): ...".
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,

@@ -298,6 +298,7 @@ absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response re
   const bool is_answer = IsAnswer(*response);
   const bool is_new = is_answer ? next_of_call_ == next_answer_ : !survives_;
   lock.unlock();
+  if (response->has_notice()) connector_.Learn(response->notice());
   absl::Status status;
   if (const auto sequence = AnsweredSequence(*response); is_answer && sequence != next_of_call_) {
     status = absl::DataLossError(absl::StrCat("the server at ", call_->address(),

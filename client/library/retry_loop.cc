@@ -8,13 +8,31 @@
 #include "client/library/channel.h"
 
 namespace partiemc::client {
+namespace {
+
+constexpr std::size_t kMaxLearned = 16;
+
+}  // namespace
 
 RetryLoop::RetryLoop(std::vector<std::string> addresses, const char* call,
                      const ReconnectPolicy& policy, std::chrono::milliseconds connect_timeout)
     : addresses_(std::move(addresses)),
+      given_(addresses_.size()),
       call_(call),
       policy_(policy),
       connect_timeout_(connect_timeout) {}
+
+void RetryLoop::Learn(const std::vector<std::string>& addresses) {
+  const std::string current = address();
+  addresses_.resize(given_);
+  const auto add = [this](const std::string& one) {
+    const bool is_known = std::ranges::find(addresses_, one) != addresses_.end();
+    if (!is_known && addresses_.size() < given_ + kMaxLearned) addresses_.push_back(one);
+  };
+  add(current);
+  for (const std::string& one : addresses) add(one);
+  address_ = static_cast<std::size_t>(std::ranges::find(addresses_, current) - addresses_.begin());
+}
 
 void RetryLoop::Lose(std::string story) {
   if (backoff_) return;

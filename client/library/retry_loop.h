@@ -46,6 +46,9 @@ class RetryLoop {
   const std::vector<std::string>& addresses() const { return addresses_; }
   /// The one in use, or to be tried next.
   const std::string& address() const { return addresses_[address_]; }
+  /// Addresses to try after those that were given, in place of others learned before; the one in
+  /// use stays. Of many the first some.
+  void Learn(const std::vector<std::string>& addresses);
   void UseNextAddress() { address_ = (address_ + 1) % addresses_.size(); }
 
   /// The call at address() is lost; `story` tells where and why. One that comes before Recovered
@@ -70,7 +73,8 @@ class RetryLoop {
   const absl::Status& refusal() const { return refusal_; }
 
  private:
-  const std::vector<std::string> addresses_;
+  std::vector<std::string> addresses_;
+  const std::size_t given_;  // Of them, at the front.
   const char* const call_;
   const ReconnectPolicy policy_;
   const std::chrono::milliseconds connect_timeout_;

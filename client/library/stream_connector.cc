@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/library/channel.h"
+#include "common/address.h"
 #include "wire/codec.h"
 
 namespace partiemc::client {
@@ -131,6 +132,17 @@ absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(Lock& lock,
   calls.Drop();
   if (!opened.ok()) return opened.status();
   return NotAccepted(address(), "stream", options_.deadline);
+}
+
+void StreamConnector::Learn(const v1::StreamNotice& notice) {
+  std::vector<std::string> usable;
+  for (const std::string& address : notice.addresses()) {
+    // A path of the server's machine means nothing here.
+    const auto parsed = ParseAddress(address);
+    const bool is_path = parsed.ok() && !parsed->unix_path.empty();
+    if (!is_path && CheckAddress(address, options_.credentials).ok()) usable.push_back(address);
+  }
+  retry_.Learn(usable);
 }
 
 void StreamConnector::Lost(const Loss& loss, v1::ResumeStream resume) {

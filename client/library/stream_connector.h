@@ -37,6 +37,8 @@ class StreamConnector {
   /// Errors: those of Stream::Open.
   absl::StatusOr<Opened> OpenNew(Lock& lock);
 
+  /// Addresses that a server knows, for when the stream is lost: those that the credentials suit.
+  void Learn(const v1::StreamNotice& notice);
   /// The stream has lost its call by `loss`: from now on OpenAgain is about that. A loss
   /// that comes before Recovered prolongs the one before it.
   void Lost(const Loss& loss, v1::ResumeStream resume);

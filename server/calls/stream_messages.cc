@@ -102,6 +102,15 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
   return status;
 }
 
+grpc::ByteBuffer DrainNotice(const std::vector<std::string>& elsewhere) {
+  v1::ReconstructResponse response;
+  v1::StreamNotice& notice = *response.mutable_notice();
+  notice.set_kind(v1::StreamNotice::KIND_DRAINING);
+  notice.set_message("the server is going away: finish reading, then connect elsewhere");
+  notice.mutable_addresses()->Assign(elsewhere.begin(), elsewhere.end());
+  return wire::ToBytes(response);
+}
+
 StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,
                                WatchDispatcher& dispatcher,
                                const CurrentCheckpointKeys& checkpoint_keys, Origin origin)
@@ -113,13 +122,7 @@ StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& regis
           dispatcher, ResultBroadcaster::Limits{.mailbox_bytes = limits.max_watcher_bytes,
                                                 .kept_bytes = limits.KeptResultBytes()})),
       requests_(limits.frames_in_flight),
-      answers_(limits.frames_in_flight) {
-  v1::ReconstructResponse draining;
-  v1::StreamNotice& notice = *draining.mutable_notice();
-  notice.set_kind(v1::StreamNotice::KIND_DRAINING);
-  notice.set_message("the server is going away: finish reading, then connect elsewhere");
-  draining_ = wire::ToBytes(draining);
-}
+      answers_(limits.frames_in_flight) {}
 
 RequestKind StreamMessages::Kind(std::size_t slot) {
   using v1::ReconstructRequest;
@@ -142,6 +145,7 @@ grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
     case Outgoing::kOpened:
       return opened_;
     case Outgoing::kDraining:
+      draining_ = DrainNotice(registry_.TakeElsewhere());
       return draining_;
     case Outgoing::kAnswer:
       break;

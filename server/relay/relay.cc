@@ -65,8 +65,9 @@ std::int64_t UnixMs(std::chrono::steady_clock::time_point time) {
 }  // namespace
 
 Relay::Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
-             const Limits& limits)
+             const Limits& limits, std::string address)
     : replica_(NewReplicaName()),
+      address_(std::move(address)),
       limits_(limits),
       registry_(registry),
       dispatcher_(dispatcher),
@@ -164,6 +165,8 @@ void Relay::Announce(Clock::time_point now, bool asks, bool leaving) {
   relay::v1::Announcement& announcement = *message.mutable_announcement();
   announcement.set_asks(asks);
   announcement.set_leaving(leaving);
+  announcement.set_address(address_);
+  announcement.set_draining(will_drain_);
   const auto streams = leaving ? std::vector<StreamSummary>()
                                : registry_.List(0, std::numeric_limits<std::size_t>::max());
   for (const StreamSummary& stream : streams) {
@@ -432,6 +435,13 @@ void Relay::LookAtSearches(Clock::time_point now) {
       search.done(connected_ ? NoSuchStream(search.name) : NoSuchStream(search.name, kOnlyHere));
     }
   }
+}
+
+void Relay::WillDrain() {
+  Post([this] {
+    will_drain_ = true;
+    Announce(Clock::now(), false, false);
+  });
 }
 
 void Relay::Drain() {

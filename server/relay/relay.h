@@ -43,9 +43,10 @@ class Relay final : private RelayPort {
     std::size_t watches = 64;        ///< That look for their streams at the same time.
   };
 
-  /// All that is passed lives longer.
+  /// All that is passed lives longer. `address`: under which clients find this server, told to the
+  /// other replicas; empty: they send nobody here.
   Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
-        const Limits& limits);
+        const Limits& limits, std::string address = {});
   ~Relay() override;
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
@@ -70,6 +71,11 @@ class Relay final : private RelayPort {
   std::size_t replicas() const { return directory_.replicas(); }
   std::size_t remote_streams() const { return directory_.streams(); }
 
+  /// Addresses of other replicas that take streams, as far as they are told: some of them.
+  std::vector<std::string> Addresses() const { return directory_.Addresses(kMaxAddresses); }
+
+  /// From now on the others send no stream here. Drain comes next.
+  void WillDrain();
   /// Says goodbye: what waits for a stream is refused, the last results and ends are sent, and
   /// nothing more. For some 300 ms at most beside what the bus takes.
   void Drain();
@@ -81,6 +87,8 @@ class Relay final : private RelayPort {
   std::uint64_t lost_messages() const { return unsent_ + queue_->lost_messages(); }
 
  private:
+  static constexpr std::size_t kMaxAddresses = 16;
+
   struct LocalStream {
     std::shared_ptr<ResultBroadcaster> broadcaster;
     std::string lineage;
@@ -120,6 +128,7 @@ class Relay final : private RelayPort {
   void GoOnDraining(Clock::time_point now);
 
   const std::string replica_;  // Tells this run of this server from all others.
+  const std::string address_;
   const Limits limits_;
   StreamRegistry& registry_;
   WatchDispatcher& dispatcher_;
@@ -141,6 +150,7 @@ class Relay final : private RelayPort {
   std::uint64_t local_changes_ = 0;
   bool told_away_ = false;  // That the bus is not connected.
   bool changed_ = false;    // Streams came or went, here or elsewhere.
+  bool will_drain_ = false;
   const Clock::time_point began_ = Clock::now();
   Clock::time_point announced_, asked_, ticked_, disconnected_ = began_;
   std::optional<Clock::time_point> connected_since_, draining_since_;

@@ -1,13 +1,23 @@
 #include "server/relay/stream_directory.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
+
+#include "common/address.h"
 
 namespace partiemc::server {
 namespace {
 
 // What bounds the memory that announcements of strangers could take.
 constexpr std::size_t kMaxReplicas = 1024;
+
+// Empty where clients are not to be sent there.
+std::string AddressOf(const relay::v1::Announcement& announcement) {
+  const auto address = ParseAddress(announcement.address());
+  const bool can_be_reached = address.ok() && address->unix_path.empty() && address->port != 0;
+  return can_be_reached && !announcement.draining() ? announcement.address() : "";
+}
 
 }  // namespace
 
@@ -22,6 +32,7 @@ bool StreamDirectory::Announced(const std::string& replica,
   if (replicas_.size() >= kMaxReplicas && !replicas_.contains(replica)) return false;
   Replica& known = replicas_[replica];
   known.heard = known.announced = now;
+  known.address = AddressOf(announcement);
   known.streams.swap(streams);
   return !std::ranges::equal(
       known.streams, streams, {}, [](const auto& item) { return item.first; },
@@ -50,6 +61,15 @@ std::vector<std::string> StreamDirectory::Expire(Clock::time_point before) {
 void StreamDirectory::Refresh(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   for (auto& [name, replica] : replicas_) replica.heard = now;
+}
+
+std::vector<std::string> StreamDirectory::Addresses(std::size_t count) const {
+  std::set<std::string> addresses;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [name, replica] : replicas_) {
+    if (!replica.address.empty() && addresses.size() < count) addresses.insert(replica.address);
+  }
+  return {addresses.begin(), addresses.end()};
 }
 
 bool StreamDirectory::HaveAllAnnouncedSince(Clock::time_point since) const {

@@ -39,6 +39,9 @@ class StreamDirectory {
   /// What was heard before counts as heard now: nothing could be heard meanwhile.
   void Refresh(Clock::time_point now);
 
+  /// Of those that do not drain, each once: at most `count`.
+  std::vector<std::string> Addresses(std::size_t count) const;
+
   /// Whether every one that is known has announced its streams since then.
   bool HaveAllAnnouncedSince(Clock::time_point since) const;
 
@@ -58,6 +61,7 @@ class StreamDirectory {
   struct Replica {
     std::map<std::string, relay::v1::LiveStream> streams;  // By their ids.
     Clock::time_point heard, announced;
+    std::string address;  // Empty where none is to be told.
   };
 
   template <typename Matches>

@@ -297,6 +297,18 @@ std::vector<std::shared_ptr<StreamStateMachine>> StreamRegistry::Machines() cons
   return machines;
 }
 
+void StreamRegistry::SetElsewhere(std::vector<std::string> addresses) {
+  const std::lock_guard lock(mutex_);
+  elsewhere_ = std::move(addresses);
+}
+
+std::vector<std::string> StreamRegistry::TakeElsewhere() {
+  const std::lock_guard lock(mutex_);
+  if (!elsewhere_.empty())
+    std::rotate(elsewhere_.begin(), elsewhere_.begin() + 1, elsewhere_.end());
+  return elsewhere_;
+}
+
 void StreamRegistry::SendAway(std::chrono::milliseconds within) {
   const auto begin = std::chrono::steady_clock::now();
   std::vector<std::shared_ptr<StreamStateMachine>> machines;

@@ -122,6 +122,10 @@ class StreamRegistry {
   /// Has grown whenever other streams are open than before.
   std::uint64_t changes() const { return changes_; }
 
+  /// Addresses of other servers that those who are sent away may go to; nobody is, unless told.
+  void SetElsewhere(std::vector<std::string> addresses);
+  /// Those, each time with another one at the front, so that not all go to the same.
+  std::vector<std::string> TakeElsewhere();
   /// Drains the machines that are here now, one after the other within this time. Who comes
   /// meanwhile is let in.
   void SendAway(std::chrono::milliseconds within);
@@ -175,6 +179,7 @@ class StreamRegistry {
   std::map<const StreamStateMachine*, Entry> entries_;
   std::uint64_t opened_ = 0;
   std::atomic<std::uint64_t> changes_ = 0;
+  std::vector<std::string> elsewhere_;
   bool draining_ = false;
   std::uint64_t turned_away_ = 0;
   std::function<void()> tell_earlier_look_;

@@ -15,7 +15,8 @@ std::string FrameBytes(std::uint64_t sequence, std::size_t bytes) {
   return text;
 }
 
-MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes)
+MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes,
+                             const std::string& address)
     : history_(history_bytes, 8 * history_bytes),
       registry_(16, history_bytes > 0 ? &history_ : nullptr) {
   auto end = hub.Connect();
@@ -24,7 +25,8 @@ MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes)
       std::move(end), registry_, dispatcher_,
       Relay::Limits{.broadcaster = {.mailbox_bytes = kWatcherBytes, .kept_bytes = kWatcherBytes},
                     .watcher_bytes = kWatcherBytes,
-                    .history = history_bytes > 0 ? &history_ : nullptr});
+                    .history = history_bytes > 0 ? &history_ : nullptr},
+      address);
 }
 
 MemoryReplica::~MemoryReplica() { relay_.reset(); }

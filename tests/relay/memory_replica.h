@@ -22,8 +22,9 @@ class MemoryReplica {
  public:
   static constexpr std::size_t kWatcherBytes = std::size_t{1} << 20;
 
-  /// Its streams hold as much for who goes back; 0: nothing.
-  explicit MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes = std::uint64_t{8} << 20);
+  /// Its streams hold as much for who goes back; 0: nothing. Where clients find it, if told.
+  explicit MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes = std::uint64_t{8} << 20,
+                         const std::string& address = {});
   ~MemoryReplica();
 
   // A producer's side. `token` tells a stream that goes on from any other.

@@ -344,6 +344,20 @@ TEST_F(RelayTest, ThatItLeavesIsTheLastThatIsHeardOfAReplica) {
   EXPECT_EQ(shows_.relay().remote_streams(), 1u);
 }
 
+TEST_F(RelayTest, AddressesAreThoseOfReplicasThatDoNotDrain) {
+  MemoryReplica a(hub_, 0, "a.example:50051"), b(hub_, 0, "b.example:50051");
+  MemoryReplica path(hub_, 0, "unix:/run/p.sock"), malformed(hub_, 0, "a;b");
+  ASSERT_TRUE(Eventually([&] { return shows_.relay().replicas() == 5; }));
+  EXPECT_THAT(shows_.relay().Addresses(), ElementsAre("a.example:50051", "b.example:50051"));
+  EXPECT_THAT(a.relay().Addresses(), ElementsAre("b.example:50051"));
+  b.relay().WillDrain();
+  EXPECT_TRUE(Eventually([&] { return shows_.relay().Addresses().size() == 1; }));
+  EXPECT_THAT(shows_.relay().Addresses(), ElementsAre("a.example:50051"));
+  EXPECT_EQ(shows_.relay().replicas(), 5u);
+  a.relay().Drain();
+  EXPECT_TRUE(Eventually([&] { return shows_.relay().Addresses().empty(); }));
+}
+
 TEST_F(RelayTest, WhoWaitsForAStreamIsRefusedWhereItsReplicaDrains) {
   std::atomic<bool> refused = false;
   shows_.relay().Find("nothing", std::nullopt, [&](const auto& found) {

@@ -63,6 +63,16 @@ TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
   EXPECT_THAT(early->text, HasSubstr("    1287 MiB  in all"));
 }
 
+TEST(CommandLineOptions, WhatIsAdvertisedIsAnAddressThatOthersReach) {
+  EXPECT_EQ(
+      Parsed({"--nats", "nats://n", "--advertise", "a.example:50051"}).server.advertised_address,
+      "a.example:50051");
+  EXPECT_THAT(Refused({"--advertise", "a.example:50051"}), HasSubstr("needs --nats"));
+  for (const char* address : {"unix:/run/p.sock", "a.example:0", "a.example"}) {
+    EXPECT_THAT(Refused({"--nats", "nats://n", "--advertise", address}), HasSubstr("--advertise"));
+  }
+}
+
 TEST(CommandLineOptions, ByDefaultListenOnLoopbackWithAffordableLimits) {
   const CommandLine line = Parsed({});
   EXPECT_EQ(line.server.address.ToString(), "127.0.0.1:50051");

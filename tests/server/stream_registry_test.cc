@@ -1,6 +1,7 @@
 // Who may open a stream, and how all are sent home.
 #include "server/stream/stream_registry.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -15,6 +16,9 @@
 
 namespace partiemc::server {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 class Registry : public ::testing::Test {
  protected:
@@ -225,6 +229,13 @@ TEST_F(Registry, ListsOpenStreamsInOrderAndPageByPage) {
   const auto rest = registry_.List(page[0].number, 5);
   ASSERT_EQ(rest.size(), 1u);
   EXPECT_EQ(rest[0].description.name, "b");
+}
+
+TEST_F(Registry, SendsOneAfterTheOtherElsewhere) {
+  EXPECT_THAT(registry_.TakeElsewhere(), IsEmpty());
+  registry_.SetElsewhere({"a:1", "b:1", "c:1"});
+  EXPECT_THAT(registry_.TakeElsewhere(), ElementsAre("b:1", "c:1", "a:1"));
+  EXPECT_THAT(registry_.TakeElsewhere(), ElementsAre("c:1", "a:1", "b:1"));
 }
 
 TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {

@@ -197,6 +197,44 @@ TEST(Resume, ADrainingServerIsLeftWithoutAWordToTheCaller) {
   EXPECT_THAT(Exchange(**stream, 4), ElementsAre(1, 2, 3, 4));
 }
 
+TEST(Resume, AStreamGoesWhereTheDrainingServerSaysButNotWithATokenInTheClear) {
+  FakeServer second([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    EXPECT_EQ(context.client_metadata().count("authorization"), 1u);
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  FakeServer first([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 1, 2);
+    v1::ReconstructResponse response;
+    v1::StreamNotice& notice = *response.mutable_notice();
+    notice.set_kind(v1::StreamNotice::KIND_DRAINING);
+    for (const std::string& address :
+         {std::string("198.51.100.1:50051"), std::string("unix:/no/such/socket"),
+          std::string("a;b"), second.address()}) {
+      notice.add_addresses(address);
+    }
+    rpc.Write(response);
+    context.AddTrailingMetadata("partiemc-reason", "DRAINING");
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  StreamOptions options = Options();
+  options.credentials.token = "alice-secret-0123456789";
+  options.reconnect.announce = true;
+  const auto stream = Stream::Open(first.address(), options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_THAT(Exchange(**stream, 1), ElementsAre(1));
+  ASSERT_TRUE((*stream)->Send(kFrame, 1).ok());
+  Event event;
+  ASSERT_TRUE((*stream)->Receive(event).ok());
+  ASSERT_EQ(event.kind, Event::Kind::kReconnected);
+  // Nowhere else in between.
+  EXPECT_THAT(event.message, HasSubstr("went on at " + second.address()));
+  ASSERT_TRUE((*stream)->Receive(event).ok());
+  EXPECT_EQ(event.sequence, 2u);
+}
+
 TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
   std::atomic<int> calls = 0;
   FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {

@@ -72,6 +72,29 @@ TEST(RetryLoop, TriesOneAddressAfterTheOtherUntilOneOpens) {
   EXPECT_TRUE(loop.lost());
 }
 
+TEST(RetryLoop, TriesWhatItLearnedAfterWhatItWasGiven) {
+  RetryLoop loop = Loop();
+  loop.Learn({"c", "a", "d"});
+  EXPECT_THAT(loop.addresses(), ElementsAre("a", "b", "c", "d"));
+  Scripted attempts({kBusy, {.opened = true}});
+  loop.Lose("lost a");
+  loop.TryNext(absl::UnavailableError("gone"));
+  ASSERT_TRUE(loop.Run(attempts, {}).ok());
+  EXPECT_THAT(attempts.started, ElementsAre("b", "c"));
+  // The one in use stays, what was learned before does not.
+  loop.Learn({"e"});
+  EXPECT_EQ(loop.address(), "c");
+  EXPECT_THAT(loop.addresses(), ElementsAre("a", "b", "c", "e"));
+  loop.UseNextAddress();
+  loop.UseNextAddress();
+  loop.Learn(std::vector<std::string>(1000, "f"));
+  EXPECT_THAT(loop.addresses(), ElementsAre("a", "b", "f"));
+  std::vector<std::string> many;
+  for (int k = 0; k < 1000; ++k) many.push_back(std::to_string(k));
+  loop.Learn(many);
+  EXPECT_EQ(loop.addresses().size(), 18u);
+}
+
 TEST(RetryLoop, TellsItsStoryAlsoOnceItHasRecovered) {
   RetryLoop loop = Loop();
   Scripted attempts({Scripted::Answer{.opened = true}});
