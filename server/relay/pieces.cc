@@ -10,6 +10,8 @@ namespace {
 
 // Replicas whose messages are being put together; others have to wait until those are through.
 constexpr std::size_t kMaxSenders = 1024;
+// The largest messages that there is room for at a time.
+constexpr std::size_t kMaxMessages = 4;
 
 }  // namespace
 
@@ -29,30 +31,42 @@ bool SendInPieces(const std::string& replica, std::uint64_t number, std::string_
   return true;
 }
 
+std::string PieceJoiner::TakeOut(std::map<std::string, Begun>::iterator begun) {
+  std::string bytes = std::move(begun->second.bytes);
+  held_bytes_ -= bytes.size();
+  begun_.erase(begun);
+  return bytes;
+}
+
+void PieceJoiner::Forget(const std::string& replica) {
+  const auto found = begun_.find(replica);
+  if (found != begun_.end()) TakeOut(found);
+}
+
 std::optional<std::string> PieceJoiner::Add(std::string_view bytes) {
   relay::v1::Piece piece;
   if (!piece.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return std::nullopt;
-  const auto found = begun_.find(piece.replica());
+  const std::size_t size = piece.data().size();
+  auto found = begun_.find(piece.replica());
   if (piece.piece() == 0) {
-    if (found != begun_.end()) begun_.erase(found);
-    if (piece.data().size() > max_bytes_) return std::nullopt;
+    if (found != begun_.end()) TakeOut(found);
+    if (size > max_bytes_) return std::nullopt;
     if (piece.pieces() == 1) return std::move(*piece.mutable_data());
     if (piece.pieces() == 0 || begun_.size() >= kMaxSenders) return std::nullopt;
-    begun_[piece.replica()] = {piece.message(), 1, std::move(*piece.mutable_data())};
-    return std::nullopt;
+    found = begun_.emplace(piece.replica(), Begun{.message = piece.message()}).first;
   }
   if (found == begun_.end()) return std::nullopt;
   Begun& begun = found->second;
   if (begun.message != piece.message() || begun.next_piece != piece.piece() ||
-      piece.piece() >= piece.pieces() || begun.bytes.size() + piece.data().size() > max_bytes_) {
-    begun_.erase(found);
+      piece.piece() >= piece.pieces() || begun.bytes.size() + size > max_bytes_ ||
+      held_bytes_ + size > kMaxMessages * max_bytes_) {
+    TakeOut(found);
     return std::nullopt;
   }
   begun.bytes += piece.data();
+  held_bytes_ += size;
   if (++begun.next_piece < piece.pieces()) return std::nullopt;
-  std::optional<std::string> whole = std::move(begun.bytes);
-  begun_.erase(found);
-  return whole;
+  return TakeOut(found);
 }
 
 }  // namespace partiemc::server

@@ -24,13 +24,16 @@ bool SendInPieces(const std::string& replica, std::uint64_t number, std::string_
 /// the other. A message of which a piece is missing is left out.
 class PieceJoiner {
  public:
-  /// A message of more than `max_bytes` is left out.
+  /// A message of more than `max_bytes` is left out, and one for which those of others that are
+  /// not whole yet leave no room: all together have four times as much.
   explicit PieceJoiner(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
   /// The message of which `piece`, a serialised Piece, is the last.
   std::optional<std::string> Add(std::string_view piece);
   /// Of this sender nothing more is expected.
-  void Forget(const std::string& replica) { begun_.erase(replica); }
+  void Forget(const std::string& replica);
+  /// Of messages that are not whole yet.
+  std::size_t held_bytes() const { return held_bytes_; }
 
  private:
   struct Begun {
@@ -39,8 +42,12 @@ class PieceJoiner {
     std::string bytes;
   };
 
+  // Its bytes, which nothing more is expected of.
+  std::string TakeOut(std::map<std::string, Begun>::iterator begun);
+
   const std::size_t max_bytes_;
-  std::map<std::string, Begun> begun_;
+  std::map<std::string, Begun> begun_;  // By sender.
+  std::size_t held_bytes_ = 0;
 };
 
 }  // namespace partiemc::server

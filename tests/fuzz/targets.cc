@@ -14,6 +14,7 @@ std::span<const Target> AllTargets() {
       {"npz", AttackNpz},
       {"packed", AttackPacked},
       {"recording", AttackRecording},
+      {"relay_messages", AttackRelayMessages},
       {"result_message", AttackResultMessage},
       {"state", AttackState},
       {"stream_requests", AttackStreamRequests},

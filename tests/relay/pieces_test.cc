@@ -56,6 +56,21 @@ TEST(Pieces, OfSeveralSendersDoNotMix) {
   EXPECT_THAT(joiner.Add(a[2]), Optional(std::string(3 * kPieceBytes, 'a')));
 }
 
+TEST(Pieces, OfManySendersTogetherTakeNoMoreThanThereIsRoomFor) {
+  PieceJoiner joiner(4 * kPieceBytes);
+  for (int sender = 0; sender < 100; ++sender) {
+    const auto pieces = PiecesOf(std::to_string(sender), 1, std::string(4 * kPieceBytes, 'a'));
+    for (int k = 0; k < 3; ++k) EXPECT_FALSE(joiner.Add(pieces[k]));
+    EXPECT_LE(joiner.held_bytes(), 16 * kPieceBytes);
+  }
+  EXPECT_GE(joiner.held_bytes(), 15 * kPieceBytes);
+  // Those that were begun come out, and make room.
+  const auto first = PiecesOf("0", 1, std::string(4 * kPieceBytes, 'a'));
+  EXPECT_TRUE(joiner.Add(first[3]));
+  for (int sender = 0; sender < 100; ++sender) joiner.Forget(std::to_string(sender));
+  EXPECT_EQ(joiner.held_bytes(), 0u);
+}
+
 TEST(Pieces, AMessageWithAPieceMissingIsLeftOutAndTheNextIsNot) {
   const std::string large(3 * kPieceBytes, 'a');
   for (int missing = 0; missing < 3; ++missing) {
