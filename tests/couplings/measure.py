@@ -122,10 +122,17 @@ def read_turning(seed):
         yield {"positions": disc @ ((c, s), (-s, c)), "time": float(k)}
 
 
+# As client/couplings/README.md has it.
+KEEPS_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
+
+
 def measure_dask(runs):
+    import dask
     import dask.distributed
     import partiemc.dask
 
+    for name, value in KEEPS_MEMORY.items():
+        dask.config.set({f"distributed.nanny.pre-spawn-environ.{name}": value})
     seeds = range(20)
     with dask.distributed.LocalCluster(n_workers=2, threads_per_worker=1,
                                        dashboard_address=None) as cluster, \
