@@ -188,7 +188,8 @@ step_viewer() {
 
 # Core, server and relay, one room after the other, then of the client what goes on in the
 # background, so that nothing else is compiled with sanitizers but what the fuzzers attack, in the
-# next step but one: it is the same build. Tests that count allocations would count the sanitizer's, slowly.
+# next step but one: it is the same build. Tests that count allocations would count the
+# sanitizer's, slowly.
 step_sanitized() {
   check "sanitized: configure" cmake --preset asan || return
   local room
