@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -414,10 +415,17 @@ TEST_F(RelayTest, GarbageOnTheBusHarmsNobody) {
   ASSERT_NE(watcher, nullptr);
   const auto stranger = hub_.Connect();
   support::Random random(3);
-  std::vector<std::string> heard;
-  const auto listens = stranger->Subscribe(
-      kReplicasSubject, [&](std::string_view message) { heard.emplace_back(message); });
-  ASSERT_TRUE(Eventually([&] { return heard.size() > 1; }));
+  std::mutex mutex;
+  std::vector<std::string> heard;  // Guarded by it.
+  auto listens = stranger->Subscribe(kReplicasSubject, [&](std::string_view message) {
+    const std::lock_guard lock(mutex);
+    heard.emplace_back(message);
+  });
+  ASSERT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return heard.size() > 1;
+  }));
+  listens.reset();
   const std::string id = shows_.Find("dam")->stream.summary().stream_id();
   for (int k = 0; k < 3000; ++k) {
     std::string message = random.Chance(0.5) ? heard[random.Below(2)] : std::string(40, 'x');
