@@ -140,12 +140,16 @@ RequestKind StreamMessages::Kind(std::size_t slot) {
   }
 }
 
+const grpc::ByteBuffer& StreamMessages::response(Outgoing what, std::size_t slot) {
+  if (what == Outgoing::kDraining) draining_ = DrainNotice(registry_.TakeElsewhere());
+  return Response(what, slot);
+}
+
 grpc::ByteBuffer& StreamMessages::Response(Outgoing what, std::size_t slot) {
   switch (what) {
     case Outgoing::kOpened:
       return opened_;
     case Outgoing::kDraining:
-      draining_ = DrainNotice(registry_.TakeElsewhere());
       return draining_;
     case Outgoing::kAnswer:
       break;

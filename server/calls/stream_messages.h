@@ -58,7 +58,7 @@ class StreamMessages final : public StreamHandler {
 
   grpc::ByteBuffer& request(std::size_t slot) { return requests_[slot]; }
   RequestKind Kind(std::size_t slot);
-  const grpc::ByteBuffer& response(Outgoing what, std::size_t slot) { return Response(what, slot); }
+  const grpc::ByteBuffer& response(Outgoing what, std::size_t slot);
   /// The response has been written: lets go of it.
   void Written(Outgoing what, std::size_t slot) { Response(what, slot).Clear(); }
 
