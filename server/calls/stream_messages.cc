@@ -67,6 +67,15 @@ void ShrinkBuffers(std::uint64_t bytes, v1::ReconstructRequest& request) {
   if (request.SpaceUsedLong() > 4 * bytes + kSmallBuffers) request = {};
 }
 
+grpc::ByteBuffer DrainNotice(const std::vector<std::string>& elsewhere) {
+  v1::ReconstructResponse response;
+  v1::StreamNotice& notice = *response.mutable_notice();
+  notice.set_kind(v1::StreamNotice::KIND_DRAINING);
+  notice.set_message("the server is going away: finish reading, then connect elsewhere");
+  notice.mutable_addresses()->Assign(elsewhere.begin(), elsewhere.end());
+  return wire::ToBytes(response);
+}
+
 }  // namespace
 
 void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
@@ -100,15 +109,6 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
   auto status = session.Answer(sequence, frame, worker, deliver, &cancelled);
   if (status.ok()) message.set_time(frame->time);
   return status;
-}
-
-grpc::ByteBuffer DrainNotice(const std::vector<std::string>& elsewhere) {
-  v1::ReconstructResponse response;
-  v1::StreamNotice& notice = *response.mutable_notice();
-  notice.set_kind(v1::StreamNotice::KIND_DRAINING);
-  notice.set_message("the server is going away: finish reading, then connect elsewhere");
-  notice.mutable_addresses()->Assign(elsewhere.begin(), elsewhere.end());
-  return wire::ToBytes(response);
 }
 
 StreamMessages::StreamMessages(const ServerLimits& limits, StreamRegistry& registry,

@@ -440,7 +440,7 @@ void Relay::LookAtSearches(Clock::time_point now) {
 void Relay::WillDrain() {
   Post([this] {
     will_drain_ = true;
-    Announce(Clock::now(), false, false);
+    announced_ = {};  // The next tick tells it.
   });
 }
 

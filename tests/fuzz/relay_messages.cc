@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "common/address.h"
 #include "fuzz/choices.h"
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
@@ -170,7 +171,11 @@ void AttackRelayMessages(Bytes bytes) {
       (void)directory.Announced("one", message.announcement(), now);
     }
     Require(joiner.held_bytes() <= 4 * kMaxBytes, "pieces that wait are bounded");
-    Require(directory.Addresses(4).size() <= 4 && directory.replicas() <= 1, "directories count");
+    for (const std::string& address : directory.Addresses(4)) {
+      const auto parsed = ParseAddress(address);
+      Require(parsed.ok() && parsed->unix_path.empty() && parsed->port != 0,
+              "clients are sent to addresses only");
+    }
     do {
       dispatcher->Flush();  // So that the same bytes do the same again.
     } while (watch != nullptr && watch->WriteDone());
