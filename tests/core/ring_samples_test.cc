@@ -47,8 +47,8 @@ bool Precedes(const ParticleSample& a, const ParticleSample& b) {
   return std::tie(a.ring, a.hash) < std::tie(b.ring, b.hash);
 }
 bool FoundPrecedes(const FoundSample& a, const FoundSample& b) {
-  return std::tie(a.before, a.now, a.way.columns, a.way.rows) <
-         std::tie(b.before, b.now, b.way.columns, b.way.rows);
+  return std::tie(a.before, a.now, a.displacement.columns, a.displacement.rows) <
+         std::tie(b.before, b.now, b.displacement.columns, b.displacement.rows);
 }
 
 // All particles of all rings, sorted; and of each ring the first ones.
@@ -95,7 +95,7 @@ void ExpectAsBySorting(const Traced& traced, std::span<const std::uint64_t> ids,
   for (std::size_t k = 0; k < found.size(); ++k) {
     EXPECT_EQ(tested.found[k].before, found[k].before);
     EXPECT_EQ(tested.found[k].now, found[k].now);
-    EXPECT_EQ(tested.found[k].way, found[k].way);
+    EXPECT_EQ(tested.found[k].displacement, found[k].displacement);
   }
 }
 

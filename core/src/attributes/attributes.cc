@@ -13,27 +13,27 @@
 namespace partiemc {
 namespace {
 
-// Of the squares of distances over the kernel radius; around a vertex inside their mean is .1 along
-// each axis, at a straight rim .03 across it.
+// Damping of the slope, in squared kernel radii. For comparison, the second moment of particles
+// around a vertex is .1 along each axis inside a body and .03 across a straight rim.
 constexpr double kSlopeRidge = 1e-3;
 
 constexpr std::size_t kVerticesAtOnce = 256;
 
 constexpr double kLargest = std::numeric_limits<float>::max();
 
-// Points of the rings, and then the others of the mesh: its first ones are those of the rings (M3).
+// The points of the mesh begin with the points of the rings (guarantee M3).
 std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh) {
   return mesh.points.size() > rings.points.size() ? mesh.points : rings.points;
 }
 
-// How tiles are divided: into powers of two of cells.
+// Divides a tile into square buckets. Their side, a power of two of cells, is at most the radius.
 class Buckets {
  public:
   explicit Buckets(double radius) {
     while (shift_ < kTileShift && (2 << shift_) <= radius) ++shift_;
   }
   int Along() const { return kTileSize >> shift_; }
-  // And the end of the last one.
+  // One offset for each bucket, and the end of the last bucket.
   std::size_t OffsetCount() const { return static_cast<std::size_t>(Along()) * Along() + 1; }
   int Of(double coordinate) const { return static_cast<int>(coordinate) >> shift_; }
   std::size_t Of(const BinnedParticle& particle) const {
@@ -44,11 +44,11 @@ class Buckets {
   int shift_ = 0;
 };
 
-// Of a value of a particle: weighted, and that times D_x, D_y and D_z.
+// Sums over particles of one component of an attribute: weighted value, and the weighted value
+// times D_x, D_y and D_z.
 using Carried = std::array<double, 4>;
 
-// Sums over particles around a vertex, D = x_i - x over the kernel radius, and then the value there
-// of a plane through what they carry.
+// Fits a plane by least squares and evaluates it at a vertex x. D = (x_i - x) / kernel radius.
 class PlaneFit {
  public:
   void Add(double weight, double dx, double dy, double dz) {
@@ -64,9 +64,9 @@ class PlaneFit {
     yy_ += weight * dy * dy;
   }
 
-  // What the sums of a carried value count: the first row of the inverse of the moments. The height
-  // is eliminated first; in the plane there is none, and what is taken off is 0.
-  Carried Shares() const {
+  // The coefficients of the four sums of `Carried` in the value at the vertex: the first row of the
+  // inverse moment matrix. Eliminates the height first; without a slice its moments are 0.
+  Carried Coefficients() const {
     if (sum_ == 0) return {};
     const double zz = zz_ + kSlopeRidge * sum_;
     const double sum = sum_ - z_ * z_ / zz;
@@ -117,7 +117,7 @@ class Interpolation {
     }
   }
 
-  // Particles keep the places that their tiles have in the bins.
+  // Sorts the particles of each wanted tile by bucket. Each tile keeps its range of the bins.
   void SortParticles() {
     scratch_.particles.resize(bins_.particles.size());
     scratch_.buckets.resize(bins_.tiles.size() * buckets_.OffsetCount());
@@ -150,7 +150,7 @@ class Interpolation {
     const std::uint32_t first = bins_.offsets[tile], last = bins_.offsets[tile + 1];
     std::fill_n(offsets, count + 1, 0);
     for (std::uint32_t i = first; i < last; ++i) ++offsets[buckets_.Of(bins_.particles[i])];
-    // Ends of buckets; they go down to the beginnings as particles come, last ones first.
+    // Counting sort: `offsets` holds the end of each bucket, then moves down to its first particle.
     std::uint32_t end = first;
     for (std::size_t bucket = 0; bucket <= count; ++bucket) {
       offsets[bucket] = end += offsets[bucket];
@@ -164,7 +164,8 @@ class Interpolation {
     }
   }
 
-  // Calls visit(particle, k w, D_x, D_y, D_z) for the particles that a kernel at a point reaches.
+  // Calls visit(particle, w k, D_x, D_y, D_z) for each particle within the kernel radius of
+  // `point`.
   template <typename Visit>
   void ForEachAround(std::uint32_t tile, Point point, const Visit& visit) const {
     const double radius = scale_.kernel_radius;
@@ -221,7 +222,7 @@ class Interpolation {
             }
           });
     }
-    const auto [constant, along_x, along_y, along_z] = fit.Shares();
+    const auto [constant, along_x, along_y, along_z] = fit.Coefficients();
     const Carried* sums = carried.data();
     for (AttributeValues& attribute : values) {
       for (int c = 0; c < attribute.components; ++c, ++sums) {

@@ -43,7 +43,7 @@ absl::Status CheckRingArrays(const Rings& rings) {
   return absl::OkStatus();
 }
 
-/// The ring that point `point` belongs to.
+/// Index of the ring that contains `point`.
 std::size_t RingOf(const Rings& rings, std::size_t point) {
   const auto after = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), point);
   return static_cast<std::size_t>(after - rings.offsets.begin()) - 1;
@@ -65,7 +65,7 @@ absl::Status CheckR1(const Rings& rings) {
   });
   for (std::size_t i = 1; i < order.size(); ++i) {
     if (point_at(order[i - 1]) != point_at(order[i])) continue;
-    // Points of different rings at one place are a touch, R2.
+    // Equal points of different rings are a touch, which R2 reports.
     const std::size_t ring = RingOf(rings, order[i]);
     if (RingOf(rings, order[i - 1]) != ring) continue;
     return Broken("R1: ring ", ring, " has points ", order[i - 1], " and ", order[i],
@@ -86,8 +86,8 @@ absl::Status CheckR2(const Rings& rings) {
                 RingOf(rings, second));
 }
 
-/// +1 for a counter-clockwise ring, -1 for a clockwise one. Requires R1 and R2: then the turn at an
-/// extreme point is not flat and has the ring's own sense.
+/// +1 for a counter-clockwise ring, -1 for a clockwise one: the turn at the lowest point. Requires:
+/// R1 and R2, so that this turn is not flat.
 int RingOrientation(std::span<const double> ring) {
   const std::size_t count = ring.size() / 2;
   std::size_t lowest = 0;
@@ -112,8 +112,8 @@ absl::Status CheckR3(const Rings& rings) {
 
 // --- R4 -----------------------------------------------------------------------------------------
 
-/// Requires R1-R3. Each hole lies in the ring that it names, with no other between, and that is an
-/// outer ring; outer rings lie in holes or in nothing.
+/// Each hole lies directly inside the outer ring that it names. Each outer ring lies directly
+/// inside a hole or inside no ring. Requires: R1-R3.
 absl::Status CheckR4(const Rings& rings) {
   const auto is_hole = [&](std::uint32_t ring) { return rings.outer_of[ring] != kNoRing; };
   RingDepths nesting;
@@ -141,7 +141,7 @@ absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> po
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (std::isfinite(points[i]) && InPredicateDomain(points[i])) continue;
     return Broken(guarantee, ": point ", i / 2, " has coordinate ", points[i],
-                  ", which is not finite or beyond what can be computed with");
+                  ", which is not finite or outside the range of exact arithmetic");
   }
   return absl::OkStatus();
 }

@@ -1,4 +1,5 @@
-// The checks of rings, and what they share with those of meshes (partiemc/validate.h).
+// Checks the guarantees R1-R4 of rings (partiemc/result.h), and helpers shared with the mesh
+// checks.
 #pragma once
 
 #include <cstddef>
@@ -12,16 +13,18 @@
 
 namespace partiemc {
 
+/// An INTERNAL error whose message is the concatenation of `parts`.
 template <typename... Parts>
 absl::Status Broken(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
 
-/// OK if all coordinates are finite and in the domain of the predicates; `guarantee` names what is
-/// broken if not.
+/// Checks that all coordinates are finite and in the domain of predicates.h. `guarantee` names the
+/// guarantee in the error.
 absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> points);
 
-/// Guarantees R1-R4.
+/// Checks guarantees R1-R4.
+/// Cost: n log n in the points.
 absl::Status CheckRings(const Rings& rings);
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-// Whether directed sides cancel each other: how a mesh is shown to cover a region exactly.
+// Checks that the directed sides of triangles cancel, which proves that a mesh covers its region.
 #pragma once
 
 #include <algorithm>
@@ -11,24 +11,25 @@
 
 namespace partiemc {
 
-/// A multiset of directed sides. It is balanced if every stretch is run through as often one way as
-/// the other. If the sides of counter-clockwise triangles, together with the boundary of a region
-/// run backwards, are balanced, then each point lies in as many triangles as the boundary winds
-/// round it: the triangles cover the region once and nothing else.
+/// A multiset of directed sides. It is balanced if every piece of every side is passed equally
+/// often in both directions.
 ///
-/// Sides may meet in T-junctions where they run along an axis, as those of merged lattice cells do;
-/// others must match whole. Exact: coordinates are compared, never computed with.
+/// Why this proves a cover: add the sides of counter-clockwise triangles, and the boundary of a
+/// region reversed. If they are balanced, the number of triangles around any point is the winding
+/// number of the boundary. The triangles therefore cover the region once, and nothing else.
+///
+/// Sides along an axis may meet in T-junctions, as the sides of merged lattice cells do. Slanted
+/// sides must match as a whole. Exact: coordinates are compared only.
 /// Cost: n log n.
 class SideBalance {
  public:
   struct Finding {
-    /// A point where sides are not balanced, or nothing if they are.
+    /// A point where the sides are not balanced, if there is one.
     std::optional<Point> imbalance;
-    /// Ends of sides that lie inside of others, where sides cancel only piece by piece. Counted if
-    /// sides are balanced. None: every side cancels whole, hence is shared by two triangles, or by
-    /// a triangle and the boundary.
+    /// Number of side ends that lie inside another side; set only if the sides are balanced. If it
+    /// is 0, two triangles share each side, or one triangle and the boundary.
     std::size_t t_junctions = 0;
-    Point t_junction;  ///< One of them.
+    Point t_junction;  ///< One of these ends.
 
     friend bool operator==(const Finding&, const Finding&) = default;
   };
@@ -42,7 +43,7 @@ class SideBalance {
     }
   }
 
-  /// What is wrong with the sides. Forgets them.
+  /// Checks the sides and clears them.
   Finding Take() {
     Finding finding;
     finding.imbalance = CancelWholeSides();
@@ -58,12 +59,12 @@ class SideBalance {
     int sign;  // +1 if it runs from `lower` to `upper`.
   };
 
-  /// A place on a line along an axis where sides begin or end.
+  /// A position on an axis-parallel line where sides begin or end.
   struct Step {
     bool is_horizontal;
     double line, position;
-    int change;   // Of the sum of signs.
-    int opening;  // How many sides begin here, less those that end.
+    int change;   // Change of the sum of signs.
+    int opening;  // Sides that begin here, minus sides that end here.
   };
 
   static auto Place(const Side& side) {
@@ -73,8 +74,8 @@ class SideBalance {
     return std::tie(step.is_horizontal, step.line, step.position);
   }
 
-  /// Turns what is left of sides along an axis into steps; returns the lower end of a slanted side
-  /// of which something is left.
+  /// Cancels equal sides. Turns the remaining axis-parallel sides into steps; returns the lower end
+  /// of a remaining slanted side, if there is one.
   std::optional<Point> CancelWholeSides() {
     std::sort(sides_.begin(), sides_.end(),
               [](const Side& a, const Side& b) { return Place(a) < Place(b); });
@@ -95,8 +96,8 @@ class SideBalance {
     return std::nullopt;
   }
 
-  /// Nothing is left on a line exactly when the changes at each of its places cancel. A place lies
-  /// inside of the sides that are open before it and do not end there.
+  /// Walks along each line. The sides on it cancel if and only if the changes at each position sum
+  /// to 0. A position lies inside the sides that begin before it and do not end at it.
   void WalkSteps(Finding& finding) {
     std::sort(steps_.begin(), steps_.end(),
               [](const Step& a, const Step& b) { return Place(a) < Place(b); });

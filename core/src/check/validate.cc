@@ -16,7 +16,7 @@
 namespace partiemc {
 namespace {
 
-/// A sum whose error does not grow with the number of terms (Neumaier).
+/// A sum whose rounding error does not grow with the number of terms (Neumaier, 1974).
 class CompensatedSum {
  public:
   void Add(double term) {
@@ -30,8 +30,8 @@ class CompensatedSum {
   double sum_ = 0, lost_ = 0;
 };
 
-/// Twice the area of triangle abc, positive when counter-clockwise. Differences come first, so that
-/// the distance from the world's origin costs no digits.
+/// Twice the area of triangle abc, positive if counter-clockwise. Subtracts coordinates first, so
+/// that the distance from the origin costs no digits.
 double DoubleArea(const Point& a, const Point& b, const Point& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
@@ -81,7 +81,8 @@ absl::Status CheckM3(const Result& result) {
 
 // --- M2 -----------------------------------------------------------------------------------------
 
-/// Areas to 1e-9 relative, and what moving every point by the last bit of its coordinates would do.
+/// Compares the areas of rings and triangles. The tolerance is 1e-9 relative, plus the change of
+/// area if every coordinate changes by its last bit.
 absl::Status CheckAreas(const Result& result) {
   const Rings& rings = result.rings;
   CompensatedSum ring_area, mesh_area;
@@ -111,7 +112,7 @@ absl::Status CheckAreas(const Result& result) {
                 ", the rings enclose ", ShortestNumber(ring_area.Value()));
 }
 
-/// How the sides of the triangles cancel each other and the segments of the rings run backwards.
+/// Balances the sides of the triangles against the reversed segments of the rings.
 SideBalance::Finding BalanceSides(const Result& result) {
   SideBalance sides;
   const Rings& rings = result.rings;
@@ -131,7 +132,7 @@ SideBalance::Finding BalanceSides(const Result& result) {
   return sides.Take();
 }
 
-/// Equal areas leave room for an overlap as large as a gap; balanced sides do not.
+/// Balanced sides exclude a gap and an overlap of the same area, which CheckAreas accepts.
 absl::Status CheckCover(const SideBalance::Finding& sides) {
   if (!sides.imbalance.has_value()) return absl::OkStatus();
   return Broken("M2: the triangles leave a gap or overlap at (", ShortestNumber(sides.imbalance->x),
@@ -140,9 +141,9 @@ absl::Status CheckCover(const SideBalance::Finding& sides) {
 
 // --- M4 -----------------------------------------------------------------------------------------
 
-/// Requires M2. Around a vertex inside a side there would be triangles on one side of it and pieces
-/// of that side on the other, so that the side does not cancel whole; and where all sides cancel
-/// whole, triangles around such a vertex would overlap those at the side.
+/// Requires: M2. Then there is no T-junction if and only if every side cancels as a whole. At a
+/// T-junction, the side that contains the vertex cancels only piece by piece. Conversely, if that
+/// side cancels as a whole, the triangles around the vertex overlap its two triangles.
 absl::Status CheckM4(const SideBalance::Finding& sides) {
   if (sides.t_junctions == 0) return absl::OkStatus();
   return Broken("M4: ", sides.t_junctions, " vertices lie inside sides, one of them at (",
@@ -163,7 +164,7 @@ absl::Status CheckMesh(const Result& result, bool allows_t_junctions) {
 
 absl::Status Validate(const Result& result) {
   if (absl::Status status = CheckRings(result.rings); !status.ok()) return status;
-  // Fill::kNone makes no mesh, whatever the rings.
+  // Fill::kNone makes no mesh.
   return result.mesh == Mesh{} ? absl::OkStatus() : CheckMesh(result, true);
 }
 

@@ -9,7 +9,7 @@
 namespace partiemc {
 namespace {
 
-// The number of a ring, given to it now if it has none.
+// The number of a ring. Assigns the next number if the ring has none.
 std::uint32_t NumberOf(std::uint32_t ring, IdentityScratch& s) {
   if (s.number[ring] == kNoRing) {
     s.number[ring] = static_cast<std::uint32_t>(s.topology_ring.size());
@@ -18,8 +18,8 @@ std::uint32_t NumberOf(std::uint32_t ring, IdentityScratch& s) {
   return s.number[ring];
 }
 
-// The runs of this frame, with numbers of rings. Each run lies between two crossed edges. Every
-// ring has one: it encloses a node, hence crosses that node's row.
+// Collects the runs of this frame and numbers the rings. Each run lies between two crossed edges.
+// Every ring has a run: the ring encloses a node, so it crosses the row of that node.
 void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<NodeRun>& runs) {
   const RingTopology& topology = input.topology;
   runs.clear();
@@ -32,10 +32,10 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
     last = edge;
     if (from.ring == kNoRing || from.row != edge.row) return;
     std::uint32_t ring = edge.ring;
-    if (!edge.begins_inside) {  // The nodes in between are inside.
+    if (!edge.begins_inside) {  // The nodes of the run are inside.
       if (topology.outer_of[ring] != kNoRing) ring = topology.outer_of[ring];
     } else if (topology.outer_of[ring] == kNoRing) {
-      ring = from.ring;  // A void between two islands is next to no hole's ring.
+      ring = from.ring;  // A run between two outer rings belongs to no hole.
       if (topology.outer_of[ring] == kNoRing) return;
     }
     if (input.placed.kept_as[ring] == kNoRing) return;
@@ -43,8 +43,8 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
   });
 }
 
-// What belongs to the numbers: outer rings of holes and of components, particles.
-void NumberOuterRings(const IdentityInput& input, IdentityScratch& s) {
+// Fills the arrays by number, and the outer rings of components.
+void FillNumberedRings(const IdentityInput& input, IdentityScratch& s) {
   const RingTopology& topology = input.topology;
   s.rings.clear();
   s.particle_count.clear();
@@ -61,8 +61,8 @@ void NumberOuterRings(const IdentityInput& input, IdentityScratch& s) {
   }
 }
 
-// Hands identities on along the largest relations, then gives new ones.
-void GiveIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory& next) {
+// Passes identities on along the largest relations first, then assigns new identities.
+void AssignIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory& next) {
   std::sort(s.relations.begin(), s.relations.end(),
             [](const RingRelation& x, const RingRelation& y) {
               return std::tie(y.nodes, x.before, x.now) < std::tie(x.nodes, y.before, y.now);
@@ -80,9 +80,9 @@ void GiveIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory
   }
 }
 
-// Identities and parents into the result.
-void Tell(const RingHistory& previous, std::span<const std::uint32_t> kept_as, IdentityScratch& s,
-          Rings& rings) {
+// Writes identities and parents to the result.
+void WriteResult(const RingHistory& previous, std::span<const std::uint32_t> kept_as,
+                 IdentityScratch& s, Rings& rings) {
   std::sort(s.relations.begin(), s.relations.end(),
             [](const RingRelation& x, const RingRelation& y) {
               return std::tie(x.now, x.before) < std::tie(y.now, y.before);
@@ -99,8 +99,8 @@ void Tell(const RingHistory& previous, std::span<const std::uint32_t> kept_as, I
   }
 }
 
-// Rings by identity, and what belongs to them with indices into them.
-void Remember(const IdentityInput& input, IdentityScratch& s, RingHistory& next) {
+// Writes the history: rings sorted by identity, and runs and samples with indices of these rings.
+void WriteHistory(const IdentityInput& input, IdentityScratch& s, RingHistory& next) {
   const std::size_t count = s.rings.size();
   std::vector<std::uint32_t>& by_identity = s.by_identity;
   by_identity.resize(count);
@@ -126,7 +126,7 @@ void Remember(const IdentityInput& input, IdentityScratch& s, RingHistory& next)
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                    IdentityScratch& scratch, RingHistory& next, Rings& rings) {
   CollectRuns(input, scratch, next.runs);
-  NumberOuterRings(input, scratch);
+  FillNumberedRings(input, scratch);
   FollowParticles({.frame = input.frame,
                    .plane = input.plane,
                    .particles = {.ids = input.frame.ids,
@@ -144,9 +144,9 @@ void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                .time = input.frame.time,
                .cell_size = input.cell_size},
               scratch.relation_scratch, scratch.relations);
-  GiveIdentities(previous, scratch, next);
-  Tell(previous, input.placed.kept_as, scratch, rings);
-  Remember(input, scratch, next);
+  AssignIdentities(previous, scratch, next);
+  WriteResult(previous, input.placed.kept_as, scratch, rings);
+  WriteHistory(input, scratch, next);
 }
 
 }  // namespace partiemc

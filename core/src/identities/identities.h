@@ -1,4 +1,4 @@
-// Stage 7 of 9: rings of two frames -> identities and parents (core/IDENTITIES.md).
+// Stage 7 of 9: rings of two successive frames -> identities and parents (core/IDENTITIES.md).
 #pragma once
 
 #include <cstdint>
@@ -18,23 +18,23 @@
 
 namespace partiemc {
 
-/// Warm buffers of ContinueRings.
+/// Warm buffers of ContinueRings. The rings of the frame are numbered in the order of their runs.
 struct IdentityScratch {
   Scanlines rows;
-  std::vector<std::uint32_t> number;         // By ring of the topology, in the order of their runs.
-  std::vector<std::uint32_t> topology_ring;  // By number.
+  std::vector<std::uint32_t> number;             // By ring of the topology.
+  std::vector<std::uint32_t> topology_ring;      // By number.
   std::vector<std::uint32_t> ring_of_component;  // Number of its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;     // By number.
-  std::vector<KnownRing> rings;                  // By number; their outer rings by number, too.
+  std::vector<KnownRing> rings;                  // By number; `outer` is a number.
   RingTracks tracks;
   RelationScratch relation_scratch;
   std::vector<RingRelation> relations;
   std::vector<std::uint8_t> is_continued;  // By ring of the last frame.
-  std::vector<std::uint32_t> by_identity;  // Numbers.
-  std::vector<std::uint32_t> rank;         // By number: place of its identity.
+  std::vector<std::uint32_t> by_identity;  // Numbers, by ascending identity.
+  std::vector<std::uint32_t> rank;         // By number: index in `by_identity`.
 };
 
-/// What the stages before tell of the rings.
+/// Results of the earlier stages.
 struct IdentityInput {
   const Frame& frame;
   Plane plane;
@@ -45,12 +45,14 @@ struct IdentityInput {
   double cell_size;
 };
 
-/// Gives every ring its identity and its parents, and writes to `next` what the next frame needs.
-/// core/IDENTITIES.md has the rules; pairs that share equally many nodes go by the older identity,
-/// then by the lower and the more left ring, and new identities by the lowest rows of their rings.
-/// Depends on rings and particles as sets: not on their order or on threads.
+/// Assigns an identity and parents to every ring of `rings`, and writes `next`, the history for the
+/// next frame. core/IDENTITIES.md has the rules.
+///
+/// Ties: among pairs of rings that share equally many nodes, the older identity comes first, then
+/// the lower and more left ring. New identities are assigned by the lowest rows of the rings.
+/// Deterministic: independent of the order of rings and particles, and of threads.
 /// Cost: linear in segments, rows of tiles and runs; n log n in rings and their relations; with ids
-/// or velocities, that of FollowParticles.
+/// or velocities, also the cost of FollowParticles.
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                    IdentityScratch& scratch, RingHistory& next, Rings& rings);
 

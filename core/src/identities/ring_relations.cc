@@ -9,19 +9,19 @@
 namespace partiemc {
 namespace {
 
-// Rings that share less than this part of the smaller one's nodes are neighbours of which one
-// moved into the other's place, not continuations.
+// Two rings that share fewer nodes than the smaller ring has, divided by this, are neighbours: one
+// moved to where the other was.
 constexpr std::uint64_t kSmallestPart = 4;
 
-// A full set of samples agrees with the nodes where their shares differ by no more than this many
-// of the sixteen: three standard deviations of a ring that splits in halves.
+// Largest difference between the shares of a full set of 16 samples and of the nodes, in samples.
+// It is three standard deviations of the samples of a ring that splits in halves.
 constexpr std::uint64_t kTolerance = 6;
 
-// The part of a ring, in quarters, that other rings' samples have to account for before nodes that
-// it shares with a ring none of whose samples it has count for nothing.
-constexpr std::uint64_t kToldQuarters = 3;
+// If the samples of other rings account for this part of a ring, in quarters, shared nodes alone
+// make no parent of it.
+constexpr std::uint64_t kAccountedQuarters = 3;
 
-// A ring that goes farther within a frame does not do so on this lattice.
+// Largest movement within a frame, in cells; coordinates of the lattice have 32 bits.
 constexpr double kMaxShift = 1u << 31;
 
 void CountNodes(std::span<const NodeRun> runs, std::size_t rings,
@@ -30,28 +30,30 @@ void CountNodes(std::span<const NodeRun> runs, std::size_t rings,
   for (const NodeRun& run : runs) nodes[run.ring] += NodeCount(run.first, run.last);
 }
 
-// Holes go with their outer rings.
+// Moves holes with their outer rings.
 void MoveHolesAlong(std::span<const KnownRing> rings, std::vector<CellShift>& shifts) {
   for (std::size_t ring = 0; ring < shifts.size(); ++ring) {
     if (rings[ring].outer != kNoRing) shifts[ring] = shifts[rings[ring].outer];
   }
 }
 
-// The lower median, which a few particles that go astray do not move. Not empty.
-std::int64_t MedianOf(std::vector<std::int64_t>& ways) {
-  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>((ways.size() - 1) / 2);
-  std::nth_element(ways.begin(), middle, ways.end());
+// The lower median, robust against a few stray particles. Requires: not empty.
+std::int64_t MedianOf(std::vector<std::int64_t>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-// Each outer ring goes the way of its samples.
+// Moves each outer ring by the median displacement of its samples.
 void ShiftBySamples(std::span<const FoundSample> found, RelationScratch& s) {
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
     while (last < found.size() && found[last].before == found[first].before) ++last;
     const auto median = [&](std::int64_t CellShift::*part) {
-      s.ways.clear();
-      for (std::size_t k = first; k < last; ++k) s.ways.push_back(found[k].way.*part);
-      return MedianOf(s.ways);
+      s.displacements.clear();
+      for (std::size_t k = first; k < last; ++k) {
+        s.displacements.push_back(found[k].displacement.*part);
+      }
+      return MedianOf(s.displacements);
     };
     s.shift_before[found[first].before] = {median(&CellShift::columns), median(&CellShift::rows)};
   }
@@ -63,8 +65,8 @@ CellShift ShiftOf(double cells_x, double cells_y) {
           static_cast<std::int64_t>(std::floor(cells_y + 0.5))};
 }
 
-// Rings of the last frame go on with their velocities, unless their samples have shown the way;
-// rings of this one go back with theirs.
+// Moves the rings of the last frame forward by their velocities, unless samples move them, and the
+// rings of this frame backward by their velocities.
 void ShiftByVelocities(const RingHistory& previous, const RingsNow& now, bool by_samples,
                        RelationScratch& s) {
   if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
@@ -84,7 +86,7 @@ bool AnyMoves(const std::vector<CellShift>& shifts) {
                      [](const CellShift& shift) { return shift != CellShift{}; });
 }
 
-// One relation for each pair, with the most that is known of it.
+// Merges the relations of each pair into one, with the maximum of each count.
 void Unite(std::vector<RingRelation>& relations) {
   std::sort(relations.begin(), relations.end(), [](const RingRelation& x, const RingRelation& y) {
     return std::tie(x.before, x.now) < std::tie(y.before, y.now);
@@ -109,7 +111,8 @@ bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_
   return previous.rings[before].is_hole == now.rings[number].is_hole;
 }
 
-// Nodes that rings share once they have moved, forward or, where this frame has velocities, back.
+// Relates rings by the nodes that they share after moving the last frame's rings forward, or this
+// frame's rings backward.
 void RelateByNodes(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
                    std::vector<RingRelation>& relations) {
   const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
@@ -143,7 +146,8 @@ void AddFoundSamples(const RingHistory& previous, const RingsNow& now, RelationS
   Unite(relations);
 }
 
-// The nodes that a ring's particles carried to another one, as its samples tell.
+// Estimates the nodes that a ring passed to another one: its nodes times the share of its samples
+// found there.
 std::uint64_t NodesBySamples(const RingRelation& relation, const RelationScratch& s) {
   const std::uint64_t nodes = s.nodes_before[relation.before];
   const std::uint64_t count = s.sample_count[relation.before];
@@ -152,8 +156,8 @@ std::uint64_t NodesBySamples(const RingRelation& relation, const RelationScratch
   return std::min(carried, s.nodes_now[relation.now]);
 }
 
-// Whether the samples of a ring say the same as its nodes, but for chance. Less than a full set is
-// all of its particles, and leaves nothing to chance.
+// Whether the samples of a ring agree with its nodes, within the statistical error. False for an
+// incomplete set: it holds all particles of the ring, so it has no such error and is exact.
 bool SamplesAgree(std::span<const RingRelation> of_one_ring, const RelationScratch& s) {
   const std::uint32_t ring = of_one_ring.front().before;
   if (s.sample_count[ring] < kMaxSamples) return false;
@@ -167,31 +171,32 @@ bool SamplesAgree(std::span<const RingRelation> of_one_ring, const RelationScrat
   });
 }
 
-// What the relations of one ring of the last frame are worth.
-void WeighBySamples(std::span<RingRelation> of_one_ring, const RelationScratch& s) {
+// Corrects the shared nodes of all relations of one ring of the last frame by its samples.
+void CorrectBySamples(std::span<RingRelation> of_one_ring, const RelationScratch& s) {
   const bool sampled = s.sample_count[of_one_ring.front().before] > 0;
-  // Nodes are complete, samples are not: where they agree, nodes count.
+  // If both agree, the nodes are more accurate than the estimate from samples.
   const bool by_nodes = !sampled || SamplesAgree(of_one_ring, s);
   for (RingRelation& relation : of_one_ring) {
     if (relation.samples > 0) {
       if (!by_nodes || relation.nodes == 0) relation.nodes = NodesBySamples(relation, s);
-    } else if (!by_nodes || 4 * s.told[relation.now] >= kToldQuarters * s.nodes_now[relation.now]) {
+    } else if (!by_nodes ||
+               4 * s.accounted[relation.now] >= kAccountedQuarters * s.nodes_now[relation.now]) {
       relation.nodes = 0;
     }
   }
 }
 
-// Lets the samples of outer rings confirm or replace what nodes say.
-void LetSamplesDecide(const RingHistory& previous, RelationScratch& s,
-                      std::vector<RingRelation>& relations) {
-  s.told.assign(s.nodes_now.size(), 0);
+// Applies the samples of all outer rings to their relations.
+void ApplySamples(const RingHistory& previous, RelationScratch& s,
+                  std::vector<RingRelation>& relations) {
+  s.accounted.assign(s.nodes_now.size(), 0);
   for (const RingRelation& relation : relations) {
-    if (relation.samples > 0) s.told[relation.now] += NodesBySamples(relation, s);
+    if (relation.samples > 0) s.accounted[relation.now] += NodesBySamples(relation, s);
   }
   for (std::size_t first = 0, last = 0; first < relations.size(); first = last) {
     while (last < relations.size() && relations[last].before == relations[first].before) ++last;
     if (previous.rings[relations[first].before].is_hole) continue;
-    WeighBySamples(std::span(relations).subspan(first, last - first), s);
+    CorrectBySamples(std::span(relations).subspan(first, last - first), s);
   }
   std::erase_if(relations, [](const RingRelation& relation) { return relation.nodes == 0; });
 }
@@ -205,8 +210,8 @@ void MarkCounting(RelationScratch& s, std::vector<RingRelation>& relations) {
   }
 }
 
-// Rings that moving has led nowhere may have stayed: a hole that does not follow the body around
-// it, or velocities that are wrong. Not outer rings whose samples have told otherwise.
+// Relates rings at their original positions, if moving found no relation for either of them: a hole
+// may not follow the body around it, and velocities may be wrong. Skips outer rings with samples.
 void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
                 std::vector<RingRelation>& relations) {
   FindSharedNodes(previous.runs, now.runs, s.newest, s.shared);
@@ -238,7 +243,7 @@ void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScrat
   RelateByNodes(previous, now, s, relations);
   if (by_samples) {
     AddFoundSamples(previous, now, s, relations);
-    LetSamplesDecide(previous, s, relations);
+    ApplySamples(previous, s, relations);
   }
   s.linked_before.assign(previous.rings.size(), 0);
   s.linked_now.assign(now.rings.size(), 0);

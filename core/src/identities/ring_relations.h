@@ -1,4 +1,4 @@
-// Which rings of two successive frames are related, and how much they have in common.
+// Finds the pairs of related rings of two successive frames, and the number of nodes they share.
 #pragma once
 
 #include <cstdint>
@@ -21,31 +21,32 @@ struct RingsNow {
   double cell_size = 1;  ///< World units.
 };
 
-/// A ring of the last frame (index in its history) and one of this frame (number), both outer or
-/// both holes.
+/// A ring of the last frame and a ring of this frame that may continue it. Either both are outer
+/// rings or both are holes.
 struct RingRelation {
-  std::uint32_t before = 0, now = 0;
-  std::uint64_t nodes = 0;    ///< That they share, by nodes or as the samples tell.
-  std::uint32_t samples = 0;  ///< Of the former that are found in the latter.
-  bool counts = false;        ///< Too much to be two neighbours that merely shift.
+  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number.
+  std::uint64_t nodes = 0;            ///< Shared nodes, counted or estimated from samples.
+  std::uint32_t samples = 0;          ///< Samples of `before` that are now in `now`.
+  bool counts = false;                ///< Shares at least a quarter of the smaller ring's nodes.
 };
 
 /// Warm buffers of RelateRings.
 struct RelationScratch {
   std::vector<CellShift> shift_before, shift_now;
-  std::vector<std::int64_t> ways;
+  std::vector<std::int64_t> displacements;
   std::vector<NodeRun> moved;
   std::vector<SharedNodes> shared;
   std::vector<std::uint32_t> newest;  // For FindSharedNodes.
   std::vector<std::uint64_t> nodes_before, nodes_now;
   std::vector<std::uint32_t> sample_count;  // By ring of the last frame.
-  std::vector<std::uint64_t> told;          // By number: nodes that the samples account for.
+  std::vector<std::uint64_t> accounted;     // By number: nodes that the samples account for.
   std::vector<std::uint8_t> linked_before, linked_now;
 };
 
-/// Finds the related rings (core/IDENTITIES.md): by the nodes that they share after rings
-/// have gone the way of their samples, or else of their velocities, or where they are; and by
-/// samples where these contradict. Relations come in no particular order, each pair once.
+/// Finds the related rings (core/IDENTITIES.md). Moves rings by the displacement of their samples,
+/// else by their velocities, else not at all, and counts the nodes that they share. If samples
+/// contradict the nodes, the samples decide. `relations` has each pair once, in no particular
+/// order.
 /// Cost: n log n in runs, rings and samples.
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& scratch,
                  std::vector<RingRelation>& relations);

@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 
-// How many times as many particles as a ring needs lie below its limit, on average. Of 32 expected
-// ones less than 16 are found in one case of 1,500: so few rings are made up for at little cost,
-// and more would cost every ring something.
+// Average number of particles below the limit of a ring, divided by the number of samples. With 2,
+// one ring of 1,500 finds fewer than 16 of its 32 expected particles and needs the second pass. A
+// larger value would cost time for every ring.
 constexpr std::uint64_t kSurplus = 2;
 
 bool HasLessHash(const ParticleSample& a, const ParticleSample& b) { return a.hash < b.hash; }
@@ -29,19 +29,20 @@ ParticleSample SampleAt(const TileCoordinate& tile, float x, float y, std::uint6
   return {HashOf(id), nearest_node(tile.x, x), nearest_node(tile.y, y), ring};
 }
 
-// Where each ring's samples go: as many places as it has particles, kMaxSamples at most.
+// Reserves a range of samples for each ring, one for each particle, but at most kMaxSamples.
 void ReserveSamples(std::span<const std::uint64_t> particle_count, RingSamples& s) {
   s.first_sample.clear();
-  std::uint32_t places = 0;
+  std::uint32_t count = 0;
   for (const std::uint64_t particles : particle_count) {
-    s.first_sample.push_back(places);
-    places += static_cast<std::uint32_t>(std::min<std::uint64_t>(particles, kMaxSamples));
+    s.first_sample.push_back(count);
+    count += static_cast<std::uint32_t>(std::min<std::uint64_t>(particles, kMaxSamples));
   }
-  s.samples.resize(places);
+  s.samples.resize(count);
   s.sample_count.assign(particle_count.size(), 0);
 }
 
-// A ring's samples are a heap: the one with the largest hash is the next to go.
+// Adds a sample to its ring. The samples of a ring are a heap with the largest hash on top; a full
+// heap drops its top.
 void TakeSample(const ParticleSample& sample, RingSamples& s) {
   ParticleSample* const first = s.samples.data() + s.first_sample[sample.ring];
   std::uint32_t& count = s.sample_count[sample.ring];
@@ -54,38 +55,38 @@ void TakeSample(const ParticleSample& sample, RingSamples& s) {
   std::push_heap(first, first + count, HasLessHash);
 }
 
-// Which hashes may be those of samples: a bit for each leading part of a hash. At most one in 32
-// others passes, one in thousands where samples are few.
+// A filter for the hashes of samples: one bit for each value of their leading bits. At most one in
+// 32 other hashes passes, one in thousands if there are few samples.
 class KnownHashes {
  public:
   KnownHashes(std::span<const ParticleSample> samples, std::vector<std::uint64_t>& bits)
       : shift_(64 - std::max(kMinBits, static_cast<int>(std::bit_width(32 * samples.size())))) {
     bits.assign(std::size_t{1} << (64 - shift_ - 6), 0);
     for (const ParticleSample& sample : samples) {
-      const std::uint64_t place = sample.hash >> shift_;
-      bits[place / 64] |= std::uint64_t{1} << (place % 64);
+      const std::uint64_t bit = sample.hash >> shift_;
+      bits[bit / 64] |= std::uint64_t{1} << (bit % 64);
     }
     bits_ = bits.data();
   }
 
   bool MayHave(std::uint64_t hash) const {
-    const std::uint64_t place = hash >> shift_;
-    return (bits_[place / 64] >> (place % 64) & 1) != 0;
+    const std::uint64_t bit = hash >> shift_;
+    return (bits_[bit / 64] >> (bit % 64) & 1) != 0;
   }
 
  private:
-  static constexpr int kMinBits = 15;  // 4 kB, which stay in the nearest cache.
+  static constexpr int kMinBits = 15;  // 4 kB fit into the first-level cache.
   int shift_;
   const std::uint64_t* bits_;
 };
 
-// Below which hashes a ring's samples are looked for.
+// The largest hash that the first pass accepts for a ring.
 std::uint64_t LimitOf(std::uint64_t particles) {
   constexpr std::uint64_t kWanted = kSurplus * kMaxSamples;
   return particles <= kWanted ? kNoLimit : kNoLimit / particles * kWanted;
 }
 
-// Of each tile the largest limit of the rings that its particles may be in.
+// Sets the limit of each tile: the largest limit of the rings that its particles may belong to.
 void SetTileLimits(const SampleInput& input, RingSamples& s) {
   const auto tiles = static_cast<std::uint32_t>(input.bins.tiles.size());
   s.tile_limit.assign(tiles, 0);
@@ -100,7 +101,7 @@ void SetTileLimits(const SampleInput& input, RingSamples& s) {
   });
 }
 
-// The particles that may be samples or have been.
+// Lists the particles that may become samples or were samples of the last frame.
 void ChooseParticles(const SampleInput& input, const KnownHashes& known,
                      const HashIndex<ParticleSample>& index, RingSamples& s) {
   const std::span<const BinStretch> stretches = input.bins.scratch.stretches;
@@ -122,7 +123,7 @@ void ChooseParticles(const SampleInput& input, const KnownHashes& known,
   });
 }
 
-// Calls visit(sample) for each chosen particle that is in a ring.
+// Calls visit(sample) for each chosen particle that belongs to a ring.
 template <typename Visit>
 void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) {
   const BinScratch& scratch = input.bins.scratch;
@@ -141,7 +142,7 @@ void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) 
   }
 }
 
-// The rings that lack samples get all of their particles to choose from.
+// The second pass: samples the rings that lack samples again, from all of their particles.
 void FillShortRings(const SampleInput& input, RingSamples& s) {
   bool any = false;
   for (std::size_t ring = 0; ring < s.ring_limit.size(); ++ring) {
@@ -179,7 +180,8 @@ void SampleRings(const SampleInput& input, std::span<const ParticleSample> previ
   ChooseParticles(input, KnownHashes(previous, s.known), index, s);
   s.found.clear();
   ForEachChosen(input, s, [&](const ParticleSample& now) {
-    // Only what is below the limit: a ring must not seem to be full by others.
+    // A sample of the last frame above the limit could fill the heap, and so hide that it lacks
+    // particles with smaller hashes.
     if (now.hash <= s.ring_limit[now.ring]) TakeSample(now, s);
     if (const ParticleSample* const before = index.Find(now.hash)) {
       s.found.push_back(

@@ -1,5 +1,4 @@
-// Particles of rings by their ids: which of them the next frame remembers, and where those that the
-// last frame remembered are now.
+// Samples the particles of each ring by their ids, and finds the last frame's samples again.
 #pragma once
 
 #include <cstdint>
@@ -14,24 +13,24 @@
 
 namespace partiemc {
 
-/// A sample of the last frame that is in a ring of this one.
+/// A sample of the last frame that is in a ring of this frame.
 struct FoundSample {
   std::uint32_t before = 0, now = 0;  ///< Its rings: index in the history, number in this frame.
-  CellShift way;                      ///< That it has gone.
+  CellShift displacement;             ///< Since the last frame.
 };
 
-/// Keeps its memory from frame to frame.
+/// Samples of a frame and their warm buffers.
 struct RingSamples {
   std::vector<ParticleSample> samples;  ///< In no order; `ring` is a number.
   std::vector<FoundSample> found;       ///< By `before`, then `now`.
 
-  // Working memory.
+  // Scratch.
   std::vector<std::uint32_t> first_sample, sample_count;  // By number.
-  std::vector<std::uint32_t> bucket;                      // Of the last frame's samples, by hash.
-  std::vector<std::uint64_t> known;                       // A bit for each leading part of a hash.
+  std::vector<std::uint32_t> bucket;                      // Index of the last frame's samples.
+  std::vector<std::uint64_t> known;                       // Bits of KnownHashes.
   std::vector<std::uint64_t> ring_limit, tile_limit;      // By number, by tile.
   struct Stretch {
-    std::vector<std::uint64_t> home_limit;  // By home.
+    std::vector<std::uint64_t> home_limit;  // By home (BinScratch): limit of its tile.
     std::vector<std::uint32_t> chosen;      // Particles.
   };
   std::vector<Stretch> stretches;  // By stretch of the bins.
@@ -43,18 +42,21 @@ struct SampleInput {
   const Crossings& crossings;
   const Components& components;
   std::span<const std::uint32_t> ring_of_component;  ///< Number of its outer ring, or kNoRing.
-  std::span<const std::uint64_t> particle_count;     ///< By number, as CountParticles counts.
+  std::span<const std::uint64_t> particle_count;     ///< By number (Components::CountParticles).
 };
 
-/// Samples are the particles with the least hashes of their ids, kMaxSamples of each outer ring (a
-/// bottom-k sketch: Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007): a random choice
-/// of places, the same whatever the order of the particles, and largely that of the next frame.
+/// Selects the samples of each outer ring, and finds the samples of the last frame.
 ///
-/// Of a ring of n particles twice as many as it needs lie below 2 kMaxSamples / n of the largest
-/// hash. One pass over the ids leaves aside each particle that is above this limit for all rings
-/// that its tile sees, and that the last frame does not remember. A ring that gets too few is
-/// sampled anew from all particles of the tiles that see it, so the samples are exact.
-/// Cost: a hash and a comparison for each particle; log n in samples for those that pass.
+/// The samples of a ring are its kMaxSamples particles with the smallest hashes of their ids: a
+/// bottom-k sketch (Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007). They are a
+/// random choice, independent of the order of the particles, and mostly the same in the next frame.
+///
+/// On average, 2 kMaxSamples of the n particles of a ring have hashes below 2 kMaxSamples / n of
+/// the largest hash. One pass over the ids skips each particle whose hash exceeds this limit for
+/// all rings near its tile, unless it is a sample of the last frame. If a ring gets too few
+/// samples, a second pass takes them from all particles of the tiles near it. The samples are
+/// therefore exact.
+/// Cost: a hash and a comparison for each particle; log kMaxSamples for each particle that passes.
 void SampleRings(const SampleInput& input, std::span<const ParticleSample> previous,
                  RingSamples& samples);
 

@@ -7,8 +7,8 @@
 namespace partiemc {
 namespace {
 
-// Velocities as integers: in units of a power of two, so small that the largest of them times the
-// number of particles fits into 62 bits. Sums are then exact, hence the same in any order.
+// Converts velocities to integers. The unit is a power of two, chosen such that the sum over all
+// particles fits into 62 bits. Sums are therefore exact and independent of the order.
 class VelocityUnits {
  public:
   explicit VelocityUnits(const Frame& frame) {

@@ -1,5 +1,4 @@
-// What ids and velocities of particles tell of rings: where the particles of a ring have gone, and
-// how fast it moves.
+// Follows rings by the ids and velocities of their particles.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +12,10 @@
 
 namespace partiemc {
 
-/// By numbers of the rings of a frame; keeps its memory from frame to frame.
+/// Samples of the rings, and warm buffers of FollowParticles.
 struct RingTracks {
   RingSamples by_id;
-  std::vector<std::int64_t> sum_x, sum_y;  // Working memory.
+  std::vector<std::int64_t> sum_x, sum_y;  // Scratch, by number.
 };
 
 struct TrackInput {
@@ -25,10 +24,10 @@ struct TrackInput {
   SampleInput particles;  ///< With the ids of the frame.
 };
 
-/// Follows the particles of a checked frame: samples as SampleRings takes them, and the velocities
-/// of `rings`, which are 0 before: means over the particles, in sums of integers, which have no
-/// order. Without ids there are no samples, without velocities they stay 0. Cost: that of
-/// SampleRings; with velocities, linear in particles.
+/// Samples the rings if the frame has ids (SampleRings), and sets the mean velocity of each outer
+/// ring if the frame has velocities. Sums of integers make the means independent of the order.
+/// Requires: a checked frame; the velocities of `rings` are 0.
+/// Cost: the cost of SampleRings; with velocities, also linear in particles.
 void FollowParticles(const TrackInput& input, const RingHistory& previous,
                      std::span<KnownRing> rings, RingTracks& tracks);
 

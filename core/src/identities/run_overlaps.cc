@@ -10,7 +10,7 @@
 namespace partiemc {
 namespace {
 
-constexpr std::size_t kMaxEncountersPerRun = 16;
+constexpr std::size_t kMaxOverlapsPerRun = 16;
 
 bool Fits(std::int64_t value) {
   return value >= std::numeric_limits<std::int32_t>::min() &&
@@ -21,7 +21,7 @@ bool ComesBefore(const NodeRun& a, const NodeRun& b) {
   return std::tie(a.row, a.first, a.ring) < std::tie(b.row, b.first, b.ring);
 }
 
-// Adds up what the same two rings share.
+// Sorts the pairs and adds up the nodes of equal pairs.
 void SumByPair(std::vector<SharedNodes>& shared) {
   std::sort(shared.begin(), shared.end(), [](const SharedNodes& x, const SharedNodes& y) {
     return std::tie(x.a, x.b) < std::tie(y.a, y.b);
@@ -51,7 +51,7 @@ void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of
     moved.push_back({static_cast<std::int32_t>(row), static_cast<std::int32_t>(first),
                      static_cast<std::int32_t>(last), run.ring});
   }
-  // As a rule they still are in order: nothing moves, or all of them alike.
+  // Usually still sorted: all runs move alike or not at all.
   if (std::is_sorted(moved.begin(), moved.end(), ComesBefore)) return;
   std::sort(moved.begin(), moved.end(), ComesBefore);
 }
@@ -60,24 +60,24 @@ void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared) {
   shared.clear();
   newest.clear();
-  const std::size_t most = kMaxEncountersPerRun * (a_runs.size() + b_runs.size());
-  std::size_t encounters = 0;
+  const std::size_t max_overlaps = kMaxOverlapsPerRun * (a_runs.size() + b_runs.size());
+  std::size_t overlaps = 0;
   std::size_t begin = 0;
   for (const NodeRun& a : a_runs) {
-    // What ends before this run begins meets no later one either.
+    // A run of b that ends before this run of a begins also ends before all later runs of a.
     while (begin < b_runs.size() &&
            std::tie(b_runs[begin].row, b_runs[begin].last) < std::tie(a.row, a.first)) {
       ++begin;
     }
     for (std::size_t k = begin;
          k < b_runs.size() && b_runs[k].row == a.row && b_runs[k].first <= a.last; ++k) {
-      if (encounters++ == most) {
+      if (overlaps++ == max_overlaps) {
         shared.clear();
         return;
       }
       const NodeRun& b = b_runs[k];
       const std::uint64_t nodes = NodeCount(std::max(a.first, b.first), std::min(a.last, b.last));
-      // As a rule a ring meets the one that it met last, row after row.
+      // Usually a ring overlaps the same ring as in the row before.
       if (a.ring >= newest.size()) newest.resize(a.ring + 1, kNoIndex);
       std::uint32_t& pair = newest[a.ring];
       if (pair != kNoIndex && shared[pair].b == b.ring) {

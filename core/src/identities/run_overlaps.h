@@ -1,4 +1,4 @@
-// The lattice nodes that rings of two frames share, where they are or after having been moved.
+// Counts the lattice nodes that rings of two frames share, with or without moving the rings first.
 #pragma once
 
 #include <cstdint>
@@ -9,29 +9,29 @@
 
 namespace partiemc {
 
-/// How far something moves, in whole cells.
+/// A displacement in whole cells.
 struct CellShift {
   std::int64_t columns = 0, rows = 0;
   friend bool operator==(const CellShift&, const CellShift&) = default;
 };
 
-/// Nodes that ring `a` of one set of runs and ring `b` of another share.
+/// Number of nodes that ring `a` of one set of runs shares with ring `b` of another set.
 struct SharedNodes {
   std::uint32_t a = 0, b = 0;
   std::uint64_t nodes = 0;
 };
 
-/// `runs` moved by the shifts of their rings, by row, then column; they may come to overlap. What
-/// would leave the range of rows and columns is left out.
+/// Writes `runs`, moved by the shifts of their rings, to `moved`, sorted by row, then column. Moved
+/// runs may overlap. Drops runs that leave the range of rows and columns.
 void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of_ring,
               std::vector<NodeRun>& moved);
 
-/// Writes to `shared` the pairs of rings that share nodes, by a, then b, each once. `a_runs` are
-/// sorted by row, then column; `b_runs` are disjoint too. `newest` is scratch, by ring of `a_runs`.
-/// Moved rings that pile up on each other could meet any number of times: beyond 16 encounters a
-/// run, `shared` is left empty. Runs that are where they were, or moved without collisions, meet
-/// at most once each. Cost: linear in runs and their rings, n log n in pairs of rings, at worst in
-/// encounters.
+/// Writes to `shared` the pairs of rings that share nodes, each once, sorted by a, then b. `newest`
+/// is scratch, by ring of `a_runs`.
+/// Requires: both sets of runs sorted by row, then column, and `b_runs` disjoint. Rings that were
+/// moved onto each other could overlap without limit. If there are more than 16 overlaps a run,
+/// `shared` is therefore left empty.
+/// Cost: linear in runs, rings and overlaps, n log n in pairs of rings.
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared);
 

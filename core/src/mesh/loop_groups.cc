@@ -9,7 +9,7 @@
 namespace partiemc {
 namespace {
 
-// Points of a batch: a few hundred microseconds of work.
+// Smallest number of points of a batch: a few hundred microseconds of work.
 constexpr std::size_t kBatchPoints = 2048;
 
 }  // namespace
@@ -26,12 +26,12 @@ void LoopGroups::EndLoop(std::uint32_t group, bool reversed) {
   groups_.push_back(group);
 }
 
-// Sorts the loops by group, those of a group in the order in which they came.
+// Sorts the loops by group, stably.
 void LoopGroups::SortLoops() {
   const std::size_t group_count =
       groups_.empty() ? 0 : std::size_t{*std::max_element(groups_.begin(), groups_.end())} + 1;
-  // Counted one place too far, so that after the sums each group's start is where its end belongs,
-  // and gets there as its loops are dealt.
+  // Counting sort. Counts are stored two elements further, so that loop_offsets_[k + 1] is first
+  // the start of group k and, after its loops were placed, its end.
   loop_offsets_.assign(group_count + 2, 0);
   for (const std::uint32_t group : groups_) ++loop_offsets_[group + 2];
   std::partial_sum(loop_offsets_.begin(), loop_offsets_.end(), loop_offsets_.begin());
@@ -42,10 +42,10 @@ void LoopGroups::SortLoops() {
   loop_offsets_.pop_back();
 }
 
-// Deals the groups to batches; returns how many there are.
+// Divides the groups into batches; returns the number of batches.
 std::size_t LoopGroups::MakeBatches() {
   std::size_t count = 0;
-  std::size_t points = kBatchPoints;  // Of the last batch.
+  std::size_t points = kBatchPoints;  // In the last batch.
   for (std::size_t group = 0; group + 1 < loop_offsets_.size(); ++group) {
     if (points >= kBatchPoints) {
       if (count == batches_.size()) batches_.emplace_back();
@@ -64,8 +64,9 @@ bool LoopGroups::TriangulateGroup(std::span<const double> points, std::size_t gr
   const auto strip = [&](std::uint32_t loop, std::uint32_t other) {
     return batch.strip.Triangulate(points, PointsOf(loop), PointsOf(other), batch.triangles);
   };
-  // The walkers go the other way round when the loops change places: what stops them one way, such
-  // as a pocket of the ring, hardly ever does the other way, while it always does from elsewhere.
+  // Exchanging the loops reverses the direction of the walkers. An obstacle, such as a pocket of
+  // the ring, rarely stops them in both directions; starting elsewhere in the same direction fails
+  // again.
   if (loops.size() == 2 && (strip(loops[0], loops[1]) || strip(loops[1], loops[0]))) return true;
   batch.points.clear();
   batch.offsets.assign(1, 0);

@@ -1,4 +1,4 @@
-// Closed loops in groups that are triangulated apart from each other, in parallel.
+// Triangulates groups of closed loops in parallel, each group by itself.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +20,9 @@ class LoopGroups {
  public:
   void Clear();
 
-  /// Adds a point to the loop that is being made.
+  /// Appends a point to the current loop.
   void AddPoint(std::uint32_t point) { points_.push_back(point); }
-  /// Adds the points [first, last), one after the other.
+  /// Appends the points [first, last).
   void AddPoints(std::uint32_t first, std::uint32_t last) {
     points_.resize(points_.size() + (last - first));
     std::iota(points_.end() - (last - first), points_.end(), first);
@@ -30,7 +30,7 @@ class LoopGroups {
   void AddPoints(std::span<const std::uint32_t> points) {
     points_.insert(points_.end(), points.begin(), points.end());
   }
-  /// Ends that loop; with `reversed`, its points go the other way round.
+  /// Ends the current loop. `reversed` reverses its direction.
   void EndLoop(std::uint32_t group, bool reversed = false);
 
   /// Appends the triangles of all groups, in the order of the groups, and forgets the loops.
@@ -41,10 +41,10 @@ class LoopGroups {
                    std::vector<std::uint32_t>& broken);
 
  private:
-  // Neighbouring groups that one task triangulates, one after the other.
+  // Successive groups that one task triangulates.
   struct Batch {
     std::size_t first_group = 0, last_group = 0;
-    std::vector<std::uint32_t> points, offsets;  // Of one group.
+    std::vector<std::uint32_t> points, offsets;  // Loops of the current group.
     std::vector<std::uint32_t> triangles;
     LoopStrip strip;
     Triangulator triangulator;
@@ -64,9 +64,9 @@ class LoopGroups {
 
   std::vector<std::uint32_t> points_, offsets_;  // Loop k has [offsets_[k], offsets_[k + 1]).
   std::vector<std::uint32_t> groups_;            // By loop.
-  std::vector<std::uint32_t> loops_;             // By group.
-  std::vector<std::uint32_t> loop_offsets_;      // Group k has [loop_offsets_[k], [k + 1]) of them.
-  std::vector<Batch> batches_;                   // As many as any frame has had.
+  std::vector<std::uint32_t> loops_;             // Sorted by group.
+  std::vector<std::uint32_t> loop_offsets_;      // By group: its range of loops_.
+  std::vector<Batch> batches_;                   // Kept warm; a frame uses the first ones.
 };
 
 }  // namespace partiemc

@@ -28,8 +28,9 @@ std::size_t Nearest(std::span<const double> points, std::span<const std::uint32_
 
 }  // namespace
 
-/// Lists the vertices as the walkers meet them: the region is to the left of both loops, so one
-/// goes along its loop and the other against it. False if a coordinate is out of the domain.
+/// Lists the vertices in the order of the walkers. The region lies to the left of both loops, so
+/// one walker follows its loop and the other walks against its loop. False if a coordinate is
+/// outside the domain of predicates.h.
 bool LoopStrip::Collect(std::span<const double> points, std::span<const std::uint32_t> loop,
                         std::span<const std::uint32_t> other) {
   bool in_domain = true;
@@ -49,8 +50,8 @@ bool LoopStrip::Collect(std::span<const double> points, std::span<const std::uin
   return in_domain;
 }
 
-/// How often a loop turns round itself, counter-clockwise: how often it comes to head right on its
-/// way from down to up, less how often on its way from up to down.
+/// The turning number of a loop: counter-clockwise minus clockwise turns through the heading
+/// "right", counted at the local minima and maxima in the order of SweepsBefore.
 int LoopStrip::Turns(std::span<const Vertex> vertices) {
   int turns = 0;
   for (std::size_t k = 1; k < vertices.size(); ++k) {
@@ -72,8 +73,8 @@ bool LoopStrip::Triangulate(std::span<const double> points, std::span<const std:
   const int turns = Turns(loop_);
   if ((turns != 1 && turns != -1) || Turns(other_) != turns) return false;
   const std::size_t size_before = triangles.size();
-  // Every point joins the front and every triangle takes one from it, which never has less than
-  // two: there are not more triangles than points.
+  // Every point joins the front once, and every triangle removes one point of it, so there are at
+  // most `count` triangles.
   const std::size_t count = loop.size() + other.size();
   triangles.resize(size_before + 3 * count);
   std::uint32_t* next = triangles.data() + size_before;
@@ -92,7 +93,7 @@ bool LoopStrip::Triangulate(std::span<const double> points, std::span<const std:
   auto on_loop = loop_.cbegin() + 1;
   auto on_other = other_.cbegin() + 1;
   while (on_loop != loop_.cend() || on_other != other_.cend()) {
-    // Who makes the shorter way across goes next.
+    // The walker whose next point is nearer to the other walker advances.
     const bool along_loop =
         on_other == other_.cend() ||
         (on_loop != loop_.cend() && SquaredDistance(on_loop->point, last->point) <=

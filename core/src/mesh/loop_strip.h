@@ -1,5 +1,4 @@
-// Triangulates the region between two loops in linear time, where walking along both at once will
-// do.
+// Triangulates the region between two parallel loops in linear time, if it is simple enough.
 #pragma once
 
 #include <cstdint>
@@ -10,30 +9,33 @@
 
 namespace partiemc {
 
-/// A way round Triangulator (triangulate.h) for regions like a ring: two loops that run side by
-/// side, as a contour does and the staircase of the cells inside it.
+/// A fast alternative to Triangulator (triangulate.h) for a region between two loops that run side
+/// by side, such as a ring and the staircase of the cells inside it.
 ///
-/// Method: two walkers start next to each other, one on each loop, and go round once, whichever is
-/// behind first. The front is a polyline from one walker to the other. At every step the new point
-/// cuts triangles off its end of the front as long as they turn counter-clockwise, then joins it.
+/// Method: two walkers start next to each other, one on each loop, and walk around once. The front
+/// is a polyline from one walker to the other. At each step one walker advances to its next point.
+/// This point cuts off triangles at its end of the front while they are counter-clockwise, and then
+/// joins the front.
 ///
-/// Why what comes out is right: each triangle takes two sides of the front away and puts its third
-/// in their place, so that the sides of all triangles and of the front always are, but for sides
-/// that cancel, the first front and the ways that the walkers have come. In the end both stand
-/// where they began. If the front is what it was at first, a single side, nothing but the loops is
-/// left: as in side_balance.h, each point lies in as many triangles as the loops wind round it,
-/// which is once in the region, never elsewhere. So every choice on the way is free; one that was
-/// wrong leaves a front that is not used up, and the strip is refused.
-/// One object per thread; it keeps its buffers warm.
+/// Correctness: each triangle replaces two sides of the front by its third side. Apart from sides
+/// that cancel, the sides of the triangles and the front therefore always sum to the first front
+/// plus the paths of the walkers. After one round both walkers are back at their starts. If the
+/// front is then again the single first side, only the loops remain. As in side_balance.h, the
+/// number of triangles around a point is then the winding number of the loops: 1 inside the region,
+/// 0 elsewhere. Any choice of walker is therefore correct; a bad choice only leaves a longer front,
+/// and Triangulate returns false.
+///
+/// Keeps its buffers warm. Use one object per thread.
 class LoopStrip {
  public:
-  /// Appends as many triangles as the loops have points together, all strictly counter-clockwise by
-  /// Orientation. Or returns false, with `triangles` as it was: then nothing is known of the loops.
-  /// Refuses loops that do not turn once each, one of them clockwise, whatever they bound, and
-  /// coordinates out of the domain of predicates.h.
-  /// Requires: indices in range, no empty loop, and loops that bound a region as Triangulator wants
-  /// them. That is not checked: of loops that run into themselves, triangles may overlap.
-  /// Cost: linear in the points, with two or three Orientations and two distances for each.
+  /// Appends one triangle for each point of the loops, all strictly counter-clockwise by
+  /// Orientation. Otherwise returns false and leaves `triangles` unchanged. Reasons:
+  ///   - the front is not used up;
+  ///   - the loops do not turn once each, in opposite directions;
+  ///   - a coordinate is outside the domain of predicates.h.
+  /// Requires: indices in range, no empty loop, and loops that meet the requirements of
+  /// Triangulator. This is not checked: if the loops cross, triangles may overlap.
+  /// Cost: linear in the points: two or three Orientations and two distances for each.
   [[nodiscard]] bool Triangulate(std::span<const double> points,
                                  std::span<const std::uint32_t> loop,
                                  std::span<const std::uint32_t> other,
@@ -49,8 +51,8 @@ class LoopStrip {
   bool Collect(std::span<const double> points, std::span<const std::uint32_t> loop,
                std::span<const std::uint32_t> other);
 
-  std::vector<Vertex> loop_, other_;  // Once round, from where the walkers start back to there.
-  std::vector<Vertex> front_;         // A walker's end grows down from the middle, the other's up.
+  std::vector<Vertex> loop_, other_;  // In the order of the walkers; the first vertex is repeated.
+  std::vector<Vertex> front_;         // Grows from the middle in both directions.
 };
 
 }  // namespace partiemc

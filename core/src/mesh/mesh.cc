@@ -13,16 +13,16 @@
 namespace partiemc {
 namespace {
 
-// One mesh in the making. Points of the connectivity: the points of the rings (for
-// `farthest-particle`: the middles of all segments), then the nodes of the lattice that triangles
-// name. Where these are not known yet when loops are triangulated, the corners of the staircases
-// stand in for them.
+// The state of BuildMesh. Points are numbered as follows: first the points of the rings (for
+// `farthest-particle` the middles of all segments), then the lattice nodes that triangles use. If
+// the nodes are not numbered yet when loops are triangulated, the corners of the staircases take
+// their place until PutNodesInPlace.
 struct Work {
   const MeshInput& input;
   MeshScratch& scratch;
   Mesh& mesh;
   std::vector<std::uint32_t>& tangled;
-  std::size_t ring_points = 0;  // Points of the connectivity that belong to rings.
+  std::size_t ring_points = 0;  // Number of points before the lattice nodes.
   std::uint64_t interior_cells = 0;
 
   bool MovesVertices() const { return TraitsOf(input.parameters.placement).takes_particles; }
@@ -52,7 +52,7 @@ void CollectRingPoints(Work& w) {
   w.ring_points = w.mesh.PointCount();
 }
 
-// Calls visit(CellRectangle) for each rectangle of the fill; `grid` has one for every cell.
+// Calls visit(CellRectangle) for each rectangle of the fill; `grid` has one for each cell.
 template <typename Visit>
 void ForEachRectangle(const Work& w, Visit visit) {
   for (const CellRectangle& rectangle : w.scratch.rectangles) visit(rectangle);
@@ -66,10 +66,11 @@ void ForEachRectangle(const Work& w, Visit visit) {
   }
 }
 
-// Numbers the nodes that rectangles have and makes two triangles of each. Every corner of
-// a staircase is among these nodes: a rectangle that is next to a node without having its corner
-// there has two neighbours, or all, of the four cells around it. Those around a corner, one or
-// three that are interior, or two across from each other, cannot be paired like that.
+// Numbers the corners of the rectangles and makes two triangles of each rectangle. Every corner of
+// a staircase is also a corner of a rectangle. Proof: the four cells around a staircase corner
+// contain one or three interior cells, or two diagonal ones. A rectangle that touches a node
+// without having a corner there covers two adjacent cells of the four, or all. Such rectangles
+// cannot cover the interior cells around a staircase corner.
 void FillRectangles(Work& w) {
   w.scratch.rectangles.clear();
   if (w.input.parameters.fill == Fill::kGreedy) {
@@ -94,7 +95,7 @@ void FillRectangles(Work& w) {
   });
 }
 
-// The number of the node of each corner of the staircases.
+// Finds the node number of each staircase corner.
 void NumberCorners(Work& w) {
   const std::vector<TilePlace>& corners = w.scratch.staircases.corners;
   NodeVertices& nodes = w.scratch.nodes;
@@ -108,7 +109,7 @@ void NumberCorners(Work& w) {
                          [&](const TilePlace& node) { return nodes.At(node); });
 }
 
-// Appends the corners of the staircases to the points; a node that loops pass twice comes twice.
+// Appends the staircase corners to the points. A node that loops pass twice is appended twice.
 void AppendCorners(Work& w) {
   for (const TilePlace& corner : w.scratch.staircases.corners) {
     const Point point = NodePoint(w.input.directory, corner, w.input.scale.cell_size);
@@ -123,15 +124,15 @@ void AppendNodes(Work& w) {
   w.scratch.nodes.AppendPoints(w.input.directory, w.input.scale.cell_size, w.mesh.points);
 }
 
-// Puts the nodes in the place of the corners of the staircases.
+// Replaces the staircase corners, in points and triangles, by the nodes.
 void PutNodesInPlace(Work& w) {
   NumberCorners(w);
   w.mesh.points.resize(2 * w.ring_points);
   const auto renumber = [&] {
-    if (w.scratch.corner_numbers.empty()) return;  // Then no triangle has one.
+    if (w.scratch.corner_numbers.empty()) return;
     const auto first = static_cast<std::uint32_t>(w.ring_points);
     for (std::uint32_t& point : w.mesh.triangles) {
-      // Without a branch, which would be unpredictable.
+      // Branch-free, since the branch would be unpredictable.
       const bool is_corner = point >= first;
       const std::uint32_t number = w.scratch.corner_numbers[is_corner ? point - first : 0];
       point = is_corner ? number : point;
@@ -140,7 +141,7 @@ void PutNodesInPlace(Work& w) {
   ParallelInvoke(renumber, [&] { AppendNodes(w); });
 }
 
-// Loops are grouped by components, each named by its outer ring.
+// Adds the rings as loops. The group of a loop is the outer ring of its component.
 void AddRingLoops(Work& w) {
   const std::vector<std::uint32_t>& offsets =
       w.MovesVertices() ? w.input.topology.offsets : w.input.rings.offsets;
@@ -151,8 +152,8 @@ void AddRingLoops(Work& w) {
   }
 }
 
-// The corners of interior cells are inside, in one component: cells stay on their side of every
-// ring, or were excluded.
+// Adds the staircases as loops. The corners of a loop lie in one component, since the interior
+// contains no cell that a ring touches.
 void AddStaircaseLoops(Work& w, bool reversed) {
   const Staircases& staircases = w.scratch.staircases;
   const RingTopology& rings = w.input.topology;
@@ -171,9 +172,8 @@ void TriangulateLoops(Work& w, TriangleClass triangle_class) {
   w.mesh.classes.resize(w.mesh.triangles.size() / 3, triangle_class);
 }
 
-// What rings and staircases bound: the band between them, all of the inside for `polygon`, and for
-// `conforming` the interior, as the corners of the staircases are the only points that the band has
-// there.
+// Triangulates the regions bounded by rings and staircases: the band, for `polygon` the whole
+// inside, and for `conforming` also the interior, whose boundary has only staircase corners.
 void TriangulateByLoops(Work& w) {
   w.scratch.loops.Clear();
   AddRingLoops(w);
@@ -184,9 +184,9 @@ void TriangulateByLoops(Work& w) {
   TriangulateLoops(w, TriangleClass::kInterior);
 }
 
-// Finds the shapes of the interior and triangulates everything. The rectangles have a thread of
-// their own where there are several: one long ring is swept by one. A single thread numbers the
-// nodes first, so that no triangle has to be renumbered. Both make the same triangles.
+// Traces the staircases and triangulates everything. With several threads, rectangles run in
+// parallel with the band, because a single long ring uses only one thread. A single thread numbers
+// the nodes first, which avoids renumbering. Both ways produce the same triangles.
 void TriangulateAll(Work& w) {
   const auto trace = [&] {
     TraceStaircases(w.input.directory, w.scratch.interior, w.scratch.staircases);
@@ -211,8 +211,8 @@ void TriangulateAll(Work& w) {
   w.mesh.classes.resize(w.mesh.triangles.size() / 3, TriangleClass::kInterior);
 }
 
-// Replaces the middles of the segments by the vertices of the rings. A triangle of which two
-// vertices became one, or whose ring collapsed, goes.
+// Replaces the middles of the segments by the vertices of the rings. Drops the triangles of
+// collapsed rings and the triangles with two equal vertices.
 void MoveVertices(Work& w) {
   const std::size_t target_ring_points = w.input.rings.PointCount();
   const auto moved = [&](std::uint32_t point) {
@@ -239,8 +239,8 @@ void MoveVertices(Work& w) {
   w.mesh.points.insert(w.mesh.points.end(), w.scratch.points.begin(), w.scratch.points.end());
 }
 
-// Triangles of the band by Euler's formula: n - 2 chi, where chi of the band is that of the rings'
-// inside less that of the interior cells.
+// The number of triangles of the band by Euler's formula, N - 2 chi. N counts the points on rings
+// and staircases, chi = chi(inside of the rings) - chi(interior cells).
 std::uint64_t ExpectedBandTriangles(const Work& w) {
   const Staircases& staircases = w.scratch.staircases;
   std::int64_t rings = 0;

@@ -20,17 +20,18 @@ namespace partiemc {
 
 /// Warm buffers of BuildMesh.
 struct MeshScratch {
-  std::vector<BitRows> interior;  // The interior cells that no ring touches, by tile.
+  std::vector<BitRows> interior;  // By tile: interior cells that no ring touches.
   Staircases staircases;
   MergeScratch merge;
   std::vector<CellRectangle> rectangles;
   LoopGroups loops;
   NodeVertices nodes;
-  std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: of its node.
-  std::vector<std::uint32_t> triangles;       // Of the rectangles.
-  std::vector<double> points;                 // Of a connectivity that is not yet the mesh's.
+  std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: number of its node.
+  std::vector<std::uint32_t> triangles;       // Two for each rectangle.
+  std::vector<double> points;                 // Lattice nodes, while ring points are replaced.
 };
 
+/// Results of the earlier stages.
 struct MeshInput {
   const TileDirectory& directory;
   const Crossings& crossings;
@@ -42,13 +43,12 @@ struct MeshInput {
   const Scale& scale;
 };
 
-/// Fills the rings with triangles as parameters.fill says and sets `triangles`, `triangles_grid`
-/// and `folded_triangles` of the statistics.
+/// Fills the rings with triangles by `parameters.fill`. Sets `triangles`, `triangles_grid` and
+/// `folded_triangles` of the statistics.
 ///
 /// The band between the rings and the staircase of the interior cells is triangulated without new
-/// points, and is the same for grid, greedy and conforming. `farthest-particle` takes its
-/// connectivity from the middles of the segments and only then moves the vertices, so that a
-/// triangle folds where the vertices do.
+/// points. It is the same for `grid`, `greedy` and `conforming`. `farthest-particle` triangulates
+/// the middles of the segments and then moves the vertices, so a triangle folds if its vertices do.
 /// Components that cannot be triangulated, which is a bug, are named in `tangled` by their outer
 /// rings of RingTopology; the mesh is then worth nothing.
 /// Cost: n log n in the points of rings and staircases, linear in cells.

@@ -1,4 +1,4 @@
-// Triangulates monotone polygons while their vertices come in from below: the second half of the
+// Triangulates monotone polygons whose vertices arrive from bottom to top: the second half of the
 // triangulation by a sweep (triangulate.h).
 #pragma once
 
@@ -12,10 +12,10 @@
 
 namespace partiemc {
 
-/// Pieces whose boundary is two chains, a left and a right one, that rise in the order of
-/// SweepsBefore from a common first vertex to a common last one. The vertices of both chains are
-/// added in that order, and every triangle is emitted as soon as it is known.
-/// Cost: linear in the vertices. Allocates nothing once warm. Not safe to share between threads.
+/// A set of monotone polygons, called pieces. A left and a right chain bound a piece; both rise in
+/// the order of SweepsBefore from a common first vertex to a common last one. The caller adds the
+/// vertices of both chains in this order. Each triangle is emitted as early as possible.
+/// Cost: linear in the vertices. Allocates nothing once warm. Use one object per thread.
 class MonotonePieces {
  public:
   struct Vertex {
@@ -23,17 +23,18 @@ class MonotonePieces {
     std::uint32_t index = 0;
   };
 
-  /// What is not triangulated yet of a piece, as a stack: the last vertex of one chain at the
-  /// bottom, and above it the end of the other chain, which turns nowhere towards the inside, so
-  /// that no triangle could be cut off. A handle, to be used with the object that started it only.
+  /// The part of a piece that is not triangulated yet, as a stack. Its bottom is the last vertex of
+  /// one chain, the vertices above are the end of the other chain. That end nowhere turns towards
+  /// the inside, so no triangle can be cut off. Valid only with the object that started it.
   struct Piece {
     std::uint32_t top = kNoIndex;
-    bool is_left_chain = false;  ///< Which chain lies on the stack; no meaning for one vertex.
+    bool is_left_chain =
+        false;  ///< Whether the stack holds the left chain, if it has two vertices.
 
     bool IsEmpty() const { return top == kNoIndex; }
   };
 
-  /// Forgets all pieces. Triangles will be appended to `triangles`, three indices each,
+  /// Drops all pieces. Later calls append triangles to `triangles`: three indices each,
   /// counter-clockwise.
   void Clear(std::vector<std::uint32_t>& triangles) {
     triangles_ = &triangles;
@@ -47,13 +48,14 @@ class MonotonePieces {
     return piece;
   }
 
-  /// The vertex that was added last. Requires: the piece is not empty, here and below.
+  /// The vertex added last.
+  /// Requires, as all methods below: the piece is not empty.
   Vertex LastVertex(const Piece& piece) const { return nodes_[piece.top].vertex; }
 
   void AddToLeftChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, true); }
   void AddToRightChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, false); }
 
-  /// Adds the last vertex of both chains, which sees the whole stack, and leaves the piece empty.
+  /// Adds the common last vertex, which sees the whole stack. The piece is empty afterwards.
   void Finish(Piece& piece, const Vertex& last) {
     while (nodes_[piece.top].below != kNoIndex) {
       EmitTopmost(piece, last);
@@ -65,12 +67,12 @@ class MonotonePieces {
  private:
   struct Node {
     Vertex vertex;
-    std::uint32_t below = kNoIndex;  // In a stack, or in the list of unused nodes.
+    std::uint32_t below = kNoIndex;  // Next node of the stack, or of the list of unused nodes.
   };
 
   void Add(Piece& piece, const Vertex& vertex, bool to_left_chain) {
     if (piece.is_left_chain != to_left_chain) {
-      // From the other chain the vertex sees the whole stack, and the last vertex stays in sight.
+      // A vertex of the other chain sees the whole stack. The last vertex stays visible for later.
       const Vertex last = LastVertex(piece);
       Finish(piece, vertex);
       PushNode(piece, last);
@@ -84,7 +86,8 @@ class MonotonePieces {
     PushNode(piece, vertex);
   }
 
-  /// Whether the two topmost vertices and `vertex`, next on their chain, make a triangle inside.
+  /// Whether the two topmost vertices and `vertex`, the next one of their chain, form a triangle
+  /// inside the piece.
   bool TopmostTurnsInward(const Piece& piece, const Vertex& vertex) const {
     const Node& upper = nodes_[piece.top];
     const int turn =
@@ -100,7 +103,7 @@ class MonotonePieces {
     triangles_->insert(triangles_->end(), {first, second, vertex.index});
   }
 
-  // By value: the vertex may be one of the nodes, which move when there are more of them.
+  // Takes `vertex` by value: it may refer to an element of nodes_, which may reallocate.
   void PushNode(Piece& piece, Vertex vertex) {
     std::uint32_t node = unused_;
     if (node == kNoIndex) {

@@ -1,4 +1,4 @@
-// Which vertices of a mesh are nodes of the lattice.
+// Numbers the lattice nodes that are vertices of a mesh.
 #pragma once
 
 #include <array>
@@ -14,44 +14,46 @@
 
 namespace partiemc {
 
-/// Nodes that a mesh names, as bits by tile: a node's number follows from the bits before it.
+/// A set of nodes, stored as bits by tile. The number of a node is the count of bits before it.
 /// Keeps its memory warm from frame to frame.
 class NodeVertices {
  public:
-  /// Forgets all nodes. Cost: linear in tiles.
+  /// Removes all nodes.
+  /// Cost: linear in tiles.
   void Clear(std::size_t tile_count) { tiles_.assign(tile_count, {}); }
 
-  /// Names a node, once or several times.
-  void Add(const TilePlace& node) { tiles_[node.tile].named[node.j] |= std::uint32_t{1} << node.i; }
+  /// Adds a node. Adding it again has no effect.
+  void Add(const TilePlace& node) { tiles_[node.tile].nodes[node.j] |= std::uint32_t{1} << node.i; }
 
-  /// Numbers the nodes by tile, row, column, from `first` on.
+  /// Numbers the nodes by tile, row and column, starting with `first`.
   void Number(std::uint32_t first);
 
-  /// Appends the nodes in the order of their numbers, interleaved and in world units.
-  /// Requires: they were numbered.
+  /// Appends the positions of the nodes in the order of their numbers, interleaved, in world units.
+  /// Requires: Number was called after the last Add.
   void AppendPoints(const TileDirectory& directory, double cell_size,
                     std::vector<double>& points) const;
 
-  /// The point of a node. Requires: it was named before Number.
+  /// The number of a node.
+  /// Requires: the node was added before Number.
   std::uint32_t At(const TilePlace& node) const {
     const Tile& tile = tiles_[node.tile];
     const std::uint32_t before = (std::uint32_t{1} << node.i) - 1;
     return tile.first + tile.before_row[node.j] +
-           static_cast<std::uint32_t>(CountBits(tile.named[node.j] & before));
+           static_cast<std::uint32_t>(CountBits(tile.nodes[node.j] & before));
   }
 
  private:
   struct Tile {
-    BitRows named{};
-    std::array<std::uint16_t, kTileSize> before_row;  // Nodes of the tile in the rows below.
-    std::uint32_t first;                              // Points before those of the tile.
+    BitRows nodes{};
+    std::array<std::uint16_t, kTileSize> before_row;  // Number of nodes of the tile in lower rows.
+    std::uint32_t first;                              // Number of its first node.
   };
 
   std::vector<Tile> tiles_;
   std::size_t count_ = 0;
 };
 
-/// Where a node lies, in world units.
+/// Position of a node in world units.
 inline Point NodePoint(const TileDirectory& directory, const TilePlace& node, double cell_size) {
   const auto world = [cell_size](std::int32_t tile, int offset) {
     return static_cast<double>((std::int64_t{tile} << kTileShift) + offset) * cell_size;
@@ -66,7 +68,7 @@ inline void NodeVertices::Number(std::uint32_t first) {
     tile.first = next;
     std::array<std::uint16_t, kTileSize> counts;
     for (int j = 0; j < kTileSize; ++j) {
-      counts[j] = static_cast<std::uint16_t>(CountBits(tile.named[j]));
+      counts[j] = static_cast<std::uint16_t>(CountBits(tile.nodes[j]));
     }
     std::exclusive_scan(counts.begin(), counts.end(), tile.before_row.begin(), std::uint16_t{0});
     next += std::uint32_t{tile.before_row.back()} + counts.back();
@@ -82,7 +84,7 @@ inline void NodeVertices::AppendPoints(const TileDirectory& directory, double ce
   for (std::uint32_t k = 0; k < tiles_.size(); ++k) {
     for (int j = 0; j < kTileSize; ++j) {
       const double y = NodePoint(directory, {k, 0, j}, cell_size).y;
-      for (std::uint32_t rest = tiles_[k].named[j]; rest != 0; rest &= rest - 1) {
+      for (std::uint32_t rest = tiles_[k].nodes[j]; rest != 0; rest &= rest - 1) {
         *next++ = NodePoint(directory, {k, std::countr_zero(rest), j}, cell_size).x;
         *next++ = y;
       }

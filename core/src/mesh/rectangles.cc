@@ -7,8 +7,8 @@
 namespace partiemc {
 namespace {
 
-// Takes the free cells of row j from (tile, i) eastward into `span`, across tiles; returns their
-// number.
+// Moves the free cells of row j from (tile, i) to the right into `span`, across tiles; returns
+// their number.
 int TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t tile, int i,
             int j) {
   int width = 0;
@@ -28,9 +28,9 @@ int TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t
   }
 }
 
-// Takes the rows above the span's as long as all of their cells are free, `row` being the first of
-// them in rows from the start of the span's tiles. Returns the row that it ends before; moves the
-// span there. A tile's rows lie together in memory: they are looked at tile by tile.
+// Takes the rows above `span` while all of their cells are free. `row` is the first of these rows,
+// counted from the first row of the span's tiles. Returns the first row that is not taken, and
+// moves `span` to the tiles of that row. Works tile by tile, as the rows of a tile are contiguous.
 int TakeRowsAbove(const TileDirectory& directory, MergeScratch& scratch, int row) {
   while (true) {
     const int first = row % kTileSize;
@@ -85,8 +85,8 @@ std::uint64_t CountCells(std::span<const BitRows> cells) {
 void MergeCells(const TileDirectory& directory, std::span<const BitRows> interior,
                 MergeScratch& scratch, std::vector<CellRectangle>& rectangles) {
   scratch.free.assign(interior.begin(), interior.end());
-  // Tiles are sorted by row: scanning each row of cells through all tiles of a tile row keeps the
-  // scan in reading order, so that tile borders leave no trace in the rectangles.
+  // Scans each row of cells across all tiles of a tile row, so that the rectangles do not depend on
+  // the borders of tiles. Tiles are sorted by row.
   for (std::uint32_t first = 0; first < interior.size();) {
     std::uint32_t last = first;
     while (last < interior.size() && directory[last].y == directory[first].y) ++last;

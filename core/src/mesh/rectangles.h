@@ -1,4 +1,4 @@
-// The cover of the interior cells, which are given as rows of bits by tile, by rectangles.
+// Covers the interior cells with rectangles (paper, section 3.8).
 #pragma once
 
 #include <array>
@@ -11,28 +11,29 @@
 
 namespace partiemc {
 
-/// `width` x `height` cells from the cell `corner` on, to the right and upwards.
+/// A rectangle of `width` x `height` cells.
 struct CellRectangle {
-  TilePlace corner;
+  TilePlace corner;  ///< Its lower left cell.
   int width, height;
 };
 
-/// Its corners, counter-clockwise from the lower left one. Requires: all of its cells are interior,
-/// so that there are tiles all along its sides.
+/// The corner nodes, counter-clockwise from the lower left one.
+/// Requires: all cells of the rectangle are interior, so that every tile along its sides exists.
 std::array<TilePlace, 4> CornersOf(const TileDirectory& directory, const CellRectangle& rectangle);
 
-/// The number of cells in rows of bits.
+/// Number of cells; `cells` has one bit for each cell, by tile.
 std::uint64_t CountCells(std::span<const BitRows> cells);
 
 /// Warm buffers of MergeCells.
 struct MergeScratch {
   std::vector<BitRows> free;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> span;  // Tile and bits of a row of cells.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> span;  // A row of cells: tiles and bits.
 };
 
-/// Covers the interior cells with disjoint rectangles (paper, section 3.8): rows are scanned, each
-/// free cell grows along its row, then by whole rows. Appends to `rectangles` in that order.
-/// Cost: linear in cells, as section 3.7 claims.
+/// Covers the interior cells with disjoint rectangles. Scans the cells row by row; each free cell
+/// grows along its row, then upward by whole rows. Appends the rectangles in this order. `interior`
+/// has one bit for each cell, by tile.
+/// Cost: linear in cells, as section 3.7 of the paper claims.
 void MergeCells(const TileDirectory& directory, std::span<const BitRows> interior,
                 MergeScratch& scratch, std::vector<CellRectangle>& rectangles);
 

@@ -12,7 +12,7 @@ enum Heading { kEast = 0, kNorth = 1, kWest = 2, kSouth = 3 };
 
 constexpr int kStepX[4] = {1, 0, -1, 0};
 constexpr int kStepY[4] = {0, 1, 0, -1};
-// Cells ahead of a node on the left and on the right, relative to the node, by heading.
+// By heading: the cells ahead of a node, on the left and on the right, relative to the node.
 constexpr int kLeftX[4] = {0, -1, -1, 0};
 constexpr int kLeftY[4] = {0, 0, -1, -1};
 constexpr int kRightX[4] = {0, 0, -1, -1};
@@ -24,7 +24,7 @@ bool IsInterior(const TileDirectory& directory, std::span<const BitRows> interio
   return cell.tile != kNoTile && (interior[cell.tile][cell.j] >> cell.i & 1) != 0;
 }
 
-// The cells of a tile that are interior above a cell that is not.
+// The interior cells of a tile whose lower neighbour is not interior.
 BitRows BottomEdges(const TileDirectory& directory, std::span<const BitRows> interior,
                     std::uint32_t tile) {
   const BitRows& rows = interior[tile];
@@ -35,7 +35,7 @@ BitRows BottomEdges(const TileDirectory& directory, std::span<const BitRows> int
   return edges;
 }
 
-// Walks one loop that starts eastward along the bottom edge of the cell at `start`.
+// Traces one loop, starting to the right along the bottom edge of the cell at `start`.
 void TraceLoop(const TileDirectory& directory, std::span<const BitRows> interior,
                const TilePlace& start, Staircases& staircases) {
   TilePlace node = start;
@@ -45,7 +45,7 @@ void TraceLoop(const TileDirectory& directory, std::span<const BitRows> interior
     node = Normalise(directory, node.tile, node.i + kStepX[heading], node.j + kStepY[heading]);
     const bool left = IsInterior(directory, interior, node, kLeftX[heading], kLeftY[heading]);
     const bool right = IsInterior(directory, interior, node, kRightX[heading], kRightY[heading]);
-    if (left && !right) continue;  // Straight on: `continue` still tests the loop's end.
+    if (left && !right) continue;  // Straight on; `continue` evaluates the loop condition.
     if (right && !left) ++staircases.pinches;
     heading = (heading + (left ? 3 : 1)) & 3;
     staircases.corners.push_back(node);
@@ -72,7 +72,7 @@ void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> in
       }
     }
   }
-  staircases.pinches /= 2;  // Each was passed by both of its cells.
+  staircases.pinches /= 2;  // Each was passed twice, once along each of its cells.
 }
 
 std::int64_t EulerCharacteristic(const TileDirectory& directory, const Staircases& staircases) {
@@ -84,7 +84,8 @@ std::int64_t EulerCharacteristic(const TileDirectory& directory, const Staircase
   };
   auto characteristic = -static_cast<std::int64_t>(staircases.pinches);
   for (std::size_t loop = 0; loop + 1 < staircases.offsets.size(); ++loop) {
-    // The area, exact in integers: of an axis-aligned loop the integral of x dy.
+    // The area is the integral of x dy, exact in integers. Its sign distinguishes outlines and
+    // voids.
     std::int64_t area = 0;
     const std::uint32_t first = staircases.offsets[loop];
     const std::uint32_t last = staircases.offsets[loop + 1];

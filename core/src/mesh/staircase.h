@@ -1,4 +1,4 @@
-// The staircase outline of the interior cells, which are given as rows of bits by tile.
+// Traces the staircase outline of the interior cells.
 #pragma once
 
 #include <cstdint>
@@ -9,22 +9,24 @@
 
 namespace partiemc {
 
-/// Closed loops along lattice edges with interior cells on the left: outlines counter-clockwise,
-/// voids clockwise. Only the corners are listed. Where two interior cells touch at a node only, the
-/// loop turns so that it stays with its cell.
+/// Closed loops along lattice edges with the interior cells on the left: outlines
+/// counter-clockwise, voids clockwise. Only corners are listed. At a pinch, a node at which two
+/// interior cells touch diagonally, each loop stays with its cell.
 struct Staircases {
   std::vector<TilePlace> corners;
   std::vector<std::uint32_t> offsets;  ///< Loop k has corners [offsets[k], offsets[k + 1]).
-  std::uint64_t pinches = 0;           ///< Nodes at which two interior cells touch, and only there.
+  std::uint64_t pinches = 0;           ///< Number of pinches.
   std::vector<BitRows> visited;        ///< Scratch: bottom edges that a loop has passed.
 };
 
+/// Traces all loops. `interior` has one bit for each cell, by tile.
 /// Cost: linear in tiles and in the length of the loops.
 void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> interior,
                      Staircases& staircases);
 
-/// Euler characteristic of the cells that the loops bound, taken as open sets: outlines less voids,
-/// and less pinches, which join cells. Cost: linear in corners.
+/// Euler characteristic of the region inside the loops: outlines - voids - pinches, since a pinch
+/// joins two cells.
+/// Cost: linear in corners.
 std::int64_t EulerCharacteristic(const TileDirectory& directory, const Staircases& staircases);
 
 }  // namespace partiemc

@@ -12,8 +12,8 @@ bool ComesFirst(const SweepEvent& a, const SweepEvent& b) {
   return SweepsBefore(a.point, b.point);
 }
 
-/// Heights in stretches of equal length. Every step rounds monotonically, so that a higher point
-/// never is in a lower stretch.
+/// Divides the range of heights into equal buckets. Every operation rounds monotonically, so a
+/// higher point is never in a lower bucket.
 class Buckets {
  public:
   /// Requires: there are events.
@@ -28,8 +28,8 @@ class Buckets {
 
   std::size_t size() const { return last_ + 1; }
   std::size_t Of(const SweepEvent& event) const {
-    const double place = (event.point.y - lowest_) * per_unit_;
-    return std::min(static_cast<std::size_t>(place), last_);
+    const double bucket = (event.point.y - lowest_) * per_unit_;
+    return std::min(static_cast<std::size_t>(bucket), last_);
   }
 
  private:
@@ -58,7 +58,7 @@ bool SweepEvents::List(std::span<const double> points, std::span<const std::uint
   for (std::size_t loop = 0; loop + 1 < loop_offsets.size(); ++loop) {
     const std::size_t begin = loop_offsets[loop];
     const std::size_t end = loop_offsets[loop + 1];
-    // A decrease is seen here before an offset beyond the last is used.
+    // Decreasing offsets are found here, before an offset beyond the last one is used.
     if (end > loop_points.size() || end < begin + 3) return false;
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t index = loop_points[i];
@@ -72,14 +72,14 @@ bool SweepEvents::List(std::span<const double> points, std::span<const std::uint
   return true;
 }
 
-/// Deals the events to as many buckets by height as there are events, then sorts each bucket.
+/// Bucket sort by height, with one bucket for each event on average; then sorts each bucket.
 void SweepEvents::Sort() {
   const Buckets buckets(events_);
   ends_.assign(buckets.size() + 1, 0);
   for (const SweepEvent& event : events_) ++ends_[buckets.Of(event) + 1];
   for (std::size_t k = 1; k < ends_.size(); ++k) ends_[k] += ends_[k - 1];
   dealt_.resize(events_.size());
-  // A bucket's start moves on until it is its end.
+  // Placing the events of a bucket moves its start to its end.
   for (const SweepEvent& event : events_) dealt_[ends_[buckets.Of(event)]++] = event;
   std::size_t begin = 0;
   for (const std::uint32_t end : ends_) {

@@ -1,4 +1,4 @@
-// The events of a sweep: the corners of closed loops in the order in which it meets them.
+// Sorts the corners of closed loops into the order of a sweep.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,19 @@
 
 namespace partiemc {
 
-/// One passage of a loop through a point.
+/// A corner of a loop.
 struct SweepEvent {
   Point point;
-  std::uint32_t index, previous, next;  // Of points.
+  std::uint32_t index, previous, next;  // Indices of this point and its neighbours on the loop.
 };
 
-/// Keeps its memory warm from one use to the next.
+/// The sorted corners; keeps its memory warm from one use to the next.
 class SweepEvents {
  public:
-  /// Lists the corners of the loops in the order of SweepsBefore, those at one place together, that
-  /// of the lowest index first. Loops are given as to Triangulator::Triangulate; false, with no
-  /// events, if indices, offsets, coordinates or the lengths of loops break its first requirement.
-  /// Cost: linear where heights are spread, n log n where many points are about equally high.
+  /// Lists the corners of the loops in the order of SweepsBefore; corners at the same position by
+  /// index. Parameters as for Triangulator::Triangulate. Returns false, without events, if they
+  /// break its first requirement (neighbours at different positions are not checked).
+  /// Cost: linear if heights are spread evenly, n log n if many points have similar heights.
   [[nodiscard]] bool Collect(std::span<const double> points,
                              std::span<const std::uint32_t> loop_points,
                              std::span<const std::uint32_t> loop_offsets);
@@ -35,7 +35,7 @@ class SweepEvents {
   void Sort();
 
   std::vector<SweepEvent> events_, dealt_;
-  std::vector<std::uint32_t> ends_;  // Of the buckets.
+  std::vector<std::uint32_t> ends_;  // By bucket.
 };
 
 }  // namespace partiemc

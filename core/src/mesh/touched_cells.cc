@@ -8,25 +8,25 @@
 namespace partiemc {
 namespace {
 
-// Cells are taken out this much beyond a box, in cells: a vertex on a lattice line touches the
-// cells on both of its sides, and the way from world units rounds.
+// Margin around the box of a segment, in cells. A vertex on a lattice line touches the cells on
+// both sides, and the conversion from world units rounds.
 constexpr double kTouchMargin = 1.0 / 1024;
 
-// Points that a task takes at least.
+// Smallest number of points of a task.
 constexpr std::size_t kExcludeGrain = 256;
 
-// Cells of the lattice, the last ones included.
+// A rectangle of cells, including `right` and `top`.
 struct CellRange {
   std::int64_t left, bottom, right, top;
 };
 
-// Like std::floor, which is a call on processors that are not known to have an instruction for it.
+// Replaces std::floor, which is a function call unless the build targets SSE4.1.
 std::int64_t Floor(double coordinate) {
   const auto integer = static_cast<std::int64_t>(coordinate);
   return integer - (static_cast<double>(integer) > coordinate ? 1 : 0);
 }
 
-// The cells from a point to its root.
+// The cells that the box of a point and its root touches.
 CellRange CellsOf(const double* point, const double* root, double cells_per_unit) {
   const double x0 = point[0] * cells_per_unit, x1 = root[0] * cells_per_unit;
   const double y0 = point[1] * cells_per_unit, y1 = root[1] * cells_per_unit;
@@ -39,31 +39,30 @@ CellRange Around(const CellRange& a, const CellRange& b) {
           std::max(a.top, b.top)};
 }
 
-// Takes cells out of the interior. Several tasks may do so at the same time: whoever comes first,
-// the same cells are left.
-class CellTaker {
+// Clears cells of the interior. Tasks clear bits atomically, so their order has no effect.
+class CellClearer {
  public:
-  CellTaker(const TileDirectory& directory, std::span<BitRows> interior)
+  CellClearer(const TileDirectory& directory, std::span<BitRows> interior)
       : directory_(directory), interior_(interior) {}
 
-  void Take(const CellRange& range) {
-    if (TakeHere(range)) return;
+  void Clear(const CellRange& range) {
+    if (ClearHere(range)) return;
     for (std::int64_t y = range.bottom >> kTileShift; y <= range.top >> kTileShift; ++y) {
       for (std::int64_t x = range.left >> kTileShift; x <= range.right >> kTileShift; ++x) {
         tile_ = directory_.Find({static_cast<std::int32_t>(y), static_cast<std::int32_t>(x)});
         origin_x_ = x << kTileShift;
         origin_y_ = y << kTileShift;
         constexpr std::int64_t kLast = kTileSize - 1;
-        TakeHere({std::max(range.left, origin_x_), std::max(range.bottom, origin_y_),
-                  std::min(range.right, origin_x_ + kLast),
-                  std::min(range.top, origin_y_ + kLast)});
+        ClearHere({std::max(range.left, origin_x_), std::max(range.bottom, origin_y_),
+                   std::min(range.right, origin_x_ + kLast),
+                   std::min(range.top, origin_y_ + kLast)});
       }
     }
   }
 
  private:
-  // Whether the range lies in the tile at hand, as it does as a rule; its cells are then taken.
-  bool TakeHere(const CellRange& range) {
+  // Clears the range if it lies in the current tile, which is the common case; else returns false.
+  bool ClearHere(const CellRange& range) {
     if (tile_ == kNoTile) return false;
     const std::int64_t left = range.left - origin_x_, right = range.right - origin_x_;
     const std::int64_t bottom = range.bottom - origin_y_, top = range.top - origin_y_;
@@ -79,8 +78,8 @@ class CellTaker {
 
   const TileDirectory& directory_;
   std::span<BitRows> interior_;
-  std::uint32_t tile_ = kNoTile;              // That of the range before,
-  std::int64_t origin_x_ = 0, origin_y_ = 0;  // and its lower left cell.
+  std::uint32_t tile_ = kNoTile;              // The current tile: it held the last range.
+  std::int64_t origin_x_ = 0, origin_y_ = 0;  // Its lower left cell.
 };
 
 }  // namespace
@@ -90,7 +89,7 @@ void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double>
                          double cell_size, std::span<BitRows> interior) {
   const double cells_per_unit = 1 / cell_size;
   ParallelForRanges(points.size() / 2, kExcludeGrain, [&](std::size_t first, std::size_t last) {
-    CellTaker taker(directory, interior);
+    CellClearer clearer(directory, interior);
     const auto cells_of = [&](std::size_t point) {
       return CellsOf(&points[2 * point], &roots[2 * point], cells_per_unit);
     };
@@ -99,7 +98,7 @@ void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double>
     for (std::size_t point = first; point < last; ++point) {
       const bool is_last = point + 1 == *ring_end;
       const CellRange next = cells_of(is_last ? *(ring_end - 1) : point + 1);
-      taker.Take(Around(cells, next));
+      clearer.Clear(Around(cells, next));
       cells = next;
       if (!is_last || point + 1 == last) continue;
       while (*ring_end == point + 1) ++ring_end;

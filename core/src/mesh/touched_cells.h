@@ -1,4 +1,4 @@
-// Which interior cells the rings leave alone.
+// Removes the cells that the rings touch from the interior cells.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,12 @@
 
 namespace partiemc {
 
-/// Takes the cells that the rings run through, or that they ran over on their way from `roots`,
-/// out of the interior: what is left lies inside of the rings and does not touch them. `interior`
-/// has its rows of bits by tile; `points` and `roots` are interleaved, in world units, one of each
-/// per point of the rings. In parallel over stretches of points. Cost: linear in the points.
+/// Clears the bits of the cells that a ring crosses, or passed over while its vertices moved from
+/// `roots` to `points`. The remaining cells lie inside the rings and do not touch them. `interior`
+/// has one bit for each cell, by tile. `points` and `roots` are interleaved, in world units, and
+/// have one position for each point of the rings.
+/// Deterministic. Parallel over stretches of points.
+/// Cost: linear in the points.
 void ExcludeTouchedCells(const TileDirectory& directory, std::span<const double> points,
                          std::span<const std::uint32_t> offsets, std::span<const double> roots,
                          double cell_size, std::span<BitRows> interior);

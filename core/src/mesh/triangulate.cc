@@ -36,10 +36,10 @@ bool Triangulator::Triangulate(std::span<const double> points,
   return true;
 }
 
-/// Moves the sweep line past one point, through which the loops pass once or several times.
-/// False if the requirements are broken here. That every vertex is compared with its neighbours on
-/// the sweep line finds every crossing: the first one exchanges two neighbours, nothing can be
-/// inserted between these any more, and the one that ends first ends on the wrong side of the
+/// Moves the sweep line past one point; `events` are the passages of loops through it. Returns
+/// false if the requirements are broken here. Comparing each vertex with its neighbours on the
+/// sweep line finds every crossing: the first crossing exchanges two neighbouring edges. Nothing
+/// can be inserted between them any more, and the one that ends first ends on the wrong side of the
 /// other.
 bool Triangulator::Visit(std::span<const SweepEvent> events) {
   const SweepEvent& vertex = events.front();
@@ -48,7 +48,7 @@ bool Triangulator::Visit(std::span<const SweepEvent> events) {
   Surroundings around;
   if (!Surround(vertex, *ending_edges, around)) return false;
 
-  // What the region is directly to the left and right of the point must agree below and above it.
+  // Directly left and right of the point, the region below and above must agree.
   const bool inside_on_left = around.left != kNoIndex;
   const bool inside_on_right = around.right != kNoIndex;
   if (rising_.empty()) {
@@ -61,8 +61,8 @@ bool Triangulator::Visit(std::span<const SweepEvent> events) {
   return true;
 }
 
-/// Collects the edges that rise from a point, from left to right; returns the number of those that
-/// end in it. Nothing if an edge has no length.
+/// Collects the edges that rise from a point, from left to right. Returns the number of edges that
+/// end in it, or nullopt if an edge has length 0.
 std::optional<std::size_t> Triangulator::SplitEdges(std::span<const SweepEvent> events) {
   const Point point = events.front().point;
   rising_.clear();
@@ -70,7 +70,8 @@ std::optional<std::size_t> Triangulator::SplitEdges(std::span<const SweepEvent> 
     const Point previous = PointAt(points_, event.previous);
     const Point next = PointAt(points_, event.next);
     if (previous == point || next == point) return std::nullopt;
-    // The region lies to the left of the loop: an edge that the loop goes down is a left one.
+    // The region lies to the left of the loop, so an edge on which the loop descends is a left
+    // edge.
     if (SweepsBefore(point, previous)) rising_.push_back({previous, true});
     if (SweepsBefore(point, next)) rising_.push_back({next, false});
   }
@@ -90,8 +91,8 @@ bool Triangulator::RisingEdgesAlternate(const Point& point) const {
   return true;
 }
 
-/// Finds the intervals around a point and closes those that end in it. False if an edge runs
-/// through the point, or if the edges found to end here are not all that should.
+/// Finds the intervals around a point and closes the intervals that end in it. Returns false if an
+/// edge contains the point in its inside, or if not all ending edges were found.
 bool Triangulator::Surround(const SweepEvent& vertex, std::size_t ending_edges,
                             Surroundings& found) {
   const Point& point = vertex.point;
@@ -132,11 +133,12 @@ bool Triangulator::Surround(const SweepEvent& vertex, std::size_t ending_edges,
   return ended == ending_edges;
 }
 
-/// Carries the intervals over the point. Where the region is on the left and on the right:
-///
-///   \ | /    \  /       /  \        \ /
-///    \|/      \/ split   \/ merge    | several rising edges: the outer ones go on with the
-///     *       *           *          * intervals around, each pair between starts a new one
+/// Updates the intervals at the point:
+///   - inside an interval: splits it, and starts an interval between each inner pair of edges;
+///   - the interval on the left continues with the leftmost rising edge as its right edge, the
+///     interval on the right with the rightmost rising edge as its left edge;
+///   - no rising edge, intervals on both sides: merges them;
+///   - each remaining pair of rising edges starts a new interval.
 void Triangulator::Advance(const SweepEvent& vertex, const Surroundings& around) {
   SweepStatus::Cursor cursor = around.cursor;
   std::span<const RisingEdge> starting = rising_;
@@ -170,7 +172,7 @@ void Triangulator::Advance(const SweepEvent& vertex, const Surroundings& around)
   Start(vertex, starting, cursor);
 }
 
-/// Starts an interval between every two of `edges`; returns the cursor behind them.
+/// Starts an interval between each pair of successive `edges`; returns the cursor after them.
 SweepStatus::Cursor Triangulator::Start(const SweepEvent& vertex, std::span<const RisingEdge> edges,
                                         SweepStatus::Cursor cursor) {
   for (std::size_t i = 0; i + 1 < edges.size(); i += 2) {
@@ -184,8 +186,8 @@ SweepStatus::Cursor Triangulator::Start(const SweepEvent& vertex, std::span<cons
   return cursor;
 }
 
-/// A vertex inside an interval: a diagonal from it to the last vertex of the interval below cuts
-/// the piece in two. Returns the new interval, which goes to the right of interval `id`.
+/// Splits an interval at a vertex inside it. The diagonal from the vertex to the last vertex of the
+/// interval cuts its piece in two. Returns the new interval, to the right of interval `id`.
 std::uint32_t Triangulator::SplitInterval(std::uint32_t id, const SweepEvent& vertex) {
   const std::uint32_t right_id = NewInterval();
   Interval& left = intervals_[id];
@@ -197,8 +199,8 @@ std::uint32_t Triangulator::SplitInterval(std::uint32_t id, const SweepEvent& ve
     right.left_piece = left.right_piece;
     left.right_piece = {};
   } else {
-    // The part on the side of the last vertex's chain has nothing but this vertex, the other part
-    // all that is left of the piece.
+    // On the side of the last vertex's chain, the new piece starts with that vertex only. The other
+    // side keeps the rest of the piece.
     const MonotonePieces::Piece fresh = pieces_.Start(pieces_.LastVertex(left.left_piece));
     right.left_piece = fresh;
     if (left.left_piece.is_left_chain) std::swap(left.left_piece, right.left_piece);

@@ -1,4 +1,4 @@
-// Triangulates regions bounded by closed loops, without adding a point.
+// Triangulates regions bounded by closed loops, without adding points.
 #pragma once
 
 #include <cstddef>
@@ -16,73 +16,70 @@
 
 namespace partiemc {
 
-/// Triangulates the region that lies to the left of all loops: outer loops counter-clockwise, holes
-/// clockwise, islands in holes and any number of components allowed, in any order.
+/// Triangulates the region to the left of all loops. Outer loops run counter-clockwise, holes
+/// clockwise. Islands in holes and several components are allowed. The order of loops is arbitrary.
 ///
-/// Method: one sweep over the points in the order of SweepsBefore (point.h). Each interval between
-/// a left and a right edge on the sweep line holds the piece of the region below it that is still
-/// to be triangulated, which is monotone: the sweep cuts the region at each point that would make
-/// it otherwise, and the pieces are triangulated as it goes. After Garey, Johnson, Preparata and
-/// Tarjan, "Triangulating a simple polygon", Information Processing Letters 7 (1978), and Hertel
-/// and Mehlhorn, "Fast triangulation of the plane with respect to simple polygons", Information and
-/// Control 64 (1985). Every decision is an exact Orientation.
+/// Method: one sweep over the points in the order of SweepsBefore (point.h). The sweep line crosses
+/// the region in intervals, each between a left and a right edge. An interval holds the piece of
+/// the region below it that is not triangulated yet. The sweep cuts the region such that every
+/// piece is monotone, and triangulates the pieces on the way. Every decision is an exact
+/// Orientation.
 ///
-/// The result depends on the input only, bit for bit. One object per thread; it keeps its buffers
-/// warm and allocates nothing for an input no larger than one before. Assign a new one to free
-/// them.
+/// Sources: Garey, Johnson, Preparata and Tarjan, "Triangulating a simple polygon", Information
+/// Processing Letters 7 (1978). Hertel and Mehlhorn, "Fast triangulation of the plane with respect
+/// to simple polygons", Information and Control 64 (1985).
+///
+/// Deterministic, bit for bit. Keeps its buffers warm: an input no larger than an earlier one
+/// allocates nothing. Use one object per thread.
 class Triangulator {
  public:
-  /// Appends the triangles, three point indices each, to `triangles`. Loop k runs through the
-  /// points loop_points[loop_offsets[k]] up to, but not including, loop_points[loop_offsets[k +
-  /// 1]], and back to its first.
+  /// Appends the triangles, three point indices each, to `triangles`. Loop k is closed and has the
+  /// points loop_points[i] with loop_offsets[k] <= i < loop_offsets[k + 1].
   ///
   /// Requires, and checks:
-  ///   1. coordinates in the domain of predicates.h, indices and offsets in their ranges, at least
-  ///      three points in a loop, and neighbours on a loop at different places;
-  ///   2. no two edges cross or overlap, and none runs through a point of another: loops may meet
-  ///      each other and themselves, but only at points that both of them name (a "pinch": by the
-  ///      same index, or by indices of points at the same place);
+  ///   1. coordinates in the domain of predicates.h, indices and offsets in range, at least three
+  ///      points in each loop, and neighbours on a loop at different positions;
+  ///   2. no two edges cross or overlap, and no edge contains a point of another edge. Loops may
+  ///      meet each other and themselves only at points that both name (a "pinch"): by the same
+  ///      index, or by indices of points at the same position;
   ///   3. the left side of every edge is inside, the right side outside.
-  /// Points may be collinear, in any number; several may have equal x or equal y.
+  /// Any number of points may be collinear, or have equal x or y.
   ///
-  /// Returns true if and only if the input is so. Then
+  /// Returns true if and only if the input meets these requirements. Then
   ///   - every triangle is strictly counter-clockwise by Orientation;
-  ///   - triangles do not overlap and cover exactly the region;
-  ///   - their number is n - 2 outers + 2 holes, for n points on the loops, when there is no pinch.
-  ///     At a pinch, count the loops that result from turning there so that the region on the left
-  ///     is never left or crossed (two squares that share a corner are two loops, even if given as
-  ///     one);
-  ///   - of several points at one place, the triangles name the one of lowest index.
-  /// Otherwise `triangles` is as it was.
+  ///   - the triangles do not overlap and cover exactly the region;
+  ///   - their number is n - 2 outers + 2 holes for n points on the loops. At a pinch, loops count
+  ///     as if each turned there without crossing the region: two squares that share a corner are
+  ///     two loops, even if they were given as one;
+  ///   - the triangles name the lowest index of several points at the same position.
+  /// Otherwise returns false and leaves `triangles` unchanged.
   ///
-  /// Cost: n log n for the searches, and for the sort where heights crowd, plus n times the square
-  /// root of the number of edges that a line meets, with a tiny factor. Memory: about 150 bytes per
-  /// point on the loops.
+  /// Cost: n log n for searching and sorting, plus n times the square root of the largest number of
+  /// edges on the sweep line, with a tiny factor. Memory: about 150 bytes for each point.
   [[nodiscard]] bool Triangulate(std::span<const double> points,
                                  std::span<const std::uint32_t> loop_points,
                                  std::span<const std::uint32_t> loop_offsets,
                                  std::vector<std::uint32_t>& triangles);
 
  private:
-  /// An edge on the sweep line, directed upward whatever the direction of its loop.
+  /// An edge on the sweep line, directed upward, independent of the direction of its loop.
   struct Edge {
     Point lower, upper;
 
-    /// +1 where `point` lies left of the edge, 0 on its line, -1 right of it.
+    /// +1 if `point` lies left of the edge, 0 if on its line, -1 if right of it.
     int SideOf(const Point& point) const { return Orientation(lower, upper, point); }
   };
 
-  /// An edge that begins at the point in hand and rises from it.
+  /// An edge that rises from the current point.
   struct RisingEdge {
     Point upper;
-    bool is_left;  // Bounds an interval of the region on its left; otherwise on its right.
+    bool is_left;  // The left end of an interval; else the right end.
   };
 
-  /// A maximal part of the sweep line inside the region. Above a merge point, where two intervals
-  /// have become one, it holds two pieces until a diagonal from the merge point to the next vertex
-  /// of the interval shows which of them ends there: `left_piece` has the merge point as the end of
-  /// its right chain, `right_piece` as the end of its left one. Otherwise there is `left_piece`
-  /// only.
+  /// A maximal part of the sweep line inside the region. It usually has one piece, `left_piece`.
+  /// After a merge point, at which two intervals became one, it has two pieces until its next
+  /// vertex: the diagonal from the merge point to that vertex finishes one of them. The merge point
+  /// ends the right chain of `left_piece` and the left chain of `right_piece`.
   struct Interval {
     Edge left, right;
     MonotonePieces::Piece left_piece, right_piece;
@@ -90,11 +87,12 @@ class Triangulator {
     bool IsMerged() const { return !right_piece.IsEmpty(); }
   };
 
-  /// Which intervals a point touches from the inside, after those that end in it were closed.
+  /// The intervals that a point touches, after the intervals that end in it were closed.
   struct Surroundings {
-    std::uint32_t left = kNoIndex;   // Has the region directly to the left of the point.
-    std::uint32_t right = kNoIndex;  // The same to the right. Equal to `left`: the point is inside.
-    SweepStatus::Cursor cursor;      // At `right`, if there is one; where new intervals go, if not.
+    std::uint32_t left = kNoIndex;  // Directly left of the point.
+    std::uint32_t right =
+        kNoIndex;                // Directly right of it; equal to `left` if the point is inside.
+    SweepStatus::Cursor cursor;  // At `right` if set, else where new intervals are inserted.
   };
 
   bool Visit(std::span<const SweepEvent> events);
