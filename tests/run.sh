@@ -235,7 +235,7 @@ step_core-alone() {
 
 step_consumer() { check "consumer" tests/consumer/run.sh build/release core client; }
 
-step_bench() { check "bench" tests/bench/run.sh --quick --check; }
+step_bench() { check "bench" tests/bench/run.py --quick --check; }
 
 if $install; then
   headline "packages"

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <new>
 
-// glibc's own names for what is replaced below; its free serves both.
+// glibc's names for the functions that this file replaces. Its free serves both.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

@@ -13,7 +13,7 @@ inline double Milliseconds(clockid_t clock) {
 
 inline double WallMs() { return Milliseconds(CLOCK_MONOTONIC); }
 
-/// What something cost. Processor time is that of all threads of the process.
+/// Wall-clock time, and processor time of all threads of the process.
 struct Cost {
   double wall_ms = 0;
   double cpu_ms = 0;

@@ -1,6 +1,10 @@
 #include "bench/core_stream.h"
 
-#include "bench/progress.h"
+#include <string>
+#include <utility>
+
+#include "bench/require.h"
+#include "partiemc/state.h"
 
 namespace partiemc::bench {
 
@@ -20,7 +24,22 @@ void CoreStream::Next(int threads) {
 }
 
 void CoreStream::WarmUp() {
+  if (std::exchange(is_warm_, true)) return;
   for (std::size_t k = 0; k <= scene_.frames.size(); ++k) Next();
+}
+
+void MeasureFrames(CoreStream& stream, benchmark::State& state, int threads) {
+  stream.WarmUp();
+  stream.stages().Clear();
+  for (auto _ : state) stream.Next(threads);
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    const auto stage = static_cast<Stage>(k);
+    const Cost cost = stream.stages()[stage];
+    const std::string name(Name(stage));
+    state.counters[name + "_wall_ms"] = {cost.wall_ms, benchmark::Counter::kAvgIterations};
+    state.counters[name + "_cpu_ms"] = {cost.cpu_ms, benchmark::Counter::kAvgIterations};
+  }
+  state.counters["state_bytes"] = static_cast<double>(SerializedBytes(stream.state()));
 }
 
 ReconstructionParameters ReferenceParameters(const Scene& scene, double kernel_radius) {

@@ -1,6 +1,7 @@
-// A stream of frames through the core in this process, stage by stage on the clock.
+// A stream of frames through the core in this process, with the cost of each stage.
 #pragma once
 
+#include <benchmark/benchmark.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <array>
@@ -14,7 +15,7 @@
 
 namespace partiemc::bench {
 
-/// Sums what each stage costs over frames.
+/// Sums the cost of each stage over frames.
 class StageClock final : public StageObserver {
  public:
   void StageBegins(Stage) override { begin_ = Cost::Now(); }
@@ -29,17 +30,17 @@ class StageClock final : public StageObserver {
   std::array<Cost, kStageCount> costs_{};
 };
 
-/// State, workspace and result are kept from frame to frame, as a server's stream keeps them.
+/// Keeps state, workspace and result from frame to frame, as a stream of a server does.
 class CoreStream {
  public:
-  /// `scene` must outlive the stream, and `ids`: of the scene's particles, or empty. Ends the
-  /// program where the parameters are refused.
+  /// Requires: `scene` and `ids` outlive the stream; `ids` has an id for each particle, or is
+  /// empty. Exits if the parameters are refused.
   CoreStream(const Scene& scene, const ReconstructionParameters& parameters,
              std::span<const std::uint64_t> ids = {});
 
   /// Reconstructs the scene's next frame in an arena of one or of two threads.
   void Next(int threads = 1);
-  /// Plays the scene once and one frame more, so that buffers have seen every frame in its place.
+  /// At the first call, plays the scene once and one frame more, so that all buffers have grown.
   void WarmUp();
 
   const Result& result() const { return result_; }
@@ -56,7 +57,12 @@ class CoreStream {
   StageClock stages_;
   std::array<oneapi::tbb::task_arena, 2> arenas_;
   std::size_t next_ = 0;
+  bool is_warm_ = false;
 };
+
+/// Measures warm frames. The counters "STAGE_wall_ms" and "STAGE_cpu_ms" are means over the frames;
+/// "state_bytes" is the size of the serialised state.
+void MeasureFrames(CoreStream& stream, benchmark::State& state, int threads = 1);
 
 /// The reference parameters, all outputs: `kernel_radius` spacings, cell = spacing, greedy fill.
 ReconstructionParameters ReferenceParameters(const Scene& scene, double kernel_radius = 3);

@@ -32,7 +32,7 @@ struct ScatterBuffers {
 
 /// density[node] = sum over particles of max(0, (1 - d^2 / R^2)^3) for the nodes of `box`, R being
 /// `kernel_radius` spacings: 2 or 3. Requires: box made by Around with a margin of at least R.
-/// Compiled for AVX2 too, and dispatched to what the machine has.
+/// Uses AVX2 where the processor has it.
 void ScatterDensity(std::span<const float> xy, const LatticeBox& box, int kernel_radius,
                     ScatterBuffers& buffers);
 

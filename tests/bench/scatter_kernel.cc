@@ -62,7 +62,7 @@ void SortByTile(std::span<const float> xy, const LatticeBox& box, ScatterBuffers
   }
 }
 
-// A particle reaches at most 2R + 1 nodes of a row and as many rows, all within kReach.
+// A particle reaches at most 2R + 1 nodes of a row, in at most 2R + 1 rows, all within kReach.
 template <int kRadius>
 void Scatter(ScatterBuffers& b) {
   constexpr int kRows = 2 * kRadius + 1;
@@ -108,7 +108,7 @@ void Scatter(ScatterBuffers& b) {
 void ScatterDensity(std::span<const float> xy, const LatticeBox& box, int kernel_radius,
                     ScatterBuffers& b) {
   SortByTile(xy, box, b);
-  // Room for what is scattered beyond the last node; no power of two, which would crowd cache sets.
+  // Padding for writes beyond the last node. A power of two would map rows to the same cache sets.
   b.stride = static_cast<std::size_t>(box.columns) + kReach;
   if (b.stride % 64 == 0) b.stride += 16;
   b.density.assign(b.stride * static_cast<std::size_t>(box.rows + 1) + kReach, 0);

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "client/cli/load/load_frames.h"
 #include "client/recording/recording.h"
 #include "support/random.h"
 
@@ -14,7 +15,7 @@ namespace partiemc::bench {
 namespace {
 
 constexpr std::uint64_t kSeed = 20240229;
-constexpr double kJitter = 0.15;  // Of a spacing, to either side.
+constexpr double kJitter = 0.15;  // Largest shift in each direction, in spacings.
 constexpr double kSway = 0.05;
 constexpr std::array<double, 4> kSwayByFrame = {0, kSway, 0, -kSway};
 
@@ -170,16 +171,22 @@ absl::StatusOr<Scene> Recorded(const std::string& name, const std::string& path)
   }
 }
 
-absl::StatusOr<ReferenceScenes> MakeReferenceScenes(bool quick) {
+Scene Load(const std::string& name, int count) {
+  Scene scene{.name = name};
+  for (std::vector<float>& xy : client::LoadFrames(count)) scene.frames.emplace_back(std::move(xy));
+  return scene;
+}
+
+absl::StatusOr<Scenes> MakeScenes(bool quick) {
   auto dam_break = Recorded("dam_break", PARTIEMC_SOURCE_DIR "/client/recordings/dam_break.pemc");
   if (!dam_break.ok()) return dam_break.status();
-  return ReferenceScenes{.blob_10k = Blob("10k", 10'000),
-                         .blob_100k = Blob("100k", 100'000),
-                         .blob_1m = Blob("1m", 1'000'000),
-                         .blob_4m = quick ? Scene{} : Blob("4m", 4'000'000),
-                         .islands_1m = Islands("islands_1m", 1'000'000),
-                         .blob_1024 = Blob("1024", 640'000),
-                         .dam_break = *std::move(dam_break)};
+  Scenes scenes{.islands_1m = Islands("islands_1m", 1'000'000),
+                .blob_1024 = Blob("1024", 640'000),
+                .dam_break = *std::move(dam_break),
+                .load_1m = Load("load_1m", 1'000'000)};
+  scenes.blobs = {Blob("10k", 10'000), Blob("100k", 100'000), Blob("1m", 1'000'000)};
+  if (!quick) scenes.blobs.push_back(Blob("4m", 4'000'000));
+  return scenes;
 }
 
 std::vector<std::uint64_t> ShuffledIds(const Scene& scene) {

@@ -28,32 +28,34 @@ struct Scene {
   std::size_t FrameBytes() const;
 };
 
-/// A body with a wavy outline and six holes round the origin: the lattice of spacing 1 inside of
-/// it, jittered by up to 0.15, exactly `count` particles in shuffled order. It sways by 0.05 over
-/// four frames, so that no frame equals the one before. Positions are float.
+/// A body with a wavy outline and six holes around the origin, of exactly `count` particles. They
+/// lie on the lattice of spacing 1, jittered by up to 0.15, in shuffled order. The body sways by
+/// 0.05 over four frames, so that consecutive frames differ. Positions are float.
 Scene Blob(const std::string& name, std::size_t count);
 
-/// A thousand discs of a thousandth of `count` particles each, scattered over a square box of ten
-/// thousand times their area, likewise jittered, shuffled and swaying. Positions are double: at
-/// such a distance a float resolves no jitter.
+/// A thousand discs of count / 1000 particles, scattered over a square box of ten thousand times
+/// their area, with the jitter, order and sway of Blob. Positions are double: at such distances a
+/// float does not resolve the jitter.
 Scene Islands(const std::string& name, std::size_t count);
 
 /// The frames of a recording, with its own spacing.
 absl::StatusOr<Scene> Recorded(const std::string& name, const std::string& path);
 
-/// Everything that is measured on: blobs of the sizes in their names, a thousand islands, a blob
-/// that just fits into 1024 x 1024 nodes, and the bundled recording.
-struct ReferenceScenes {
-  Scene blob_10k, blob_100k, blob_1m;
-  Scene blob_4m;  ///< Without frames in a quick run.
-  Scene islands_1m;
-  Scene blob_1024;
-  Scene dam_break;
-};
-absl::StatusOr<ReferenceScenes> MakeReferenceScenes(bool quick);
+/// The particles of `partiemc load`.
+Scene Load(const std::string& name, int count);
 
-/// Ids of all particles that a scene ever has: 0, 1, 2, ... in shuffled order, which is not that in
-/// which the particles lie, as in a simulator that sorts them anew now and then.
+/// Every scene of the benchmark.
+struct Scenes {
+  std::vector<Scene> blobs;  ///< "10k", "100k", "1m", and, unless the run is quick, "4m".
+  Scene islands_1m;
+  Scene blob_1024;  ///< Fits into 1024 x 1024 nodes.
+  Scene dam_break;  ///< The bundled recording.
+  Scene load_1m;
+};
+absl::StatusOr<Scenes> MakeScenes(bool quick);
+
+/// Ids 0, 1, 2, ... for the largest frame of the scene, in an order unrelated to the positions, as
+/// of a simulator that sorts its particles from time to time.
 std::vector<std::uint64_t> ShuffledIds(const Scene& scene);
 
 /// The float positions of a scene's first frame. Requires: a scene of floats.

@@ -22,6 +22,7 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/console.h"
 #include "client/cli/load/latencies.h"
+#include "client/cli/load/load_frames.h"
 #include "client/cli/load/server_figures.h"
 #include "client/output/text.h"
 #include "common/json_text.h"
@@ -35,34 +36,11 @@ using Clock = std::chrono::steady_clock;
 
 // Compared with each other, until they tell the same.
 constexpr std::chrono::seconds kWindow(2);
-// Frames of each stream are made before the clock starts, and come again and again.
-constexpr int kFrames = 16;
 // More than are ever in flight.
 constexpr std::size_t kRemembered = 4096;
 
 double Milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
-}
-
-// A disc of particles with spacing 1 that goes round in a circle, a spacing from frame to frame.
-std::vector<std::vector<float>> MakeFrames(int particles) {
-  const double radius = std::sqrt(particles / 3.14159265358979);
-  std::vector<std::vector<float>> frames(kFrames);
-  for (int frame = 0; frame < kFrames; ++frame) {
-    const double angle = 2 * 3.14159265358979 * frame / kFrames;
-    const double away = kFrames / (2 * 3.14159265358979);
-    std::vector<float>& xy = frames[frame];
-    const int reach = static_cast<int>(radius) + 2;
-    // In the order of rows, as many as are wanted: the disc of the radius has some more or less.
-    for (int j = -reach; j <= reach && xy.size() < 2 * static_cast<std::size_t>(particles); ++j) {
-      for (int i = -reach; i <= reach && xy.size() < 2 * static_cast<std::size_t>(particles); ++i) {
-        if (i * i + j * j > (radius + 0.5) * (radius + 0.5)) continue;
-        xy.push_back(static_cast<float>(i + away * std::cos(angle)));
-        xy.push_back(static_cast<float>(j + away * std::sin(angle)));
-      }
-    }
-  }
-  return frames;
 }
 
 double SecondsOf(clockid_t clock) {
@@ -153,7 +131,7 @@ class LoadedStream {
         std::this_thread::sleep_until(due);
       }
       due_[(k + 1) % kRemembered] = due.time_since_epoch().count();
-      const std::vector<float>& frame = shared_.frames[k % kFrames];
+      const std::vector<float>& frame = shared_.frames[k % shared_.frames.size()];
       const auto sent = stream_->Send(
           {.positions = std::span<const float>(frame), .ids = shared_.ids}, static_cast<double>(k));
       if (!sent.ok()) {
@@ -408,7 +386,7 @@ CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
 }
 
 int Load(const LoadFlags& flags) {
-  Shared shared{.flags = flags, .frames = MakeFrames(flags.particles)};
+  Shared shared{.flags = flags, .frames = LoadFrames(flags.particles)};
   for (std::size_t k = 0; !flags.no_ids && 2 * k < shared.frames[0].size(); ++k) {
     shared.ids.push_back(k);
   }

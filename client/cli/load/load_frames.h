@@ -1,0 +1,35 @@
+// The particles that `partiemc load` sends.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+namespace partiemc::client {
+
+/// A disc of particles on a lattice of spacing 1, whose centre moves on a circle, by a spacing from
+/// frame to frame: x0, y0, x1, y1, ... of each frame of one turn. Requires: particles > 0.
+inline std::vector<std::vector<float>> LoadFrames(int particles) {
+  constexpr int kFrames = 16;
+  constexpr double kOrbit = kFrames / (2 * std::numbers::pi);
+  const auto coordinates = 2 * static_cast<std::size_t>(particles);
+  const double radius = std::sqrt(particles / std::numbers::pi) + 0.5;
+  const int reach = static_cast<int>(radius) + 2;
+  std::vector<std::vector<float>> frames(kFrames);
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const double angle = 2 * std::numbers::pi * frame / kFrames;
+    std::vector<float>& xy = frames[frame];
+    // Row by row. The disc may hold some particles more than wanted.
+    for (int j = -reach; j <= reach && xy.size() < coordinates; ++j) {
+      for (int i = -reach; i <= reach && xy.size() < coordinates; ++i) {
+        if (i * i + j * j > radius * radius) continue;
+        xy.push_back(static_cast<float>(i + kOrbit * std::cos(angle)));
+        xy.push_back(static_cast<float>(j + kOrbit * std::sin(angle)));
+      }
+    }
+  }
+  return frames;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,79 @@
+"""Tests the check of ratios in run.py."""
+
+import contextlib
+import io
+import math
+import tempfile
+import unittest
+from pathlib import Path
+
+import run
+
+
+def worse(slow, fast):
+    rows = [{"metric": "slow", "value": 2, "better": "lower", "margin": 1.7},
+            {"metric": "fast", "value": 80, "better": "higher", "margin": 1.7}]
+    return run.failures(rows, {"slow": slow, "fast": fast})
+
+
+def file_with(text):
+    file = tempfile.NamedTemporaryFile("w+", suffix=".csv", encoding="utf-8")
+    file.write(text)
+    file.flush()
+    return file
+
+
+class Failures(unittest.TestCase):
+    def test_noise_and_improvements_pass(self):
+        self.assertEqual(worse(2 * 1.5, 80 / 1.5), [])
+        self.assertEqual(worse(0.1, 1000), [])
+
+    def test_twice_as_slow_fails(self):
+        self.assertRegex(worse(4, 80)[0], "^slow is 4, recorded 2")
+        self.assertRegex(worse(2, 40)[0], "^fast is 40, recorded 80")
+        self.assertEqual(len(worse(math.nan, math.nan)), 2)
+
+    def test_zero_stays_zero(self):
+        row = {"metric": "allocations", "value": 0, "better": "lower", "margin": 1.7}
+        self.assertEqual(len(run.failures([row], {"allocations": 1})), 1)
+
+    def test_unmeasured_metric_fails(self):
+        row = {"metric": "gone", "value": 1, "better": "lower", "margin": 2}
+        self.assertEqual(len(run.failures([row], {})), 1)
+
+
+class Expectations(unittest.TestCase):
+    def test_refresh_replaces_values_only(self):
+        with file_with("# why\nmetric,value,better,margin\nslow,2,lower,1.7\n") as file:
+            run.refresh(file.name, {"slow": math.pi})
+            self.assertEqual(Path(file.name).read_text(),
+                             "# why\nmetric,value,better,margin\nslow,3.14,lower,1.7\n")
+
+    def test_bad_row_is_named(self):
+        for row in ("slow,2,lower", "slow,x,lower,2", "slow,2,worse,2", "slow,2,lower,0.5"):
+            with self.subTest(row), file_with(f"metric,value,better,margin\n{row}\n") as file:
+                with self.assertRaises(SystemExit) as end:
+                    run.read_expectations(file.name)
+                self.assertIn(row.split(",")[1], str(end.exception))
+
+    def test_recorded_expectations_are_read(self):
+        rows = run.read_expectations(run.EXPECTED)
+        self.assertTrue(rows)
+        for row in rows:
+            self.assertLess(row["margin"], 2, row["metric"])
+
+
+class Medians(unittest.TestCase):
+    def test_median_over_repetitions(self):
+        runs = [{"name": "frame/1m/iterations:4/repeats:3", "run_type": "iteration",
+                 "cpu_time": time, "bins_cpu_ms": 1, "field_cpu_ms": 2} for time in (3, 1, 2)]
+        runs.append({"name": "frame/1m_mean", "run_type": "aggregate", "cpu_time": 9})
+        measures = run.Measures({"benchmarks": runs})
+        self.assertEqual(measures.median("frame/1m"), 2)
+        self.assertEqual(measures.stages("frame/1m", "bins", "field"), 3)
+        self.assertEqual(measures.scenes("frame"), ["1m"])
+
+
+if __name__ == "__main__":
+    with contextlib.redirect_stdout(io.StringIO()):
+        unittest.main()
