@@ -1,10 +1,10 @@
-# What `cmake --install` puts where, and the package that find_package(partiemc) finds. Components are
-# Debian packages, too (docker/debian): server, client, c, python, and dev, which is the rest.
+# Installs programs, libraries, headers and the CMake package that find_package(partiemc) uses.
+# Each component is also a Debian package (docker/debian): server, client, c, python and dev (the rest).
 include(CMakePackageConfigHelpers)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/partiemc)
 
-# One export set per component, so that the core is found where no gRPC is installed.
+# One export set for each component, so that the core does not need gRPC.
 set(PARTIEMC_COMPONENTS core)
 install(TARGETS partiemc_core EXPORT partiemcCore)
 install(DIRECTORY core/include/ TYPE INCLUDE)
@@ -12,8 +12,8 @@ install(EXPORT partiemcCore NAMESPACE partiemc:: DESTINATION ${package_dir})
 
 if(PARTIEMC_SERVICE)
   list(APPEND PARTIEMC_COMPONENTS client)
-  # The client library drags along what it is made of: codec and common without a header, the messages
-  # with theirs, as programs without our client library speak the protocol too.
+  # The client library needs the codec and the common library (no headers), and the messages (with
+  # headers, as programs may use the protocol without the client library).
   install(TARGETS partiemc_common partiemc_messages partiemc_proto partiemc_codec partiemc_wire
     partiemc_client EXPORT partiemcClient)
   set(programs partiemc)

@@ -64,7 +64,7 @@ std::span<const double> VerticesOf(const Result& result) {
   return result.mesh.points.empty() ? result.rings.points : result.mesh.points;
 }
 
-TEST(Attributes, ALinearFieldIsReproducedAtEveryVertex) {
+TEST(Attributes, ReproducesLinearFieldAtEveryVertex) {
   const Cloud cloud(0.3);
   const std::vector<Attribute> attributes = {{"pressure", 1, cloud.linear},
                                              {"velocity", 2, cloud.vector}};
@@ -89,7 +89,7 @@ TEST(Attributes, ALinearFieldIsReproducedAtEveryVertex) {
   }
 }
 
-TEST(Attributes, NothingElseDependsOnThem) {
+TEST(Attributes, ChangeNothingElse) {
   const Cloud cloud(0.3);
   const std::vector<Attribute> attributes = {{"pressure", 1, cloud.linear}};
   const Result with = Reconstructed({.positions = cloud.positions, .attributes = attributes});
@@ -99,7 +99,7 @@ TEST(Attributes, NothingElseDependsOnThem) {
   EXPECT_THAT(without.attributes, testing::IsEmpty());
 }
 
-TEST(Attributes, TheSameBitsForAnyNumberOfThreads) {
+TEST(Attributes, SameBitsForAnyNumberOfThreads) {
   const Cloud cloud(0.3);
   const std::vector<Attribute> attributes = {{"velocity", 2, cloud.vector}};
   const Frame frame{.positions = cloud.positions, .attributes = attributes};
@@ -109,8 +109,8 @@ TEST(Attributes, TheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.attributes, seven.attributes);
 }
 
-// Volumes weigh as they do in the field: of two halves that overlap, the heavier one counts more.
-TEST(Attributes, VolumesWeigh) {
+// Volumes are weights, as in the field: the heavier one of two overlapping halves counts more.
+TEST(Attributes, WeightsParticlesByVolume) {
   std::vector<float> positions, values, volumes;
   for (int j = 0; j < 12; ++j) {
     for (int i = 0; i < 12; ++i) {
@@ -129,7 +129,7 @@ TEST(Attributes, VolumesWeigh) {
   for (const float value : result.attributes[0].values) EXPECT_NEAR(value, 0.75, 1e-5);
 }
 
-// What few particles hardly tell is not driven far beyond what they carry.
+// Slopes that few particles barely determine do not extrapolate far beyond the particles' values.
 TEST(Attributes, DropsOfFewParticlesStayNearTheirValues) {
   const std::vector<float> positions = {0, 0, 0.02f, 0, 50, 0, 50, 1, 100, 0};
   const std::vector<float> values = {1, 2, 3, 4, 5};
@@ -150,7 +150,7 @@ TEST(Attributes, DropsOfFewParticlesStayNearTheirValues) {
   }
 }
 
-TEST(Attributes, TheLargestValuesStayFinite) {
+TEST(Attributes, LargestValuesStayFinite) {
   const Cloud cloud(0.3);
   std::vector<float> values(cloud.Count());
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -162,7 +162,7 @@ TEST(Attributes, TheLargestValuesStayFinite) {
                                   [](float value) { return std::isfinite(value); }));
 }
 
-TEST(Attributes, WhatIsWrongIsNamed) {
+TEST(Attributes, RefusalsNameTheField) {
   const Cloud cloud(0);
   std::vector<float> spoiled = cloud.linear;
   spoiled[3] = std::numeric_limits<float>::quiet_NaN();

@@ -1,4 +1,4 @@
-// Which ring continues which: through motion, splits, merges, in any order, on any machine state.
+// Identities of rings through motion, splits and merges, for any order and any number of threads.
 #include "identities/identities.h"
 
 #include <gmock/gmock.h>
@@ -30,14 +30,14 @@ Particles Together(std::initializer_list<Particles> parts) {
   return all;
 }
 
-// A bar of particles whose middle third is there or not.
+// A bar of particles, with or without its middle third.
 Particles Bar(bool whole, double y = 0) {
   Particles bar = Together({support::Lattice(30, 12, 0, y), support::Lattice(12, 12, 40, y)});
   if (whole) bar.Add(support::Lattice(10, 12, 30, y));
   return bar;
 }
 
-TEST(Identities, OfAFirstFrameAreDifferentAndHaveNoParents) {
+TEST(Identities, FirstFrameHasDistinctRingsWithoutParents) {
   Stream stream;
   const Rings& rings = stream.Next(
       Together({support::Disc(6, 0, 0), support::Annulus(20, 40), support::Disc(3, 60, 0)}));
@@ -51,7 +51,7 @@ TEST(Identities, OfAFirstFrameAreDifferentAndHaveNoParents) {
   EXPECT_THAT(rings.parent_offsets, ElementsAre(0, 0, 0, 0, 0));
 }
 
-TEST(Identities, TwoDiscsThatPassEachOtherKeepTheirs) {
+TEST(Identities, PassingDiscsKeepTheirIdentities) {
   Stream stream;
   std::uint64_t right_going = 0, left_going = 0;
   for (int k = 0; k <= 40; ++k) {
@@ -71,7 +71,7 @@ TEST(Identities, TwoDiscsThatPassEachOtherKeepTheirs) {
   }
 }
 
-TEST(Identities, ANeighbourThatMovesIntoThePlaceIsNoParent) {
+TEST(Identities, NeighbourThatMovesInIsNoParent) {
   // Two blocks side by side; both move right by a third of their width, so that the left one comes
   // to lie where the edge of the right one was.
   Stream stream;
@@ -86,7 +86,7 @@ TEST(Identities, ANeighbourThatMovesIntoThePlaceIsNoParent) {
   EXPECT_THAT(stream.Parents(37, 9), ElementsAre(right));
 }
 
-TEST(Identities, AfterASplitTheLargerPartKeepsItAndTheOtherNamesItsParent) {
+TEST(Identities, LargerPartKeepsIdentityAfterSplit) {
   Stream stream;
   stream.Next(Bar(true));
   ASSERT_EQ(stream.rings().RingCount(), 1u);
@@ -99,7 +99,7 @@ TEST(Identities, AfterASplitTheLargerPartKeepsItAndTheOtherNamesItsParent) {
   EXPECT_THAT(stream.Parents(46, 6), ElementsAre(whole));
 }
 
-TEST(Identities, AfterAMergeTheLargerPartIsContinuedAndBothAreParents) {
+TEST(Identities, LargerPartIsContinuedAfterMerge) {
   Stream stream;
   stream.Next(Bar(false));
   const std::uint64_t large = stream.Identity(15, 6);
@@ -108,13 +108,13 @@ TEST(Identities, AfterAMergeTheLargerPartIsContinuedAndBothAreParents) {
   ASSERT_EQ(stream.rings().RingCount(), 1u);
   EXPECT_EQ(stream.Identity(25, 6), large);
   EXPECT_THAT(stream.Parents(25, 6), UnorderedElementsAre(large, small));
-  // Parted again, the smaller one is a new ring: what was given is never given again.
+  // After another split, the smaller part is a new ring with a new identity.
   stream.Next(Bar(false));
   EXPECT_EQ(stream.Identity(15, 6), large);
   EXPECT_GT(stream.Identity(46, 6), std::max(large, small));
 }
 
-TEST(Identities, ASmallDropJoinsALargeBodyAsItsParent) {
+TEST(Identities, SmallDropBecomesParentOfLargeBody) {
   Stream stream;
   stream.Next(Together({support::Lattice(40, 20), support::Disc(2.5, 20, 25)}));
   ASSERT_EQ(stream.rings().RingCount(), 2u);
@@ -126,7 +126,7 @@ TEST(Identities, ASmallDropJoinsALargeBodyAsItsParent) {
   EXPECT_THAT(stream.Parents(20, 9), UnorderedElementsAre(body, drop));
 }
 
-TEST(Identities, OfHolesAndIslandsGoTheirOwnWay) {
+TEST(Identities, HolesAndIslandsAreTrackedSeparately) {
   // A ring of fluid with an island in it; the island drifts, then the fluid ring opens.
   Stream stream;
   const auto scene = [](double x, bool open) {
@@ -154,7 +154,7 @@ TEST(Identities, OfHolesAndIslandsGoTheirOwnWay) {
   for (const RingMeasures& measures : stream.rings().measures) before.insert(measures.identity);
   EXPECT_EQ(before.size(), 3u);
   stream.Next(scene(2, true));
-  ASSERT_EQ(stream.rings().RingCount(), 2u);  // The hole is gone, fluid and island are the same.
+  ASSERT_EQ(stream.rings().RingCount(), 2u);  // The hole vanished; fluid and island stay.
   for (std::size_t ring = 0; ring < 2; ++ring) {
     EXPECT_TRUE(before.contains(stream.rings().measures[ring].identity));
     EXPECT_NE(stream.rings().measures[ring].identity, hole);
@@ -163,7 +163,7 @@ TEST(Identities, OfHolesAndIslandsGoTheirOwnWay) {
   }
 }
 
-TEST(Identities, ARingThatIsMissingFromOneFrameComesBackAsANewOne) {
+TEST(Identities, RingMissingInOneFrameIsNew) {
   Stream stream;
   stream.Next(Together({support::Disc(6), support::Disc(6, 40, 0)}));
   const std::uint64_t kept = stream.Identity(0, 0);
@@ -175,7 +175,7 @@ TEST(Identities, ARingThatIsMissingFromOneFrameComesBackAsANewOne) {
   EXPECT_THAT(stream.Parents(40, 0), IsEmpty());
 }
 
-TEST(Identities, AnEmptyFrameEndsAllRingsAndNoneIsGivenAgain) {
+TEST(Identities, EmptyFrameEndsAllIdentities) {
   Stream stream;
   stream.Next(support::Disc(6));
   EXPECT_EQ(stream.Identity(0, 0), 1u);
@@ -188,7 +188,7 @@ TEST(Identities, AnEmptyFrameEndsAllRingsAndNoneIsGivenAgain) {
   EXPECT_THAT(stream.Parents(0, 0), IsEmpty());
 }
 
-TEST(Identities, ARefusedFrameChangesNothing) {
+TEST(Identities, RefusedFrameChangesNothing) {
   Stream disturbed, undisturbed;
   Particles bad = support::Disc(6);
   bad.xy[3] = std::numeric_limits<double>::quiet_NaN();
@@ -201,7 +201,7 @@ TEST(Identities, ARefusedFrameChangesNothing) {
   }
 }
 
-// Spray, bodies, holes: everything that forms, breaks and joins.
+// Spray, bodies and holes that form, break and join.
 Particles Turmoil(std::uint64_t seed, int frame) {
   support::Random random(seed);
   Particles particles;
@@ -213,7 +213,7 @@ Particles Turmoil(std::uint64_t seed, int frame) {
   return particles;
 }
 
-TEST(Identities, AreUniqueInAFrameAndParentsAreOfTheFrameBefore) {
+TEST(Identities, AreUniqueAndParentsAreOfTheLastFrame) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     Stream stream;
@@ -238,7 +238,7 @@ TEST(Identities, AreUniqueInAFrameAndParentsAreOfTheFrameBefore) {
           ++children[parent];
         }
         merges += parents.size() > 1;
-        // Either it goes on from a parent, or it was never given before.
+        // An identity continues a parent's or is new.
         if (std::find(parents.begin(), parents.end(), identity) == parents.end()) {
           EXPECT_GT(identity, highest);
         }
@@ -246,7 +246,7 @@ TEST(Identities, AreUniqueInAFrameAndParentsAreOfTheFrameBefore) {
       for (const auto& [parent, count] : children) {
         splits += count > 1;
         if (count == 1) continue;
-        // One of the children, or none where a larger parent's identity went to each.
+        // One child continues it, or none, if each child continues a larger parent.
         EXPECT_LE(now.count(parent), 1u);
       }
       if (!now.empty()) highest = std::max(highest, now.rbegin()->first);
@@ -257,7 +257,7 @@ TEST(Identities, AreUniqueInAFrameAndParentsAreOfTheFrameBefore) {
   }
 }
 
-TEST(Identities, DoNotDependOnTheOrderOfParticlesOrOnThreadsOrRestarts) {
+TEST(Identities, DoNotDependOnOrderThreadsOrRestarts) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     Stream stream, permuted, restored;
@@ -285,7 +285,7 @@ TEST(Identities, DoNotDependOnTheOrderOfParticlesOrOnThreadsOrRestarts) {
 }
 
 TEST(Identities, DoNotDependOnTheOrderOfRings) {
-  // Moved by part of a tile, the same scene gives its rings in another order.
+  // Shifted by part of a tile, the same scene has its rings in another order.
   for (const auto& [dx, dy] : {std::pair(16.0, 16.0), {-16.0, 0.0}, {7.0, 21.0}}) {
     Stream here, there;
     int reordered = 0;
@@ -322,7 +322,7 @@ TEST(Identities, EveryPlacementTracksTheRingsThatItKeeps) {
   }
 }
 
-TEST(Identities, WhatAStreamRemembersFollowsTheOutlineAndNotTheArea) {
+TEST(Identities, StateGrowsWithOutlineNotArea) {
   Stream stream;
   stream.Next(support::Lattice(200, 200));
   EXPECT_LT(stream.state().history.runs.size(), 210u);

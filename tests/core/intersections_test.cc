@@ -65,14 +65,14 @@ std::size_t CountAllPairs(const Region& rings) {
   return count;
 }
 
-TEST(CountTouchingPairs, NeighboursOnARingDoNotCount) {
+TEST(CountTouchingPairs, IgnoresNeighboursOnARing) {
   EXPECT_EQ(Count(Region{}), 0u);
   EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 0}, {0, 1}}})), 0u);
   EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 0}, {2, 0}, {2, 1}, {0, 1}}})), 0u) << "straight on";
   EXPECT_EQ(Count(RingsOf({Rectangle(0, 0, 1, 1), Rectangle(2, 0, 3, 1)})), 0u);
 }
 
-TEST(CountTouchingPairs, EveryKindOfTouchCountsOnce) {
+TEST(CountTouchingPairs, CountsEveryKindOfTouchOnce) {
   EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}})), 1u) << "crossing";
   EXPECT_EQ(Count(RingsOf({{{0, 0}, {2, 0}, {1, 0}, {1, 1}}})), 2u)
       << "folds back, and the side after that begins on the first side";
@@ -91,7 +91,7 @@ TEST(CountTouchingPairs, ListsThePairsThatTouch) {
   EXPECT_EQ(buffers.pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{{4, 6}}));
 }
 
-TEST(CountTouchingPairs, AgreesWithAllPairsOnSmallLatticesFullOfDegeneracies) {
+TEST(CountTouchingPairs, AgreesWithAllPairsOnDegenerateLattices) {
   Random random(8);
   for (int round = 0; round < 20'000; ++round) {
     const Region indexed = testing::RandomGarbage(random, 2 + round % 9, 4, 9);
@@ -101,7 +101,7 @@ TEST(CountTouchingPairs, AgreesWithAllPairsOnSmallLatticesFullOfDegeneracies) {
   }
 }
 
-TEST(CountTouchingPairs, AgreesWithAllPairsForSegmentsOfVeryDifferentLengths) {
+TEST(CountTouchingPairs, AgreesWithAllPairsForMixedLengths) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Random random(seed);
     Region rings;
@@ -116,7 +116,7 @@ TEST(CountTouchingPairs, AgreesWithAllPairsForSegmentsOfVeryDifferentLengths) {
   }
 }
 
-TEST(CountTouchingPairs, AgreesWithAllPairsWhetherRingsLieApartOrTogether) {
+TEST(CountTouchingPairs, AgreesWithAllPairsForDistantRings) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     Random random(seed);
     Region rings;
@@ -136,7 +136,7 @@ TEST(CountTouchingPairs, AgreesWithAllPairsWhetherRingsLieApartOrTogether) {
 }
 
 /// Segments as long as cells, with ends on the borders of cells: where indices are rounded.
-TEST(CountTouchingPairs, AgreesWithAllPairsWhereSegmentsEndOnBordersOfCells) {
+TEST(CountTouchingPairs, AgreesWithAllPairsAtBordersOfCells) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Random random(seed);
     const testing::Cells cells = testing::RandomCells(random, 12, 12, 0.5);
@@ -151,7 +151,7 @@ TEST(CountTouchingPairs, AgreesWithAllPairsWhereSegmentsEndOnBordersOfCells) {
   }
 }
 
-TEST(CountTouchingPairs, ContoursTouchNowhereUntilAPointIsMovedAcross) {
+TEST(CountTouchingPairs, ContoursTouchOnlyAfterAPointMoved) {
   Random random(9);
   Region rings = testing::RandomContours(random, 200).Transformed(0.01, 1e3);
   ASSERT_GT(rings.loop_points.size(), 2'000u);
@@ -162,7 +162,7 @@ TEST(CountTouchingPairs, ContoursTouchNowhereUntilAPointIsMovedAcross) {
   EXPECT_EQ(count, CountAllPairs(rings));
 }
 
-TEST(CountTouchingPairs, BuffersCarryNothingFromOneCallToTheNext) {
+TEST(CountTouchingPairs, ReusedBuffersHaveNoEffect) {
   TouchingPairsBuffers warm;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Random random(seed);

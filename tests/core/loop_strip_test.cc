@@ -57,7 +57,7 @@ Region RegionOf(const std::vector<Point>& loop, const std::vector<Point>& other)
   return region;
 }
 
-/// A loop round the origin whose distance from it is `radius` times 1 plus waves of a random shape.
+/// A loop around the origin with a wavy random radius.
 std::vector<Point> Wobbly(Random& random, double radius, std::size_t count) {
   constexpr double kTurn = 6.283185307179586;
   const double depth = Uniform(random, 0, 0.1);
@@ -72,7 +72,7 @@ std::vector<Point> Wobbly(Random& random, double radius, std::size_t count) {
   return loop;
 }
 
-TEST(LoopStrip, AFrameBetweenTwoSquaresHasATriangleForEachPoint) {
+TEST(LoopStrip, FrameHasOneTriangleForEachPoint) {
   ExpectStrip(RegionOf(Rectangle(0, 0, 4, 4), Reversed(Rectangle(1, 1, 3, 3))));
   ExpectStrip(RegionOf(Reversed(Rectangle(1, 1, 3, 3)), Rectangle(0, 0, 4, 4)));
 }
@@ -102,14 +102,14 @@ TEST(LoopStrip, WobblyRingsAreCoveredAtAnyScaleAndPlace) {
   }
 }
 
-TEST(LoopStrip, ARingThatTouchesItsStaircaseIsCoveredOrRefused) {
+TEST(LoopStrip, TouchingRingIsCoveredOrRefused) {
   Region region;
   region.AddLoop(Rectangle(0, 0, 4, 4));
   region.AddLoop({0, region.AddPoint({1, 3}), region.AddPoint({3, 3}), region.AddPoint({3, 1})});
   if (const auto triangles = Strip(region)) ExpectCover(region, *triangles);
 }
 
-TEST(LoopStrip, WhatIsTakenOfBandsBetweenContoursAndStaircasesIsCovered) {
+TEST(LoopStrip, AcceptedBandsAreCovered) {
   std::size_t strips = 0, bands = 0;
   for (std::uint64_t seed = 0; seed < 600; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -126,8 +126,8 @@ TEST(LoopStrip, WhatIsTakenOfBandsBetweenContoursAndStaircasesIsCovered) {
   EXPECT_GT(strips, bands / 2);
 }
 
-// Whatever the loops are: triangles turn counter-clockwise, and their sides are the loops.
-TEST(LoopStrip, WhateverIsTakenOfRandomLoopsHasTheirSides) {
+// For any loops, accepted triangles are counter-clockwise, and their sides sum to the loops.
+TEST(LoopStrip, AcceptedRandomLoopsKeepTheirSides) {
   Random random(5);
   LoopStrip strip;
   std::size_t taken = 0;
@@ -143,7 +143,7 @@ TEST(LoopStrip, WhateverIsTakenOfRandomLoopsHasTheirSides) {
   EXPECT_GT(taken, 0u);
 }
 
-TEST(LoopStrip, ARingWithOnePointMovedIsTakenRightOrRefused) {
+TEST(LoopStrip, RingWithOnePointMovedIsCoveredOrRefused) {
   Random random(9);
   std::size_t taken = 0;
   for (int round = 0; round < 2'000; ++round) {
@@ -159,7 +159,7 @@ TEST(LoopStrip, ARingWithOnePointMovedIsTakenRightOrRefused) {
   EXPECT_LT(taken, 2'000u);
 }
 
-TEST(LoopStrip, WhatIsNoRingIsRefused) {
+TEST(LoopStrip, RefusesOtherRegions) {
   const auto square = Rectangle(0, 0, 4, 4);
   EXPECT_FALSE(Strip(RegionOf(square, Rectangle(1, 1, 3, 3)))) << "the same way round";
   EXPECT_FALSE(Strip(RegionOf(Rectangle(1, 1, 3, 3), square))) << "the same way round";
@@ -176,7 +176,7 @@ TEST(LoopStrip, WhatIsNoRingIsRefused) {
   }
 }
 
-TEST(LoopStrip, TheResultDoesNotDependOnWhatWasTriangulatedBefore) {
+TEST(LoopStrip, EarlierInputHasNoEffect) {
   Random random(6);
   LoopStrip warm;
   for (int round = 0; round < 20; ++round) {

@@ -13,7 +13,7 @@
 namespace partiemc {
 namespace {
 
-TEST(NodeVertices, EachNodeIsOnePointAtItsPlaceInTheOrderOfTilesRowsColumns) {
+TEST(NodeVertices, AreNumberedByTileRowColumn) {
   support::Random random(12);
   NodeVertices nodes;
   for (int round = 0; round < 50; ++round) {

@@ -37,7 +37,7 @@ std::vector<CellNormal> Reversed(std::vector<CellNormal> normals) {
 
 class NormalsOf : public testing::TestWithParam<Placement> {};
 
-TEST_P(NormalsOf, AHalfPlanePointAcrossItsBoundary) {
+TEST_P(NormalsOf, HalfPlaneAreAcrossItsBoundary) {
   Stages stages;
   stages.Run(support::HalfPlane(41, 12), {.placement = GetParam(), .spacing = 1.0});
   int checked = 0;
@@ -49,7 +49,7 @@ TEST_P(NormalsOf, AHalfPlanePointAcrossItsBoundary) {
   EXPECT_GE(checked, 20);
 }
 
-TEST_P(NormalsOf, ADiscPointAwayFromItsCentre) {
+TEST_P(NormalsOf, DiscPointAwayFromItsCentre) {
   Stages stages;
   stages.Run(support::Disc(14.2), {.placement = GetParam(), .spacing = 1.0});
   double sum = 0;
@@ -62,7 +62,7 @@ TEST_P(NormalsOf, ADiscPointAwayFromItsCentre) {
   EXPECT_LT(sum / static_cast<double>(stages.planes.size()), 7);
 }
 
-TEST_P(NormalsOf, VerticesAreUnitAndOutwardWhateverTheMemorySays) {
+TEST_P(NormalsOf, VerticesAreUnitAndOutwardForAnyMemory) {
   Stages first;
   first.Run(support::Disc(9.7), {.placement = GetParam(), .spacing = 1.0});
   Stages second;
@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(Placements, NormalsOf, testing::ValuesIn(AllPlacements(
                            return name;
                          });
 
-TEST(Normals, AreTurnedToTheSideOfThePreviousOnes) {
+TEST(Normals, AreOrientedByPreviousNormals) {
   Stages first;
   first.Run(support::Disc(9.7), {.spacing = 1.0});
   Stages kept, turned;
@@ -102,7 +102,7 @@ TEST(Normals, AreTurnedToTheSideOfThePreviousOnes) {
   }
 }
 
-TEST(Normals, IgnoreThePreviousOnesWhereMemoryIsSwitchedOff) {
+TEST(Normals, IgnorePreviousNormalsWithoutMemory) {
   Stages first, second;
   first.Run(support::Disc(9.7), {.spacing = 1.0});
   second.Run(support::Disc(9.7), {.spacing = 1.0, .normal_memory = false},
@@ -113,7 +113,7 @@ TEST(Normals, IgnoreThePreviousOnesWhereMemoryIsSwitchedOff) {
   }
 }
 
-TEST(Normals, OfOtherCellsThanTheActiveOnesChangeNothing) {
+TEST(Normals, PreviousNormalsOfInactiveCellsHaveNoEffect) {
   Stages first, second;
   first.Run(support::Disc(9.7), {.spacing = 1.0});
   std::vector<CellNormal> elsewhere = Reversed(first.next_normals);
@@ -124,7 +124,7 @@ TEST(Normals, OfOtherCellsThanTheActiveOnesChangeNothing) {
   }
 }
 
-TEST(Normals, ThatAreRememberedComeByRowThenColumnOnePerCell) {
+TEST(Normals, AreStoredByRowThenColumnOnePerCell) {
   support::Random random(1);
   Stages stages;
   stages.Run(support::Shifted(support::Blob(random, 10), -30, 31), {.spacing = 1.0});
@@ -149,7 +149,7 @@ TEST(Normals, ThatAreRememberedComeByRowThenColumnOnePerCell) {
   EXPECT_EQ(single, stages.next_normals.size());
 }
 
-// A circle by hand, and one particle that gives a gradient to the segments near it only.
+// A circle built by hand, and one particle, which gives only the segments near it a gradient.
 struct WeakCircle : Stages {
   explicit WeakCircle(std::span<const CellNormal> previous = {}) {
     support::Particles particle;
@@ -162,7 +162,7 @@ struct WeakCircle : Stages {
   std::size_t Before(std::size_t k) const { return (k + planes.size() - 1) % planes.size(); }
 };
 
-TEST(Normals, WithoutAGradientAreThoseOfReliableNeighboursElseOfTheSegment) {
+TEST(Normals, WeakGradientUsesNeighboursElseSegment) {
   const WeakCircle circle;
   int reliable = 0, mended = 0, alone = 0;
   for (std::size_t k = 0; k < circle.planes.size(); ++k) {
@@ -191,7 +191,7 @@ TEST(Normals, WithoutAGradientAreThoseOfReliableNeighboursElseOfTheSegment) {
   EXPECT_GT(alone, 20);
 }
 
-TEST(Normals, WithoutAGradientAreThePreviousOnesBeforeAnythingElse) {
+TEST(Normals, WeakGradientUsesPreviousNormalFirst) {
   const WeakCircle plain;
   std::vector<CellNormal> previous = plain.next_normals;
   for (CellNormal& normal : previous) {

@@ -1,4 +1,4 @@
-// Margins of periodic rings, against walks along the ring.
+// Compares the margins of periodic rings with walks along the ring.
 #include "vertices/periodic_ring.h"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,8 @@
 namespace partiemc {
 namespace {
 
-// A square of side 20, whose corners are 20 cells of the ring apart, with many vertices that have
-// all but fallen together around those that are `reach` from the first one, either way.
+// A square of side 20. Many nearly coincident vertices lie at the distance `reach` from the first
+// vertex, in both directions.
 std::vector<Point> CrowdedSquare(support::Random& random, double reach) {
   std::vector<double> at;
   for (int k = 0; k < 80; ++k) at.push_back(k + (k == 0 ? 0 : random.Uniform(-0.4, 0.4)));
@@ -51,7 +51,7 @@ bool IsNear(std::int64_t units, double reach) {
   return 1.0f - distance * distance * static_cast<float>(1 / (reach_units * reach_units)) > 0;
 }
 
-TEST(PeriodicRings, HaveMarginsThatHoldEveryVertexThatAWindowTakesForNear) {
+TEST(PeriodicRings, MarginsHoldEveryVertexOfAWindow) {
   for (unsigned seed = 1; seed <= 300; ++seed) {
     support::Random random(seed);
     const double reach = random.Uniform(3, 18);

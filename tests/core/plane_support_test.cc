@@ -1,4 +1,4 @@
-// What particles say of a plane, against a plain sum over all particles.
+// Compares the support sums of a plane with a plain sum over all particles.
 #include "vertices/plane_support.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@
 namespace partiemc {
 namespace {
 
-// Rows of particles in one band. `xs` are told modulo kColumnPeriod; the disc has all.
+// Rows of particles in one band. `xs` are stored modulo kColumnPeriod; the disc contains all.
 NeighbourRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys,
                       const float* weights, NeighbourBand band, float origin_x, float origin_y) {
   NeighbourRows near;
@@ -33,7 +33,7 @@ NeighbourRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys
   return near;
 }
 
-// A position, rounded as those of particles are, so that it is the same after any period.
+// A position, rounded like a particle's, so that it is the same after any period.
 float Rounded(double position) {
   return static_cast<float>(std::round(position * 131072) / 131072);
 }
@@ -43,7 +43,7 @@ float InPeriod(float x) { return x < 0 ? x + kColumnPeriod : x; }
 // Particles in rows of 3 buckets, with more particles behind each row, which must not count.
 struct Rows {
   explicit Rows(support::Random& random) {
-    // Now and then more than are summed at once, in one bucket or in several.
+    // Sometimes more particles than are summed at once, in one bucket or in several.
     const double most = random.Chance(0.2) ? random.Uniform(4, 400) : 4;
     offsets.push_back(0);
     for (int row = 0; row < 5; ++row) {
@@ -130,7 +130,7 @@ TEST(PlaneSupport, AgreesWithASumOverAllParticles) {
   }
 }
 
-TEST(PlaneSupport, OfManyPlanesAtOnceHasTheBitsOfEachAlone) {
+TEST(PlaneSupport, BatchHasTheBitsOfSinglePlanes) {
   support::Random random(5);
   for (int round = 0; round < 50; ++round) {
     const bool weighted = round % 2 == 1;

@@ -1,4 +1,4 @@
-// Whether triangles cover a region exactly.
+// Checks that triangles cover a region exactly.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace partiemc::testing {
 
-/// Expects counter-clockwise triangles whose sides cancel but for the loops: together they cover
-/// each point as often as the loops wind round it. Sides have to match whole.
+/// Expects counter-clockwise triangles whose sides cancel except for the loops. The number of
+/// triangles around a point is then the winding number of the loops. Sides must match as a whole.
 void ExpectCover(const Region& region, const std::vector<std::uint32_t>& triangles);
 
 }  // namespace partiemc::testing

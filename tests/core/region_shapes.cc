@@ -141,8 +141,8 @@ class FieldContours {
 
  private:
   // Corners 0..3 of a cell counter-clockwise from its lower left one, and side k from corner k to
-  // corner k + 1. To have the inside on its left, a contour enters by a side from an inside to an
-  // outside corner and leaves by one from an outside to an inside corner.
+  // corner k + 1. A contour has the inside on its left. It enters a cell through a side from an
+  // inside to an outside corner and leaves through a side from an outside to an inside corner.
   void AddCell(std::size_t node) {
     const std::array<std::size_t, 4> nodes{node, node + 1, node + 1 + size_, node + size_};
     const std::array<LatticeEdge, 4> sides{LatticeEdge{node, false}, LatticeEdge{node + 1, true},
@@ -153,8 +153,8 @@ class FieldContours {
         values_[nodes[0]] + values_[nodes[1]] + values_[nodes[2]] + values_[nodes[3]];
     for (std::size_t entry = 0; entry < 4; ++entry) {
       if (!inside(entry) || inside(entry + 1)) continue;
-      // Leaves by the nearest side from outside to inside: going on counter-clockwise keeps the
-      // outside corners apart from each other, clockwise the inside ones.
+      // Leaves through the nearest side from outside to inside. Searching counter-clockwise
+      // separates the outside corners, searching clockwise the inside ones.
       const std::size_t step = mean < 0 ? 1 : 3;
       std::size_t exit = (entry + step) % 4;
       while (inside(exit) || !inside(exit + 1)) exit = (exit + step) % 4;

@@ -1,4 +1,4 @@
-// Regions for tests of the geometry: as loops with the inside on their left.
+// Regions for geometry tests, as loops with the inside on their left.
 #pragma once
 
 #include <cstddef>
@@ -10,26 +10,26 @@
 
 namespace partiemc::testing {
 
-/// Loops as Triangulator and CountTouchingPairs take them.
+/// Loops in the format of Triangulator and CountTouchingPairs.
 struct Region {
   std::vector<double> points;
   std::vector<std::uint32_t> loop_points;
   std::vector<std::uint32_t> loop_offsets{0};
 
   std::uint32_t AddPoint(const Point& point);
-  /// A loop through new points.
+  /// Adds a loop through new points.
   void AddLoop(const std::vector<Point>& loop);
-  /// A loop through points that are there already.
+  /// Adds a loop through existing points.
   void AddLoop(const std::vector<std::uint32_t>& indices);
 
   Point PointAt(std::size_t index) const { return {points[2 * index], points[2 * index + 1]}; }
   std::size_t LoopCount() const { return loop_offsets.size() - 1; }
   std::vector<Point> Loop(std::size_t loop) const;
-  /// Every coordinate multiplied by `scale`, then moved by `shift`.
+  /// Multiplies every coordinate by `scale`, then adds `shift`.
   Region Transformed(double scale, double shift) const;
 };
 
-/// Twice the signed area, of the loop or of all loops; about the loop's own first point.
+/// Twice the signed area of one loop, or of all loops.
 double DoubleArea(const std::vector<Point>& loop);
 double DoubleArea(const Region& region);
 
@@ -41,9 +41,9 @@ std::vector<Point> Reversed(std::vector<Point> loop);
 std::vector<Point> RandomStar(Random& random, std::size_t count);
 /// A band of `turns` turns that winds outwards.
 std::vector<Point> Spiral(std::size_t points_per_side, double turns);
-/// Teeth of random length above a common back, about 4 points each. Every tooth begins on its own.
+/// A comb: teeth of random length above a common back, about 4 points each.
 std::vector<Point> Comb(Random& random, std::size_t teeth);
-/// The teeth of a comb turned round the back: all hang down from it.
+/// The same comb with its teeth hanging down.
 std::vector<Point> HangingComb(Random& random, std::size_t teeth);
 
 /// Contours of a sum of random waves on a lattice of size x size nodes of spacing 1, outside at its
@@ -57,15 +57,15 @@ struct Cells {
   bool At(std::ptrdiff_t x, std::ptrdiff_t y) const;
 };
 Cells RandomCells(Random& random, std::size_t width, std::size_t height, double density);
-/// Boundary of the cells, lattice points named once. At a pinch the loops go on at random, left or
-/// right. `corners_only` leaves out points in the middle of straight sides.
+/// Boundary of the cells; each lattice point has one index. At a pinch a loop turns left or right
+/// at random. `corners_only` omits points in the middle of straight sides.
 Region Staircases(const Cells& cells, Random& random, bool corners_only);
 
-/// Contours of a random field, and as holes the staircases round the cells inside that they do not
-/// run through.
+/// Contours of a random field, and as holes the staircases around the inside cells that no contour
+/// crosses.
 Region RandomBand(Random& random, std::size_t size);
 
-/// A random number of random closed loops on a small lattice: hardly ever a region.
+/// Random closed loops on a small lattice, which rarely bound a region.
 Region RandomGarbage(Random& random, std::size_t lattice_size, std::size_t max_loops,
                      std::size_t max_points);
 

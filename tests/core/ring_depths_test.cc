@@ -29,7 +29,7 @@ std::vector<std::int32_t> Depths(const Region& region) {
   return DepthsOf(region, nesting);
 }
 
-// How often a ring winds around a point, by all of its segments.
+// Winding number of a ring around a point, computed from all segments.
 int WindingNumber(const Region& region, std::size_t ring, const Point& point) {
   const std::size_t first = region.loop_offsets[ring], last = region.loop_offsets[ring + 1];
   int winding = 0;
@@ -56,7 +56,7 @@ std::vector<std::int32_t> DepthsOneByOne(const Region& region) {
   return depths;
 }
 
-// Of the rings around a ring the one that lies in all others of them.
+// The innermost ring around a ring.
 std::uint32_t AroundOneByOne(const Region& region, std::size_t ring) {
   const auto is_in = [&](std::size_t inner, std::size_t outer) {
     return WindingNumber(region, outer, region.PointAt(region.loop_offsets[inner])) != 0;
@@ -82,22 +82,22 @@ Region RegionOf(const std::vector<std::vector<Point>>& rings) {
   return region;
 }
 
-TEST(RingDepths, OuterRingsLieInNothingAndHolesInTheFluidAroundThem) {
+TEST(RingDepths, HolesLieInTheirOuterRings) {
   EXPECT_EQ(Depths(Region{}), std::vector<std::int32_t>{});
   EXPECT_EQ(Depths(RegionOf({Square(0, 0, 10), Square(0, 0, 5, true), Square(0, 0, 2),
                              Square(20, 0, 3), Square(0, 7, 1, true)})),
             (std::vector<std::int32_t>{0, 1, 0, 0, 1}));
 }
 
-TEST(RingDepths, OuterRingsInsideEachOtherAddUp) {
+TEST(RingDepths, NestedOuterRingsAddUp) {
   EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3, true)})),
             (std::vector<std::int32_t>{0, -1, 0}));
   EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)})),
             (std::vector<std::int32_t>{2, 1, 0}));
 }
 
-TEST(RingDepths, ARingIsLookedForWhereItIsLowestNotWhereItTurnsFirst) {
-  // Its other low turns lie above a square that stands between its legs.
+TEST(RingDepths, RingIsFoundAtItsLowestPoint) {
+  // Its other minima lie above a square between its legs.
   const std::vector<Point> legs{{0, 4}, {0, -1}, {1, 3}, {3, 3}, {4, 0}, {4, 4}};
   EXPECT_EQ(Depths(RegionOf({legs, Square(2, 1, 0.5)})), (std::vector<std::int32_t>{0, 0}));
 }
@@ -116,7 +116,7 @@ TEST(RingDepths, AgreeWithWindingNumbersOfStaircases) {
   }
 }
 
-/// Stars within, beside and around each other, some of them the wrong way round.
+/// Stars inside, next to and around each other, some with the wrong direction.
 TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
   int nested = 0;
   RingDepths warm;

@@ -1,4 +1,4 @@
-// Window sums along rings, against walks along the ring that know of neither vectors nor margins.
+// Compares window sums along rings with scalar walks along the ring.
 #include "vertices/ring_filters.h"
 
 #include <gtest/gtest.h>
@@ -62,7 +62,7 @@ class RandomRing {
       ring.weight[k] = static_cast<float>(WeightOf(k));
       ring.base[k] = static_cast<float>(bases_[k]);
     }
-    // In two parts, as two tasks would.
+    // In two ranges, like two tasks.
     const auto repeat = [&](auto* values) {
       ring.Repeat(values, 0, count() / 3);
       ring.Repeat(values, count() / 3, count());
@@ -78,7 +78,7 @@ class RandomRing {
     return ring;
   }
 
-  // What the three functions of ring_filters.h say, vertex by vertex.
+  // The three functions of ring_filters.h, computed for one vertex.
   Point MeanNormal(int k, double reach, bool by_angle) const {
     Point sum;
     ForEachNear(k, reach, [&](int j, double w) {
@@ -134,7 +134,7 @@ class RandomRing {
   std::vector<double> bases_, steps_;
 };
 
-TEST(RingFilters, GoByTheLengthsOfStepsForAnyInstructionSet) {
+TEST(RingFilters, UseSameLengthsOnAnyInstructionSet) {
   for (const int count : {24, 31, 100}) {
     support::Random random(static_cast<std::uint64_t>(count));
     const RandomRing source(random, count);
@@ -159,7 +159,7 @@ TEST(RingFilters, GoByTheLengthsOfStepsForAnyInstructionSet) {
   }
 }
 
-TEST(RingFilters, AgreeWithAWalkAlongTheRing) {
+TEST(RingFilters, AgreeWithScalarWalk) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     support::Random random(seed);
     const RandomRing expected(random, 16 + static_cast<int>(seed) * 2);
@@ -186,7 +186,7 @@ TEST(RingFilters, AgreeWithAWalkAlongTheRing) {
   }
 }
 
-TEST(RingFilters, KeepTheOwnNormalWhereTheMeanVanishes) {
+TEST(RingFilters, KeepOwnNormalIfMeanVanishes) {
   support::Random random(3);
   const RandomRing source(random, 40);
   PeriodicRings rings;
@@ -200,7 +200,7 @@ TEST(RingFilters, KeepTheOwnNormalWhereTheMeanVanishes) {
 }
 
 // A polygon whose windows hold many more vertices in one place than at the ends of the ring.
-TEST(RingFilters, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
+TEST(RingFilters, ReadNothingBeyondMargins) {
   constexpr int kSides = 60, kCrowd = 80;
   constexpr double kReach = 10.5;
   for (const int crowded : {15, kSides - 14}) {
@@ -211,7 +211,7 @@ TEST(RingFilters, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
                     {kSides / 6.0 * std::cos(angle), kSides / 6.0 * std::sin(angle)});
     }
     const auto count = static_cast<std::ptrdiff_t>(points.size());
-    // What lies beyond the margins looks near and spoils every sum.
+    // Elements beyond the margins would be near and would change every sum.
     const auto results_with = [&](std::uint32_t more) {
       PeriodicRingSize size = SizeForWindows(points, kReach);
       size.margin += static_cast<std::uint32_t>(kWindowPadding) + more;
@@ -248,7 +248,7 @@ TEST(RingFilters, ReadNothingBeyondMarginsWhereverVerticesCrowd) {
   }
 }
 
-TEST(RingFilters, HaveTheSameBitsForAnyInstructionSetAndAnyStretches) {
+TEST(RingFilters, SameBitsForAnyInstructionSetAndStretch) {
   support::Random random(5);
   const RandomRing source(random, 103);
   const double reach = source.Length() / 7;

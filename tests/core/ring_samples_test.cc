@@ -21,7 +21,7 @@ namespace {
 using support::Particles;
 using support::Stages;
 
-// A frame up to its components, of which each stands for a ring of its own.
+// A frame up to its components; each component represents one ring.
 struct Traced {
   Stages stages;
   Components components;
@@ -51,7 +51,7 @@ bool FoundPrecedes(const FoundSample& a, const FoundSample& b) {
          std::tie(b.before, b.now, b.displacement.columns, b.displacement.rows);
 }
 
-// All particles of all rings, sorted; and of each ring the first ones.
+// All particles of all rings, sorted, and then the first ones of each ring.
 void ExpectAsBySorting(const Traced& traced, std::span<const std::uint64_t> ids,
                        std::span<const ParticleSample> previous, RingSamples& tested) {
   SampleRings(traced.Input(ids), previous, tested);
@@ -117,9 +117,9 @@ std::vector<ParticleSample> ByHash(std::vector<ParticleSample> samples) {
   return samples;
 }
 
-TEST(RingSamples, AreThoseWithTheLeastHashesWhateverTheIds) {
+TEST(RingSamples, HaveTheSmallestHashesForAnyIds) {
   constexpr std::uint64_t kLargest = std::numeric_limits<std::uint64_t>::max();
-  RingSamples samples;  // What one call leaves there must not be seen by the next.
+  RingSamples samples;  // Reused: one call must not affect the next.
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const Traced traced(Bodies(seed));
@@ -130,8 +130,8 @@ TEST(RingSamples, AreThoseWithTheLeastHashesWhateverTheIds) {
     for (std::size_t k = 0; k < count; ++k) {
       dense[k] = k;
       sparse[k] = random.Bits();
-      // Made so that no hash is below the limit of a ring, or that all of them are: the least and
-      // the largest hash among them.
+      // Ids chosen such that no hash, or every hash, is below the limit of a ring. They include the
+      // smallest and the largest hash.
       last[k] = support::IdWithHash(kLargest - k);
       first[k] = support::IdWithHash(k);
     }
@@ -140,7 +140,7 @@ TEST(RingSamples, AreThoseWithTheLeastHashesWhateverTheIds) {
     for (const auto* const ids : {&dense, &sparse, &last, &first, &dense}) {
       ExpectAsBySorting(traced, *ids, previous, samples);
       previous = ByHash(samples.samples);
-      // Those of the last frame are found, wherever they are now and however large their hashes.
+      // Samples of the last frame are found in any ring and with any hash.
       const Traced moved(Bodies(seed + 100));
       std::vector<std::uint64_t> again(ids->begin(), ids->end());
       again.resize(moved.stages.particles.size(), 0);
@@ -153,8 +153,8 @@ TEST(RingSamples, AreThoseWithTheLeastHashesWhateverTheIds) {
   }
 }
 
-TEST(RingSamples, OfASingleBodyAreFoundAgainInAnotherOne) {
-  // The body's limit is below the hash of most samples of the drop that has fallen into it.
+TEST(RingSamples, AreFoundInAnotherBody) {
+  // A drop has fallen into the body. The hashes of most of its samples exceed the body's limit.
   RingSamples samples;
   const Traced apart([] {
     Particles particles = support::Disc(60);

@@ -55,7 +55,7 @@ Shared Found(const std::vector<NodeRun>& a_runs, const std::vector<NodeRun>& b_r
   return shared;
 }
 
-TEST(RunOverlaps, AreThoseOfTheNodesOneByOneAlsoWhereMovedRingsPileUp) {
+TEST(RunOverlaps, AgreeWithNodesAlsoIfMovedRingsOverlap) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     support::Random random(seed);
@@ -74,7 +74,7 @@ TEST(RunOverlaps, AreThoseOfTheNodesOneByOneAlsoWhereMovedRingsPileUp) {
   }
 }
 
-TEST(RunOverlaps, WhatLeavesTheRangeOfTheLatticeIsLeftOut) {
+TEST(RunOverlaps, DropRunsBeyondTheLattice) {
   constexpr std::int32_t kLargest = std::numeric_limits<std::int32_t>::max();
   const std::vector<NodeRun> runs = {{0, 0, 3, 0}, {kLargest, 5, 6, 0}, {kLargest, 7, 8, 1}};
   std::vector<NodeRun> moved;
@@ -82,8 +82,8 @@ TEST(RunOverlaps, WhatLeavesTheRangeOfTheLatticeIsLeftOut) {
   EXPECT_EQ(moved, (std::vector<NodeRun>{{1, 0, 3, 0}, {kLargest, kLargest - 1, kLargest, 1}}));
 }
 
-TEST(RunOverlaps, AHeapOfRingsInOnePlaceCostsNoMoreThanItsShareOfRuns) {
-  // A thousand long runs over a thousand short ones would be a million encounters.
+TEST(RunOverlaps, LimitTheCostOfOverlappingRings) {
+  // A thousand long runs over a thousand short ones would have a million overlaps.
   std::vector<NodeRun> heap, row;
   for (std::uint32_t k = 0; k < 1000; ++k) {
     heap.push_back({0, 0, 10000, k});

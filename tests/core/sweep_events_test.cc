@@ -19,7 +19,7 @@ using testing::Uniform;
 
 using Passage = std::tuple<double, double, std::uint32_t, std::uint32_t, std::uint32_t>;
 
-/// As they are written: by height, then from left to right, then by index.
+/// The order of the contract: by height, then from left to right, then by index.
 std::vector<Passage> Expected(const Region& region) {
   std::vector<Passage> passages;
   for (std::size_t loop = 0; loop < region.LoopCount(); ++loop) {
@@ -41,7 +41,7 @@ std::vector<Passage> Collected(const Region& region, SweepEvents& events) {
   for (const SweepEvent& event : events.events()) {
     passages.emplace_back(event.point.y, event.point.x, event.index, event.previous, event.next);
   }
-  // A loop may pass through a point several times: in which order is left open.
+  // A loop may pass through a point several times; their order is not specified.
   const auto same_point = [](const Passage& a, const Passage& b) {
     return std::get<2>(a) == std::get<2>(b);
   };
@@ -54,12 +54,12 @@ std::vector<Passage> Collected(const Region& region, SweepEvents& events) {
   return passages;
 }
 
-TEST(SweepEvents, ComeAsASortWouldBringThem) {
+TEST(SweepEvents, AgreeWithSort) {
   Random random(21);
   SweepEvents events;
   for (int round = 0; round < 300; ++round) {
     SCOPED_TRACE("seed 21, round " + std::to_string(round));
-    // Lattices have many points of one height, and some passed through again.
+    // Lattices have many points of equal height, and some points occur several times.
     Region region = testing::RandomGarbage(random, 2 + round % 30, 6, 60);
     EXPECT_EQ(Collected(region, events), Expected(region));
     for (double& coordinate : region.points) coordinate += Uniform(random, -1e-9, 1e-9);
@@ -67,7 +67,7 @@ TEST(SweepEvents, ComeAsASortWouldBringThem) {
   }
 }
 
-TEST(SweepEvents, HeightsOfAnySpreadAreInOrder) {
+TEST(SweepEvents, AreInOrderForAnyHeights) {
   Random random(22);
   SweepEvents events;
   for (const double spread : {0.0, 1e-100, 1e-15, 1.0, 1e15, 1e149}) {

@@ -1,4 +1,4 @@
-// Guarantee M4: meshes without T-junctions, against brute force and with T-junctions planted.
+// Guarantee M4, no T-junctions, compared with brute force and with planted T-junctions.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ bool IsInside(const Point& a, const Point& b, const Point& p) {
   return SweepsBefore(a, p) == SweepsBefore(p, b);
 }
 
-// Every vertex against every side of every triangle and every segment of every ring.
+// Compares every vertex with every side of a triangle and every segment of a ring.
 std::size_t CountTJunctionsByBruteForce(const Result& result) {
   const Rings& rings = result.rings;
   const Mesh& mesh = result.mesh;
@@ -60,7 +60,7 @@ std::size_t CountTJunctionsByBruteForce(const Result& result) {
   return count;
 }
 
-TEST(TJunctions, M4SeesAVertexInsideASideWhereTheFillPromisesNone) {
+TEST(TJunctions, M4FindsVertexInsideASide) {
   // A square as two rectangles side by side on top of a third: one vertex inside its upper side,
   // three inside sides of the ring.
   Result result = Square();
@@ -80,7 +80,7 @@ TEST(TJunctions, M4SeesAVertexInsideASideWhereTheFillPromisesNone) {
   }
 }
 
-TEST(TJunctions, AResultThatIsKnownToBeFilledNeedsAMesh) {
+TEST(TJunctions, FilledResultNeedsAMesh) {
   Result result = Square();
   result.mesh.points = result.rings.points;
   result.mesh.triangles = {0, 1, 2, 0, 2, 3};
@@ -92,9 +92,9 @@ TEST(TJunctions, AResultThatIsKnownToBeFilledNeedsAMesh) {
   EXPECT_EQ(Validate(Result{}, Fill::kConforming), absl::OkStatus());
 }
 
-// Frames of all kinds: `conforming` and `polygon` have no T-junction by either count, `greedy` has
-// some, as many as brute force finds.
-TEST(TJunctions, AreCountedAsByBruteForceInRandomFrames) {
+// Frames of all kinds. `conforming` and `polygon` have no T-junction by either count; for `greedy`
+// both counts agree.
+TEST(TJunctions, AgreeWithBruteForceInRandomFrames) {
   std::size_t greedy_total = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     support::Random random(seed);
@@ -119,9 +119,9 @@ TEST(TJunctions, AreCountedAsByBruteForceInRandomFrames) {
   EXPECT_GT(greedy_total, 1000u);
 }
 
-// A vertex planted in the middle of one side of a conforming mesh: the triangle on one side of it
-// is parted there, the one on the other side is not.
-TEST(TJunctions, M4SeesATJunctionPlantedIntoAConformingMesh) {
+// A vertex planted in the middle of one side of a conforming mesh. Only the triangle on one side is
+// split there.
+TEST(TJunctions, M4FindsPlantedTJunction) {
   support::Random random(3);
   const Result good = support::ReconstructOnce(
       {.placement = Placement::kMarchingSquares, .fill = Fill::kConforming, .spacing = 1.0},
@@ -133,7 +133,7 @@ TEST(TJunctions, M4SeesATJunctionPlantedIntoAConformingMesh) {
     const std::size_t opposite = k - k % 3 + (k % 3 + 2) % 3;
     const Point a = PointAt(good.mesh.points, good.mesh.triangles[k]);
     const Point b = PointAt(good.mesh.points, good.mesh.triangles[next]);
-    // Other sides are slanted, where a middle is not exactly on them, or belong to rings.
+    // Other sides belong to rings, or are slanted and do not contain their rounded middle.
     if (good.mesh.classes[k / 3] != TriangleClass::kInterior) continue;
     if (a.x != b.x && a.y != b.y) continue;
     Result result = good;

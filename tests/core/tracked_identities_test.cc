@@ -1,4 +1,4 @@
-// Which ring continues which where particles have ids or velocities: rings that leap.
+// Identities of rings that leap, if particles have ids or velocities.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ Scene Flight(Known known, int frame, double told_speed = 40) {
       .Add(support::Disc(3, 40.0 * frame, 20), 1000, told_speed, 0);
 }
 
-TEST_P(Tracked, ARingThatLeapsOverItsDiametersKeepsItsIdentity) {
+TEST_P(Tracked, LeapingRingKeepsItsIdentity) {
   RingStream stream;
   stream.Next(Flight(GetParam(), 0));
   const std::uint64_t drop = stream.Identity(0, 20), body = stream.Identity(10, 5);
@@ -50,7 +50,7 @@ TEST_P(Tracked, ARingThatLeapsOverItsDiametersKeepsItsIdentity) {
   }
 }
 
-TEST(TrackedIdentities, WithoutIdsAndRightVelocitiesALeapMakesANewRing) {
+TEST(TrackedIdentities, LeapIsNewRingWithoutIdsOrVelocities) {
   for (const auto& [known, told_speed] :
        {std::pair(kNothing, 0.0), {kVelocities, 0.0}, {kVelocities, -40.0}, {kVelocities, 1e30}}) {
     SCOPED_TRACE(told_speed);
@@ -64,7 +64,7 @@ TEST(TrackedIdentities, WithoutIdsAndRightVelocitiesALeapMakesANewRing) {
   }
 }
 
-TEST(TrackedIdentities, VelocitiesNeedATimeThatGoesOn) {
+TEST(TrackedIdentities, VelocitiesNeedAdvancingTime) {
   for (const double time : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                             std::numeric_limits<double>::infinity()}) {
     SCOPED_TRACE(time);
@@ -78,7 +78,7 @@ TEST(TrackedIdentities, VelocitiesNeedATimeThatGoesOn) {
   }
 }
 
-TEST(TrackedIdentities, VelocitiesAreInWorldUnitsOfThePlaneOfThreeComponents) {
+TEST(TrackedIdentities, VelocitiesAreInWorldUnitsOfThePlane) {
   // The drop flies along z, at a tenth of the usual size, half a unit of time a frame.
   RingStream stream({.spacing = 0.1, .plane = Plane::kXz});
   const auto next = [&](int frame) {
@@ -99,8 +99,8 @@ TEST(TrackedIdentities, VelocitiesAreInWorldUnitsOfThePlaneOfThreeComponents) {
   EXPECT_EQ(stream.Identity(0, 4), 1u);
 }
 
-TEST_P(Tracked, DropsInARowThatMoveByOnePlaceKeepTheirOwn) {
-  // Each comes to lie exactly where the one before it was.
+TEST_P(Tracked, DropsInARowKeepTheirIdentities) {
+  // Each drop moves exactly to the position of the one before it.
   RingStream stream;
   const auto row = [](Known known, int frame) {
     Scene scene(known, frame);
@@ -116,15 +116,15 @@ TEST_P(Tracked, DropsInARowThatMoveByOnePlaceKeepTheirOwn) {
   for (int k = 0; k < 6; ++k) {
     EXPECT_EQ(stream.Identity(12 * (k + 1), 0), identities[static_cast<std::size_t>(k)]);
   }
-  // Without either, the places keep the identities.
+  // Without ids and velocities, identities stay at their positions.
   RingStream blind;
   blind.Next(row(kNothing, 0));
   blind.Next(row(kNothing, 1));
   EXPECT_EQ(blind.Identity(12, 0), identities[1]);
 }
 
-TEST(TrackedIdentities, WhereIdsContradictThePlacesIdsDecide) {
-  // Two blocks of many particles, and two drops of few, that change places.
+TEST(TrackedIdentities, IdsDecideAgainstPositions) {
+  // Two blocks of many particles, and two drops of few, exchange their positions.
   for (const double radius : {8.0, 2.0}) {
     RingStream stream;
     stream.Next(
@@ -135,7 +135,7 @@ TEST(TrackedIdentities, WhereIdsContradictThePlacesIdsDecide) {
     EXPECT_EQ(stream.Identity(0, 0), right);
     EXPECT_EQ(stream.Identity(30, 0), left);
     EXPECT_THAT(stream.Parents(0, 0), ElementsAre(right));
-    // Other particles in the same place: another ring.
+    // Other particles at the same position form another ring.
     stream.Next(
         Scene(kIds, 2).Add(support::Disc(radius, 30, 0), 1).Add(support::Disc(radius, 0, 0), 5000));
     EXPECT_EQ(stream.Identity(30, 0), left);
@@ -144,8 +144,8 @@ TEST(TrackedIdentities, WhereIdsContradictThePlacesIdsDecide) {
   }
 }
 
-// A bar of 40 and 12 columns with a gap of 10 between them that other particles fill or not; it
-// flies, several of its lengths a frame.
+// A bar of 40 and 12 columns, with a gap of 10 between them that other particles may fill. It moves
+// by several of its lengths a frame.
 Scene Bar(Known known, int frame, bool whole) {
   const double x = 150.0 * frame, y = -70.0 * frame;
   Scene scene(known, frame);
@@ -155,7 +155,7 @@ Scene Bar(Known known, int frame, bool whole) {
   return scene;
 }
 
-TEST_P(Tracked, ASplitWhileLeapingIsToldRight) {
+TEST_P(Tracked, SplitWhileLeapingIsFound) {
   RingStream stream;
   stream.Next(Bar(GetParam(), 0, true));
   ASSERT_EQ(stream.rings().RingCount(), 1u);
@@ -168,7 +168,7 @@ TEST_P(Tracked, ASplitWhileLeapingIsToldRight) {
   EXPECT_THAT(stream.Parents(206, -64), ElementsAre(bar));
 }
 
-TEST_P(Tracked, AMergeWhileLeapingIsToldRight) {
+TEST_P(Tracked, MergeWhileLeapingIsFound) {
   RingStream stream;
   stream.Next(Bar(GetParam(), 0, false));
   ASSERT_EQ(stream.rings().RingCount(), 2u);
@@ -179,7 +179,7 @@ TEST_P(Tracked, AMergeWhileLeapingIsToldRight) {
   EXPECT_THAT(stream.Parents(180, -64), UnorderedElementsAre(large, small));
 }
 
-TEST_P(Tracked, ADropThatLeapsIntoABodyIsItsParentAndOneThatLeapsOutItsChild) {
+TEST_P(Tracked, DropLeapsIntoAndOutOfABody) {
   RingStream stream;
   const auto drop_in = [&](int frame, double y, double velocity) {
     stream.Next(Scene(GetParam(), frame)
@@ -220,7 +220,7 @@ TEST_P(Tracked, HolesFollowTheirOuterRing) {
   EXPECT_GT(blind.Identity(390, 33, true), 4u);
 }
 
-TEST_P(Tracked, AHoleThatStaysWhileItsRingMovesKeepsItsIdentity) {
+TEST_P(Tracked, HoleThatStaysKeepsItsIdentity) {
   // A bubble that stands still in a body that moves by more than its diameter.
   RingStream stream;
   const auto channel = [&](int frame) {
@@ -243,8 +243,8 @@ TEST_P(Tracked, AHoleThatStaysWhileItsRingMovesKeepsItsIdentity) {
   EXPECT_EQ(stream.Identity(40, 9.5, true), hole);
 }
 
-TEST(TrackedIdentities, APartTooSmallForTheSamplesIsToldByItsPlace) {
-  // One part in fifty leaves the body and stays close: no sample need be in it.
+TEST(TrackedIdentities, PartWithoutSamplesIsFoundByPosition) {
+  // One part in fifty leaves the body and stays close. It may hold no sample.
   for (std::uint64_t first_id = 0; first_id < 20; ++first_id) {
     RingStream stream;
     const auto scene = [&](int frame, double y) {
@@ -262,7 +262,7 @@ TEST(TrackedIdentities, APartTooSmallForTheSamplesIsToldByItsPlace) {
   }
 }
 
-TEST(TrackedIdentities, WhatIsRememberedOfARingIsBounded) {
+TEST(TrackedIdentities, SizeOfHistoryIsBounded) {
   RingStream stream;
   stream.Next(Scene(kBoth, 0).Add(support::Lattice(200, 200), 1, 1, 1));
   EXPECT_EQ(stream.state().history.samples.size(), kMaxSamples);
@@ -273,7 +273,7 @@ TEST(TrackedIdentities, WhatIsRememberedOfARingIsBounded) {
   EXPECT_EQ(stream.state().history.rings[0].velocity_x, 0);
 }
 
-TEST(TrackedIdentities, FramesWithIdsAndWithoutMayFollowEachOther) {
+TEST(TrackedIdentities, FramesWithAndWithoutIdsMayAlternate) {
   RingStream stream;
   for (const Known known : {kIds, kNothing, kVelocities, kBoth, kNothing, kIds, kVelocities}) {
     stream.Next(Scene(known, 0).Add(support::Disc(6), 1));

@@ -1,5 +1,5 @@
-// Which ring continues which where particles have ids or velocities, in scenes in which everything
-// leaps, parts and meets.
+// Identities of rings in scenes where everything leaps, splits and merges, if particles have ids or
+// velocities.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -39,7 +39,7 @@ Particles Turmoil(Known known, std::uint64_t seed, int frame) {
   for (std::uint64_t k = 0; k < 100; ++k) {
     const double x = random.Uniform(0, 150), y = random.Uniform(0, 150);
     const double vx = random.Uniform(-10, 10), vy = random.Uniform(-10, 10);
-    // Around in a box of 150, so that rings meet and part again.
+    // Moves around in a box of 150, so that rings merge and split again.
     const auto wrapped = [](double value) { return value - 150 * std::floor(value / 150); };
     scene.Add(
         support::Disc(random.Uniform(0.5, 6), wrapped(x + vx * frame), wrapped(y + vy * frame)),
@@ -64,8 +64,8 @@ void ExpectSameOutlines(const Result& a, const Result& b) {
   }
 }
 
-// Ids and velocities tell of identities, and of nothing else.
-TEST(TrackedTurmoilOf100Discs, OutlinesDoNotDependOnIdsOrVelocitiesByABit) {
+// Ids and velocities change identities and nothing else.
+TEST(TrackedTurmoilOf100Discs, IdsAndVelocitiesChangeNoOutline) {
   for (const Placement placement : AllPlacements()) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       const ReconstructionParameters parameters{.placement = placement};
@@ -85,7 +85,7 @@ TEST(TrackedTurmoilOf100Discs, OutlinesDoNotDependOnIdsOrVelocitiesByABit) {
   }
 }
 
-TEST_P(TrackedTurmoil, OrderOfParticlesThreadsAndRestartsBetweenAnyFramesChangeNothing) {
+TEST_P(TrackedTurmoil, OrderThreadsAndRestartsHaveNoEffect) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     RingStream stream, permuted, restored;
@@ -115,9 +115,9 @@ TEST_P(TrackedTurmoil, OrderOfParticlesThreadsAndRestartsBetweenAnyFramesChangeN
   }
 }
 
-TEST(TrackedTurmoilOf100Discs, InTurmoilTheMoreIsKnownTheFewerRingsComeFromNowhere) {
+TEST(TrackedTurmoilOf100Discs, IdsAndVelocitiesReduceOrphans) {
   struct Count {
-    std::uint64_t identities = 0, orphans = 0;  // Of which no parent is known.
+    std::uint64_t identities = 0, orphans = 0;  // Orphans have no known parent.
   };
   const auto births = [](Known known) {
     Count count;
@@ -145,7 +145,8 @@ TEST(TrackedTurmoilOf100Discs, InTurmoilTheMoreIsKnownTheFewerRingsComeFromNowhe
   EXPECT_LT(by_ids.orphans, blind.orphans / 5);
 }
 
-// Which particles lie in a ring and in none of its holes, by even and odd crossings to the right.
+// The particles inside an outer ring and outside its holes, by the parity of crossings to the
+// right.
 std::set<std::uint64_t> ParticlesIn(const Rings& rings, std::size_t outer,
                                     const Particles& particles) {
   std::set<std::uint64_t> ids;
@@ -166,7 +167,7 @@ std::set<std::uint64_t> ParticlesIn(const Rings& rings, std::size_t outer,
   return ids;
 }
 
-// Parents as they were told, against the particles that outer rings of two frames share.
+// Compares reported parents with the particles that outer rings of two frames share.
 struct Parentage {
   int told = 0, wrong = 0;        // Without a particle in common.
   int relations = 0, missed = 0;  // With a quarter of the smaller one's particles in common.
@@ -208,10 +209,10 @@ Parentage CompareParents(Known known) {
   return sum;
 }
 
-TEST(TrackedTurmoilOf100Discs, ParentsAreThoseThatSentParticles) {
+TEST(TrackedTurmoilOf100Discs, ParentsShareParticles) {
   const Parentage blind = CompareParents(kNothing), by_velocities = CompareParents(kVelocities),
                   by_ids = CompareParents(kIds), by_both = CompareParents(kBoth);
-  EXPECT_GT(2 * blind.missed, blind.relations);  // So much leaps.
+  EXPECT_GT(2 * blind.missed, blind.relations);  // Most rings leap.
   EXPECT_LT(by_velocities.wrong, 0.03 * by_velocities.told);
   EXPECT_LT(by_velocities.missed, 0.15 * by_velocities.relations);
   EXPECT_LT(by_ids.wrong, 0.01 * by_ids.told);
@@ -220,7 +221,7 @@ TEST(TrackedTurmoilOf100Discs, ParentsAreThoseThatSentParticles) {
   EXPECT_LT(by_both.missed, 0.05 * by_both.relations);
 }
 
-TEST_P(TrackedTurmoil, AFrameThatIsRefusedLeavesNoTrace) {
+TEST_P(TrackedTurmoil, RefusedFrameHasNoEffect) {
   RingStream disturbed, undisturbed;
   for (int frame = 0; frame < 4; ++frame) {
     const Particles good = Turmoil(GetParam(), 1, frame);

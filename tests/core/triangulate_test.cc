@@ -36,7 +36,7 @@ std::optional<std::vector<std::uint32_t>> Triangulate(const Region& region) {
   return triangles;
 }
 
-/// Of a region without pinches.
+/// Number of triangles of a region without pinches.
 std::size_t ExpectedCount(const Region& region) {
   std::size_t count = region.loop_points.size();
   for (std::size_t loop = 0; loop < region.LoopCount(); ++loop) {
@@ -58,7 +58,7 @@ Region RegionOf(const std::vector<std::vector<Point>>& loops) {
   return region;
 }
 
-TEST(Triangulator, ATriangleStaysWhatItIs) {
+TEST(Triangulator, TriangleStaysUnchanged) {
   EXPECT_EQ(Triangulate(RegionOf({{{0, 0}, {2, 0}, {1, 1}}})),
             (std::vector<std::uint32_t>{0, 1, 2}));
 }
@@ -67,9 +67,9 @@ TEST(Triangulator, NoLoopsMakeNoTriangles) {
   EXPECT_EQ(Triangulate(Region{}), std::vector<std::uint32_t>{});
 }
 
-TEST(Triangulator, TrianglesAreAppendedAndAFailureLeavesThemAsTheyWere) {
+TEST(Triangulator, FailureLeavesTrianglesUnchanged) {
   const Region square = RegionOf({Rectangle(0, 0, 1, 1)});
-  // The second loop is met by the sweep when the first has already been triangulated.
+  // The sweep reaches the second loop after it has triangulated the first one.
   const Region spoiled = RegionOf({Rectangle(0, 0, 1, 1), {{0, 2}, {1, 3}, {1, 2}, {0, 3}}});
   std::vector<std::uint32_t> triangles{7, 8, 9};
   Triangulator triangulator;
@@ -88,7 +88,7 @@ TEST(Triangulator, HolesIslandsAndComponentsNest) {
                                Reversed(Rectangle(6, 3, 7, 5)), Rectangle(20, 0, 21, 10)}));
 }
 
-TEST(Triangulator, PointsOnStraightSidesMakeNoDegenerateTriangle) {
+TEST(Triangulator, CollinearPointsMakeNoDegenerateTriangle) {
   std::vector<Point> loop;
   for (int i = 0; i < 5; ++i) loop.push_back({static_cast<double>(i), 0});
   for (int i = 0; i < 5; ++i) loop.push_back({5, static_cast<double>(i)});
@@ -100,23 +100,23 @@ TEST(Triangulator, PointsOnStraightSidesMakeNoDegenerateTriangle) {
   ExpectTriangulated(RegionOf({loop, Reversed(hole)}));
 }
 
-TEST(Triangulator, HolesThatPinchEachOtherAndTheRingAtNamedPointsAreFine) {
+TEST(Triangulator, AcceptsHolesThatPinch) {
   Region region;
   // A square whose corner (0, 0) is shared by a hole, which shares another point with a second
   // hole.
   region.AddLoop(Rectangle(0, 0, 10, 10));
   const std::uint32_t shared = region.AddPoint({4, 4});
   region.AddLoop({0, region.AddPoint({2, 4}), shared, region.AddPoint({4, 2})});
-  // At the place of `shared`, but another point.
+  // Another point at the position of `shared`.
   region.AddLoop(Reversed({{4, 4}, {6, 4}, {6, 6}, {4, 6}}));
   const auto triangles = Triangulate(region);
   ASSERT_TRUE(triangles.has_value());
   ExpectCover(region, *triangles);
-  // All three loops hang together at pinches: one loop of 12 points goes round the inside.
+  // Pinches connect all three loops: one loop of 12 points bounds the inside.
   EXPECT_EQ(triangles->size() / 3, 12u - 2);
 }
 
-TEST(Triangulator, ALoopMayPassThroughAPointTwiceHoweverItIsPaired) {
+TEST(Triangulator, AcceptsLoopThatPassesAPointTwice) {
   Region one, two;
   for (Region* region : {&one, &two}) {
     for (const Point& point : {Point{0, 0}, {1, 0}, {1, 1}, {0, 1}, {2, 1}, {2, 2}, {1, 2}}) {
@@ -144,7 +144,7 @@ TEST(Triangulator, StarsSpiralsAndCombsAreCovered) {
   }
 }
 
-TEST(Triangulator, ContoursOfRandomFieldsAreCoveredAtAnyScaleAndPlace) {
+TEST(Triangulator, ContoursAreCoveredAtAnyScaleAndPosition) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -156,7 +156,7 @@ TEST(Triangulator, ContoursOfRandomFieldsAreCoveredAtAnyScaleAndPlace) {
   }
 }
 
-/// Half the quarter turns of cells inside around each point.
+/// Expected number of triangles: the inside angles at all points, in units of a half turn.
 std::size_t ExpectedCount(const Region& staircases, const Cells& cells) {
   std::size_t quarters = 0;
   for (std::size_t i = 0; i < staircases.points.size() / 2; ++i) {
@@ -203,7 +203,7 @@ TEST(Triangulator, AHundredThousandPointsAreCovered) {
   ExpectTriangulated(testing::RandomContours(random, 300).Transformed(1, 1e6));
 }
 
-TEST(Triangulator, TheResultDoesNotDependOnWhatWasTriangulatedBefore) {
+TEST(Triangulator, EarlierInputHasNoEffect) {
   Random random(6);
   Triangulator warm;
   for (int round = 0; round < 20; ++round) {
@@ -217,7 +217,7 @@ TEST(Triangulator, TheResultDoesNotDependOnWhatWasTriangulatedBefore) {
 
 // --- Input that breaks the requirements ---------------------------------------------------------
 
-TEST(Triangulator, EachBrokenRequirementIsFound) {
+TEST(Triangulator, FindsEachBrokenRequirement) {
   EXPECT_FALSE(Triangulate(RegionOf({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}))) << "crosses itself";
   EXPECT_FALSE(Triangulate(RegionOf({Reversed(Rectangle(0, 0, 1, 1))}))) << "hole in nothing";
   EXPECT_FALSE(Triangulate(RegionOf({Rectangle(0, 0, 3, 3), Rectangle(1, 1, 2, 2)}))) << "twice";
@@ -235,7 +235,7 @@ TEST(Triangulator, EachBrokenRequirementIsFound) {
   }
 }
 
-TEST(Triangulator, WrongIndicesAndOffsetsAreFound) {
+TEST(Triangulator, FindsWrongIndicesAndOffsets) {
   const std::vector<double> points{0, 0, 1, 0, 0, 1};
   const auto accepts = [&](const std::vector<std::uint32_t>& loop_points,
                            const std::vector<std::uint32_t>& loop_offsets) {
@@ -270,7 +270,7 @@ int Winding(const Region& region, const Point& point) {
   return winding;
 }
 
-/// The requirements of Triangulate, as they are written, for points of a lattice of spacing 1.
+/// The requirements of Triangulate, checked directly, for points of a lattice of spacing 1.
 bool IsRegion(const Region& region) {
   std::vector<std::pair<Point, Point>> edges;
   for (std::size_t k = 0; k < region.LoopCount(); ++k) {
@@ -287,7 +287,7 @@ bool IsRegion(const Region& region) {
       if (!SegmentsTouch(a, b, c, d)) continue;
       const int common = (a == c) + (a == d) + (b == c) + (b == d);
       if (common != 1) return false;
-      // Of two edges with one common end, neither may run through the other end of the other.
+      // If two edges share one end, neither may contain the other end of the other edge.
       const bool collinear = Orientation(a, b, c) == 0 && Orientation(a, b, d) == 0;
       const Point& corner = a == c || a == d ? a : b;
       const Point& end = a == corner ? b : a;
@@ -328,7 +328,7 @@ TEST(Triangulator, LargeGarbageIsRefused) {
   }
 }
 
-TEST(Triangulator, ARegionWithOnePointMovedIsTriangulatedRightOrRefused) {
+TEST(Triangulator, RegionWithOnePointMovedIsCoveredOrRefused) {
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);

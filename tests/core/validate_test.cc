@@ -40,7 +40,7 @@ void FillWithTriangles(Result& result) {
   result.mesh.classes.assign(result.mesh.triangles.size() / 3, TriangleClass::kInterior);
 }
 
-/// A square with two holes, an island in the first one, and a square beside.
+/// A square with two holes and an island in the first hole, and a separate square.
 Result GoodResult(double shift = 0) {
   Result result;
   std::vector<std::vector<Point>> rings{Rectangle(0, 0, 10, 10), Reversed(Rectangle(1, 1, 5, 9)),
@@ -61,13 +61,13 @@ void ExpectBroken(const Result& result, const std::string& guarantee) {
   EXPECT_THAT(std::string(status.message()), StartsWith(guarantee + ": "));
 }
 
-TEST(Validate, AGoodResultPassesNearAndFarFromTheOrigin) {
+TEST(Validate, GoodResultPassesNearAndFarFromTheOrigin) {
   EXPECT_EQ(Validate(GoodResult()), absl::OkStatus());
   EXPECT_EQ(Validate(GoodResult(1e9)), absl::OkStatus());
   EXPECT_EQ(Validate(GoodResult(-1e14 / 3)), absl::OkStatus());
 }
 
-TEST(Validate, NothingIsFineAndSoAreRingsWithoutAMesh) {
+TEST(Validate, EmptyResultAndRingsWithoutMeshPass) {
   Result result;
   EXPECT_EQ(Validate(result), absl::OkStatus());
   result.Clear();
@@ -94,7 +94,7 @@ TEST(Validate, ContoursOfRandomFieldsPass) {
   }
 }
 
-TEST(Validate, R1SeesWrongArrays) {
+TEST(Validate, R1FindsWrongArrays) {
   Result result = GoodResult();
   result.rings.points.pop_back();
   ExpectBroken(result, "R1");
@@ -118,13 +118,13 @@ TEST(Validate, R1SeesWrongArrays) {
   ExpectBroken(result, "R1");
 }
 
-TEST(Validate, R1SeesARingOfTwoPoints) {
+TEST(Validate, R1FindsRingOfTwoPoints) {
   Result result;
   AddRing({{0, 0}, {1, 0}}, kNoRing, result.rings);
   ExpectBroken(result, "R1");
 }
 
-TEST(Validate, R1SeesAPointThatIsNotFinite) {
+TEST(Validate, R1FindsPointThatIsNotFinite) {
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {
     Result result = GoodResult();
@@ -133,13 +133,13 @@ TEST(Validate, R1SeesAPointThatIsNotFinite) {
   }
 }
 
-TEST(Validate, R1SeesARepeatedPoint) {
+TEST(Validate, R1FindsRepeatedPoint) {
   Result result;
   AddRing({{0, 0}, {2, 0}, {2, 2}, {0, 2}, {0, 0}}, kNoRing, result.rings);
   ExpectBroken(result, "R1");
 }
 
-TEST(Validate, R2SeesACrossingAndNamesIt) {
+TEST(Validate, R2FindsAndNamesCrossing) {
   Result result;
   AddRing(Rectangle(5, 0, 6, 1), kNoRing, result.rings);
   AddRing({{0, 0}, {2, 0}, {2, 2}, {1, -1}}, kNoRing, result.rings);
@@ -147,14 +147,14 @@ TEST(Validate, R2SeesACrossingAndNamesIt) {
   EXPECT_THAT(std::string(Validate(result).message()), HasSubstr("point 4 of ring 1"));
 }
 
-TEST(Validate, R2SeesRingsThatTouchAtAPoint) {
+TEST(Validate, R2FindsRingsThatTouchAtAPoint) {
   Result result;
   AddRing(Rectangle(0, 0, 1, 1), kNoRing, result.rings);
   AddRing(Rectangle(1, 1, 2, 2), kNoRing, result.rings);
   ExpectBroken(result, "R2");
 }
 
-TEST(Validate, R3SeesWrongSenses) {
+TEST(Validate, R3FindsWrongDirections) {
   Result result;
   AddRing(Reversed(Rectangle(0, 0, 1, 1)), kNoRing, result.rings);
   ExpectBroken(result, "R3");
@@ -164,7 +164,7 @@ TEST(Validate, R3SeesWrongSenses) {
   ExpectBroken(result, "R3");
 }
 
-TEST(Validate, R4SeesAHoleThatNamesNoOuterRing) {
+TEST(Validate, R4FindsHoleThatNamesNoOuterRing) {
   for (const std::uint32_t outer : {1u, 2u, 5u, 77u}) {
     Result result = GoodResult();
     result.rings.outer_of[2] = outer;
@@ -172,7 +172,7 @@ TEST(Validate, R4SeesAHoleThatNamesNoOuterRing) {
   }
 }
 
-TEST(Validate, R4SeesAHoleThatNamesAnotherOuterRing) {
+TEST(Validate, R4FindsHoleThatNamesAnotherOuterRing) {
   for (const std::uint32_t outer : {3u, 4u}) {
     Result result = GoodResult();
     result.rings.outer_of[1] = outer;
@@ -180,7 +180,7 @@ TEST(Validate, R4SeesAHoleThatNamesAnotherOuterRing) {
   }
 }
 
-TEST(Validate, R4SeesAHoleInNothingAndAnOuterRingInAnother) {
+TEST(Validate, R4FindsHoleOutsideAndOuterRingInside) {
   Result result;
   AddRing(Rectangle(0, 0, 9, 9), kNoRing, result.rings);
   AddRing(Reversed(Rectangle(11, 1, 12, 2)), 0, result.rings);
@@ -193,7 +193,7 @@ TEST(Validate, R4SeesAHoleInNothingAndAnOuterRingInAnother) {
   EXPECT_THAT(std::string(Validate(result).message()), HasSubstr("ring 1, an outer ring"));
 }
 
-TEST(Validate, M1SeesWrongArrays) {
+TEST(Validate, M1FindsWrongArrays) {
   Result result = GoodResult();
   result.mesh.classes.pop_back();
   ExpectBroken(result, "M1");
@@ -208,14 +208,14 @@ TEST(Validate, M1SeesWrongArrays) {
   ExpectBroken(result, "M1");
 }
 
-TEST(Validate, M1SeesAPointThatIsNotFinite) {
+TEST(Validate, M1FindsPointThatIsNotFinite) {
   Result result = GoodResult();
   result.mesh.points.insert(result.mesh.points.end(),
                             {0.0, std::numeric_limits<double>::quiet_NaN()});
   ExpectBroken(result, "M1");
 }
 
-TEST(Validate, M1SeesClockwiseAndDegenerateTriangles) {
+TEST(Validate, M1FindsClockwiseAndDegenerateTriangles) {
   Result result = GoodResult();
   std::swap(result.mesh.triangles[0], result.mesh.triangles[1]);
   ExpectBroken(result, "M1");
@@ -224,7 +224,7 @@ TEST(Validate, M1SeesClockwiseAndDegenerateTriangles) {
   ExpectBroken(result, "M1");
 }
 
-TEST(Validate, M2SeesATriangleTooFewAndOneTooMany) {
+TEST(Validate, M2FindsMissingAndSurplusTriangle) {
   Result result = GoodResult();
   result.mesh.triangles.resize(result.mesh.triangles.size() - 3);
   result.mesh.classes.pop_back();
@@ -239,7 +239,7 @@ TEST(Validate, M2SeesATriangleTooFewAndOneTooMany) {
   ExpectBroken(result, "M2");
 }
 
-TEST(Validate, M2SeesAnOverlapAsLargeAsAGap) {
+TEST(Validate, M2FindsOverlapAsLargeAsAGap) {
   Result result;
   AddRing(Rectangle(0, 0, 1, 1), kNoRing, result.rings);
   FillWithTriangles(result);
@@ -257,12 +257,12 @@ TEST(Validate, M2AllowsTJunctionsAlongTheAxes) {
   result.mesh.triangles = {0, 1, 5, 0, 5, 4, 4, 6, 7, 4, 7, 3, 6, 5, 2, 6, 2, 7};
   result.mesh.classes.assign(6, TriangleClass::kInterior);
   EXPECT_EQ(Validate(result), absl::OkStatus());
-  // A sliver too few, far below the tolerance of areas.
+  // A missing sliver, far below the tolerance of areas.
   result.mesh.points[13] = std::nextafter(1.0, 2.0);
   ExpectBroken(result, "M2");
 }
 
-TEST(Validate, M3SeesAMissingAndAChangedPoint) {
+TEST(Validate, M3FindsMissingAndChangedPoint) {
   Result result = GoodResult();
   result.mesh.points.resize(result.mesh.points.size() - 2);
   result.mesh.triangles.resize(3);
@@ -276,7 +276,7 @@ TEST(Validate, M3SeesAMissingAndAChangedPoint) {
   ExpectBroken(result, "M3");
 }
 
-TEST(Validate, GarbageIsRefusedWithoutAnAccident) {
+TEST(Validate, RefusesGarbage) {
   Random random(12);
   for (int round = 0; round < 20'000; ++round) {
     Result result = GoodResult();
@@ -309,12 +309,12 @@ TEST(Validate, GarbageIsRefusedWithoutAnAccident) {
     }
     if (result == GoodResult()) continue;
     const absl::Status status = Validate(result);
-    // A changed point may leave rings that are as good as before, but never with the same mesh.
+    // Rings may stay valid after a point changed, but the mesh does not fit them any more.
     EXPECT_FALSE(status.ok()) << "seed 12, round " << round;
   }
 }
 
-TEST(SideBalance, SidesCancelWholeOrPiecewiseAlongTheAxesOnly) {
+TEST(SideBalance, SidesCancelPiecewiseOnlyAlongAxes) {
   SideBalance sides;
   EXPECT_EQ(sides.Take().imbalance, std::nullopt);
   sides.Add({0, 0}, {2, 1}), sides.Add({2, 1}, {0, 0});

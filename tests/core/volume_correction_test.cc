@@ -16,7 +16,7 @@ struct Vector {
   double x, y;
 };
 
-// Point by point, in plain numbers.
+// The same offset, computed point by point.
 std::vector<double> OffsetPlainly(const std::vector<double>& points, double offset) {
   const std::size_t count = points.size() / 2;
   const auto normal_after = [&](std::size_t k) {
@@ -43,18 +43,18 @@ std::vector<double> Offset(const std::vector<double>& points, double offset) {
   return target;
 }
 
-TEST(RingOffset, MovesASquaresSidesOutward) {
+TEST(RingOffset, MovesSidesOfASquareOutward) {
   const std::vector<double> square = {0, 0, 4, 0, 4, 4, 0, 4};
   EXPECT_EQ(Offset(square, 0.5), (std::vector<double>{-0.5, -0.5, 4.5, -0.5, 4.5, 4.5, -0.5, 4.5}));
 }
 
-TEST(RingOffset, IsThatOfPlainNumbersToTheBitForEveryCount) {
+TEST(RingOffset, AgreesWithPointwiseOffset) {
   for (std::size_t count = 1; count <= 200; ++count) {
     SCOPED_TRACE(testing::Message() << "points, seed " << count);
     support::Random random(count);
     std::vector<double> points(2 * count);
     for (double& coordinate : points) coordinate = random.Uniform(-3, 3);
-    // Points that fall together, and needles, whose mitres are cut.
+    // Coincident points, and needles with limited mitres.
     for (std::size_t k = 2; k < count; ++k) {
       if (!random.Chance(0.2)) continue;
       const std::size_t from = random.Chance(0.5) ? k - 1 : k - 2;

@@ -1,4 +1,4 @@
-// Grids of all sizes in one hash table (a hierarchical grid): a box lies in one cell of the grid of
+// A hierarchical grid: cells of all sizes in one hash table. A box lies in one cell of the grid of
 // its size.
 #pragma once
 
@@ -12,31 +12,32 @@
 
 namespace partiemc {
 
-// Bits for the column and for the row of a cell, and for the level of its grid, in one key.
+// Bits of a key: one column, one row and one level.
 inline constexpr int kGridIndexBits = 29;
 inline constexpr int kGridLevelBits = 5;
 inline constexpr int kGridLevels = 1 << kGridLevelBits;
 static_assert(2 * kGridIndexBits + kGridLevelBits <= 64);
 
-// A box is this much smaller than its cell, so that rounding of an index to the wrong side of
-// a cell's border cannot put it two cells away from one that it touches. Any value well above
-// 2^-24, the error of an index, will do.
+// Smallest ratio of the sizes of a cell and its box. It ensures that two touching boxes lie at most
+// one cell apart, even if an index is rounded to the wrong side of a border. Any value well above 1
+// + 2^-24, the error of an index, is sufficient.
 inline constexpr double kGridSlack = 1.0 + 0x1p-10;
 
 /// Level k has square cells of side `finest` * 2^k.
 class HierarchicalGrid {
  public:
+  /// `bounds` contains all boxes; `mean_extent` is their mean extent.
   HierarchicalGrid(const Box& bounds, double mean_extent)
       : origin_{bounds.left, bounds.bottom},
-        // Cells of twice the mean extent hold almost all boxes of like things in one grid and
-        // still make few candidates; the second bound keeps
-        // indices below 2^27, the third keeps sizes above zero when all points coincide.
+        // With cells of twice the mean extent, nearly all boxes lie in one grid, and a cell has few
+        // candidates. The second term keeps indices below 2^27, the third keeps sizes above 0 if
+        // all points coincide.
         finest_(std::max(
             {2 * mean_extent, bounds.Extent() * 0x1p-27, std::numeric_limits<double>::min()})) {
     for (int level = 0; level < kGridLevels; ++level) per_length_[level] = 1 / CellSize(level);
   }
 
-  /// The first level whose cells hold a box of `extent`; 28 at most, by the bounds of the finest.
+  /// The first level whose cells can hold a box of `extent`; at most 28, by the bounds of finest_.
   int LevelFor(double extent) const {
     int level = 0;
     while (level + 1 < kGridLevels && CellSize(level) < kGridSlack * extent) ++level;
@@ -63,7 +64,8 @@ class HierarchicalGrid {
   std::array<double, kGridLevels> per_length_;  // By level: 1 / size of its cells.
 };
 
-/// Fibonacci hashing: the high bits of the product depend on all bits of the key.
+/// The slot of a key in a table of `slot_count` slots, a power of two. Fibonacci hashing: the high
+/// bits of the product depend on all bits of the key.
 inline std::size_t SlotOf(std::uint64_t cell, std::size_t slot_count) {
   return static_cast<std::size_t>((cell * 0x9e3779b97f4a7c15u) >> 32) & (slot_count - 1);
 }

@@ -1,12 +1,12 @@
-// Segments are taken in short runs along their rings. A run of which all segments go to the right,
-// say, does not meet itself, nor the run after it if that goes to the right, too: on contours this
-// leaves hardly any pairs of neighbours, by comparisons of coordinates alone.
+// Method. Segments are grouped into short runs along their rings. If all segments of a run point to
+// the right, for example, the run does not meet itself, nor the next run if that also points to the
+// right. On contours, comparing coordinates in this way excludes nearly all pairs of neighbours.
 //
-// Successive runs of a ring form a block. Blocks that are near each other are found in a
-// hierarchical grid: a block lies in the grid whose cells are just larger than its box, in the cell
-// of its lower left corner, and so in one cell of one grid only, however long it is. It is compared
-// with blocks of its own grid and of coarser ones, of which few cells can hold blocks that reach
-// it. To compare all runs of two blocks costs less than to find each run's neighbours in a grid.
+// Successive runs of a ring form a block. A hierarchical grid finds blocks that are near each
+// other. A block lies in one cell only: in the grid whose cells are just larger than its box, in
+// the cell of its lower left corner. It is compared with blocks of the same grid and of coarser
+// grids; only a few cells of each can hold blocks that reach it. Comparing all runs of two blocks
+// costs less than finding the neighbours of each run in a grid.
 #include "vertices/intersections.h"
 
 #include <algorithm>
@@ -25,20 +25,20 @@ namespace {
 using Run = TouchingPairsBuffers::Run;
 using Block = TouchingPairsBuffers::Block;
 
-// Segments of a run. Longer ones have larger boxes, of which more overlap.
+// Segments of a run. Longer runs have larger boxes, and more boxes overlap.
 constexpr std::uint32_t kRunLength = 8;
 
 // Runs of a block.
 constexpr std::uint32_t kBlockRuns = 8;
 
-// Directions that all segments of a run may have.
+// Bits of Run::directions.
 constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
 
 struct Segment {
   Point a, b;
 };
 
-/// Whether `second`, which begins where `first` ends, lies on it for more than that point.
+/// Whether two successive segments overlap in more than their common point.
 bool FoldsBack(const Segment& first, const Segment& second) {
   const Point& corner = first.b;
   if (first.a == corner || second.b == corner) return false;
@@ -46,7 +46,7 @@ bool FoldsBack(const Segment& first, const Segment& second) {
          Orientation(first.a, corner, second.b) == 0;
 }
 
-// All of the work on one input.
+// One search.
 struct Search {
   std::span<const double> points;
   TouchingPairsBuffers& buffers;
@@ -141,7 +141,7 @@ void FillGrid(Search& s, const HierarchicalGrid& grid) {
   }
 }
 
-/// Whether a pair of segments counts, see the header.
+/// Whether a pair of segments counts (see the header).
 bool Touches(const Search& s, const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) {
   const Segment a = s.SegmentAt(of_i, i);
   const Segment b = s.SegmentAt(of_j, j);
@@ -197,9 +197,9 @@ void ForEachPairBetween(const Search& s, const Block& first, const Block& second
   }
 }
 
-/// Calls visit(i, j) for all pairs that count, of segments of a block and of later ones. What a
-/// block may touch has its lower left corner no farther to the right and above than its box, and
-/// less than a cell to the left and below.
+/// Calls visit(i, j) for all pairs that count between segments of a block and of later blocks. The
+/// lower left corner of a touching block is neither above nor to the right of this block's box, and
+/// less than one cell below or to the left of it.
 template <typename Visit>
 void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t index, Visit visit) {
   const std::span<const Block> blocks = s.buffers.blocks;
@@ -213,7 +213,7 @@ void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t in
     const std::int64_t last_column = grid.Column(block.box.right, level);
     const std::int64_t first_row = std::max<std::int64_t>(grid.Row(block.box.bottom, level) - 1, 0);
     const std::int64_t last_row = grid.Row(block.box.top, level);
-    // Of two blocks of one level, the earlier one finds the pairs.
+    // If two blocks have the same level, the earlier one finds their pairs.
     const bool finds_all = block.level < level;
     for (std::int64_t row = first_row; row <= last_row; ++row) {
       for (std::int64_t column = first_column; column <= last_column; ++column) {
@@ -228,7 +228,7 @@ void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t in
   }
 }
 
-/// Finds out which blocks find pairs; returns whether any does.
+/// Sets `finds_pair` of all blocks; returns whether there is any pair.
 bool FindPairs(Search& s, const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
   ParallelFor(static_cast<std::uint32_t>(s.buffers.blocks.size()), [&](std::uint32_t index) {
@@ -251,8 +251,7 @@ std::size_t CountTouchingPairs(std::span<const double> points,
   if (buffers.blocks.empty()) return 0;
   const HierarchicalGrid grid = MakeGrid(s);
   FillGrid(s, grid);
-  // Nearly all frames have no pair. Pairs are listed in the order of the blocks, whatever the
-  // number of threads.
+  // Nearly all frames have no pair. Pairs are listed by block, independent of the threads.
   if (!FindPairs(s, grid)) return 0;
   std::size_t count = 0;
   const std::size_t max_pairs = points.size() / 2;

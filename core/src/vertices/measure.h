@@ -1,4 +1,4 @@
-// Area, perimeter and centroid of a ring.
+// Measures area, perimeter and centroid of rings.
 #pragma once
 
 #include <span>
@@ -7,11 +7,12 @@
 
 namespace partiemc {
 
-/// Measures a closed ring of interleaved points, at least one; particle_count and identity are 0.
-/// Relative to the first point, so that a ring far from the origin loses no digits.
+/// Measures a closed ring of interleaved points; particle_count and identity are 0. Computes
+/// relative to the first point, so that a ring far from the origin loses no digits.
+/// Requires: at least one point.
 RingMeasures MeasureRing(std::span<const double> points);
 
-/// All of them, in parallel.
+/// Measures all rings, in parallel.
 void MeasureRings(Rings& rings);
 
 }  // namespace partiemc

@@ -5,7 +5,7 @@
 namespace partiemc {
 namespace {
 
-// Windows judge distances in floats, which may take what is this much farther away for near.
+// Windows compare distances in floats and may include a vertex that is farther by this factor.
 constexpr double kReachTolerance = 1e-6;
 
 }  // namespace
@@ -20,7 +20,7 @@ PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach) {
   };
   const auto limit =
       static_cast<std::int64_t>(reach * (1 + kReachTolerance) * kRingUnitsPerCell) + 1;
-  // Behind the last vertex, and before the first one.
+  // Vertices needed after the last vertex, and before the first one.
   std::size_t after = 0;
   for (std::int64_t distance = length_after(count - 1); distance < limit; ++after) {
     distance += length_after(after % count);

@@ -1,4 +1,4 @@
-// Rings as windows along them are read: straight, with neither end nor beginning.
+// Rings as arrays that repeat beyond both ends, so that every window along a ring is contiguous.
 #pragma once
 
 #include <algorithm>
@@ -12,45 +12,45 @@
 
 namespace partiemc {
 
-/// Numbers of a ring's vertices and of those that repeat it beyond each end.
+/// Numbers of vertices of a ring, and of repeated vertices beyond each end.
 struct PeriodicRingSize {
   std::uint32_t count = 0, margin = 0;
 };
 
-/// Lengths along rings and coordinates are whole numbers of this fraction of a cell, modulo 2^32:
-/// differences of vertices less than 512 cells apart are exact wherever the ring lies, and what is
-/// computed of them in floats is as exact on a long ring as on a short one.
+/// Coordinates and arc lengths are integers in units of 2^-22 cells, modulo 2^32. Differences of
+/// vertices less than 512 cells apart are therefore exact, independent of the position and length
+/// of the ring.
 inline constexpr double kRingUnitsPerCell = 1 << 22;
 
-/// Requires: |cells| < 2^41.
+/// Converts cells to units, rounding towards 0. Requires: |cells| < 2^41.
 inline std::int32_t RingUnits(double cells) {
   return static_cast<std::int32_t>(static_cast<std::int64_t>(cells * kRingUnitsPerCell));
 }
 
-/// From one vertex to another, less than 512 cells away.
+/// The difference `to` - `from`. Requires: less than 512 cells apart.
 inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) -
                                    static_cast<std::uint32_t>(from));
 }
 
-/// Length of a step, rounded down; MeasureArc (ring_filters.h) adds up such lengths.
+/// Length of a step in units, rounded down. MeasureArc (ring_filters.h) sums the same lengths.
 inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
   const auto x = static_cast<float>(step_x);
   const auto y = static_cast<float>(step_y);
   return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
 }
 
-/// Numbers of a closed ring's vertices and of those that a window of `reach` cells holds at most
-/// beyond either of its ends, by the very lengths that windows go by: of two vertices that have all
-/// but fallen together none may be taken for being beyond it. Cost: the ring's length.
+/// The size of a closed ring. Its margin is the largest number of vertices that a window of `reach`
+/// cells needs beyond either end. Uses the lengths of LengthInUnits, as windows do: nearly
+/// coincident vertices must not be missed. Cost: linear in the vertices.
 PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach);
 
-/// One ring. Arrays are by vertex, 0 <= k < count, and go on beyond both ends by `margin` vertices
-/// that repeat the ring, so that a window is a contiguous stretch of them.
+/// One ring. Arrays are indexed by vertex, 0 <= k < count. They extend by `margin` elements beyond
+/// both ends, which repeat the ring, so that a window is a contiguous range.
 struct PeriodicRing {
   static constexpr int kUnitArrays = 3, kFloatArrays = 7;
 
-  /// With arrays of which units(k) and floats(k) tell where the first vertex is.
+  /// Makes a ring whose arrays have their first vertices at units(k) and floats(k).
   template <typename Units, typename Floats>
   static PeriodicRing In(const PeriodicRingSize& size, Units units, Floats floats) {
     return {.count = size.count,
@@ -69,15 +69,15 @@ struct PeriodicRing {
 
   std::ptrdiff_t count, margin;
   std::int32_t *x, *y;         ///< Lattice coordinates of the world, in units.
-  std::int32_t* arc;           ///< Length of the ring up to the vertex, in units; in margins, too.
+  std::int32_t* arc;           ///< Arc length up to the vertex, in units; continues in the margins.
   float *normal_x, *normal_y;  ///< Unit, outward.
-  float *next_x, *next_y;  ///< Scratch: the normals of the next step; then how supports scatter.
-  float* weight;           ///< l: half of the two segments at the vertex, in cells.
-  float* base;             ///< Shift along the normal that the vertex's plane asks for, in cells.
-  float* shift;            ///< Scratch of the steps; has no margins.
+  float *next_x, *next_y;      ///< Scratch: next normals; later next_x is the variance of supports.
+  float* weight;               ///< l: half the length of the two segments at the vertex, in cells.
+  float* base;                 ///< Shift of the vertex's plane along the normal, in cells.
+  float* shift;                ///< Scratch of the steps; has no margins.
 
-  /// Writes the elements [begin, end) of one of the arrays to where they are repeated. Different
-  /// elements are repeated in different places.
+  /// Copies the elements [begin, end) of an array to their repetitions in the margins. Calls with
+  /// disjoint ranges may run in parallel.
   template <typename Value>
   void Repeat(Value* values, std::ptrdiff_t begin, std::ptrdiff_t end) const {
     // A margin may be longer than the ring.
@@ -92,13 +92,14 @@ struct PeriodicRing {
   }
 };
 
-/// Memory of one ring that is short enough for the stack: it stays in the cache.
+/// The arrays of one short ring, for the stack, so that they stay in the cache.
 class ShortRing {
  public:
   static bool Holds(const PeriodicRingSize& size) {
-    return std::size_t{size.count} + 2 * std::size_t{size.margin} <= kRoom;
+    return std::size_t{size.count} + 2 * std::size_t{size.margin} <= kCapacity;
   }
-  /// Requires: Holds(size). Valid as long as this object; elements have no values yet.
+  /// A ring in this memory, with uninitialised elements; valid as long as this object.
+  /// Requires: Holds(size).
   PeriodicRing Of(const PeriodicRingSize& size) {
     return PeriodicRing::In(
         size, [&](int array) { return units_[array] + size.margin; },
@@ -106,22 +107,22 @@ class ShortRing {
   }
 
  private:
-  static constexpr std::size_t kRoom = 768;
-  std::int32_t units_[PeriodicRing::kUnitArrays][kRoom];
-  float floats_[PeriodicRing::kFloatArrays][kRoom];
+  static constexpr std::size_t kCapacity = 768;
+  std::int32_t units_[PeriodicRing::kUnitArrays][kCapacity];
+  float floats_[PeriodicRing::kFloatArrays][kCapacity];
 };
 
-/// Memory of the rings of a frame, kept warm from frame to frame.
+/// The arrays of all long rings of a frame, kept warm from frame to frame.
 class PeriodicRings {
  public:
   using Size = PeriodicRingSize;
 
-  /// Makes room for rings of the given numbers of vertices and margins; 0 vertices for a ring that
-  /// has none here. Elements keep no values.
+  /// The size of each ring, to be set before Allocate; 0 vertices for a ring without arrays here.
   std::vector<Size>& sizes() { return sizes_; }
+  /// Allocates the arrays. Elements are uninitialised.
   void Allocate();
 
-  /// Requires: Allocate was called after `sizes` were set.
+  /// Requires: Allocate was called after the sizes were set.
   PeriodicRing operator[](std::size_t ring);
 
  private:

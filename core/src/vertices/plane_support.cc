@@ -25,7 +25,7 @@ HWY_INLINE Vector Bump(Vector square, Vector inverse_square) {
   return hn::Mul(t, t);
 }
 
-// What planes have in common.
+// The support shape in vectors.
 struct Shape {
   HWY_INLINE explicit Shape(const SupportShape& support)
       : radius_square(Constant(support.radius * support.radius)),
@@ -37,7 +37,7 @@ struct Shape {
   Vector radius_square, height, inverse_square, depth, inverse_spacing;
 };
 
-// The sums over a chunk's particles for a plane.
+// The sums of one plane over the particles of a chunk.
 HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
                                               const NeighbourChunk& chunk, const BentPlane& plane,
                                               const Shape& shape) {
@@ -58,7 +58,7 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
 
     Vector w = hn::Max(hn::Add(hn::Mul(distance, shape.inverse_spacing), shape.depth), hn::Zero(d));
     for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
-    // Of what lies far away, weights and distances may be no numbers.
+    // Masks every term: far away, or in padding, weights and distances may be NaN.
     const auto supports = hn::And(hn::Lt(square, shape.radius_square), hn::Lt(above, shape.height));
     w = hn::IfThenElseZero(supports, hn::Mul(Bump(square, shape.inverse_square), w));
     const Vector moment = hn::IfThenElseZero(supports, hn::Mul(w, distance));

@@ -1,5 +1,5 @@
-// The sums over particles that say where a virtual plane belongs, in the vectors of the processor
-// at hand.
+// Sums over the particles that support a virtual plane (core/METHOD.md, "The default placement",
+// step 3). Vectorised with run-time dispatch.
 #pragma once
 
 #include <array>
@@ -10,36 +10,38 @@
 
 namespace partiemc {
 
-/// Which particles support a plane, lengths in cells: those nearer to its point than a radius and
-/// not higher above it than a height, weighted by B(apart, radius) max(0, distance / spacing +
-/// depth)^8.
+/// Selects and weighs the particles that support a plane. A particle supports it if it is nearer to
+/// its point than `radius` and less than `height` above it. Its weight is B(distance, radius)
+/// max(0, u / spacing + depth)^8, with its height u above the bent plane. Lengths in cells.
 struct SupportShape {
   double radius, height, spacing;
   double depth;  ///< In spacings.
 };
 
-/// A plane bent to a parabola, in cells relative to a tile.
+/// A plane bent to a parabola through (x, y), in cells relative to a tile.
 struct BentPlane {
   double x, y;
   double normal_x, normal_y;  ///< Unit.
   double curvature;
 };
 
-/// Over the particles of a support: the sums of their weights, of their weighted distances to the
-/// parabola, positive above it, and of the squares of these.
+/// Sums over the particles that support a plane: of weights, of weighted heights above the
+/// parabola, and of weighted squared heights.
 struct SupportSums {
   double weight, distance, square;
 };
 
-/// Up to kPointsAtOnce planes, and at least the particles in the disc of each.
+/// Up to kPointsAtOnce planes. `near` contains at least the particles within the radius of each.
 struct SupportQuery {
   NeighbourRows near;
   std::span<const BentPlane> planes;
 };
 
-/// sums[k][i] are those of planes[i] of queries[k], at most kQueriesAtOnce. In floats, with the
-/// same bits for any processor, as SumAtPoints.
 using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
+
+/// Computes sums[k][i] for planes[i] of queries[k]. Float arithmetic in a fixed order: the bits are
+/// the same on any processor, as for SumAtPoints.
+/// Requires: at most kQueriesAtOnce queries.
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
                  std::span<QuerySupports> sums);
 

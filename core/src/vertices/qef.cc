@@ -5,10 +5,11 @@
 namespace partiemc {
 namespace {
 
-// Eigenvalues of the QEF below this share of the larger one leave their direction free.
+// An eigenvalue of the QEF below this fraction of the larger one counts as 0.
 constexpr double kQefCutoff = 0.1;
 
-// The normal of the level set at a point of the plane's cell; the plane's own where it is weak.
+// The normal of the level set at a point of the cell, or the plane's normal if the gradient is
+// weak.
 Point NormalAt(const VertexInput& input, const CellPlane& plane, const Point& point) {
   const ActiveCell& cell = plane.cell;
   const Point origin = CellOrigin(input.bins.tiles, cell);
@@ -35,12 +36,12 @@ Point QefVertex(const VertexInput& input, const CellPlane& plane) {
     bx += n.x * offset;
     by += n.y * offset;
   }
-  // Closed-form eigenvalues of the symmetric 2 x 2 matrix; the trace is 2 as normals are unit.
+  // Closed-form eigenvalues of the symmetric 2 x 2 matrix.
   const double mean = (xx + yy) / 2;
   const double radius = std::sqrt((xx - yy) * (xx - yy) / 4 + xy * xy);
   const double large = mean + radius;
   const double small = mean - radius;
-  // Of the two forms of the eigenvector, the one without cancellation.
+  // Selects the form of the eigenvector that has no cancellation.
   double ex = xx >= yy ? large - yy : xy;
   double ey = xx >= yy ? xy : large - xx;
   const double length = std::sqrt(ex * ex + ey * ey);

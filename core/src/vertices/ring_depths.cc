@@ -37,11 +37,11 @@ void RingDepths::CollectTurns(std::span<const std::uint32_t> offsets) {
 }
 
 std::uint32_t RingDepths::Above(const Chain& chain) {
-  if (chain.goes_on) return chain.at + 1 == chain.last ? chain.first : chain.at + 1;
+  if (chain.is_forward) return chain.at + 1 == chain.last ? chain.first : chain.at + 1;
   return (chain.at == chain.first ? chain.last : chain.at) - 1;
 }
 
-// Whether a chain that the line meets at the height of `point` runs to the left of it.
+// Whether a chain on the sweep line runs left of `point`. Advances the chain to this height.
 bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
   Chain& c = chains_[chain];
   std::uint32_t above = Above(c);
@@ -59,7 +59,8 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets)
   const std::uint32_t first = offsets[turn.ring], last = offsets[turn.ring + 1];
   Chain on{turn.ring, turn.index, first, last, true, depth};
   Chain back{turn.ring, turn.index, first, last, false, depth};
-  // A ring that runs upwards on the right winds counter-clockwise around what lies between.
+  // If the forward chain is on the right, the ring winds counter-clockwise around the region
+  // between.
   const bool on_is_right =
       Orientation(turn.point, PointAt(points_, Above(on)), PointAt(points_, Above(back))) > 0;
   if (turn.is_lowest) {
@@ -67,8 +68,8 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets)
     ring = {depth, kNoRing, on_is_right};
     if (!status_.IsEnd(right)) {
       const Chain& beside = chains_[status_.At(right)];
-      const Ring& other = rings_[beside.ring];  // Was met before, as its chain goes on already.
-      ring.around = beside.goes_on == other.is_counter_clockwise ? beside.ring : other.around;
+      const Ring& other = rings_[beside.ring];  // Known, as its lowest point was passed before.
+      ring.around = beside.is_forward == other.is_counter_clockwise ? beside.ring : other.around;
     }
   }
   (on_is_right ? on : back).depth += on_is_right ? 1 : -1;

@@ -1,4 +1,4 @@
-// How rings that do not cross lie in each other.
+// Finds the nesting of rings that do not cross: winding numbers and enclosing rings.
 #pragma once
 
 #include <cstddef>
@@ -12,41 +12,44 @@
 
 namespace partiemc {
 
-/// One sweep over rings, from below to above in the order of SweepsBefore. The line meets chains,
-/// pieces of rings that only rise: they begin in pairs where a ring is lowest in its surroundings,
-/// end in pairs where it is highest, and keep their order in between, as nothing crosses. Each
-/// knows how often rings wind around what lies directly left of it. Keeps its memory warm from one
-/// use to the next. Not safe to share between threads.
+/// Nesting of rings.
+///
+/// Method: one sweep from bottom to top in the order of SweepsBefore. The sweep line crosses
+/// chains, the rising pieces of rings. Chains begin in pairs at the local minima of a ring and end
+/// in pairs at its local maxima. Their order on the line is fixed in between, as nothing crosses.
+/// Each chain stores the winding number of the region directly left of it.
+///
+/// Keeps its memory warm. Use one object per thread.
 class RingDepths {
  public:
-  /// Ring k has the points [offsets[k], offsets[k + 1]) of the interleaved `points`, and is closed
-  /// by a segment from the last to the first. Requires: CountTouchingPairs of the rings is 0;
-  /// coordinates in the domain of predicates.h. Exact. Cost: linear in the points, and n log n in
-  /// the places where rings turn from falling to rising or back, of which a round ring has two.
+  /// Computes the nesting. Ring k has the points [offsets[k], offsets[k + 1]) of the interleaved
+  /// `points`, and is closed by a segment from the last to the first. Exact.
+  /// Requires: CountTouchingPairs of the rings is 0; coordinates in the domain of predicates.h.
+  /// Cost: linear in the points; n log n in the local minima and maxima (a round ring has two).
   void Find(std::span<const double> points, std::span<const std::uint32_t> offsets);
 
-  /// How often the others wind around ring k: +1 for each that runs counter-clockwise around it, -1
-  /// for each that runs clockwise.
+  /// Winding number of the other rings around ring k: +1 for each counter-clockwise ring around it,
+  /// -1 for each clockwise one.
   std::int32_t DepthOf(std::size_t ring) const { return rings_[ring].depth; }
   /// The innermost of the rings around ring k, or kNoRing.
   std::uint32_t AroundOf(std::size_t ring) const { return rings_[ring].around; }
 
  private:
-  // Where a ring turns from falling to rising, or back.
+  // A local minimum or maximum of a ring.
   struct Turn {
     Point point;
-    std::uint32_t index;  // Of the point.
+    std::uint32_t index;  // Index of the point.
     std::uint32_t ring;
-    bool is_low;
-    bool is_lowest;  // Of its ring.
+    bool is_low;     // Whether it is a minimum.
+    bool is_lowest;  // Whether it is the lowest point of its ring.
   };
-  // A piece of a ring that rises from turn to turn.
+  // A rising piece of a ring, from a minimum to a maximum.
   struct Chain {
     std::uint32_t ring;
-    std::uint32_t at;           // Its last point that the line has passed.
-    std::uint32_t first, last;  // The points [first, last) of its ring.
-    bool goes_on;               // Rises as the ring runs; else against it.
-    std::int32_t depth;         // Of what lies directly left of it.
+    std::uint32_t at;           // Its last point below the sweep line.
+    std::uint32_t first, last;  // The ring has the points [first, last).
+    bool is_forward;            // Whether it rises in the direction of the ring.
+    std::int32_t depth;         // Winding number of the region directly left of it.
   };
 
   struct Ring {
@@ -66,7 +69,7 @@ class RingDepths {
   std::vector<Turn> turns_;
   std::vector<Chain> chains_;
   std::vector<std::uint32_t> unused_;
-  SweepStatus status_;  // Of chains.
+  SweepStatus status_;  // Chains from left to right.
 };
 
 }  // namespace partiemc

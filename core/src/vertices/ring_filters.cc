@@ -26,28 +26,28 @@ HWY_INLINE Vector Dot(Vector ax, Vector ay, Vector bx, Vector by) {
   return hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by));
 }
 
-// Falls from 1 to 0.1 at 30 degrees: what lies beyond a corner has no say.
+// max(0, cosine)^16. Falls from 1 to 0.1 at 30 degrees, so vertices beyond a corner do not count.
 HWY_INLINE Vector AngleWeight(Vector cosine) {
   Vector power = hn::Max(cosine, hn::Zero(Lanes()));
   for (int squaring = 0; squaring < 4; ++squaring) power = hn::Mul(power, power);
   return power;
 }
 
-// Vertices as many as there are lanes.
+// The vertices of one vector; `lanes` of them are valid.
 struct Block {
   std::ptrdiff_t first, lanes;
 };
 
-// From vertices of a ring to neighbours, in cells; their coordinates begin at `from` and `to`.
+// Differences `to` - `from` of coordinates, in cells.
 HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
   const Lanes d;
   const auto units = hn::Sub(hn::LoadU(Units(), to), from);
   return hn::Mul(hn::ConvertTo(d, units), hn::Set(d, static_cast<float>(1 / kRingUnitsPerCell)));
 }
 
-// Goes over the vertices [begin, end) by blocks: in each it calls add(j, w) for every offset that
-// is in the window of one of its vertices; j is the neighbour of the first vertex, w the weights of
-// the neighbours, 0 beyond a window. Then finish(block).
+// Processes the vertices [begin, end) in blocks. Calls start(first vertex) for each block. Then
+// calls add(j, w) for every offset in the window of one of the block's vertices: j is the neighbour
+// of the first vertex, w has the weights, 0 beyond a window. At the end calls finish(block).
 template <typename Start, typename Add, typename Finish>
 HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {
@@ -74,7 +74,7 @@ HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, st
     const auto is_near = [&](Vector nearness) HWY_ATTR {
       return !hn::AllFalse(d, hn::And(hn::Gt(nearness, hn::Zero(d)), in_block));
     };
-    // Each way until it ends: the other way may hold more vertices than a margin has here.
+    // Each direction ends by itself: the other one may continue beyond the margin on this side.
     bool goes_before = true, goes_after = true;
     for (std::ptrdiff_t apart = 1; goes_before || goes_after; ++apart) {
       if (goes_before) {
@@ -103,11 +103,11 @@ HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
   }
 }
 
-// LengthInUnits of the step after each vertex, in place of its arc.
+// Writes LengthInUnits of the step after each vertex to its arc.
 void MeasureSteps(const PeriodicRing& ring) {
   const Lanes d;
   const Units d_units;
-  // May go on into the margin.
+  // The last vector may extend into the margin.
   for (std::ptrdiff_t k = 0; k < ring.count; k += kLanes) {
     const auto along = [&](const std::int32_t* at) HWY_ATTR {
       return hn::ConvertTo(d, hn::Sub(hn::LoadU(d_units, at + k + 1), hn::LoadU(d_units, at + k)));

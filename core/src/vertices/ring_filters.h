@@ -1,4 +1,5 @@
-// Sums over windows along a ring, in the vectors of the processor at hand.
+// Filters along a ring: weighted sums over windows (core/METHOD.md, "The default placement").
+// Vectorised with run-time dispatch.
 #pragma once
 
 #include <cstddef>
@@ -7,32 +8,34 @@
 
 namespace partiemc {
 
-/// What vectors of up to sixteen vertices read beyond a window that ends in a margin.
+/// Largest number of vertices that vectors read beyond the end of a window.
 inline constexpr std::ptrdiff_t kWindowPadding = 17;
 
-/// Sets the arc and the weights of a ring by its coordinates, in the margins, too.
-/// Requires: coordinates are repeated in the margins, of kWindowPadding vertices at least.
+/// Computes arc lengths and weights of a ring, including the margins.
+/// Requires: coordinates are repeated in the margins; margins have at least kWindowPadding
+/// vertices.
 void MeasureArc(const PeriodicRing& ring);
 
-/// Each of these functions sums, for each of the vertices [begin, end) of a ring, over the vertices
-/// j less than `reach` from it along the ring, with weights that begin with l_j B(d, reach)
-/// (core/METHOD.md, "The default placement"). A vertex per lane, in floats: first itself, then the
-/// two vertices beside it, the one before it first, then the next two, until a window ends. The
-/// bits are the same whatever the width of the vectors and wherever a stretch begins. Requires: the
-/// ring is at least two reaches long; its margins hold what SizeForWindows says and kWindowPadding
-/// more.
+/// The three functions below process the vertices [begin, end) of a ring. Each sums over the
+/// vertices j nearer than `reach` cells along the ring, with weights that contain l_j B(d, reach).
+/// Arithmetic is in floats, one vertex for each lane. A sum starts with the vertex itself and
+/// continues with the next vertex on each side, the one before first, until the window ends. The
+/// bits do not depend on the width of vectors or on `begin`.
+/// Requires: the ring is at least two reaches long; its margins have the size of SizeForWindows
+/// plus kWindowPadding.
 
-/// Unit mean of the normals, into next_x and next_y; with `by_angle`, weighted by the angle between
-/// them, too (max(0, n_i . n_j)^16). The vertex's own normal where they cancel out.
+/// Writes the unit mean of the normals to next_x and next_y. `by_angle` multiplies the weights by
+/// max(0, n_i . n_j)^16. If normals cancel, the vertex keeps its own normal.
 void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle);
 
-/// How normals turn along the tangent, positive where the ring is convex, into shift.
+/// Writes the curvature, positive where the ring is convex, to shift: the change of the normals
+/// along the tangent.
 void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach);
 
-/// The mean of what the neighbours' planes say, shifted by their bases, along the vertex's normal,
-/// weighted by angle, into shift.
+/// Writes the shift of each vertex along its normal to shift: to the mean of the neighbours'
+/// planes, each moved by its base, with weights by angle as above.
 void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach);
 
 }  // namespace partiemc

@@ -1,5 +1,5 @@
-// The default placement: vertices on the level set, then on virtual planes that their surroundings
-// support (core/METHOD.md, "The default placement").
+// The default placement, steps 1 to 3: vertices on the level set, then on virtual planes supported
+// by the nearby particles (core/METHOD.md, "The default placement").
 #pragma once
 
 #include "vertices/vertices.h"
