@@ -27,6 +27,7 @@ Steps, all of them by default:
   consumer    everything installed, found and used by tests/consumer (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
 Builds are kept in build/, so that a second run compiles only what has changed.
+With CI=true a skipped test or step fails, unless tests/skips.txt names it with its reason.
 USAGE
 }
 
@@ -66,6 +67,27 @@ record_failure() {
   echo "FAILED: $2"
 }
 
+# record_skips KIND LOG...: prints what did not run (tests/support/skips.py). In continuous integration a
+# skipped test fails unless tests/skips.txt names it.
+record_skips() {
+  local found name reason
+  if ! found=$(tests/support/skips.py "$@"); then
+    record_failure 1 "skips: tests/support/skips.py $*"
+    return
+  fi
+  while IFS=$'\t' read -r name reason; do
+    if [[ -z $name ]]; then
+      continue
+    elif [[ -n $reason ]]; then
+      echo "skipped: $name ($reason)"
+    elif [[ ${CI:-} == true ]]; then
+      record_failure 1 "skipped: $name (tests/skips.txt does not name it)"
+    else
+      echo "skipped: $name"
+    fi
+  done <<<"$found"
+}
+
 # check NAME COMMAND...: one test, passed if the command succeeds.
 check() {
   local name=$1
@@ -80,7 +102,7 @@ check() {
 
 # What each failed test wrote, of a log of CTest's: its line of the result and what follows it.
 failed_tests() {
-  awk '/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: / { shown = /\*\*\*/ }
+  awk '/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: / { shown = /\*\*\*/ && !/\*\*\*Skipped/ }
        /^[0-9]+% tests passed/ { exit }
        shown && !/^ +Start +[0-9]+: / { print substr($0, 1, 500) }' "$1"
 }
@@ -99,11 +121,13 @@ run_ctest() {
     tee "$log" | sed -u -E '/^ +Start +[0-9]+: /d; s/ \.{3,} */ .. /'
   local summary='^[0-9]+% tests passed, ([0-9]+) tests failed out of ([0-9]+)$'
   if [[ $(grep -E "$summary" "$log") =~ $summary ]]; then
-    passed=$((passed + BASH_REMATCH[2] - BASH_REMATCH[1]))
-    if ((BASH_REMATCH[1] != 0)); then
+    local bad=${BASH_REMATCH[1]} all=${BASH_REMATCH[2]}
+    passed=$((passed + all - bad - $(grep -c '\*\*\*Skipped' "$log")))
+    if ((bad != 0)); then
       failed_tests "$log" >>"$details"
-      record_failure "${BASH_REMATCH[1]}" "$name: $(names_of_failed_tests "$log")"
+      record_failure "$bad" "$name: $(names_of_failed_tests "$log")"
     fi
+    record_skips ctest "$log" "$directory/Testing/Temporary/LastTest.log"
   else
     record_failure 1 "$name: CTest gave no result"
   fi
@@ -134,7 +158,8 @@ step_contract() {
     mkdir -p build/buf
     if ! npm install --prefix build/buf --no-save --ignore-scripts --no-audit --no-fund \
       --fetch-retries=0 --fetch-timeout=30000 "@bufbuild/buf@$buf_version" >build/buf/log 2>&1; then
-      echo "buf is left out: npm is not here or cannot fetch it (build/buf/log)"
+      echo "npm is not installed or cannot fetch buf (build/buf/log)"
+      record_skips step buf
       return
     fi
   fi
@@ -171,6 +196,7 @@ run_node() {
     elif ((well == 0)); then
       record_failure 1 "$name: no test was run"
     fi
+    record_skips node "$log"
   fi
   rm -f "$log"
 }
@@ -178,7 +204,8 @@ run_node() {
 # Its packages come from npm alone, as buf does.
 step_viewer() {
   if ! client/viewer/build.sh --packages >build/viewer.log 2>&1; then
-    echo "viewer is left out: npm is not here or cannot fetch its packages (build/viewer.log)"
+    echo "npm is not installed or cannot fetch the viewer's packages (build/viewer.log)"
+    record_skips step viewer
     return
   fi
   check "viewer: build" client/viewer/build.sh || return

@@ -19,7 +19,9 @@ def to_path(rings):
     import numpy
     from matplotlib.path import Path
 
-    starts, ends = rings.offsets[:-1], rings.offsets[1:]
+    # numpy.insert adds to these indices in place, which it cannot do to unsigned ones.
+    offsets = rings.offsets.astype(numpy.intp)
+    starts, ends = offsets[:-1], offsets[1:]
     vertices = numpy.insert(rings.points, ends, rings.points[starts], axis=0)
     codes = numpy.full(len(vertices), Path.LINETO, Path.code_type)
     codes[starts + numpy.arange(len(starts))] = Path.MOVETO
@@ -35,10 +37,13 @@ def to_triangulation(mesh):
 
 
 def to_meshio(mesh):
-    """A meshio Mesh, which writes VTK, VTU, STL, Gmsh and many others."""
+    """A meshio Mesh with z = 0, which writes VTK, VTU, STL, Gmsh and many others."""
     import meshio
+    import numpy
 
-    return meshio.Mesh(mesh.points, [("triangle", mesh.triangles)])
+    # Some of its writers require three coordinates, Gmsh's signed indices.
+    points = numpy.pad(mesh.points, ((0, 0), (0, 1)))
+    return meshio.Mesh(points, [("triangle", mesh.triangles.astype(numpy.int64))])
 
 
 def to_svg(result, width=800):

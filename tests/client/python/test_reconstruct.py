@@ -1,9 +1,12 @@
 """The core in this process: arrays in, views out."""
 
+import contextlib
 import gc
+import io
 import pickle
 import subprocess
 import sys
+import tempfile
 import threading
 import tracemalloc
 import unittest
@@ -252,7 +255,10 @@ class Results(unittest.TestCase):
             path = self.result.rings.to_path()
         except ImportError:
             self.skipTest("NOT TESTED: there is no matplotlib (Debian: python3-matplotlib)")
-        self.assertEqual(len(path.to_polygons()), 2)
+        polygons = path.to_polygons()
+        self.assertEqual(len(polygons), 2)
+        for ring, polygon in zip(self.result.rings, polygons):
+            numpy.testing.assert_array_equal(polygon, numpy.concatenate([ring, ring[:1]]))
         self.assertEqual(len(self.result.mesh.to_triangulation().triangles), len(self.result.mesh))
 
     def test_meshio_takes_results(self):
@@ -261,6 +267,13 @@ class Results(unittest.TestCase):
         except ImportError:
             self.skipTest("NOT TESTED: there is no meshio (Debian: python3-meshio)")
         self.assertEqual(len(mesh.cells[0].data), len(self.result.mesh))
+        import meshio
+        for extension in ("vtu", "vtk", "stl", "msh", "obj", "ply"):
+            with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+                mesh.write(f"{folder}/mesh.{extension}")
+                read = meshio.read(f"{folder}/mesh.{extension}")
+            self.assertEqual(sum(len(cells.data) for cells in read.cells), len(self.result.mesh),
+                             extension)
 
 
 class Errors(unittest.TestCase):
