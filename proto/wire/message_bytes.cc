@@ -70,6 +70,29 @@ bool ReadSequence(CodedInputStream& input, google::protobuf::uint64& sequence, i
   return input.BytesUntilLimit() == 0;
 }
 
+// As ReadSequence, of a ReconstructRequest.
+bool FindSequence(grpc::ByteBuffer& bytes, google::protobuf::uint64& sequence) {
+  grpc::ProtoBufferReader reader(&bytes);
+  if (!reader.status().ok()) return false;
+  CodedInputStream input(&reader);
+  int fields = 0;
+  while (const std::uint32_t tag = input.ReadTag()) {
+    if (++fields > kMaxFields) return false;
+    if (tag == LengthTag(v1::ReconstructRequest::kFrameFieldNumber)) {
+      int length = 0;
+      if (!input.ReadVarintSizeAsInt(&length)) return false;
+      const auto limit = input.PushLimit(length);
+      if (!ReadSequence(input, sequence, fields)) return false;
+      input.PopLimit(limit);
+    } else if (!WireFormatLite::SkipField(&input, tag)) {
+      return false;
+    } else if (tag == LengthTag(v1::ReconstructRequest::kOpenFieldNumber)) {
+      sequence = 0;  // It takes the place of a frame before it.
+    }
+  }
+  return input.ConsumedEntireMessage();
+}
+
 // `frame` without its arrays.
 Frame ScalarsOf(const Frame& frame) {
   Frame scalars{.positions = frame.positions, .components = frame.components, .time = frame.time};
@@ -168,26 +191,14 @@ std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last) {
 }
 
 std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes) {
-  grpc::ProtoBufferReader reader(&bytes);
-  if (!reader.status().ok()) return std::nullopt;
-  CodedInputStream input(&reader);
   google::protobuf::uint64 sequence = 0;
-  int fields = 0;
-  while (const std::uint32_t tag = input.ReadTag()) {
-    if (++fields > kMaxFields) return std::nullopt;
-    if (tag == LengthTag(v1::ReconstructRequest::kFrameFieldNumber)) {
-      int length = 0;
-      if (!input.ReadVarintSizeAsInt(&length)) return std::nullopt;
-      const auto limit = input.PushLimit(length);
-      if (!ReadSequence(input, sequence, fields)) return std::nullopt;
-      input.PopLimit(limit);
-    } else if (!WireFormatLite::SkipField(&input, tag)) {
-      return std::nullopt;
-    } else if (tag == LengthTag(v1::ReconstructRequest::kOpenFieldNumber)) {
-      sequence = 0;  // It takes the place of a frame before it.
-    }
-  }
-  if (!input.ConsumedEntireMessage()) return std::nullopt;
+  if (!FindSequence(bytes, sequence)) return std::nullopt;
+  return sequence;
+}
+
+std::uint64_t ReadableSequence(grpc::ByteBuffer& bytes) {
+  google::protobuf::uint64 sequence = 0;
+  FindSequence(bytes, sequence);
   return sequence;
 }
 

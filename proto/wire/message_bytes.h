@@ -34,6 +34,11 @@ std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
 /// where they are none, or have more than kMaxFields fields. Passes over the frame's arrays.
 std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes);
 
+/// The `sequence` of the ParticleFrame in `bytes` as SequenceOf, also of a message that is damaged
+/// or has more than kMaxFields fields: then the last one before the damage and among these fields.
+/// 0 if there is none.
+std::uint64_t ReadableSequence(grpc::ByteBuffer& bytes);
+
 /// Adds what `bytes` holds to `message`; strings that are there and empty keep their memory. False
 /// where `bytes` is no such message; `message` may then hold a part of it.
 bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message);

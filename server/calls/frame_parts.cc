@@ -47,15 +47,17 @@ std::chrono::milliseconds TimeoutOf(const v1::OpenStream& open) {
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
                         const std::string& field) {
   request.mutable_frame()->Clear();
+  absl::Status status = MalformedFrame(field, bytes.Length());
   try {
     if (wire::HasFewFields(bytes, *request.GetDescriptor()) && wire::MergeBytes(bytes, request)) {
       request.DiscardUnknownFields();
       return absl::OkStatus();
     }
   } catch (const std::bad_alloc&) {
-    return OutOfMemory(absl::StrCat(bytes.Length(), " bytes"));
+    status = OutOfMemory(absl::StrCat(bytes.Length(), " bytes"));
   }
-  return MalformedFrame(field, bytes.Length());
+  request.mutable_frame()->set_sequence(wire::ReadableSequence(bytes));
+  return status;
 }
 
 absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits) {

@@ -24,7 +24,8 @@
 namespace partiemc::server {
 
 /// Parses a request that holds a frame into `request`, whose buffers are used again. What is not
-/// known of it is passed over, and kept nowhere. Errors: MALFORMED, OUT_OF_MEMORY of `field`.
+/// known of it is passed over, and kept nowhere. Errors: MALFORMED, OUT_OF_MEMORY of `field`; the
+/// frame then has its `sequence` if that can be read, else 0.
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
                         const std::string& field = "frame");
 

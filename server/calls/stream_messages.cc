@@ -297,9 +297,16 @@ Answered StreamMessages::AnswerFrameIn(std::size_t slot, Worker& worker,
   const v1::ParticleFrame& request = messages->request.frame();
   v1::ReconstructedFrame& result = *messages->result.mutable_frame();
   const std::uint64_t next_sequence = session_->next_sequence();
-  const absl::Status status = AnswerFrame(
-      parsed.ok() ? DecodeFrameWithin(request, limits_, outputs_, messages->attributes) : parsed,
-      request.sequence(), outputs_, *session_, worker, cancelled, result);
+  // Frames are numbered from 1: without a number, a malformed frame is neither a gap nor a
+  // duplicate.
+  const bool has_number = parsed.ok() || request.sequence() != 0;
+  const absl::Status status =
+      has_number
+          ? AnswerFrame(parsed.ok()
+                            ? DecodeFrameWithin(request, limits_, outputs_, messages->attributes)
+                            : parsed,
+                        request.sequence(), outputs_, *session_, worker, cancelled, result)
+          : session_->Refuse(parsed, worker);
   std::string checkpoint =
       CheckpointAfter(next_sequence, *session_, terms_, limits_, checkpoint_keys_);
   if (part_zero_) {

@@ -57,11 +57,15 @@ absl::Status Session::Answer(std::uint64_t sequence, const absl::StatusOr<Frame>
     worker.Empty();
     return status;
   }
-  if (!status.ok() && worker.observer != nullptr) {
-    const auto violation = FindViolation(status);
+  return status.ok() ? status : Refuse(std::move(status), worker);
+}
+
+absl::Status Session::Refuse(absl::Status why, Worker& worker) const {
+  if (worker.observer != nullptr) {
+    const auto violation = FindViolation(why);
     worker.observer->FrameRefused(violation ? std::string_view(violation->reason) : "INTERNAL");
   }
-  return status;
+  return why;
 }
 
 absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame,

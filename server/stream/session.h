@@ -59,6 +59,9 @@ class Session {
   absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
                       Deliver deliver, const std::atomic<bool>* cancelled = nullptr);
 
+  /// Refuses a frame whose number could not be read; it uses up none. Returns `why`.
+  absl::Status Refuse(absl::Status why, Worker& worker) const;
+
   /// 1 for a new stream.
   std::uint64_t next_sequence() const { return next_sequence_; }
   /// As resolved.

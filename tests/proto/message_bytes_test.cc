@@ -204,6 +204,24 @@ TEST(MessageBytes, WhatIsNoMessageIsCountedAsFarAsAParserComes) {
   EXPECT_FALSE(RequestHasFewFields("\x7b\x7c")) << "a group";
 }
 
+TEST(MessageBytes, ReadableSequenceIsFoundBeforeTheDamage) {
+  const auto readable = [](const std::string& frame, const std::string& after = "") {
+    std::string text = "\x12";  // `frame`, of less than 2^14 bytes.
+    text += static_cast<char>(0x80 | (frame.size() & 127));
+    text += static_cast<char>(frame.size() >> 7);
+    grpc::ByteBuffer bytes = InPieces(text + frame + after, 50);
+    return ReadableSequence(bytes);
+  };
+  const std::string number("\x08\x05", 2), many = Repeated(Field(15, ""), kMaxFields);
+  EXPECT_EQ(readable(number), 5u);
+  EXPECT_EQ(readable(number + many), 5u);
+  EXPECT_EQ(readable(many + number), 0u);
+  EXPECT_EQ(readable(number + "\x07"), 5u);
+  EXPECT_EQ(readable("\x07" + number), 0u);
+  EXPECT_EQ(readable(number, "\x07"), 5u);
+  EXPECT_EQ(readable(""), 0u);
+}
+
 TEST(MessageBytes, TheHeldFieldOfTooManyIsNotLookedFor) {
   grpc::ByteBuffer bytes = InPieces(Repeated(Field(15, ""), kMaxFields + 1), 100);
   EXPECT_FALSE(HeldField(bytes, kLast).has_value());

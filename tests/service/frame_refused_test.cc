@@ -92,6 +92,27 @@ TEST_F(FrameRefused, MALFORMED) {
   EXPECT_EQ(error.next_sequence(), 2u);
 }
 
+class FrameOfManyFields : public FrameRefused {};
+
+// Also the first frame, whose number no other one has used.
+TEST_F(FrameOfManyFields, IsMalformed) {
+  auto scalars = BlobRequest(1, 1, 0);
+  while (scalars.frame().scalars_size() <= 4096) scalars.mutable_frame()->add_scalars();
+  Expect(scalars, "MALFORMED",
+         "frame: " + std::to_string(scalars.ByteSizeLong()) +
+             " bytes; must be a ParticleFrame of at most 4096 fields");
+  // A number behind too many fields is not read, and none is used up.
+  std::string unknown;
+  for (int i = 0; i < 4097; ++i) unknown += std::string("\x7a\0", 2);
+  const std::string message = std::string("\x12\x84\x40", 3) + unknown + "\x08\x01";
+  const StreamEnd end =
+      SendBytes(channel_, {OpenRequest().SerializeAsString(), message, std::string("\x07")});
+  ASSERT_EQ(end.answers.size(), 2u) << end.status.error_message();
+  EXPECT_EQ(end.answers[1].error().reason(), "MALFORMED");
+  EXPECT_EQ(end.answers[1].error().next_sequence(), 1u);
+  EXPECT_EQ(end.answers[1].error().sequence(), 0u);
+}
+
 TEST_F(FrameRefused, UNSUPPORTED) {
   auto request = BlobRequest(1, 1, 0);
   request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_UNSPECIFIED);
