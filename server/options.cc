@@ -281,13 +281,38 @@ void AddWeb(CLI::App& app, Raw& raw) {
       ->type_name("ORIGIN")
       ->envname("PARTIEMC_WEB_ORIGIN")
       ->group(kGroup);
+  app.add_option(
+         "--web-host", raw.web_options.hosts,
+         "Accept requests that name this host, as those that a proxy of this machine passes "
+         "on; may be given several times. On a loopback address only localhost, loopback "
+         "addresses, these names and the hosts of --web-origin are accepted")
+      ->needs(web)
+      ->type_name("NAME")
+      ->envname("PARTIEMC_WEB_HOST")
+      ->group(kGroup);
+  app.add_option("--web-frame-ancestors", raw.web_options.frame_ancestors,
+                 "Allow pages of this origin to show the viewer's page in a frame, "
+                 "https://HOST[:PORT]; may be given several times")
+      ->needs(web)
+      ->type_name("ORIGIN")
+      ->envname("PARTIEMC_WEB_FRAME_ANCESTORS")
+      ->group(kGroup);
   app.add_option("--web-connections", raw.web_options.max_connections,
-                 "Connections at once; of those that make no call the oldest gives way")
+                 "Maximum number of connections. Above it the oldest connection without a request "
+                 "is closed; health checks have 16 more")
       ->check(CLI::Range(1, 65'536))
       ->capture_default_str()
       ->needs(web)
       ->type_name("N")
       ->envname("PARTIEMC_WEB_CONNECTIONS")
+      ->group(kGroup);
+  app.add_option("--web-connections-per-address", raw.web_options.max_per_address,
+                 "Maximum number of connections of one address (default: half of "
+                 "--web-connections)")
+      ->check(CLI::Range(1, 65'536))
+      ->needs(web)
+      ->type_name("N")
+      ->envname("PARTIEMC_WEB_CONNECTIONS_PER_ADDRESS")
       ->group(kGroup);
   app.add_option("--web-port-file", raw.web_port_file, "As --port-file, for --web")
       ->needs(web)

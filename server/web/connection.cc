@@ -1,5 +1,6 @@
 #include "server/web/connection.h"
 
+#include <algorithm>
 #include <array>
 
 #include "absl/strings/str_cat.h"
@@ -56,7 +57,8 @@ void WebConnection::CloseAfter(std::chrono::milliseconds time) {
   });
 }
 
-// A socket that is closed with something unread takes back what was written last.
+// A socket that is closed with unread bytes resets the connection, and the client may lose the
+// response.
 void WebConnection::CloseGently() {
   error_code error;
   socket().shutdown(WebSocket::shutdown_send, error);
@@ -66,16 +68,22 @@ void WebConnection::CloseGently() {
     const auto self = weak.lock();
     if (!aborted && self != nullptr) self->Close();
   });
-  Discard();
+  // Linux reports this once both directions are shut down, or after a reset.
+  socket().async_wait(WebSocket::wait_error, [weak = weak_from_this()](error_code aborted) {
+    const auto self = weak.lock();
+    if (!aborted && self != nullptr) self->CloseIfRead();
+  });
 }
 
-void WebConnection::Discard() {
-  auto nowhere = std::make_shared<std::array<char, 4096>>();
-  socket().async_read_some(boost::asio::buffer(*nowhere),
-                           [self = shared_from_this(), nowhere](error_code error, std::size_t) {
-                             if (error) return self->Close();
-                             self->Discard();
-                           });
+// A client that half-closes may still wait for the response. The last bytes of TLS are read, so
+// that a connection without a body closes at once.
+void WebConnection::CloseIfRead() {
+  std::array<char, 1024> last;
+  error_code error;
+  const std::size_t unread = socket().available(error);
+  if (!error && unread > last.size()) return;
+  if (!error && unread > 0) socket().read_some(boost::asio::buffer(last), error);
+  Close();
 }
 
 }  // namespace partiemc::server

@@ -56,14 +56,15 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   void CloseAfter(std::chrono::milliseconds time);
   void CloseNever() { deadline_.expires_at(std::chrono::steady_clock::time_point::max()); }
 
-  /// What was written arrives before the end, although there may be more to read.
+  /// Closes the connection once the client has closed it, or after kWebCloseTime. Until then what
+  /// was written can arrive. What the client still sends is not read.
   void CloseGently();
 
   const WebExecutor& executor() const { return executor_; }
 
   WebContext& context;
   const std::string peer;
-  ConnectionPlaces::Place place;
+  ConnectionSlots::Slot slot;
   /// What has come and is not used up.
   boost::beast::flat_buffer buffer{kMaxHeaderBytes};
 
@@ -71,7 +72,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   virtual WebSocket& socket() = 0;
 
  private:
-  void Discard();
+  void CloseIfRead();
 
   const WebExecutor executor_;
   boost::asio::steady_timer deadline_;

@@ -13,8 +13,8 @@
 #include "server/calls/methods.h"
 #include "server/stream/limits.h"
 #include "server/telemetry/metrics.h"
+#include "server/web/connection_slots.h"
 #include "server/web/page_files.h"
-#include "server/web/places.h"
 #include "server/web/requests.h"
 
 namespace partiemc::server {
@@ -43,9 +43,10 @@ struct WebContext {
   const WebPings pings;
   const WebRules rules;
   const PageFiles files;
+  const std::string page_policy;  ///< PagePolicy.
   const std::function<bool()> draining;
   WebRefusals refusals;
-  ConnectionPlaces places;
+  ConnectionSlots slots;
 
   /// Counts and logs what was not let in.
   void Refuse(WebRefusal refusal, const std::string& peer, const absl::Status& why);

@@ -34,6 +34,7 @@ WebRequest ViewOf(const HttpParser& parser) {
           .origins = All(request, http::field::origin),
           .authorizations = All(request, http::field::authorization),
           .protocols = All(request, http::field::sec_websocket_protocol),
+          .transfer_encodings = All(request, http::field::transfer_encoding),
           .content_type = View(request[http::field::content_type]),
           .accept_encoding = View(request[http::field::accept_encoding]),
           .if_none_match = View(request[http::field::if_none_match]),

@@ -56,8 +56,17 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
     }
     if (error) return connection_->Close();
     WebAnswer answer = Understand(ViewOf(*parser_), connection_->context.rules);
+    if (connection_->slot.reserved()) {
+      closes_ = true;
+      if (!std::holds_alternative<WebHealth>(answer.what)) return Refuse(FullServer());
+    }
     allowed_origin_ = std::move(answer.allowed_origin);
     std::visit([this](auto& what) { Do(what); }, answer.what);
+  }
+
+  static WebRefused FullServer() {
+    return {WebRefusal::kFull, 503,
+            "must come again later: all connections of the server, or of this address, have calls"};
   }
 
   void Refuse(WebRefused refused) {
@@ -67,6 +76,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   }
 
   void Do(const WebRefused& refused) {
+    closes_ = closes_ || refused.http_status == 400;  // Where the request ends is in doubt.
     connection_->context.Refuse(refused.refusal, connection_->peer,
                                 absl::InvalidArgumentError("the request " + refused.rule));
     Send(ResponseTo(refused));
@@ -78,7 +88,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
     const PageFiles& files = connection_->context.files;
     auto file = files.Find(asked);
     if (!file) return Send(ResponseWithoutFile(asked, files.HasPage()));
-    WebResponse response = ResponseOf(*file, asked, ViewOf(*parser_).if_none_match);
+    WebResponse response =
+        ResponseOf(*file, asked, ViewOf(*parser_).if_none_match, connection_->context.page_policy);
     if (response.head_only || file->bytes == 0) return Send(std::move(response));
     file_.emplace(*std::move(file));
     left_ = file_->bytes;

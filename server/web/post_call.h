@@ -46,6 +46,7 @@ class PostCall final : public WebChannel {
     if (length && *length > message_limit()) {
       return Break(WebRefusal::kTooLarge, TooLarge(*length));
     }
+    parser_->body_limit(message_limit());  // Of all chunks, when they are announced.
     const auto expect = parser_->get()[boost::beast::http::field::expect];
     if (!boost::beast::iequals(expect, "100-continue")) return ReadMore();
     static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
@@ -60,7 +61,6 @@ class PostCall final : public WebChannel {
     if (!wanted()) return;  // It has ended meanwhile.
     if (parser_->is_done()) return BodyCame();
     const auto left = parser_->content_length_remaining();
-    // Chunks announce no sum: one byte more tells that it is too much.
     const auto expected = left ? *left : message_limit() + 1 - gathered_.size();
     const auto room = gathered_.Room(expected);
     auto& body = parser_->get().body();
@@ -76,6 +76,9 @@ class PostCall final : public WebChannel {
 
   void OnBody(error_code error, std::size_t room) {
     if (error == boost::beast::http::error::need_buffer) error = {};
+    if (error == boost::beast::http::error::body_limit) {
+      return Break(WebRefusal::kTooLarge, TooLarge(message_limit() + 1));
+    }
     if (error) return Gone();
     gathered_.Filled(room - parser_->get().body().size);
     if (gathered_.size() > message_limit()) {
@@ -150,7 +153,7 @@ class PostCall final : public WebChannel {
     const bool keeps = !is_gone() && parser_->is_done() && parser_->keep_alive();
     Over();
     if (!keeps) return connection_->CloseGently();
-    connection_->place.SetWaiting(true);
+    connection_->slot.SetState(ConnectionSlots::State::kNoCall);
     goes_on_ = true;
     connection_->CloseAfter(kWebHeaderTime);
     if (!watching_) next_();

@@ -116,10 +116,14 @@ std::optional<std::string> NormalHost(std::string_view text, std::string_view us
 
 std::string_view UsualPort(std::string_view scheme) { return scheme == "https" ? "443" : "80"; }
 
+// Of a normal host, without its port; of a number in brackets with these.
+std::string_view NameOf(std::string_view host) {
+  return host.substr(0, host.front() == '[' ? host.find(']') + 1 : host.find(':'));
+}
+
 bool IsLocalHost(std::string_view host) {
-  const std::size_t end = host.front() == '[' ? host.find(']') : host.find(':');
-  std::string_view name = host.substr(0, end);
-  ConsumePrefix(name, "[");
+  std::string_view name = NameOf(host);
+  if (ConsumePrefix(name, "[")) name.remove_suffix(1);
   return name == "localhost" || name.ends_with(".localhost") ||
          Address{.host = std::string(name), .port = 1, .unix_path = {}}.IsLocal();
 }
@@ -165,8 +169,19 @@ WebAnswer PostCallOf(const WebRequest& request, WebMethod method, bool from_page
 
 std::string_view Name(WebRefusal refusal) {
   static constexpr std::array<std::string_view, kWebRefusals> kNames = {
-      "full", "timeout", "malformed", "origin", "call", "too_large", "bad_message"};
+      "full", "timeout", "malformed", "origin", "host", "call", "too_large", "bad_message"};
   return kNames[static_cast<std::size_t>(refusal)];
+}
+
+bool IsHostAllowed(std::string_view host, const WebRules& rules) {
+  if (!rules.is_local) return true;
+  const auto normal = NormalHost(host, "");
+  if (!normal) return false;
+  const std::string_view name = NameOf(*normal);
+  return IsLocalHost(*normal) || std::ranges::find(rules.hosts, name) != rules.hosts.end() ||
+         std::ranges::any_of(rules.origins, [&](std::string_view origin) {
+           return NameOf(origin.substr(origin.find("//") + 2)) == name;
+         });
 }
 
 WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
@@ -176,9 +191,18 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
   if (request.hosts.size() != 1) {
     return RefusedAs(WebRefusal::kMalformed, 400, "must have one header Host");
   }
+  const auto& encodings = request.transfer_encodings;
+  if (encodings.size() > 1 || (encodings.size() == 1 && encodings.front() != "chunked")) {
+    return RefusedAs(WebRefusal::kMalformed, 400,
+                     "must have no Transfer-Encoding, or once and exactly `chunked`");
+  }
   if (path == "/v1/healthz") {
     if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, "is asked by GET", "GET, HEAD");
     return {.what = WebHealth{.head_only = head_only}};
+  }
+  if (!IsHostAllowed(request.hosts.front(), rules)) {
+    return RefusedAs(WebRefusal::kHost, 421,
+                     "must name a host of this machine, or one of the server's --web-host");
   }
   if (!path.starts_with(kCalls)) {
     if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, "is asked by GET", "GET, HEAD");
@@ -203,6 +227,16 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
                                       : PostCallOf(request, route->method, from_page);
   if (from_page && !route->is_socket) answer.allowed_origin = std::string(request.origins.front());
   return answer;
+}
+
+absl::StatusOr<std::string> NormalHostName(std::string_view text) {
+  auto host = NormalHost(text, "");
+  if (!host || NameOf(*host) != *host) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\"", std::string(text.substr(0, 100)),
+                     "\" is no host name: must be NAME, IPV4 or [IPV6], without a port"));
+  }
+  return *std::move(host);
 }
 
 absl::StatusOr<std::string> NormalOrigin(std::string_view text) {
@@ -231,7 +265,7 @@ bool IsOriginAllowed(std::string_view origin, std::string_view host, const WebRu
   const std::string scheme = normal->substr(0, normal->find(':'));
   const auto own = NormalHost(host, UsualPort(scheme));
   if (!own || *normal != scheme + "://" + *own) return false;
-  return !rules.is_local || IsLocalHost(*own);
+  return IsHostAllowed(host, rules);
 }
 
 std::optional<std::string> FilePathOf(std::string_view target) {

@@ -20,7 +20,7 @@ inline constexpr std::string_view kBearerProtocol = "bearer.";
 /// often, as which of them is meant would depend on who reads it.
 struct WebRequest {
   std::string_view method, target;
-  std::vector<std::string_view> hosts, origins, authorizations, protocols;
+  std::vector<std::string_view> hosts, origins, authorizations, protocols, transfer_encodings;
   std::string_view content_type, accept_encoding, if_none_match;
   bool is_upgrade = false;  ///< To a WebSocket.
   bool has_body = false;
@@ -30,21 +30,24 @@ struct WebRequest {
 struct WebRules {
   /// As WebOptions::origins.
   std::vector<std::string> origins = {};
+  /// As WebOptions::hosts.
+  std::vector<std::string> hosts = {};
   /// The server listens on a loopback address only.
   bool is_local = true;
 };
 
 /// The refusals that the metrics count, by these names.
 enum class WebRefusal {
-  kFull,        ///< No place, or the place was given to another one.
+  kFull,        ///< A connection was evicted, or has a reserved slot and is no health check.
   kTimeout,     ///< No handshake, or no request, in time; or nobody takes what is sent.
   kMalformed,   ///< No HTTP, or none of ours.
   kOrigin,      ///< A page of somebody else.
+  kHost,        ///< A host name that is not this machine's.
   kCall,        ///< A call that is not let in: token, limits, drain.
   kTooLarge,    ///< A message above the limit.
   kBadMessage,  ///< No WebSocket message, or none of ours.
 };
-inline constexpr std::size_t kWebRefusals = 7;
+inline constexpr std::size_t kWebRefusals = 8;
 std::string_view Name(WebRefusal refusal);
 
 enum class WebMethod { kInfo, kStreams, kFrame, kWatch, kReconstruct };
@@ -84,9 +87,13 @@ struct WebAnswer {
 
 WebAnswer Understand(const WebRequest& request, const WebRules& rules);
 
+/// Whether a request may name `host`. A server on a loopback address accepts names and addresses of
+/// this machine, the hosts of the rules, and the hosts of their origins. Otherwise a page whose
+/// name resolves to 127.0.0.1 could read what the server sends (DNS rebinding).
+bool IsHostAllowed(std::string_view host, const WebRules& rules);
+
 /// Whether a page of `origin` may ask the server that it calls `host`: the same host and port, or
-/// one of the rules' origins. Of a local server the host must be local too, or that of an allowed
-/// origin: otherwise a page whose name somebody points to 127.0.0.1 would be let in.
+/// one of the rules' origins. The host must be allowed (IsHostAllowed).
 bool IsOriginAllowed(std::string_view origin, std::string_view host, const WebRules& rules);
 
 /// The path of a file below a folder: without the query, decoded, "index.html" for "/". Nothing for
@@ -110,5 +117,9 @@ bool AcceptsGzip(std::string_view accept_encoding);
 /// "https://host[:port]" in lower case, the scheme's usual port left out.
 /// Errors: INVALID_ARGUMENT for what is no origin.
 absl::StatusOr<std::string> NormalOrigin(std::string_view text);
+
+/// A host name or address in lower case. Errors: INVALID_ARGUMENT for anything else, such as a name
+/// with a port.
+absl::StatusOr<std::string> NormalHostName(std::string_view text);
 
 }  // namespace partiemc::server

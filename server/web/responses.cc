@@ -8,7 +8,7 @@ namespace {
 
 constexpr char kPolicy[] =
     "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' data: blob:; "
-    "media-src blob:; style-src 'self' 'unsafe-inline'";
+    "media-src blob:; style-src 'self' 'unsafe-inline'; frame-ancestors 'self'";
 constexpr char kPlainText[] = "text/plain; charset=utf-8";
 
 constexpr char kNoPage[] =
@@ -58,11 +58,18 @@ WebResponse ResponseToPreflight() {
                       {"Access-Control-Max-Age", "600"}}};
 }
 
-WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match) {
+std::string PagePolicy(const std::vector<std::string>& frame_ancestors) {
+  std::string policy = kPolicy;
+  for (const std::string& origin : frame_ancestors) absl::StrAppend(&policy, " ", origin);
+  return policy;
+}
+
+WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match,
+                       const std::string& policy) {
   WebResponse response{.headers = {{"Content-Type", file.type},
                                    {"ETag", file.tag},
                                    {"Cache-Control", "no-cache"},
-                                   {"Content-Security-Policy", kPolicy},
+                                   {"Content-Security-Policy", policy},
                                    {"Referrer-Policy", "no-referrer"}},
                        .body_bytes = file.bytes,
                        .head_only = asked.head_only};

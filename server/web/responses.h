@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -28,8 +29,13 @@ struct WebResponse {
 WebResponse ResponseTo(const WebRefused& refused);
 WebResponse ResponseTo(const WebHealth& health, bool draining);
 WebResponse ResponseToPreflight();
+/// The Content-Security-Policy of the page. `frame_ancestors` are origins that may show it in a
+/// frame, beside its own.
+std::string PagePolicy(const std::vector<std::string>& frame_ancestors);
 /// The head of a file, whose contents follow; 304 without them where `if_none_match` has its tag.
-WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match);
+/// `policy` is PagePolicy.
+WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match,
+                       const std::string& policy);
 /// Where a file is asked for that is not there; for the page itself it says how to get one.
 WebResponse ResponseWithoutFile(const WebFile& asked, bool has_page);
 /// How a call ended that has no answer: JSON.

@@ -36,7 +36,7 @@ void WebChannel::StartRead(grpc::ByteBuffer* message) {
     Post([this] {
       if (wanted_ == nullptr) return;
       admitted_ = true;
-      connection_->place.SetWaiting(false);
+      connection_->slot.SetState(ConnectionSlots::State::kPending);
       Read();
     });
   });
@@ -62,6 +62,7 @@ void WebChannel::Cancel() {
 void WebChannel::Finish(const absl::Status& status) {
   Post([this, status] {
     finished_ = true;
+    if (admitted_) connection_->slot.SetState(ConnectionSlots::State::kPending);
     if (wanted_ != nullptr) ReadEnded();
     const absl::Status& told = told_instead_ ? *told_instead_ : status;
     if (!admitted_ && !told.ok()) connection_->context.refusals.Count(WebRefusal::kCall);
@@ -70,6 +71,7 @@ void WebChannel::Finish(const absl::Status& status) {
 }
 
 void WebChannel::Deliver(grpc::ByteBuffer message) {
+  if (!finished_) connection_->slot.SetState(ConnectionSlots::State::kServed);
   std::exchange(wanted_, nullptr)->Swap(&message);
   call_->OnReadDone(true);
 }

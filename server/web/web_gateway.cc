@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -35,6 +36,47 @@ absl::Status CannotListen(const Address& address, const error_code& error) {
                                              error.message(), "; choose another"));
 }
 
+ConnectionSlots::Limits LimitsOf(const WebOptions& options) {
+  const std::size_t connections = options.max_connections, asked = options.max_per_address;
+  return {.connections = connections,
+          .per_address = asked > 0 ? asked : std::max<std::size_t>(connections / 2, 1)};
+}
+
+// What Start has checked of WebOptions.
+struct CheckedOptions {
+  WebRules rules;
+  std::vector<std::string> frame_ancestors;
+};
+
+// Replaces each of `values` by its normal form.
+absl::StatusOr<std::vector<std::string>> Normal(
+    std::string_view flag, const std::vector<std::string>& values,
+    absl::StatusOr<std::string> (*normal_form)(std::string_view)) {
+  std::vector<std::string> normal;
+  for (const std::string& value : values) {
+    auto form = normal_form(value);
+    if (!form.ok()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(std::string(flag), " ", form.status().message()));
+    }
+    normal.push_back(*std::move(form));
+  }
+  return normal;
+}
+
+absl::StatusOr<CheckedOptions> Check(const WebOptions& options) {
+  auto origins = Normal("--web-origin", options.origins, &NormalOrigin);
+  if (!origins.ok()) return origins.status();
+  auto hosts = Normal("--web-host", options.hosts, &NormalHostName);
+  if (!hosts.ok()) return hosts.status();
+  auto ancestors = Normal("--web-frame-ancestors", options.frame_ancestors, &NormalOrigin);
+  if (!ancestors.ok()) return ancestors.status();
+  return CheckedOptions{.rules = {.origins = *std::move(origins),
+                                  .hosts = *std::move(hosts),
+                                  .is_local = options.address.IsLocal()},
+                        .frame_ancestors = *std::move(ancestors)};
+}
+
 void Converse(const std::shared_ptr<WebConnectionOver<WebSocket>>& connection) {
   std::make_shared<HttpSession<WebSocket>>(connection)->ReadRequest();
 }
@@ -55,19 +97,20 @@ void Converse(const std::shared_ptr<WebConnectionOver<TlsWebSocket>>& connection
 
 class WebGateway::Implementation {
  public:
-  Implementation(const WebOptions& options, const Setup& setup, WebRules rules)
+  Implementation(const WebOptions& options, const Setup& setup, CheckedOptions config)
       : context_{.methods = setup.methods,
                  .limits = setup.limits,
                  .pings = {setup.ping_interval, setup.ping_timeout},
-                 .rules = std::move(rules),
+                 .rules = std::move(config.rules),
                  .files = PageFiles(options.root.empty() ? DefaultPageRoot() : options.root),
+                 .page_policy = PagePolicy(config.frame_ancestors),
                  .draining = setup.draining,
                  .refusals = WebRefusals(setup.metrics),
-                 .places = ConnectionPlaces(options.max_connections)},
+                 .slots = ConnectionSlots(LimitsOf(options))},
         address_(options.address) {
     if (setup.tls != nullptr) tls_.emplace(*setup.tls);
     setup.metrics.AddGauge("partiemc_web_connections", "Connections of the gateway.",
-                           [this] { return static_cast<double>(context_.places.count()); });
+                           [this] { return static_cast<double>(context_.slots.count()); });
   }
 
   ~Implementation() { Stop(std::chrono::steady_clock::now()); }
@@ -110,11 +153,11 @@ class WebGateway::Implementation {
       for (auto& listener : listeners_) listener.acceptor.close(ignored);
       for (auto& listener : listeners_) listener.rest.cancel();
     });
-    context_.places.EndWaiting();
-    if (!context_.places.WaitUntilEmpty(deadline)) {
+    context_.slots.EndUnused();
+    if (!context_.slots.WaitUntilEmpty(deadline)) {
       // Some may have come in meanwhile, but none after this.
-      boost::asio::post(accepting_, [this] { context_.places.EndAll(); });
-      context_.places.WaitUntilEmpty();
+      boost::asio::post(accepting_, [this] { context_.slots.EndAll(); });
+      context_.slots.WaitUntilEmpty();
     }
     work_.reset();
     for (auto& thread : threads_) thread.join();
@@ -184,16 +227,14 @@ class WebGateway::Implementation {
   void Enter(const WebExecutor& executor, std::string peer, Arguments&&... arguments) {
     auto connection = std::make_shared<WebConnectionOver<Stream>>(
         context_, executor, std::move(peer), std::forward<Arguments>(arguments)...);
-    bool gave_way = false;
-    auto place = context_.places.Enter(
+    bool evicted = false;
+    connection->slot = context_.slots.Enter(
         HostOfPeer(connection->peer),
         [weak = std::weak_ptr<WebConnection>(connection)] {
           if (const auto alive = weak.lock()) alive->Abort();
         },
-        gave_way);
-    if (gave_way || !place) context_.refusals.Count(WebRefusal::kFull);
-    if (!place) return;  // Closed.
-    connection->place = *std::move(place);
+        evicted);
+    if (evicted) context_.refusals.Count(WebRefusal::kFull);
     boost::asio::post(executor, [connection] { Converse(connection); });
   }
 
@@ -226,15 +267,9 @@ absl::StatusOr<std::unique_ptr<WebGateway>> WebGateway::Start(const WebOptions& 
     return absl::InvalidArgumentError(
         absl::StrCat("--web ", options.address.ToString(), ": must be HOST:PORT or [IPV6]:PORT"));
   }
-  WebRules rules{.origins = {}, .is_local = options.address.IsLocal()};
-  for (const std::string& origin : options.origins) {
-    auto normal = NormalOrigin(origin);
-    if (!normal.ok()) {
-      return absl::InvalidArgumentError(absl::StrCat("--web-origin ", normal.status().message()));
-    }
-    rules.origins.push_back(*std::move(normal));
-  }
-  auto implementation = std::make_unique<Implementation>(options, setup, std::move(rules));
+  auto checked = Check(options);
+  if (!checked.ok()) return checked.status();
+  auto implementation = std::make_unique<Implementation>(options, setup, *std::move(checked));
   if (auto status = implementation->Listen(); !status.ok()) return status;
   return std::unique_ptr<WebGateway>(new WebGateway(std::move(implementation)));
 }

@@ -15,8 +15,14 @@ struct WebOptions {
   std::string root = {};
   /// Beside pages of the host that is asked itself, pages of these may call: "https://host:port".
   std::vector<std::string> origins = {};
-  /// Sockets of all kinds, those of which nobody knows yet who they are included; at least 1.
+  /// Host names that requests may name beside those of this machine, if the server listens on a
+  /// loopback address: "viewer.example".
+  std::vector<std::string> hosts = {};
+  /// Origins whose pages may show the page in a frame, beside its own.
+  std::vector<std::string> frame_ancestors = {};
+  /// Connections, including those without a call, of all addresses and of one; at least 1.
   std::uint32_t max_connections = 256;
+  std::uint32_t max_per_address = 0;  ///< 0: half of max_connections.
 };
 
 }  // namespace partiemc::server

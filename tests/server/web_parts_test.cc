@@ -1,8 +1,9 @@
-// The parts of the gateway that know no connection: places, signs of life, messages in pieces.
+// The parts of the gateway that know no connection: slots, signs of life, messages in pieces.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <random>
@@ -10,8 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "server/web/connection_slots.h"
 #include "server/web/gathered_message.h"
-#include "server/web/places.h"
 #include "server/web/signs_of_life.h"
 
 namespace partiemc::server {
@@ -19,66 +20,131 @@ namespace {
 
 using std::chrono::milliseconds;
 
+using State = ConnectionSlots::State;
+
 struct Guests {
-  explicit Guests(std::size_t most) : places(most) {}
-  // Whether the one that comes gets a place; which others were told to go, by their names.
-  bool Come(const std::string& host, const std::string& name) {
-    bool gave_way = false;
-    auto place = places.Enter(
-        host, [this, name] { told.push_back(name); }, gave_way);
-    if (place) held[name] = *std::move(place);
-    return place.has_value();
+  explicit Guests(ConnectionSlots::Limits limits) : slots(limits) {}
+  // Whether the new one may do everything.
+  bool Come(const std::string& address, const std::string& name) {
+    bool evicted = false;
+    const std::size_t before = ended.size();
+    held[name] = slots.Enter(
+        address, [this, name] { ended.push_back(name); }, evicted);
+    EXPECT_EQ(evicted, ended.size() > before);
+    return !held[name].reserved();
   }
 
-  ConnectionPlaces places;
-  std::vector<std::string> told;
-  std::map<std::string, ConnectionPlaces::Place> held;
+  ConnectionSlots slots;
+  std::vector<std::string> ended;
+  std::map<std::string, ConnectionSlots::Slot> held;
 };
 
-TEST(ConnectionPlaces, TheOldestOfTheHostThatHasMostGivesWayOfThoseThatWait) {
-  Guests guests(4);
+TEST(ConnectionSlots, EvictsOldestIdleOfTheAddressWithMost) {
+  Guests guests({.connections = 4, .per_address = 4, .reserved = 1});
   EXPECT_TRUE(guests.Come("a", "a1"));
   EXPECT_TRUE(guests.Come("b", "b1"));
   EXPECT_TRUE(guests.Come("b", "b2"));
   EXPECT_TRUE(guests.Come("b", "b3"));
-  EXPECT_TRUE(guests.told.empty());
-  guests.held["b1"].SetWaiting(false);
+  EXPECT_TRUE(guests.ended.empty());
+  guests.held["b1"].SetState(State::kServed);
+  guests.held["b2"].SetState(State::kPending);
   EXPECT_TRUE(guests.Come("c", "c1"));
-  EXPECT_EQ(guests.told, (std::vector<std::string>{"b2"}));
+  EXPECT_EQ(guests.ended, (std::vector<std::string>{"b2"}));
   guests.held.erase("b2");
   EXPECT_TRUE(guests.Come("c", "c2"));  // Each has one: the oldest of all.
-  EXPECT_EQ(guests.told, (std::vector<std::string>{"b2", "a1"}));
-  guests.held["b1"].SetWaiting(true);  // Its call is over.
+  EXPECT_EQ(guests.ended, (std::vector<std::string>{"b2", "a1"}));
+  guests.held["b1"].SetState(State::kNoCall);  // Its call is over.
   EXPECT_TRUE(guests.Come("c", "c3"));
-  EXPECT_EQ(guests.told.back(), "b1");
+  EXPECT_EQ(guests.ended.back(), "b1");
 }
 
-TEST(ConnectionPlaces, WhereAllHaveCallsNobodyComesInUntilOneLeaves) {
-  Guests guests(2);
+TEST(ConnectionSlots, EvictsOfTheNewcomersAddressAtItsLimit) {
+  Guests guests({.connections = 8, .per_address = 2, .reserved = 1});
   guests.Come("a", "a1");
-  guests.Come("a", "a2");
-  for (auto& [name, place] : guests.held) place.SetWaiting(false);
-  EXPECT_FALSE(guests.Come("b", "b1"));
-  EXPECT_TRUE(guests.told.empty());
+  guests.Come("b", "b1");
+  guests.Come("b", "b2");
+  EXPECT_TRUE(guests.Come("b", "b3"));
+  EXPECT_EQ(guests.ended, (std::vector<std::string>{"b1"}));
+  guests.held["b2"].SetState(State::kServed);
+  guests.held["b3"].SetState(State::kServed);
+  EXPECT_FALSE(guests.Come("b", "b4"));
+  EXPECT_TRUE(guests.Come("a", "a2"));
+  guests.held.erase("b2");
+  EXPECT_TRUE(guests.Come("b", "b5"));
+  EXPECT_EQ(guests.ended.size(), 1u);
+}
+
+TEST(ConnectionSlots, ReservesSlotsBesideServedConnections) {
+  Guests guests({.connections = 2, .per_address = 2, .reserved = 2});
+  guests.Come("a", "a1");
+  guests.Come("b", "b1");
+  for (auto& [name, slot] : guests.held) slot.SetState(State::kServed);
+  EXPECT_FALSE(guests.Come("c", "c1"));
+  EXPECT_FALSE(guests.Come("d", "d1"));
+  EXPECT_TRUE(guests.ended.empty());
+  EXPECT_FALSE(guests.Come("d", "d2"));
+  EXPECT_EQ(guests.ended, (std::vector<std::string>{"c1"}));
+  EXPECT_FALSE(guests.Come("e", "e1"));
+  EXPECT_EQ(guests.ended.back(), "d1");
   guests.held.erase("a1");
-  EXPECT_TRUE(guests.Come("b", "b1"));
+  EXPECT_TRUE(guests.Come("c", "c2"));
+  EXPECT_EQ(guests.ended.size(), 2u);
 }
 
-TEST(ConnectionPlaces, EndsThoseThatWaitAndThenAllAndWaitsForThem) {
-  Guests guests(4);
+TEST(ConnectionSlots, EndsUnusedOnesThenAllAndWaitsForThem) {
+  Guests guests({.connections = 4, .per_address = 4, .reserved = 1});
   guests.Come("a", "a1");
   guests.Come("a", "a2");
-  guests.held["a1"].SetWaiting(false);
-  guests.places.EndWaiting();
-  EXPECT_EQ(guests.told, (std::vector<std::string>{"a2"}));
+  guests.Come("a", "a3");
+  guests.held["a1"].SetState(State::kServed);
+  guests.held["a3"].SetState(State::kPending);
+  guests.slots.EndUnused();
+  EXPECT_EQ(guests.ended, (std::vector<std::string>{"a2"}));
   guests.held.erase("a2");
-  EXPECT_FALSE(guests.places.WaitUntilEmpty(std::chrono::steady_clock::now()));
-  guests.places.EndAll();
-  EXPECT_EQ(guests.told.back(), "a1");
+  EXPECT_FALSE(guests.slots.WaitUntilEmpty(std::chrono::steady_clock::now()));
+  guests.slots.EndAll();
+  EXPECT_EQ(guests.ended.size(), 3u);
   std::thread leaver([&] { guests.held.clear(); });
-  guests.places.WaitUntilEmpty();
+  guests.slots.WaitUntilEmpty();
   leaver.join();
-  EXPECT_EQ(guests.places.count(), 0u);
+  EXPECT_EQ(guests.slots.count(), 0u);
+}
+
+// Against a model with plain counts, with connections that come, go and change at random.
+TEST(ConnectionSlots, KeepsItsLimitsInAnyOrder) {
+  std::mt19937 random(7);
+  const auto below = [&](std::size_t count) { return random() % count; };
+  for (int round = 0; round < 200; ++round) {
+    const ConnectionSlots::Limits limits{
+        .connections = 1 + below(6), .per_address = 1 + below(4), .reserved = 1 + below(3)};
+    Guests guests(limits);
+    std::map<std::string, std::string> address_of;
+    for (int step = 0; step < 300; ++step) {
+      if (!guests.held.empty() && below(3) == 0) {
+        auto at = std::next(guests.held.begin(), static_cast<long>(below(guests.held.size())));
+        at->second.SetState(static_cast<State>(below(3)));
+        if (at->second.reserved()) at->second.SetState(State::kNoCall);
+        if (below(2) == 0) guests.held.erase(at);
+        continue;
+      }
+      const std::string name = std::to_string(step), address(1, static_cast<char>('a' + below(3)));
+      address_of[name] = address;
+      guests.Come(address, name);
+      std::map<std::string, std::size_t> ordinary;
+      std::size_t all = 0, reserved = 0;
+      for (const auto& [held, slot] : guests.held) {
+        if (std::ranges::find(guests.ended, held) != guests.ended.end()) continue;
+        if (slot.reserved()) {
+          ++reserved;
+        } else {
+          ++all;
+          ASSERT_LE(++ordinary[address_of[held]], limits.per_address);
+        }
+      }
+      ASSERT_LE(all, limits.connections);
+      ASSERT_LE(reserved, limits.reserved);
+    }
+  }
 }
 
 TEST(SignsOfLife, AsksAfterTheIntervalAndGivesUpAfterTheTimeout) {

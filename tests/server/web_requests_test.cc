@@ -83,6 +83,30 @@ TEST(IsOriginAllowed, TakesThePagesOfThisServerAndThoseThatAreNamed) {
   EXPECT_FALSE(IsOriginAllowed("", "", open));
 }
 
+TEST(IsHostAllowed, OnLoopbackAcceptsThisMachineAndTheRules) {
+  const WebRules local{
+      .origins = {"https://lab.example:8443"}, .hosts = {"viewer.example"}, .is_local = true};
+  for (const char* host : {"localhost", "Localhost:8080", "lab.localhost", "127.0.0.1",
+                           "127.8.8.8:1", "[::1]", "[::1]:80", "viewer.example:1", "LAB.example"}) {
+    EXPECT_TRUE(IsHostAllowed(host, local)) << host;
+  }
+  for (const char* host :
+       {"", ":80", "evil.example", "viewer.example.evil.example", "192.0.2.1", "[2001:db8::1]",
+        "evil.example:localhost", "localhost:x", "127.0.0.1x"}) {
+    EXPECT_FALSE(IsHostAllowed(host, local)) << host;
+    EXPECT_TRUE(IsHostAllowed(host, {.is_local = false})) << host;
+  }
+}
+
+TEST(NormalHostName, IsANameWithoutAPort) {
+  EXPECT_EQ(*NormalHostName("Viewer.Example"), "viewer.example");
+  EXPECT_EQ(*NormalHostName("192.0.2.1"), "192.0.2.1");
+  EXPECT_EQ(*NormalHostName("[2001:DB8::1]"), "[2001:db8::1]");
+  for (const char* text : {"", "a:80", "[::1]:80", "http://a", "a/b", "a b", "*"}) {
+    EXPECT_FALSE(NormalHostName(text).ok()) << text;
+  }
+}
+
 TEST(Understand, KnowsWhatIsAskedFor) {
   WebRequest request{.method = "GET", .target = "/v1/watch", .hosts = {"localhost"}};
   const auto refused = [&] {
@@ -113,6 +137,17 @@ TEST(Understand, KnowsWhatIsAskedFor) {
   const WebAnswer post = Understand(request, {});
   EXPECT_EQ(std::get<WebCall>(post.what).method, WebMethod::kFrame);
   EXPECT_EQ(post.allowed_origin, "http://localhost");
+  request.transfer_encodings = {"chunked"};
+  EXPECT_EQ(std::get<WebCall>(Understand(request, {}).what).method, WebMethod::kFrame);
+  for (const std::string_view encoding : {"gzip", "Chunked", "gzip, chunked", "chunked,", ""}) {
+    request.transfer_encodings = {encoding};
+    EXPECT_EQ(refused(), 400u) << encoding;
+  }
+  request.transfer_encodings = {"chunked", "chunked"};
+  EXPECT_EQ(refused(), 400u);
+  request.transfer_encodings = {};
+  request.hosts = {"evil.example"};
+  EXPECT_EQ(refused(), 421u);
   request.hosts = {"localhost", "localhost"};
   EXPECT_EQ(refused(), 400u);
 }

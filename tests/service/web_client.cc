@@ -1,6 +1,8 @@
 #include "service/web_client.h"
 
+#include <arpa/inet.h>
 #include <netdb.h>
+#include <netinet/in.h>
 #include <openssl/bio.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
@@ -51,14 +53,22 @@ Context MakeContext(const WebTls& tls) {
   return context;
 }
 
-int ConnectTo(const Address& address) {
+bool BindTo(int file, const char* from) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  return inet_pton(AF_INET, from, &address.sin_addr) == 1 &&
+         bind(file, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+}
+
+int ConnectTo(const Address& address, const char* from) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
   if (getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found) != 0) {
     return -1;
   }
   const int file = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const bool connected = file >= 0 && connect(file, found->ai_addr, found->ai_addrlen) == 0;
+  const bool connected = file >= 0 && (from == nullptr || BindTo(file, from)) &&
+                         connect(file, found->ai_addr, found->ai_addrlen) == 0;
   freeaddrinfo(found);
   if (connected || file < 0) return file;
   close(file);
@@ -110,9 +120,9 @@ struct WebPipe::Connection {
   }
 };
 
-WebPipe::WebPipe(const Address& address, const WebTls* tls)
+WebPipe::WebPipe(const Address& address, const WebTls* tls, const char* from)
     : connection_(std::make_unique<Connection>()) {
-  connection_->file = ConnectTo(address);
+  connection_->file = ConnectTo(address, from);
   connection_->open = connection_->file >= 0;
   if (tls == nullptr || !connection_->open) return;
   connection_->context = MakeContext(*tls);
@@ -249,8 +259,8 @@ std::string ClientFrame(int opcode, std::string_view payload, bool last) {
 
 WebSocketClient::WebSocketClient(const Address& address, const std::string& path,
                                  const WebHeaders& headers, const std::string& protocols,
-                                 const WebTls* tls)
-    : pipe_(address, tls) {
+                                 const WebTls* tls, const char* from)
+    : pipe_(address, tls, from) {
   handshake_ = Ask(pipe_, "GET", path,
                    "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
                    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"

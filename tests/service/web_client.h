@@ -25,7 +25,8 @@ struct WebTls {
 /// A connection, in the clear or with TLS. Blocks; nothing comes any more once it is broken.
 class WebPipe {
  public:
-  explicit WebPipe(const Address& address, const WebTls* tls = nullptr);
+  /// `from`: the IPv4 address that it comes from, one of this machine's; or null.
+  explicit WebPipe(const Address& address, const WebTls* tls = nullptr, const char* from = nullptr);
   ~WebPipe();
   WebPipe(const WebPipe&) = delete;
   WebPipe& operator=(const WebPipe&) = delete;
@@ -89,7 +90,8 @@ std::string ClientFrame(int opcode, std::string_view payload, bool last = true);
 class WebSocketClient {
  public:
   WebSocketClient(const Address& address, const std::string& path, const WebHeaders& headers = {},
-                  const std::string& protocols = "partiemc.v1", const WebTls* tls = nullptr);
+                  const std::string& protocols = "partiemc.v1", const WebTls* tls = nullptr,
+                  const char* from = nullptr);
 
   /// Of the handshake: 101 where it came about.
   const HttpReply& handshake() const { return handshake_; }

@@ -13,6 +13,7 @@
 namespace partiemc::server {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -52,6 +53,18 @@ TEST_F(WebPage, FilesComeWithTheirTypeAndWhatKeepsAPageSafe) {
   EXPECT_EQ(Ask(web(), "POST", "/").status, 405u);
   EXPECT_EQ(Ask(web(), "GET", "/v1/nothing").status, 404u);
   EXPECT_EQ(Ask(web(), "GET", "/v1/info").headers.at("allow"), "POST");
+}
+
+TEST_F(WebPage, FrameAncestorsAreItselfAndThoseOfTheOptions) {
+  options_.web->frame_ancestors = {"HTTPS://Lab.example:443", "http://localhost:8888"};
+  Serve();
+  EXPECT_THAT(Ask(web(), "GET", "/").headers.at("content-security-policy"),
+              EndsWith("; frame-ancestors 'self' https://lab.example http://localhost:8888"));
+  server_.reset();
+  options_.web->frame_ancestors.clear();
+  Serve();
+  EXPECT_THAT(Ask(web(), "GET", "/").headers.at("content-security-policy"),
+              EndsWith("; frame-ancestors 'self'"));
 }
 
 TEST_F(WebPage, PackedFilesComeToThoseWhoTakeThem) {
@@ -116,7 +129,7 @@ TEST_F(WebPage, APageOfAnotherHostMayNotCallUnlessItIsAllowed) {
   EXPECT_EQ(Refusals("origin"), 10);
   // A name that somebody has pointed to this machine: it is the same in both headers.
   const std::string pointed = "Host: evil.example:1\r\nOrigin: http://evil.example:1\r\n";
-  EXPECT_EQ(WebSocketClient(web(), "/v1/watch", pointed).handshake().status, 403u);
+  EXPECT_EQ(WebSocketClient(web(), "/v1/watch", pointed).handshake().status, 421u);
   const std::string twice = OwnOrigin() + "Origin: http://evil.example\r\n";
   EXPECT_EQ(WebSocketClient(web(), "/v1/watch", twice).handshake().status, 403u);
 

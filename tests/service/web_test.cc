@@ -166,13 +166,13 @@ TEST_F(WebGatewayTest, ABodyMayComeInChunksAndAfterItWasAskedFor) {
   request.set_page_size(-1);
   const std::string body = request.SerializeAsString();
   WebPipe chunked(web());
-  chunked.Send("POST /v1/streams HTTP/1.1\r\nHost: x\r\n" + type +
+  chunked.Send("POST /v1/streams HTTP/1.1\r\nHost: localhost\r\n" + type +
                "Transfer-Encoding: chunked\r\n\r\n");
   for (const char byte : body) chunked.Send(std::string("1\r\n") + byte + "\r\n");
   chunked.Send("0\r\n\r\n");
   EXPECT_THAT(chunked.ReceiveUntil("}\n"), HasSubstr("400 Bad Request"));
   WebPipe asked(web());
-  asked.Send("POST /v1/info HTTP/1.1\r\nHost: x\r\n" + type +
+  asked.Send("POST /v1/info HTTP/1.1\r\nHost: localhost\r\n" + type +
              "Expect: 100-continue\r\nContent-Length: 0\r\n\r\n");
   EXPECT_EQ(asked.ReceiveUntil("\r\n\r\n"), "HTTP/1.1 100 Continue\r\n\r\n");
   EXPECT_THAT(asked.ReceiveUntil("\r\n\r\n"), HasSubstr("200 OK"));
@@ -218,7 +218,7 @@ TEST_F(WebGatewayTest, WhoStaysSilentIsEndedAndTold) {
   EXPECT_EQ(end.close_code, 4004u);
   WebPipe pipe(web());
   pipe.Send(
-      "POST /v1/info HTTP/1.1\r\nHost: x\r\nContent-Type: application/x-protobuf\r\n"
+      "POST /v1/info HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/x-protobuf\r\n"
       "Content-Length: 9\r\n\r\nhalf");
   EXPECT_THAT(pipe.ReceiveAll(), HasSubstr("IDLE"));
 }

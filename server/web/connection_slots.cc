@@ -1,0 +1,113 @@
+#include "server/web/connection_slots.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace partiemc::server {
+
+ConnectionSlots::Slot::~Slot() {
+  if (slots_ == nullptr) return;
+  const std::lock_guard lock(slots_->mutex_);
+  const auto found = slots_->connections_.find(number_);
+  if (!found->second.evicted) slots_->Uncount(found->second);
+  slots_->connections_.erase(found);
+  // With the lock held: a thread that waits for the last connection may delete the slots after it.
+  slots_->left_.notify_all();
+}
+
+void ConnectionSlots::Slot::SetState(State state) {
+  const std::lock_guard lock(slots_->mutex_);
+  slots_->connections_.find(number_)->second.state = state;
+}
+
+ConnectionSlots::Slot ConnectionSlots::Enter(const std::string& address, End end, bool& evicted) {
+  Slot slot;
+  End end_other;
+  {
+    const std::lock_guard lock(mutex_);
+    const bool address_is_full = CountOf(address) >= limits_.per_address;
+    const bool is_full = address_is_full || held_ >= limits_.connections;
+    Connection* other =
+        is_full ? NextToEvict(false, address_is_full ? &address : nullptr) : nullptr;
+    slot.reserved_ = is_full && other == nullptr;
+    if (slot.reserved_ && held_reserved_ >= limits_.reserved) other = NextToEvict(true, nullptr);
+    if (other != nullptr) {
+      other->evicted = true;
+      Uncount(*other);
+      end_other = other->end;
+    }
+    slot.slots_ = this;
+    slot.number_ = next_++;
+    const auto [entered, is_new] = connections_.emplace(
+        slot.number_,
+        Connection{.address = address, .end = std::move(end), .reserved = slot.reserved_});
+    Count(entered->second);
+  }
+  evicted = end_other != nullptr;
+  if (evicted) end_other();
+  return slot;
+}
+
+// Called only if no slot is free, so that a pass over all connections is fast enough.
+ConnectionSlots::Connection* ConnectionSlots::NextToEvict(bool reserved,
+                                                          const std::string* address) {
+  const auto may_go = [&](const Connection& connection) {
+    return connection.state != State::kServed && !connection.evicted &&
+           connection.reserved == reserved &&
+           (address == nullptr || connection.address == *address);
+  };
+  std::unordered_map<std::string, std::size_t> counts;
+  std::size_t most = 0;
+  for (const auto& [number, connection] : connections_) {
+    if (may_go(connection)) most = std::max(most, ++counts[connection.address]);
+  }
+  for (auto& [number, connection] : connections_) {
+    if (may_go(connection) && counts[connection.address] == most) return &connection;
+  }
+  return nullptr;
+}
+
+void ConnectionSlots::Count(const Connection& connection) {
+  ++(connection.reserved ? held_reserved_ : held_);
+  if (!connection.reserved) ++held_by_[connection.address];
+}
+
+void ConnectionSlots::Uncount(const Connection& connection) {
+  --(connection.reserved ? held_reserved_ : held_);
+  if (connection.reserved) return;
+  const auto found = held_by_.find(connection.address);
+  if (--found->second == 0) held_by_.erase(found);
+}
+
+std::size_t ConnectionSlots::CountOf(const std::string& address) const {
+  const auto found = held_by_.find(address);
+  return found == held_by_.end() ? 0 : found->second;
+}
+
+std::size_t ConnectionSlots::count() const {
+  const std::lock_guard lock(mutex_);
+  return connections_.size();
+}
+
+void ConnectionSlots::EndSome(bool all) {
+  std::vector<End> ends;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [number, connection] : connections_) {
+      if (all || connection.state == State::kNoCall) ends.push_back(connection.end);
+    }
+  }
+  for (const End& end : ends) end();
+}
+
+bool ConnectionSlots::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return left_.wait_until(lock, deadline, [this] { return connections_.empty(); });
+}
+
+void ConnectionSlots::WaitUntilEmpty() {
+  std::unique_lock lock(mutex_);
+  left_.wait(lock, [this] { return connections_.empty(); });
+}
+
+}  // namespace partiemc::server

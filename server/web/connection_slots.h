@@ -1,0 +1,107 @@
+// Limits the connections of the gateway, and selects the one to close when there are too many.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+namespace partiemc::server {
+
+/// A connection is idle unless the first request of a call has arrived and the call goes on. A
+/// handshake without a message, an incomplete body and a closing handshake are idle.
+///
+/// If the server or the address of a new connection is at its limit, the new connection evicts an
+/// idle one: the oldest of that address, or else the oldest of the address with the most idle
+/// connections. If none is idle, the new connection gets a reserved slot, in which the gateway
+/// answers health checks only. Connections in reserved slots are always idle and are evicted by the
+/// same rule, so each new connection gets a slot. Thread-safe.
+class ConnectionSlots {
+ public:
+  struct Limits {
+    std::size_t connections = 256;  ///< Outside of the reserved slots; at least 1.
+    std::size_t per_address = 128;  ///< Of those; at least 1.
+    std::size_t reserved = 16;      ///< At least 1.
+  };
+
+  enum class State {
+    kNoCall,   ///< Idle, and nothing is lost if it is closed.
+    kPending,  ///< Idle: the call has no request yet, or has ended and its status is on its way.
+    kServed,   ///< Not idle.
+  };
+
+  /// Closes the connection soon. Called from any thread, possibly after the connection has gone.
+  using End = std::function<void()>;
+
+  /// The slot of one connection, until the connection is gone.
+  class Slot {
+   public:
+    Slot() = default;
+    Slot(Slot&& other) noexcept { *this = std::move(other); }
+    Slot& operator=(Slot&& other) noexcept {
+      std::swap(slots_, other.slots_);
+      std::swap(number_, other.number_);
+      std::swap(reserved_, other.reserved_);
+      return *this;
+    }
+    ~Slot();
+
+    /// Whether the connection is for health checks only.
+    bool reserved() const { return reserved_; }
+    void SetState(State state);
+
+   private:
+    friend class ConnectionSlots;
+    ConnectionSlots* slots_ = nullptr;
+    std::uint64_t number_ = 0;
+    bool reserved_ = false;
+  };
+
+  explicit ConnectionSlots(Limits limits) : limits_(limits) {}
+
+  /// Admits a connection from `address`. Sets `evicted` if another connection is closed for it. The
+  /// slots outlive it.
+  Slot Enter(const std::string& address, End end, bool& evicted);
+
+  std::size_t count() const;
+  /// Ends connections without a call, or all.
+  void EndUnused() { EndSome(false); }
+  void EndAll() { EndSome(true); }
+  /// Until all connections are gone; false if some are left at the deadline.
+  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
+  void WaitUntilEmpty();
+
+ private:
+  struct Connection {
+    std::string address;
+    End end;
+    bool reserved = false;
+    State state = State::kNoCall;
+    bool evicted = false;  // About to go, and not counted any more.
+  };
+
+  // With the lock held:
+  Connection* NextToEvict(bool reserved, const std::string* address);
+  void Count(const Connection& connection);
+  void Uncount(const Connection& connection);
+  std::size_t CountOf(const std::string& address) const;
+  // Without:
+  void EndSome(bool all);
+
+  const Limits limits_;
+  mutable std::mutex mutex_;  // Guards everything below.
+  std::condition_variable left_;
+  std::map<std::uint64_t, Connection> connections_;  // In the order in which they came.
+  // Without the evicted ones:
+  std::size_t held_ = 0, held_reserved_ = 0;
+  std::unordered_map<std::string, std::size_t> held_by_;  // Outside of the reserved slots.
+  std::uint64_t next_ = 1;
+};
+
+}  // namespace partiemc::server
