@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "partiemc/printable.h"
+#include "common/printable.h"
 
 namespace partiemc::client {
 namespace {

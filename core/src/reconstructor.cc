@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
+#include "core/internal/research.h"
 #include "field/slice_field.h"
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
@@ -120,6 +121,17 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   return size;
 }
 
+// The inputs of one outline of a frame.
+struct OutlineTask {
+  const ReconstructionParameters& parameters;
+  const VirtualPlaneVariant variant;
+  const FrameLimits& limits;
+  const Frame& frame;
+  const State& previous;
+  StageObserver* observer;
+  bool is_first;  // Of the frame, which is checked then.
+};
+
 // Stage 1 of a frame that CheckFrame has passed: sets `seen` to what the stages see of it, of a
 // slice its slab. `lengths` stay empty where nothing tells them. Errors: see Reconstruct.
 absl::Status SortParticles(const ReconstructionParameters& parameters, const FrameLimits& limits,
@@ -166,11 +178,13 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
-// The stages from the rings on. Returns the outer rings that are tangled.
-std::span<const std::uint32_t> Outline(const ReconstructionParameters& parameters,
-                                       const Frame& frame, const Scale& scale,
-                                       const State& previous, StageObserver* observer,
-                                       Workspace::Buffers& b, Result& result) {
+// The stages from the rings on. Errors: INTERNAL for a bug in
+// RepairRings or BuildMesh, which say why there should be none.
+absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
+                         Workspace::Buffers& b, Result& result) {
+  const ReconstructionParameters& parameters = task.parameters;
+  const State& previous = task.previous;
+  StageObserver* const observer = task.observer;
   InStage(observer, Stage::kNormals, [&] {
     const PlacementTraits& traits = TraitsOf(parameters.placement);
     b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
@@ -178,36 +192,27 @@ std::span<const std::uint32_t> Outline(const ReconstructionParameters& parameter
     EstimateNormals(b.bins, b.crossings, b.topology, b.sampler, parameters, previous.normals,
                     b.normal_scratch, b.planes, b.next_normals);
   });
-  InStage(observer, Stage::kVertices, [&] {
+  const bool is_placed = InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;
-    PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
-                   parameters, scale},
-                  b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
-    result.statistics.self_intersections = b.placed.self_intersections;
+    return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
+                          parameters, task.variant, scale},
+                         b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
   });
+  if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
+  result.statistics.self_intersections = b.placed.self_intersections;
   InStage(observer, Stage::kIdentities, [&] {
     ContinueRings(
         {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size},
         previous.history, b.identity_scratch, b.next_history, result.rings);
   });
-  if (!b.placed.tangled.empty()) return b.placed.tangled;
-  InStage(observer, Stage::kMesh, [&] {
-    BuildMesh({b.bins.tiles, b.crossings, b.topology, b.planes, b.placed, result.rings, parameters,
-               scale},
-              b.mesh_scratch, result.mesh, result.statistics, b.tangled);
+  const bool is_filled = InStage(observer, Stage::kMesh, [&] {
+    return BuildMesh({b.bins.tiles, b.crossings, b.topology, b.planes, b.placed, result.rings,
+                      parameters, scale},
+                     b.mesh_scratch, result.mesh, result.statistics);
   });
-  return b.tangled;
+  if (!is_filled) return absl::InternalError("rings cannot be triangulated");
+  return absl::OkStatus();
 }
-
-// What an outline is made of. `is_first` of a frame: it is checked then.
-struct OutlineTask {
-  const ReconstructionParameters& parameters;
-  const FrameLimits& limits;
-  const Frame& frame;
-  const State& previous;
-  StageObserver* observer;
-  bool is_first;
-};
 
 // One outline of the frame. Errors: see Reconstruct.
 absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
@@ -234,13 +239,8 @@ absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
   FindRings(parameters, scale, observer, b);
   status = memory.Reserve(SizeOf(parameters, seen, b));
   if (!status.ok()) return status;
-  // No component is ever tangled (repair.h). Were that wrong, it would cost the frame that
-  // component, not everything.
-  for (;;) {
-    const auto tangled = Outline(parameters, seen, scale, task.previous, observer, b, result);
-    if (tangled.empty()) break;
-    DropComponents(b.bins, tangled, b.crossings, b.ring_scratch, b.topology);
-  }
+  status = FillOutline(task, seen, scale, b, result);
+  if (!status.ok()) return status;
   if (!seen.attributes.empty()) {
     InStage(observer, Stage::kAttributes, [&] {
       InterpolateAttributes(seen, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
@@ -278,8 +278,11 @@ Workspace::~Workspace() = default;
 Workspace::Workspace(Workspace&&) noexcept = default;
 Workspace& Workspace::operator=(Workspace&&) noexcept = default;
 
-Reconstructor::Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits)
-    : parameters_(Resolve(parameters)), limits_(limits) {
+Reconstructor::Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits,
+                             const VirtualPlaneVariant& variant)
+    : parameters_(Resolve(parameters)),
+      limits_(limits),
+      variant_(std::make_shared<const VirtualPlaneVariant>(variant)) {
   for (const Section& section : parameters.sections) {
     sections_.push_back(Resolve(ParametersOf(parameters, section)));
   }
@@ -287,9 +290,15 @@ Reconstructor::Reconstructor(const ReconstructionParameters& parameters, const F
 
 absl::StatusOr<Reconstructor> Reconstructor::Create(const ReconstructionParameters& parameters,
                                                     const FrameLimits& limits) {
+  return CreateVariant(parameters, {}, limits);
+}
+
+absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& parameters,
+                                            const VirtualPlaneVariant& variant,
+                                            const FrameLimits& limits) {
   if (absl::Status status = Validate(parameters); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
-  return Reconstructor(parameters, limits);
+  return Reconstructor(parameters, limits, variant);
 }
 
 absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Workspace& workspace,
@@ -322,7 +331,8 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {
     absl::Status status =
-        ReconstructOutline({parameters, limits_, frame, previous, control.observer, outline == 0},
+        ReconstructOutline({parameters, VariantFor(parameters, *variant_), limits_, frame, previous,
+                            control.observer, outline == 0},
                            memory, b, b.next_states[outline], into);
     memory.Done();
     return status;

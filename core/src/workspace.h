@@ -49,7 +49,6 @@ struct Workspace::Buffers {
   RingHistory next_history;
   MeshScratch mesh_scratch;
   AttributeScratch attribute_scratch;
-  std::vector<std::uint32_t> tangled;  // Outer rings that could not be triangulated.
   std::vector<NextState> next_states;  // By outline: the stream's own, then its sections.
 };
 

@@ -1,6 +1,6 @@
 #include "common/json_text.h"
 
-#include "partiemc/printable.h"
+#include "common/printable.h"
 
 namespace partiemc {
 

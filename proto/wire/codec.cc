@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "partiemc/printable.h"
+#include "common/printable.h"
 #include "partiemc/status.h"
 #include "wire/bytes.h"
 

@@ -1,8 +1,8 @@
 #include "server/rpc/error_details.h"
 
+#include "common/printable.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
-#include "partiemc/printable.h"
 #include "partiemc/status.h"
 
 namespace partiemc::server {

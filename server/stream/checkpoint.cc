@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "partiemc/byte_string.h"
+#include "core/internal/byte_string.h"
+#include "core/internal/research.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/status.h"
 #include "server/base/name_pattern.h"
@@ -32,9 +33,8 @@ constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Names each part, so that a new one does not compile until it is bound, too.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
-               surface_offset, normal_memory, clean, steps, constants, min_component_area,
-               min_component_particles, plane, slice, isovalue, sections] = parameters;
-  const auto& [edge_vertices, normals, curvature, support, smoothing, area] = steps;
+               surface_offset, normal_memory, clean, min_component_area, min_component_particles,
+               plane, slice, isovalue, sections] = parameters;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
   const auto put_optional = [&](std::optional<double> value) {
@@ -51,10 +51,13 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   PutNumber(surface_offset, bytes);
   put_small(normal_memory);
   put_small(clean ? (*clean ? 2 : 1) : 0);
-  for (const bool step : {edge_vertices, normals, curvature, support, smoothing, area}) {
-    put_small(step);
+  // The default placement: no request can change it, but a server with other constants refuses the
+  // checkpoint.
+  const VirtualPlaneVariant method;
+  for (const NamedStep& step : AllSteps()) put_small(method.steps.*step.value);
+  for (const NamedConstant& constant : AllConstants()) {
+    PutNumber(method.constants.*constant.value, bytes);
   }
-  for (const NamedConstant& constant : AllConstants()) PutNumber(constants.*constant.value, bytes);
   PutNumber(min_component_area, bytes);
   PutNumber(min_component_particles, bytes);
   put_small(plane);

@@ -8,7 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
-#include "partiemc/printable.h"
+#include "common/printable.h"
 #include "partiemc/status.h"
 #include "server/base/name_pattern.h"
 #include "server/stream/stream_token.h"

@@ -45,7 +45,7 @@ class MeshOf : public testing::TestWithParam<std::tuple<Scene, Placement>> {
  protected:
   const Scene& scene() const { return std::get<0>(GetParam()); }
   Placement placement() const { return std::get<1>(GetParam()); }
-  bool IsFarthest() const { return placement() == Placement::kFarthestParticle; }
+  bool IsFarthest() const { return !KeepsGuarantees(placement()); }
   Result With(Fill fill) const {
     return ReconstructOnce({.placement = placement(), .fill = fill, .spacing = 1.0},
                            scene().particles);

@@ -36,9 +36,7 @@ std::vector<double> Reversed(const std::vector<double>& ring) {
 // measured as they are now.
 Rings Repaired(const Rings& roots, Rings rings) {
   RepairScratch scratch;
-  std::vector<std::uint32_t> tangled;
-  RepairRings(roots.points, scratch, rings, tangled);
-  EXPECT_TRUE(tangled.empty());
+  EXPECT_TRUE(RepairRings(roots.points, scratch, rings));
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.offsets, scratch.pairs), 0u);
   EXPECT_EQ(rings.measures.size(), rings.RingCount());
   for (std::size_t ring = 0; ring < rings.measures.size(); ++ring) {
@@ -122,22 +120,26 @@ TEST(Repair, EndsInSimpleRingsHoweverManyRoundsItWouldTake) {
   EXPECT_EQ(Repaired(roots, RingsOf(elsewhere, kSquares)).points, roots.points);
 }
 
-TEST(Repair, NamesTheOuterRingsOfWhatCrossesAtItsRootsToo) {
-  // The first square and the third cross; so do the fifth and its hole.
-  const Rings roots = RingsOf({Square(0, 0, 1), Square(5, 0, 1), Square(1.5, 0, 1),
-                               Square(20, 0, 3), Square(10, 0, 2), Reversed(Square(11, 0, 2))},
-                              5);
-  Rings rings = roots;
-  rings.outer_of[5] = 4;
+TEST(Repair, FailsIfRingsCrossAtTheirRoots) {
+  // Two outer rings that cross; an outer ring and its hole.
+  const std::vector<Rings> crossing = {
+      RingsOf({Square(0, 0, 1), Square(5, 0, 1), Square(1.5, 0, 1)}, 3),
+      RingsOf({Square(10, 0, 2), Reversed(Square(11, 0, 2))}, 1)};
   RepairScratch scratch;
-  std::vector<std::uint32_t> tangled;
-  RepairRings(roots.points, scratch, rings, tangled);
-  EXPECT_EQ(tangled, (std::vector<std::uint32_t>{0, 2, 4}));
-  EXPECT_EQ(rings.points, roots.points);
-  EXPECT_EQ(rings.measures.size(), 6u);
-  rings = RingsOf({Square(0, 0, 1)}, 1);
-  RepairRings(rings.points, scratch, rings, tangled);
-  EXPECT_TRUE(tangled.empty()) << "it is of the frame before";
+  for (const Rings& roots : crossing) {
+    Rings rings = roots;
+    EXPECT_FALSE(RepairRings(roots.points, scratch, rings));
+    EXPECT_EQ(rings.points, roots.points);
+  }
+  Rings rings = RingsOf({Square(0, 0, 1)}, 1);
+  EXPECT_TRUE(RepairRings(std::vector(rings.points), scratch, rings)) << "with the same scratch";
+}
+
+TEST(Repair, FailsIfARingIsMisplacedAtItsRoot) {
+  const Rings roots = RingsOf({Square(0, 0, 5), Square(0, 0, 1)}, 2);
+  Rings rings = roots;
+  RepairScratch scratch;
+  EXPECT_FALSE(RepairRings(roots.points, scratch, rings));
 }
 
 TEST(Repair, SeparatesPointsThatFellTogether) {

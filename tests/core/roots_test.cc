@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/internal/research.h"
 #include "partiemc/validate.h"
 #include "support/level_sets.h"
 #include "support/stages.h"
@@ -192,7 +193,6 @@ TEST(Roots, TheRepairFindsBackToThemFromAnywhere) {
   Stages stages;
   Result result;
   RepairScratch scratch;
-  std::vector<std::uint32_t> tangled;
   std::size_t crossing = 0;
   for (std::uint64_t seed = 1; seed <= 2'000; ++seed) {
     Random random(seed);
@@ -207,7 +207,7 @@ TEST(Roots, TheRepairFindsBackToThemFromAnywhere) {
       result.rings.points[k + 1] += random.Uniform(-reach, reach);
     }
     crossing += CountTouchingPairs(result.rings.points, result.rings.offsets, scratch.pairs) > 0;
-    RepairRings(roots, scratch, result.rings, tangled);
+    ASSERT_TRUE(RepairRings(roots, scratch, result.rings)) << "seed " << seed;
     const absl::Status valid = Validate(result, Fill::kNone);
     ASSERT_TRUE(valid.ok()) << "seed " << seed << ": " << valid;
   }

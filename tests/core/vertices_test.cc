@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/internal/research.h"
 #include "partiemc/validate.h"
 #include "support/oracle.h"
 #include "support/particles.h"
@@ -28,13 +29,14 @@ const ActiveCell& CellOf(const Stages& stages, std::size_t k) {
 
 VertexInput InputOf(const Stages& stages, const Frame& frame) {
   return {frame,        stages.bins,   stages.level_set,  stages.crossings, stages.topology,
-          stages.field, stages.planes, stages.parameters, stages.scale};
+          stages.field, stages.planes, stages.parameters, stages.variant,   stages.scale};
 }
 
 // Noise of both signs with many saddles, and particles that give the vertices gradients to follow.
 struct NoisyStages : Stages {
   NoisyStages(std::uint64_t seed, Placement placement) {
     support::Random random(seed);
+    variant.steps = VirtualPlaneSteps::None();
     RunOn(
         [seed](int x, int y) {
           if (x <= 0 || y <= 0 || x >= 63 || y >= 63) return 1.0;
@@ -42,10 +44,7 @@ struct NoisyStages : Stages {
           return node.Uniform(-1, 1);
         },
         {0, 0}, {1, 1}, support::Shifted(support::Noise(random, 400, 30), 31, 31),
-        {.placement = placement,
-         .spacing = 1.0,
-         .clean = false,
-         .steps = VirtualPlaneSteps::None()});
+        {.placement = placement, .spacing = 1.0, .clean = false});
   }
 };
 
@@ -111,8 +110,8 @@ TEST(Vertices,
      OfTheVirtualPlaneWithoutItsStepsLieNearerToTheLevelSetThanTheMiddlesOfTheirSegments) {
   support::Random random(2);
   Stages stages;
-  stages.Run(support::Snapped(support::Blob(random, 12), 1.0),
-             {.spacing = 1.0, .steps = VirtualPlaneSteps::None()});
+  stages.variant.steps = VirtualPlaneSteps::None();
+  stages.Run(support::Snapped(support::Blob(random, 12), 1.0), {.spacing = 1.0});
   const support::FieldOracle oracle(stages.particles, stages.parameters, 1.0);
   double middles = 0, vertices = 0;
   for (std::size_t k = 0; k < stages.planes.size(); ++k) {

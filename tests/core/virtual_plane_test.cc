@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/internal/research.h"
 #include "partiemc/partiemc.h"
 #include "support/instruction_sets.h"
 #include "support/random.h"
@@ -32,9 +33,9 @@ std::vector<double> Disc(double radius, double noise, std::uint64_t seed) {
 }
 
 Result Reconstructed(const std::vector<double>& positions, ReconstructionParameters parameters,
-                     State& state) {
+                     State& state, const VirtualPlaneVariant& variant = {}) {
   parameters.spacing = 1.0;
-  const auto reconstructor = Reconstructor::Create(parameters);
+  const auto reconstructor = CreateVariant(parameters, variant);
   Workspace workspace;
   Result result;
   const absl::Status status = reconstructor->Reconstruct(
@@ -45,9 +46,10 @@ Result Reconstructed(const std::vector<double>& positions, ReconstructionParamet
 }
 
 Result Reconstructed(const std::vector<double>& positions,
-                     const ReconstructionParameters& parameters = {}) {
+                     const ReconstructionParameters& parameters = {},
+                     const VirtualPlaneSteps& steps = {}) {
   State state;
-  return Reconstructed(positions, parameters, state);
+  return Reconstructed(positions, parameters, state, {.steps = steps});
 }
 
 // Root mean square of the distance of the first ring from its mean radius, sampled along its
@@ -84,10 +86,8 @@ TEST(VirtualPlane, FindsTheRadiusOfADisc) {
 
 // Area of a disc without the area step and without the others that `steps` lacks.
 double DiscArea(double radius, VirtualPlaneSteps steps) {
-  ReconstructionParameters parameters;
-  parameters.steps = steps;
-  parameters.steps.area = false;
-  const Result result = Reconstructed(Disc(radius, 0.05, 5), parameters);
+  steps.area = false;
+  const Result result = Reconstructed(Disc(radius, 0.05, 5), {}, steps);
   return result.rings.RingCount() == 1 ? result.rings.measures[0].area : -1;
 }
 
@@ -113,12 +113,10 @@ TEST(VirtualPlane, KeepsTheAreaOfADiscWhateverTheMeanOfItsSupport) {
 }
 
 TEST(VirtualPlane, IsSmootherThanItsStartUnderNoise) {
-  ReconstructionParameters first_form;
-  first_form.steps = VirtualPlaneSteps::None();
   double rough = 0, smooth = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const std::vector<double> positions = Disc(10, 0.2, seed);
-    rough += Roughness(Reconstructed(positions, first_form).rings);
+    rough += Roughness(Reconstructed(positions, {}, VirtualPlaneSteps::None()).rings);
     smooth += Roughness(Reconstructed(positions).rings);
   }
   EXPECT_LT(smooth, 0.9 * rough);
@@ -127,13 +125,11 @@ TEST(VirtualPlane, IsSmootherThanItsStartUnderNoise) {
 TEST(VirtualPlane, MatchesTheVolumeOfTheParticlesWhereItIsKnown) {
   const std::vector<double> positions = Disc(12, 0.1, 3);
   const auto volume = static_cast<double>(positions.size() / 2);
-  ReconstructionParameters unmatched;
-  unmatched.reference_radius = 0.78;  // Too far in, by about 0.06 spacings.
-  unmatched.steps.area = false;
-  ReconstructionParameters matched = unmatched;
-  matched.steps.area = true;
-  const double before = std::abs(Reconstructed(positions, unmatched).statistics.area - volume);
-  const double after = std::abs(Reconstructed(positions, matched).statistics.area - volume);
+  const ReconstructionParameters small{.reference_radius = 0.78};  // About 0.06 spacings inward.
+  const VirtualPlaneSteps unmatched{.area = false};
+  const double before =
+      std::abs(Reconstructed(positions, small, unmatched).statistics.area - volume);
+  const double after = std::abs(Reconstructed(positions, small).statistics.area - volume);
   EXPECT_GT(before, 0.005 * volume);
   EXPECT_LT(after, 0.4 * before);
 }

@@ -58,7 +58,7 @@ TEST(Study, EachStepMethodHasExactlyOneStepOff) {
   const VirtualPlaneSteps all;
   std::set<std::string> names;
   for (const StudyMethod& method : StepMethods()) {
-    const VirtualPlaneSteps& steps = method.method.parameters.steps;
+    const VirtualPlaneSteps& steps = method.method.variant.steps;
     const int off = (all.edge_vertices != steps.edge_vertices) + (all.normals != steps.normals) +
                     (all.curvature != steps.curvature) + (all.support != steps.support) +
                     (all.smoothing != steps.smoothing) + (all.area != steps.area);
@@ -73,14 +73,15 @@ TEST(Study, EachSensitivityMethodHasExactlyOneConstantChanged) {
   EXPECT_EQ(methods.size(), 2 * AllConstants().size());
   std::set<std::string> names;
   for (const StudyMethod& method : methods) {
-    ReconstructionParameters parameters = method.method.parameters;
+    VirtualPlaneVariant variant = method.method.variant;
     int changed = 0;
     for (const NamedConstant& constant : AllConstants()) {
-      changed += parameters.constants.*constant.value != VirtualPlaneConstants{}.*constant.value;
+      changed += variant.constants.*constant.value != VirtualPlaneConstants{}.*constant.value;
     }
     EXPECT_EQ(changed, 1) << method.method.name;
-    parameters.constants = {};
-    EXPECT_EQ(parameters, ReconstructionParameters{}) << method.method.name;
+    variant.constants = {};
+    EXPECT_EQ(variant, VirtualPlaneVariant{}) << method.method.name;
+    EXPECT_EQ(method.method.parameters, ReconstructionParameters{}) << method.method.name;
     names.insert(method.method.name);
   }
   EXPECT_EQ(names.size(), methods.size());

@@ -4,10 +4,10 @@
 
 #include <string>
 
+#include "core/internal/byte_string.h"
 #include "fuzz/choices.h"
 #include "fuzz/hostile_frames.h"
 #include "fuzz/require.h"
-#include "partiemc/byte_string.h"
 #include "partiemc/status.h"
 
 namespace partiemc::fuzz {

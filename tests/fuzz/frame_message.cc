@@ -68,7 +68,7 @@ void AttackFrameMessage(Bytes bytes) {
     Require(!error.reason().empty() && !error.SerializeAsString().empty(), "an error can be sent");
     return;
   }
-  if (reconstructor->parameters().placement != Placement::kFarthestParticle) {
+  if (KeepsGuarantees(reconstructor->parameters().placement)) {
     RequireOk(Validate(result, reconstructor->parameters().fill), "every guarantee holds");
   }
   RequireArrives(result, outputs.ok() ? *outputs : wire::Outputs{});

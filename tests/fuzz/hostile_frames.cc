@@ -66,7 +66,7 @@ std::uint64_t HostileId(Choices& choices, std::size_t k) {
 }
 
 void RequireGuarantees(const ReconstructionParameters& parameters, const Result& result) {
-  if (parameters.placement == Placement::kFarthestParticle) return;
+  if (!KeepsGuarantees(parameters.placement)) return;
   RequireOk(Validate(result, parameters.fill),
             absl::StrCat("every guarantee holds (", std::string(Name(parameters.placement)), ", ",
                          std::string(Name(parameters.fill)), ")"));

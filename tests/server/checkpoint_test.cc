@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/internal/byte_string.h"
 #include "partiemc/status.h"
 #include "server/moving_blob.h"
 #include "server/stream/session.h"
@@ -171,6 +172,14 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   default_told.clean = true;  // What `virtual-plane` does by default.
   const auto session = Session::Open(default_told, kLimits);
   EXPECT_TRUE(ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr).ok());
+}
+
+TEST(Checkpoint, KeepsItsFingerprintOfParameters) {
+  constexpr std::size_t kFingerprintAt = 4 * 4 + 32;
+  const std::string bytes = Serialize(1, State{}, {.spacing = 1.0}, Terms(), nullptr);
+  std::string_view rest = std::string_view(bytes).substr(kFingerprintAt);
+  EXPECT_EQ(TakeNumber<std::uint64_t>(rest), 0x7b5fb422f893357bu)
+      << "checkpoints of version 2 would be refused";
 }
 
 TEST(Checkpoint, IsBoundToItsStreamAndToAllOfItsTerms) {

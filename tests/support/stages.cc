@@ -92,12 +92,12 @@ void Stages::RunFromRings(std::span<const CellNormal> previous) {
                   next_normals);
   const Frame frame = particles.AsFrame();
   std::optional<double> area_offset;
-  std::vector<std::uint32_t> tangled;
-  PlaceVertices({frame, bins, level_set, crossings, topology, field, planes, parameters, scale},
-                area_offset, vertex_scratch, placed, result.rings);
-  BuildMesh({bins.tiles, crossings, topology, planes, placed, result.rings, parameters, scale},
-            mesh_scratch, result.mesh, result.statistics, tangled);
-  ASSERT_TRUE(tangled.empty());
+  ASSERT_TRUE(PlaceVertices(
+      {frame, bins, level_set, crossings, topology, field, planes, parameters, variant, scale},
+      area_offset, vertex_scratch, placed, result.rings));
+  ASSERT_TRUE(
+      BuildMesh({bins.tiles, crossings, topology, planes, placed, result.rings, parameters, scale},
+                mesh_scratch, result.mesh, result.statistics));
 }
 
 std::array<double, 4> Stages::CornerValues(const ActiveCell& cell) const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bins/bins.h"
+#include "core/internal/research.h"
 #include "crossings/crossings.h"
 #include "field/field.h"
 #include "frame/scale.h"
@@ -26,6 +27,7 @@ LevelSet LevelSetOf(const std::function<double(int, int)>& function, const TileD
 /// What the stages make of one frame. Not movable once run: later results refer to earlier ones.
 struct Stages {
   ReconstructionParameters parameters;  ///< Resolved.
+  VirtualPlaneVariant variant;          ///< Set before Run.
   Scale scale;
   Particles particles;
   ParticleBins bins;

@@ -14,9 +14,9 @@
 #include "client/input/base/text.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
+#include "common/printable.h"
 #include "partiemc/client/local_stream.h"
 #include "partiemc/client/stream.h"
-#include "partiemc/printable.h"
 #include "partiemc/validate.h"
 
 namespace partiemc::client {
@@ -142,8 +142,8 @@ class Receiver {
       valid.Update(Validate(section, fill));
     }
     if (valid.ok()) return;
-    // farthest-particle breaks guarantees in almost every frame: one example is enough.
-    const std::uint64_t told = flags_.placement == Name(Placement::kFarthestParticle) ? 1 : 10;
+    // A placement without guarantees breaks them in almost every frame: one example is enough.
+    const std::uint64_t told = KeepsGuarantees(*FindPlacement(flags_.placement)) ? 10 : 1;
     if (++failed_checks_ > told) return;
     progress_.Note(Concat("partiemc: ", source, ": --check: ", OneLine(valid)));
   }
@@ -183,11 +183,11 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
     code = kInput;
   }
   if (failed_checks > 0) {
-    // farthest-particle breaks guarantees by its nature: counted and told, never fatal.
-    const bool expected = parameters.placement == Placement::kFarthestParticle;
-    Complain(kFailed,
-             Concat("--check: ", Plural(failed_checks, "frame"), " of ", summary.frame_count(),
-                    " broke a guarantee", expected ? ", as farthest-particle may" : ""));
+    const bool expected = !KeepsGuarantees(parameters.placement);
+    Complain(kFailed, Concat("--check: ", Plural(failed_checks, "frame"), " of ",
+                             summary.frame_count(), " broke a guarantee",
+                             expected ? Concat(", as ", Name(parameters.placement), " may")
+                                      : std::string()));
     if (!expected) code = kFailed;
   }
   return code;

@@ -148,7 +148,7 @@ absl::StatusOr<std::vector<Result>> Evaluator::Reconstruct(
   if (options.knowledge != Knowledge::kNothing) {
     parameters.spacing = options.original_spacing ? sequence_.original_spacing : sequence_.spacing;
   }
-  const auto reconstructor = Reconstructor::Create(parameters);
+  const auto reconstructor = CreateVariant(parameters, method.variant);
   if (!reconstructor.ok()) return reconstructor.status();
   const bool ids = TellsIds(options);
   State state;

@@ -15,6 +15,7 @@
 #include "client/evaluation/metrics/metrics.h"
 #include "client/evaluation/scenes/sampling.h"
 #include "client/evaluation/scenes/sequence.h"
+#include "core/internal/research.h"
 #include "partiemc/parameters.h"
 #include "partiemc/stage.h"
 
@@ -24,6 +25,7 @@ namespace partiemc::evaluation {
 struct Method {
   std::string name;
   ReconstructionParameters parameters;  ///< `spacing` is set by the run, see Knowledge.
+  VirtualPlaneVariant variant = {};
 };
 
 /// What a method is told beside the positions.

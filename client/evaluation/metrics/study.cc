@@ -104,32 +104,20 @@ std::vector<StudyMethod> StudyMethods() {
   methods[1].method.name += "-clean";
   methods[1].method.parameters.clean = true;
   methods[5].method.name += "-no-volumes";
-  methods[5].method.parameters.steps.area = false;
+  methods[5].method.variant.steps.area = false;
   methods[5].needs_spacing = true;
   return methods;
 }
 
 std::vector<StudyMethod> StepMethods() {
-  struct Step {
-    std::string_view name;
-    bool VirtualPlaneSteps::*flag;
-  };
-  constexpr Step kSteps[] = {
-      {"edge-vertices", &VirtualPlaneSteps::edge_vertices},
-      {"normals", &VirtualPlaneSteps::normals},
-      {"curvature", &VirtualPlaneSteps::curvature},
-      {"support", &VirtualPlaneSteps::support},
-      {"smoothing", &VirtualPlaneSteps::smoothing},
-      {"area", &VirtualPlaneSteps::area},
-  };
   std::vector<StudyMethod> methods;
-  for (const Step& step : kSteps) {
+  for (const NamedStep& step : AllSteps()) {
     methods.push_back(
         Plain(Placement::kVirtualPlane, "without the step " + std::string(step.name)));
     methods.back().method.name += "-without-" + std::string(step.name);
-    methods.back().method.parameters.steps.*step.flag = false;
+    methods.back().method.variant.steps.*step.value = false;
     methods.back().is_step = true;
-    methods.back().needs_spacing = step.flag == &VirtualPlaneSteps::area;
+    methods.back().needs_spacing = step.value == &VirtualPlaneSteps::area;
   }
   return methods;
 }
@@ -141,7 +129,7 @@ std::vector<StudyMethod> SensitivityMethods() {
       const std::string what = std::string(name) + " times " + std::string(constant.name);
       methods.push_back(Plain(Placement::kVirtualPlane, what));
       methods.back().method.name += "-" + std::string(name) + "-" + std::string(constant.name);
-      methods.back().method.parameters.constants.*constant.value *= factor;
+      methods.back().method.variant.constants.*constant.value *= factor;
       methods.back().is_step = true;
     }
   }

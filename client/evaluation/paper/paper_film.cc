@@ -37,7 +37,7 @@ absl::StatusOr<std::vector<Result>> Timed(const Sequence& film, const Method& me
                                           double& milliseconds) {
   ReconstructionParameters parameters = method.parameters;
   parameters.spacing = film.spacing;
-  const auto reconstructor = Reconstructor::Create(parameters);
+  const auto reconstructor = CreateVariant(parameters, method.variant);
   if (!reconstructor.ok()) return reconstructor.status();
   std::vector<Result> results(film.frames.size());
   Workspace workspace;

@@ -56,6 +56,8 @@ struct FrameControl {
   const std::atomic<bool>* cancelled = nullptr;
 };
 
+struct VirtualPlaneVariant;  // core/internal/research.h
+
 /// Knows the order of the stages; holds no state of a stream. Safe to share between threads.
 class Reconstructor {
  public:
@@ -79,7 +81,12 @@ class Reconstructor {
   const ReconstructionParameters& parameters() const { return parameters_; }
 
  private:
-  Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits);
+  friend absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& parameters,
+                                                     const VirtualPlaneVariant& variant,
+                                                     const FrameLimits& limits);
+
+  Reconstructor(const ReconstructionParameters& parameters, const FrameLimits& limits,
+                const VirtualPlaneVariant& variant);
 
   absl::Status ReconstructOrThrow(const Frame& frame, State& state, Workspace::Buffers& buffers,
                                   Result& result, const FrameControl& control) const;
@@ -87,6 +94,7 @@ class Reconstructor {
   ReconstructionParameters parameters_;
   std::vector<ReconstructionParameters> sections_;  // Resolved.
   FrameLimits limits_;
+  std::shared_ptr<const VirtualPlaneVariant> variant_;
 };
 
 }  // namespace partiemc

@@ -26,7 +26,7 @@ struct RingMeasures {
   friend bool operator==(const RingMeasures&, const RingMeasures&) = default;
 };
 
-/// Closed polylines. Guarantees, but for `farthest-particle` (core/METHOD.md, "Guarantees"):
+/// Closed polylines. Guarantees, if KeepsGuarantees(placement) (core/METHOD.md, "Guarantees"):
 ///   R1 every ring has at least 3 points, all finite, none repeated; its end is not stored twice;
 ///   R2 rings are simple and do not touch each other;
 ///   R3 the inside lies on the left: outer rings counter-clockwise, holes clockwise;
@@ -63,7 +63,7 @@ enum class TriangleClass : std::uint8_t {
   kInterior,  ///< A piece of an interior cell, or of several merged ones.
 };
 
-/// Triangles that cover the inside of the rings. Guarantees, but for `farthest-particle`:
+/// Triangles that cover the inside of the rings. Guarantees, if KeepsGuarantees(placement):
 ///   M1 every triangle is counter-clockwise, none is folded or degenerate;
 ///   M2 triangles do not overlap and together cover exactly the inside of the rings;
 ///   M3 its first points are the points of the rings, bit for bit, in their order;
@@ -81,12 +81,10 @@ struct Mesh {
 
 struct FrameStatistics {
   std::uint64_t particles = 0;
-  std::uint64_t tiles = 0;          ///< Tiles of 32 x 32 nodes that were allocated.
-  std::uint64_t active_cells = 0;   ///< Cells that the isoline runs through.
-  std::uint64_t dropped_holes = 0;  ///< Holes that cleaning closed.
-  /// Components without a particle that cleaning removed. Those whose rings could not be made
-  /// simple would count here, too: there are none (core/METHOD.md, "Why rings are simple").
-  std::uint64_t dropped_components = 0;
+  std::uint64_t tiles = 0;               ///< Tiles of 32 x 32 nodes that were allocated.
+  std::uint64_t active_cells = 0;        ///< Cells that the isoline runs through.
+  std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
+  std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Components below a size that the caller set.
   std::uint64_t triangles = 0;           ///< Triangles of the mesh.
   std::uint64_t triangles_grid = 0;      ///< What `grid` would have made of the same rings.

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "frame/frame_view.h"
 #include "partiemc/frame.h"
-#include "partiemc/printable.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -18,13 +18,16 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 64;
 
+// Errors reach logs and messages, which take text only.
+std::string Escaped(std::string_view name) { return absl::CHexEscape({name.data(), name.size()}); }
+
 absl::Status CheckAttribute(const Frame& frame, std::size_t k) {
   const Attribute& attribute = frame.attributes[k];
   const std::string field = absl::StrCat("attributes[", k, "]");
   const auto is_printable = [](char c) { return c >= ' ' && c <= '~'; };
   if (attribute.name.empty() || attribute.name.size() > kMostNameBytes ||
       !std::ranges::all_of(attribute.name, is_printable)) {
-    return InvalidFrame(kReasonOutOfRange, field + ".name", Printable(attribute.name),
+    return InvalidFrame(kReasonOutOfRange, field + ".name", Escaped(attribute.name),
                         absl::StrCat("must be 1 to ", kMostNameBytes, " bytes of ASCII"));
   }
   for (const Attribute& before : frame.attributes.first(k)) {
@@ -78,7 +81,7 @@ absl::Status ChooseAttributes(const Frame& frame, std::span<const std::string> n
       continue;
     }
     if (found == frame.attributes.end()) {
-      return InvalidFrame(kReasonNoSuchAttribute, "attributes", Printable(name),
+      return InvalidFrame(kReasonNoSuchAttribute, "attributes", Escaped(name),
                           "must be in every frame, as it is asked for");
     }
     chosen.push_back(*found);

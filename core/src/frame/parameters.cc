@@ -109,7 +109,7 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     return Refused("spacing", "absent",
                    "must be given for a slice: particles beside the plane do not tell it");
   }
-  if (!TraitsOf(p.placement).takes_particles) return absl::OkStatus();
+  if (KeepsGuarantees(p.placement)) return absl::OkStatus();
   if (p.slice) {
     return Refused("placement", std::string(Name(p.placement)),
                    "must be another one for a slice: its vertices would be particles, which lie "
@@ -158,21 +158,13 @@ ReconstructionParameters Resolve(ReconstructionParameters parameters) {
             ? CalibratedSliceRadius(parameters.kernel_radius)
             : CalibratedReferenceRadius(parameters.placement, parameters.kernel_radius);
   }
-  // These are of the plane: a ring of a section does not tell how the body bends across it, the
-  // layer that supports it leans, and volumes are not its area.
-  if (parameters.slice) {
-    parameters.steps.curvature = parameters.steps.support = parameters.steps.area = false;
-  }
-  // An isoline is where the density has its value, and nowhere else.
-  if (parameters.isovalue) {
-    VirtualPlaneSteps& steps = parameters.steps;
-    steps.curvature = steps.support = steps.smoothing = steps.area = false;
-  }
   if (!parameters.clean) {
     parameters.clean = TraitsOf(parameters.placement).cleans && !parameters.isovalue;
   }
   return parameters;
 }
+
+bool KeepsGuarantees(Placement placement) { return !TraitsOf(placement).takes_particles; }
 
 std::string_view Name(Placement placement) { return TraitsOf(placement).name; }
 

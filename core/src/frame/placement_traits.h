@@ -20,8 +20,8 @@ struct PlacementTraits {
   double reach_cells, reach_kernels;
   bool on_edges;  ///< A vertex on each crossed lattice edge,
   bool in_cells;  ///< and one for each cell.
-  /// Vertices are particles. Planes are then the paper's, through the weighted means of the cells;
-  /// rings may cross, and the mesh has the connectivity of the segments' middles.
+  /// Vertices are particles, planes go through the weighted means of the cells
+  /// (farthest_particle.h). Rings may cross; the mesh connects the middles of the segments.
   bool takes_particles;
   /// Vertices move along their rings, from the level set to where their surroundings put them, and
   /// out of their cells: rings are repaired, and the interior loses the cells that they touch.
@@ -31,9 +31,7 @@ struct PlacementTraits {
   double Reach(double kernel_radius) const { return reach_cells + reach_kernels * kernel_radius; }
 };
 
-/// By the number of the placement. `farthest-particle` takes only its topology from the level set,
-/// and samples the field at the means of the particles around cells; `virtual-plane` samples it
-/// where the Newton steps of its roots end.
+/// By the number of the placement.
 inline constexpr std::array<PlacementTraits, 4> kPlacements = {{
     {.placement = Placement::kMarchingSquares,
      .name = "marching-squares",

@@ -78,26 +78,26 @@ bool LoopGroups::TriangulateGroup(std::span<const double> points, std::size_t gr
   return batch.triangulator.Triangulate(points, batch.points, batch.offsets, batch.triangles);
 }
 
-void LoopGroups::Triangulate(std::span<const double> points, std::vector<std::uint32_t>& triangles,
-                             std::vector<std::uint32_t>& broken) {
+bool LoopGroups::Triangulate(std::span<const double> points,
+                             std::vector<std::uint32_t>& triangles) {
   SortLoops();
   const std::size_t batch_count = MakeBatches();
   ParallelFor(batch_count, [&](std::size_t k) {
     Batch& batch = batches_[k];
     batch.triangles.clear();
-    batch.broken.clear();
+    batch.is_complete = true;
     for (std::size_t group = batch.first_group; group < batch.last_group; ++group) {
       ThrowIfCancelled();
-      if (!TriangulateGroup(points, group, batch)) {
-        batch.broken.push_back(static_cast<std::uint32_t>(group));
-      }
+      batch.is_complete &= TriangulateGroup(points, group, batch);
     }
   });
+  bool is_complete = true;
   for (std::size_t k = 0; k < batch_count; ++k) {
+    is_complete &= batches_[k].is_complete;
     triangles.insert(triangles.end(), batches_[k].triangles.begin(), batches_[k].triangles.end());
-    broken.insert(broken.end(), batches_[k].broken.begin(), batches_[k].broken.end());
   }
   Clear();
+  return is_complete;
 }
 
 }  // namespace partiemc

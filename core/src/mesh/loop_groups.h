@@ -35,10 +35,10 @@ class LoopGroups {
 
   /// Appends the triangles of all groups, in the order of the groups, and forgets the loops.
   /// Groups are taken together to batches of about the same number of points, whatever the number
-  /// of threads. A group whose loops are seen to break the requirements of Triangulator, which a
-  /// strip does not look for, has no triangles and is added to `broken`.
-  void Triangulate(std::span<const double> points, std::vector<std::uint32_t>& triangles,
-                   std::vector<std::uint32_t>& broken);
+  /// of threads. Returns false if Triangulator finds that the loops of a group break its
+  /// requirements; that group has no triangles. LoopStrip does not check them.
+  [[nodiscard]] bool Triangulate(std::span<const double> points,
+                                 std::vector<std::uint32_t>& triangles);
 
  private:
   // Successive groups that one task triangulates.
@@ -48,7 +48,7 @@ class LoopGroups {
     std::vector<std::uint32_t> triangles;
     LoopStrip strip;
     Triangulator triangulator;
-    std::vector<std::uint32_t> broken;  // Groups.
+    bool is_complete = true;
   };
 
   void SortLoops();

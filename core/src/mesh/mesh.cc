@@ -13,17 +13,17 @@
 namespace partiemc {
 namespace {
 
-// The state of BuildMesh. Points are numbered as follows: first the points of the rings (for
-// `farthest-particle` the middles of all segments), then the lattice nodes that triangles use. If
-// the nodes are not numbered yet when loops are triangulated, the corners of the staircases take
-// their place until PutNodesInPlace.
+// The state of BuildMesh. Points are numbered as follows: first the points of the rings (the
+// middles of all segments if vertices move), then the lattice nodes that triangles use. If the
+// nodes are not numbered yet when loops are triangulated, the corners of the staircases take their
+// place until PutNodesInPlace.
 struct Work {
   const MeshInput& input;
   MeshScratch& scratch;
   Mesh& mesh;
-  std::vector<std::uint32_t>& tangled;
   std::size_t ring_points = 0;  // Number of points before the lattice nodes.
   std::uint64_t interior_cells = 0;
+  bool is_complete = true;  // Every group of loops has been triangulated.
 
   bool MovesVertices() const { return TraitsOf(input.parameters.placement).takes_particles; }
   bool HasBand() const {
@@ -168,7 +168,7 @@ void AddStaircaseLoops(Work& w, bool reversed) {
 }
 
 void TriangulateLoops(Work& w, TriangleClass triangle_class) {
-  w.scratch.loops.Triangulate(w.mesh.points, w.mesh.triangles, w.tangled);
+  w.is_complete &= w.scratch.loops.Triangulate(w.mesh.points, w.mesh.triangles);
   w.mesh.classes.resize(w.mesh.triangles.size() / 3, triangle_class);
 }
 
@@ -263,11 +263,10 @@ std::uint64_t CountFolded(const Work& w) {
 
 }  // namespace
 
-void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
-               FrameStatistics& statistics, std::vector<std::uint32_t>& tangled) {
-  Work w{input, scratch, mesh, tangled};
+bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
+               FrameStatistics& statistics) {
+  Work w{input, scratch, mesh};
   w.mesh.Clear();
-  w.tangled.clear();
   FindInterior(w);
   if (w.input.parameters.fill == Fill::kNone) {
     TraceStaircases(w.input.directory, w.scratch.interior, w.scratch.staircases);
@@ -275,7 +274,7 @@ void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
   } else {
     CollectRingPoints(w);
     TriangulateAll(w);
-    if (!w.tangled.empty()) return;
+    if (!w.is_complete) return false;
     if (w.MovesVertices()) MoveVertices(w);
   }
   const auto band_triangles =
@@ -285,6 +284,7 @@ void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
   statistics.triangles = w.mesh.TriangleCount();
   statistics.triangles_grid = 2 * w.interior_cells + band_triangles;
   statistics.folded_triangles = w.MovesVertices() ? CountFolded(w) : 0;
+  return true;
 }
 
 }  // namespace partiemc

@@ -47,12 +47,13 @@ struct MeshInput {
 /// `folded_triangles` of the statistics.
 ///
 /// The band between the rings and the staircase of the interior cells is triangulated without new
-/// points. It is the same for `grid`, `greedy` and `conforming`. `farthest-particle` triangulates
-/// the middles of the segments and then moves the vertices, so a triangle folds if its vertices do.
-/// Components that cannot be triangulated, which is a bug, are named in `tangled` by their outer
-/// rings of RingTopology; the mesh is then worth nothing.
+/// points. It is the same for `grid`, `greedy` and `conforming`. Where vertices are particles
+/// (placement_traits.h), the middles of the segments are triangulated and moved to the vertices
+/// afterwards, so a triangle folds if its vertices do.
+/// Returns false if a component cannot be triangulated. That is a bug: rings are simple, and the
+/// remaining interior cells lie inside them.
 /// Cost: n log n in the points of rings and staircases, linear in cells.
-void BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
-               FrameStatistics& statistics, std::vector<std::uint32_t>& tangled);
+[[nodiscard]] bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
+                             FrameStatistics& statistics);
 
 }  // namespace partiemc

@@ -8,6 +8,7 @@
 #include "base/bits.h"
 #include "base/parallel.h"
 #include "frame/placement_traits.h"
+#include "normals/farthest_particle.h"
 #include "sampler/query_batch.h"
 
 namespace partiemc {
@@ -76,28 +77,6 @@ std::size_t GroupOf(const RingTopology& rings, std::size_t segment) {
   const auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), segment);
   const std::size_t first = *(end - 1);
   return first + BeginOfGroup(segment - first);
-}
-
-// The paper's representative point (Eq. 4 at the cell's centre) and grad phi there (Eq. 9). Where
-// no particle reaches the point the gradient stays 0, hence weak.
-void SampleAtMean(const TileDirectory& directory, const LevelSetSampler& field, CellPlane& plane) {
-  const ActiveCell& cell = plane.cell;
-  const double centre_x = cell.i + 0.5;
-  const double centre_y = cell.j + 0.5;
-  const FieldSample centre = field.Sample(cell.tile, centre_x, centre_y);
-  const Point origin = CellOrigin(directory, cell);
-  plane.point = {origin.x + 0.5 + centre.mean_x, origin.y + 0.5 + centre.mean_y};
-  plane.gradient_x = plane.gradient_y = 0;
-  plane.value = static_cast<float>(centre.value);
-  const double mean_x = centre_x + centre.mean_x;
-  const double mean_y = centre_y + centre.mean_y;
-  const int i = static_cast<int>(std::floor(mean_x));
-  const int j = static_cast<int>(std::floor(mean_y));
-  const TilePlace place = Normalise(directory, cell.tile, i, j);
-  if (place.tile == kNoTile) return;
-  const FieldSample mean = field.Sample(place.tile, place.i + (mean_x - i), place.j + (mean_y - j));
-  plane.gradient_x = static_cast<float>(mean.phi_x);
-  plane.gradient_y = static_cast<float>(mean.phi_y);
 }
 
 void Orient(const CellNormal* reference, CellPlane& plane) {
@@ -212,7 +191,8 @@ void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
       begins_group[k - first] = BeginsGroup(k - *(end - 1));
     }
     if (traits.takes_particles) {
-      for (std::size_t k = first; k < last; ++k) SampleAtMean(bins.tiles, field, planes[k]);
+      const FarthestParticle rule(bins.tiles, field);
+      for (std::size_t k = first; k < last; ++k) rule.SampleAtMean(planes[k]);
     } else {
       auto groups = CollectPoints<Point>(sample);
       for (std::size_t k = first; k < last; ++k) {

@@ -16,16 +16,16 @@
 
 namespace partiemc {
 
-/// What is known at the representative point of one segment. The point is the weighted mean at the
-/// cell's centre for `farthest-particle` (the paper's), the middle of the segment for the others.
-/// What comes of sums of floats is kept as floats: planes are more than a cache holds.
+/// The level set at the point that represents a segment: the middle of the segment, or the weighted
+/// mean at the cell's centre where vertices are particles (placement_traits.h).
+/// Sums of floats stay floats, because the planes of a frame do not fit into a cache.
 struct CellPlane {
   ActiveCell cell;       ///< Of the segment: along a ring, cells lie anywhere in memory.
   bool is_weak = false;  ///< The gradient was too small; the normal is a fallback.
   Point point;           ///< Lattice coordinates of the world, in cells.
   Point entry, exit;     ///< The segment's ends: linear crossings of lattice edges.
   float value = 0;       ///< F at the point.
-  float gradient_x = 0, gradient_y = 0;  ///< Of F; of phi for `farthest-particle`.
+  float gradient_x = 0, gradient_y = 0;  ///< Of F; of phi where vertices are particles.
   double normal_x = 0, normal_y = 0;     ///< Unit, oriented (Eq. 11).
   /// `virtual-plane` only: F and its gradient at `entry`.
   float entry_value = 0;

@@ -286,22 +286,17 @@ std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spaci
   return count;
 }
 
-// Drops the components that are marked.
-void DropMarked(const ParticleBins& bins, Crossings& crossings, RingScratch& scratch,
-                RingTopology& rings) {
-  ClearDropped(rings, scratch, crossings);
-  KeepSurvivors(bins.tiles, crossings, scratch, rings);
-  MarkInteriorCells(bins.tiles, crossings);
-  CountComponents(bins, crossings, scratch, rings);
-  Nest(bins, crossings, scratch, rings);
-}
-
 void DropSpray(const ParticleBins& bins, const Scale& scale,
                const ReconstructionParameters& parameters, Crossings& crossings,
                RingScratch& scratch, RingTopology& rings) {
   FindContainers(bins.tiles, crossings, rings, scratch);
   rings.dropped_spray = FindSpray(parameters, scale.spacing, rings, scratch);
-  if (rings.dropped_spray > 0) DropMarked(bins, crossings, scratch, rings);
+  if (rings.dropped_spray == 0) return;
+  ClearDropped(rings, scratch, crossings);
+  KeepSurvivors(bins.tiles, crossings, scratch, rings);
+  MarkInteriorCells(bins.tiles, crossings);
+  CountComponents(bins, crossings, scratch, rings);
+  Nest(bins, crossings, scratch, rings);
 }
 
 }  // namespace
@@ -324,16 +319,6 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
   if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {
     DropSpray(bins, scale, parameters, crossings, scratch, rings);
   }
-}
-
-void DropComponents(const ParticleBins& bins, std::span<const std::uint32_t> outer_rings,
-                    Crossings& crossings, RingScratch& scratch, RingTopology& rings) {
-  scratch.dropped.assign(rings.components.size(), 0);
-  for (const std::uint32_t ring : outer_rings) {
-    std::uint8_t& dropped = scratch.dropped[rings.component_of_ring[ring]];
-    if (std::exchange(dropped, std::uint8_t{1}) == 0) ++rings.dropped_components;
-  }
-  DropMarked(bins, crossings, scratch, rings);
 }
 
 }  // namespace partiemc

@@ -60,10 +60,4 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
                 const ReconstructionParameters& parameters, Crossings& crossings,
                 RingScratch& scratch, RingTopology& rings);
 
-/// Drops the components of these outer rings as cleaning does, and counts them in
-/// `dropped_components`; islands in their holes stay. Requires: TraceRings has left everything as
-/// it is. Cost: linear in segments, tiles and particles.
-void DropComponents(const ParticleBins& bins, std::span<const std::uint32_t> outer_rings,
-                    Crossings& crossings, RingScratch& scratch, RingTopology& rings);
-
 }  // namespace partiemc

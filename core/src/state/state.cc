@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "partiemc/byte_string.h"
+#include "core/internal/byte_string.h"
 #include "partiemc/parameters.h"
 #include "partiemc/status.h"
 #include "state/state_parts.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "partiemc/byte_string.h"
+#include "core/internal/byte_string.h"
 #include "partiemc/status.h"
 #include "state/state_parts.h"
 

@@ -31,9 +31,4 @@ inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
 /// directions that the normals hardly constrain stay at the middle. In lattice coordinates.
 Point QefVertex(const VertexInput& input, const CellPlane& plane);
 
-/// The particle that lies farthest along the plane's normal, among those on or above the plane and
-/// within one cell (and one kernel radius) of its point; the middle of the segment if there is
-/// none. In world units, moved outward by the surface offset.
-Point FarthestParticleVertex(const VertexInput& input, const CellPlane& plane);
-
 }  // namespace partiemc

@@ -95,21 +95,6 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   }
 }
 
-// Names the outer rings of all that have a marked point.
-void NameTangledRings(const Rings& rings, const RepairScratch& scratch,
-                      std::vector<std::uint32_t>& tangled) {
-  for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
-    const auto points =
-        std::span(scratch.is_marked)
-            .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
-    if (std::ranges::none_of(points, [](std::uint8_t marked) { return marked != 0; })) continue;
-    const std::uint32_t outer = rings.outer_of[ring];
-    tangled.push_back(outer == kNoRing ? ring : outer);
-  }
-  std::ranges::sort(tangled);
-  tangled.erase(std::unique(tangled.begin(), tangled.end()), tangled.end());
-}
-
 // Moves the marked points; returns whether any was not at its root yet.
 bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratch& scratch,
              Rings& rings) {
@@ -124,9 +109,7 @@ bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratc
 
 }  // namespace
 
-void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings,
-                 std::vector<std::uint32_t>& tangled) {
-  tangled.clear();
+bool RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings) {
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
     const std::size_t touching = CountTouchingPairs(rings.points, rings.offsets, scratch.pairs);
@@ -140,18 +123,15 @@ void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
     } else {
       MeasureRings(rings);
       FindMisplacedRings(rings, scratch);
-      if (scratch.misplaced.empty()) return;
+      if (scratch.misplaced.empty()) return true;
       MarkMisplacedRings(rings, scratch);
       all_the_way = true;
     }
     if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
-    // What is marked is at its roots already, so it is something else that is out of its place.
-    NameTangledRings(rings, scratch, tangled);
+    // The rounds are used up, or every marked point is at its root and an unmarked one is at fault.
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
-    if (!Retreat(roots, true, scratch, rings)) break;
-    tangled.clear();
+    if (!Retreat(roots, true, scratch, rings)) return false;
   }
-  MeasureRings(rings);
 }
 
 }  // namespace partiemc

@@ -30,13 +30,15 @@ struct RepairScratch {
 /// whole, with those around it. Ordinary frames need no round. After the twenty-fourth, everything
 /// goes back.
 ///
-/// Ends, and in such rings: rings through the roots are so (core/METHOD.md, "Why rings are
-/// simple"). Should that be wrong, `tangled` names the outer rings of all that still cross or are
-/// misplaced, ascending, with every point at its root; else it is empty.
+/// Returns false if the rings still cross or are misplaced with every point at its root. That is a
+/// bug, because rings through the roots are simple and nested: a path from root to root stays in
+/// one cell, or crosses the common edge of two cells, and no other path does either (in a saddle,
+/// each has its own half). So rings meet only where they share a root, and they separate the same
+/// lattice nodes as the rings of RingTopology. core/METHOD.md, "Why rings are simple", has the
+/// details; tests/core/roots_test.cc tries to refute them.
 ///
-/// Measures the rings (measure.h) as they are in the end.
+/// Measures the rings (measure.h) unless it fails.
 /// Cost: for each round near-linear in the points, and n log n in the places where rings turn.
-void RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings,
-                 std::vector<std::uint32_t>& tangled);
+[[nodiscard]] bool RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings);
 
 }  // namespace partiemc

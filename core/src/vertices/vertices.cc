@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "frame/placement_traits.h"
+#include "normals/farthest_particle.h"
 #include "vertices/intersections.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
@@ -44,8 +45,9 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
     const Segment& segment = input.crossings.segments[input.topology.segments[k]];
     Store(ClampToCell(input.bins.tiles, plane.cell, segment, QefVertex(input, plane)), cell_size,
           target);
-  } else if (input.parameters.placement == Placement::kFarthestParticle) {
-    const Point vertex = FarthestParticleVertex(input, plane);
+  } else if (TraitsOf(input.parameters.placement).takes_particles) {
+    const Point vertex = FarthestParticle(input.bins.tiles, input.field)
+                             .Vertex(plane, input.frame, input.parameters, input.scale);
     target[0] = vertex.x;
     target[1] = vertex.y;
   }
@@ -124,8 +126,9 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment,
   return keep;
 }
 
-// The rings of `virtual-plane`, moved, matched to their area and repaired.
-void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
+// The rings of `virtual-plane`, moved, matched to their area and repaired. Returns false if the
+// repair failed.
+bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
                        VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
   RingVertices& vertices = scratch.vertices;
   PlaceOnVirtualPlanes(input, vertices);
@@ -159,7 +162,7 @@ void PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   CorrectVolume(input, scratch.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
-  RepairRings(placed.roots, scratch.repair, rings, placed.tangled);
+  return RepairRings(placed.roots, scratch.repair, rings);
 }
 
 // The rings of the other placements, segment by segment.
@@ -180,7 +183,7 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
     rings.offsets.push_back(static_cast<std::uint32_t>(rings.PointCount()));
     rings.outer_of.push_back(topology.outer_of[ring]);
   }
-  // A hole whose outer ring collapsed stands alone; only `farthest-particle` can do that.
+  // A hole whose outer ring was dropped becomes an outer ring.
   for (std::uint32_t& outer : rings.outer_of) {
     if (outer != kNoRing) outer = placed.kept_as[outer];
   }
@@ -192,16 +195,15 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
 
 }  // namespace
 
-void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
                    VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
   const RingTopology& topology = input.topology;
   rings.Clear();
-  placed.tangled.clear();
   placed.self_intersections = 0;
   placed.point_of_segment.resize(topology.segments.size());
   placed.kept_as.resize(topology.RingCount());
   if (TraitsOf(input.parameters.placement).refines) {
-    PlaceRefinedRings(input, area_offset, scratch, placed, rings);
+    if (!PlaceRefinedRings(input, area_offset, scratch, placed, rings)) return false;
   } else {
     PlaceRings(input, scratch, placed, rings);
   }
@@ -209,6 +211,7 @@ void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
     const std::uint32_t kept_as = placed.kept_as[ring];
     if (kept_as != kNoRing) rings.measures[kept_as].particle_count = topology.particle_count[ring];
   }
+  return true;
 }
 
 }  // namespace partiemc

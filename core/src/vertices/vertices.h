@@ -16,6 +16,8 @@
 
 namespace partiemc {
 
+struct VirtualPlaneVariant;  // core/internal/research.h
+
 /// Marks a segment whose ring was dropped in PlacedVertices::point_of_segment.
 inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 
@@ -28,8 +30,6 @@ struct PlacedVertices {
   /// `virtual-plane` only: where each point of the rings may retreat to, interleaved, in world
   /// units.
   std::vector<double> roots;
-  std::vector<std::uint32_t>
-      tangled;  ///< Outer rings that repair could not make simple (repair.h).
   std::uint64_t self_intersections = 0;  ///< Of placements that do not promise to have none.
 };
 
@@ -75,24 +75,24 @@ struct VertexInput {
   const LevelSetSampler& field;
   const std::vector<CellPlane>& planes;
   const ReconstructionParameters& parameters;
+  const VirtualPlaneVariant& variant;
   const Scale& scale;
 };
 
 /// Places the vertices of every ring and measures the rings.
 ///   marching-squares   the crossings of lattice edges, by linear interpolation of F;
 ///   qef                those, and in each cell the minimiser of Eq. 14, kept in the cell;
-///   farthest-particle  section 3.5: the particle farthest along the normal, one cell around;
 ///   virtual-plane      one vertex per cell and crossed edge, moved to the plane that its
 ///                      surroundings support (virtual_plane.h), matched to the particles' area
 ///                      (volume_correction.h) and repaired (repair.h).
 /// marching-squares and qef keep every vertex in its cell or on its edge, so that rings are simple
 /// by construction (core/METHOD.md, "Why rings are simple"); virtual-plane may leave the cells and
-/// is simple by its repair. farthest-particle drops consecutive equal vertices, and rings of which
-/// fewer than three points remain.
+/// is simple by its repair. Placements that take particles as vertices (placement_traits.h) drop
+/// consecutive equal vertices, and rings with fewer than three points left.
 /// `area_offset`: of `virtual-plane`, that of the last frame, then of this one
-/// (volume_correction.h). Deterministic, in parallel over segments. Cost: linear in segments and
-/// the particles near them.
-void PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
-                   VertexScratch& scratch, PlacedVertices& placed, Rings& rings);
+/// (volume_correction.h). Returns false if the repair failed, which is a bug.
+/// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
+[[nodiscard]] bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
+                                 VertexScratch& scratch, PlacedVertices& placed, Rings& rings);
 
 }  // namespace partiemc

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/prefetch.h"
+#include "core/internal/research.h"
 #include "sampler/query_batch.h"
 #include "vertices/placement.h"
 #include "vertices/plane_support.h"
@@ -59,7 +60,7 @@ FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point&
 // that of a distance stays the same: unless a step is long, normals are those of the points that it
 // begins at.
 void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
-  const VirtualPlaneConstants& constants = input.parameters.constants;
+  const VirtualPlaneConstants& constants = input.variant.constants;
   const CellPlane& plane = input.planes[segment];
   const std::size_t edge = 2 * segment;
   const std::size_t inner = edge + 1;
@@ -96,7 +97,7 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
     const Point chord{b.x - a.x, b.y - a.y};
     return std::sqrt(Dot(chord, chord));
   };
-  const double min_length = input.parameters.constants.ShortestRing() * input.scale.spacing;
+  const double min_length = input.variant.constants.ShortestRing() * input.scale.spacing;
   double length = 0;
   for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
   if (length < min_length) return {};
@@ -135,7 +136,7 @@ void ForEachStretch(const PeriodicRing& ring, Body body) {
 
 // Step 2: normals averaged along the ring, first by distance, then also by angle.
 void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
-  const VirtualPlaneConstants& c = input.parameters.constants;
+  const VirtualPlaneConstants& c = input.variant.constants;
   for (const bool by_angle : {false, true}) {
     const double reach = (by_angle ? c.bilateral_reach : c.normal_reach) * input.scale.spacing;
     ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -185,8 +186,8 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
 void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
-  const VirtualPlaneSteps& steps = input.parameters.steps;
-  const VirtualPlaneConstants& c = input.parameters.constants;
+  const VirtualPlaneSteps& steps = input.variant.steps;
+  const VirtualPlaneConstants& c = input.variant.constants;
   const SupportShape support{// Particles are listed within the kernel radius.
                              .radius = std::min(c.support_radius * h, input.scale.kernel_radius),
                              .height = c.support_height * h,
@@ -247,9 +248,9 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
 // chord.
 void SmoothPositions(const VertexInput& input, std::size_t first, const PeriodicRing& ring,
                      RingVertices& v) {
-  const double reach = input.parameters.constants.smoothing_reach * input.scale.spacing;
+  const double reach = input.variant.constants.smoothing_reach * input.scale.spacing;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    if (input.parameters.steps.smoothing) {
+    if (input.variant.steps.smoothing) {
       MeanShift(ring, begin, end, reach);
     } else {
       std::copy(ring.base + begin, ring.base + end, ring.shift + begin);
@@ -267,14 +268,14 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Periodic
 void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, RingVertices& v) {
   const std::size_t first_segment = input.topology.offsets[r];
   CopyRing(v, 2 * first_segment, ring);
-  if (input.parameters.steps.normals) SmoothNormals(input, ring);
+  if (input.variant.steps.normals) SmoothNormals(input, ring);
   ShiftPlanes(input, first_segment, ring, v);
   SmoothPositions(input, 2 * first_segment, ring, v);
 }
 
 // Drops edge vertices that lie on the chord of the cell vertices beside them.
 void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
-  const double min_distance = input.parameters.constants.thinning_distance * input.scale.spacing;
+  const double min_distance = input.variant.constants.thinning_distance * input.scale.spacing;
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
   for (std::size_t k = first; k < last; k += 2) {
@@ -283,7 +284,7 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
     const Point& b = v.point[k + 1];
     const Point chord{b.x - a.x, b.y - a.y};
     const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
-    v.is_kept[k] = input.parameters.steps.edge_vertices &&
+    v.is_kept[k] = input.variant.steps.edge_vertices &&
                    std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));
     v.is_kept[k + 1] = 1;
   }

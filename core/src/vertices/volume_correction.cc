@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "base/point.h"
+#include "core/internal/research.h"
 #include "vertices/measure.h"
 
 namespace partiemc {
@@ -24,7 +25,7 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
 
 // The offset that a frame alone would ask for, in spacings. Nothing without large components.
 std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
-  const VirtualPlaneConstants& constants = input.parameters.constants;
+  const VirtualPlaneConstants& constants = input.variant.constants;
   MeasureRings(rings);
   double volume = 0, area = 0, perimeter = 0;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
@@ -70,10 +71,10 @@ void OffsetRing(std::span<const double> points, double offset, double* target) {
 void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
                    std::optional<double>& offset, Rings& rings) {
   const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
-  if (!is_known || !input.parameters.steps.area) return;
+  if (!is_known || !input.variant.steps.area) return;
   const double spacing = input.scale.spacing * input.scale.cell_size;
   if (const std::optional<double> target = TargetOf(input, spacing, rings)) {
-    const double change = input.parameters.constants.area_change;
+    const double change = input.variant.constants.area_change;
     offset = offset ? std::clamp(*target, *offset - change, *offset + change) : *target;
   }
   if (!offset) return;

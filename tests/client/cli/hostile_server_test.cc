@@ -7,7 +7,7 @@
 #include <string>
 
 #include "client/cli/program.h"
-#include "partiemc/printable.h"
+#include "common/printable.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 
 namespace partiemc::client {

@@ -1,4 +1,4 @@
-#include "partiemc/printable.h"
+#include "common/printable.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,17 @@
-#include "partiemc/virtual_plane_constants.h"
+#include "core/internal/research.h"
 
 namespace partiemc {
+
+std::span<const NamedStep> AllSteps() {
+  using S = VirtualPlaneSteps;
+  static constexpr NamedStep kSteps[] = {
+      {"edge-vertices", &S::edge_vertices}, {"normals", &S::normals},
+      {"curvature", &S::curvature},         {"support", &S::support},
+      {"smoothing", &S::smoothing},         {"area", &S::area},
+  };
+  static_assert(sizeof(S) == std::size(kSteps) * sizeof(bool), "one is missing");
+  return kSteps;
+}
 
 std::span<const NamedConstant> AllConstants() {
   using C = VirtualPlaneConstants;
@@ -15,6 +26,16 @@ std::span<const NamedConstant> AllConstants() {
   };
   static_assert(sizeof(C) == std::size(kConstants) * sizeof(double), "one is missing");
   return kConstants;
+}
+
+VirtualPlaneVariant VariantFor(const ReconstructionParameters& parameters,
+                               VirtualPlaneVariant variant) {
+  VirtualPlaneSteps& steps = variant.steps;
+  if (parameters.slice || parameters.isovalue) {
+    steps.curvature = steps.support = steps.area = false;
+  }
+  if (parameters.isovalue) steps.smoothing = false;
+  return variant;
 }
 
 }  // namespace partiemc

@@ -1,0 +1,99 @@
+// Experiments with the default placement: switch its steps off, vary its constants.
+// Not installed and not on the wire: for the evaluation, the tests and this repository's Python
+// module. Everybody else uses Reconstructor::Create, which is the method as METHOD.md describes it.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/reconstructor.h"
+
+namespace partiemc {
+
+/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). All on is the method.
+struct VirtualPlaneSteps {
+  bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, beside the cell's.
+  bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
+  bool curvature = true;      ///< Undo the kernel's rounding of curved boundaries.
+  bool support = true;        ///< Shift planes to the particles that support them.
+  bool smoothing = true;      ///< Vertices smoothed along the ring, but not across corners.
+  bool area = true;           ///< Match the particles' volumes where they are known.
+
+  /// One vertex per cell, one Newton step from the middle of its segment, and nothing else.
+  static constexpr VirtualPlaneSteps None() { return {false, false, false, false, false, false}; }
+
+  friend bool operator==(const VirtualPlaneSteps&, const VirtualPlaneSteps&) = default;
+};
+
+/// The constants of `virtual-plane`. core/METHOD.md, "The default placement", gives the purpose,
+/// the reason and the effect of each. In spacings unless noted otherwise.
+struct VirtualPlaneConstants {
+  // 1. Roots.
+  double newton_step = 0.3;  ///< Longest Newton step, in cells.
+  double long_step = 0.07;   ///< After a longer step the gradient is evaluated again, in cells.
+  // 2. Normals.
+  double normal_reach = 3;     ///< Window of the mean by distance along the ring.
+  double bilateral_reach = 6;  ///< Window of the mean by distance and angle.
+  // 3. Planes.
+  double curvature_reach = 2;       ///< Window of the curvature fit.
+  double rounding = 0.5;            ///< The kernel moves a bend inward by this times R^2 kappa / 9.
+  double support_radius = 2;        ///< Particles within this distance may support a plane.
+  double support_depth = 2;         ///< Particles deeper below the plane have no weight.
+  double support_height = 0.6;      ///< Particles higher above it do not count; limits the shift.
+  double support_scatter = 0.01;    ///< Variance in h^2 at which the support counts half.
+  double smoothing_reach = 3;       ///< Window of the mean of the neighbours' planes.
+  double thinning_distance = 0.01;  ///< Edge vertices nearer to the chord are removed.
+  // 4. Area.
+  double area_limit = 0.2;    ///< Largest offset.
+  double area_change = 0.01;  ///< Largest change of the offset per frame.
+
+  /// Shorter rings stay at their roots, as windows along them would overlap their own ends. Their
+  /// components do not count for the area.
+  double ShortestRing() const {
+    return 2 * std::max({normal_reach, bilateral_reach, curvature_reach, smoothing_reach});
+  }
+
+  friend bool operator==(const VirtualPlaneConstants&, const VirtualPlaneConstants&) = default;
+};
+
+/// A form of `virtual-plane`; by default the method itself.
+struct VirtualPlaneVariant {
+  VirtualPlaneSteps steps;
+  VirtualPlaneConstants constants;
+
+  friend bool operator==(const VirtualPlaneVariant&, const VirtualPlaneVariant&) = default;
+};
+
+/// A step by its name.
+struct NamedStep {
+  std::string_view name;  ///< "edge-vertices", ...
+  bool VirtualPlaneSteps::*value;
+};
+
+/// A constant by its name.
+struct NamedConstant {
+  std::string_view name;  ///< "normal-reach", ...
+  double VirtualPlaneConstants::*value;
+};
+
+/// All steps and all constants, in their order.
+std::span<const NamedStep> AllSteps();
+std::span<const NamedConstant> AllConstants();
+
+/// Reconstructor::Create for a variant of `virtual-plane`; other placements ignore it.
+/// Requires: constants are positive and finite. Errors: as Reconstructor::Create.
+absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& parameters,
+                                            const VirtualPlaneVariant& variant,
+                                            const FrameLimits& limits = {});
+
+/// `variant` without the steps that `parameters` rule out. A section of a body in space has no area
+/// to match, no curvature across its plane and a slanted outermost layer. The vertices of an
+/// isoline stay on it.
+VirtualPlaneVariant VariantFor(const ReconstructionParameters& parameters,
+                               VirtualPlaneVariant variant);
+
+}  // namespace partiemc
