@@ -189,7 +189,7 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     const PlacementTraits& traits = TraitsOf(parameters.placement);
     b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
                     traits.takes_particles);
-    EstimateNormals(b.bins, b.crossings, b.topology, b.sampler, parameters, previous.normals,
+    EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, previous.normals,
                     b.normal_scratch, b.planes, b.next_normals);
   });
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {

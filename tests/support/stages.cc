@@ -88,7 +88,7 @@ void Stages::Trace() {
 
 void Stages::RunFromRings(std::span<const CellNormal> previous) {
   field.Build(bins, crossings, scale, scale.kernel_radius + 1, true);
-  EstimateNormals(bins, crossings, topology, field, parameters, previous, normal_scratch, planes,
+  EstimateNormals({bins, crossings, topology, field, parameters}, previous, normal_scratch, planes,
                   next_normals);
   const Frame frame = particles.AsFrame();
   std::optional<double> area_offset;

@@ -19,14 +19,14 @@ std::int64_t KeyOf(const CellNormal& normal) {
   return (std::int64_t{normal.row} << 32) + normal.column;
 }
 
-// The place of a cell, without its normal.
-CellNormal PlaceOf(const TileDirectory& directory, const ActiveCell& cell) {
+// The position of a cell, without a normal.
+CellNormal PositionOfCell(const TileDirectory& directory, const ActiveCell& cell) {
   const TileCoordinate& tile = directory[cell.tile];
   return {(tile.x << kTileShift) + cell.i, (tile.y << kTileShift) + cell.j, 0, 0};
 }
 
-// Finds the normals that the cells of `order` had in the frame before: both are in one order.
-// Writes the cells' places to `next`.
+// Finds the previous normals of the cells of `order` by a merge: both lists are sorted by row.
+// Writes the positions of the cells to `next`.
 void MatchPrevious(std::span<const CellNormal> previous, std::span<const std::uint32_t> order,
                    const TileDirectory& directory, const Crossings& crossings,
                    NormalScratch& scratch, std::vector<CellNormal>& next) {
@@ -34,7 +34,7 @@ void MatchPrevious(std::span<const CellNormal> previous, std::span<const std::ui
   next.resize(order.size());
   std::uint32_t before = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
-    next[k] = PlaceOf(directory, crossings.cells[order[k]]);
+    next[k] = PositionOfCell(directory, crossings.cells[order[k]]);
     const std::int64_t key = KeyOf(next[k]);
     while (before < previous.size() && KeyOf(previous[before]) < key) ++before;
     if (before < previous.size() && KeyOf(previous[before]) == key) {
@@ -49,7 +49,8 @@ void SetNormal(double x, double y, CellPlane& plane) {
   plane.normal_y = y / length;
 }
 
-// Collects the middles of segments, of which a plane's vertex is 2 k + 1, and their entries, 2 k.
+// Adds the points of segment k to sample: its middle as vertex 2 k + 1, and optionally its entry as
+// vertex 2 k.
 template <typename Groups>
 void AddPoints(const TileDirectory& directory, std::size_t k, bool with_entry, CellPlane& plane,
                Groups& groups) {
@@ -71,7 +72,7 @@ void SetSample(std::size_t vertex, const LevelSetSample& sample, std::span<CellP
   (at_middle ? plane.gradient_y : plane.entry_gradient_y) = static_cast<float>(sample.gradient_y);
 }
 
-// The segment with which the group of a segment begins.
+// The first segment of the group that contains `segment`.
 std::size_t GroupOf(const RingTopology& rings, std::size_t segment) {
   if (segment == rings.segments.size()) return segment;
   const auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), segment);
@@ -88,43 +89,140 @@ void Orient(const CellNormal* reference, CellPlane& plane) {
   plane.normal_y = -plane.normal_y;
 }
 
-// Replaces the weak normals of one ring. Reliable ones were set before. previous_of(segment) is the
-// normal of the frame before, or nullptr.
-template <typename PreviousOf>
-void MendWeakNormals(std::span<const std::uint32_t> segments, PreviousOf previous_of,
-                     std::span<CellPlane> planes) {
-  const std::size_t count = planes.size();
-  for (std::size_t k = 0; k < count; ++k) {
-    CellPlane& plane = planes[k];
-    if (!plane.is_weak) continue;
-    if (const CellNormal* memory = previous_of(segments[k])) {
-      SetNormal(memory->x, memory->y, plane);
-      continue;
+// One call of EstimateNormals, after previous normals were matched to cells.
+class NormalEstimation {
+ public:
+  NormalEstimation(const NormalInput& input, std::span<const CellNormal> previous,
+                   NormalScratch& scratch, std::span<CellPlane> planes)
+      : input_(input),
+        traits_(TraitsOf(input.parameters.placement)),
+        previous_(previous),
+        scratch_(scratch),
+        planes_(planes) {}
+
+  // Computes the planes of all segments, in parallel. Weak normals are set in a second pass.
+  void Run() {
+    const RingTopology& rings = input_.topology;
+    ParallelForRanges(planes_.size(), kSegmentsAtOnce, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; k += kSegmentsAtOnce) {
+        Estimate(GroupOf(rings, k), GroupOf(rings, std::min(k + kSegmentsAtOnce, end)));
+      }
+    });
+    if (!any_is_weak_) return;
+    for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+      ReplaceWeakNormals(rings.offsets[ring], rings.offsets[ring + 1]);
     }
-    double x = 0, y = 0;
-    for (const std::size_t near : {(k + count - 1) % count, (k + 1) % count}) {
-      if (planes[near].is_weak) continue;
-      x += planes[near].normal_x;
-      y += planes[near].normal_y;
-    }
-    if (x * x + y * y < kWeakGradientSquare) {
-      x = plane.OutwardX();
-      y = plane.OutwardY();
-    }
-    SetNormal(x, y, plane);
   }
-}
 
-// Keeps a normal for the next frame, unless its cell has two.
-void Keep(const ActiveCell& cell, std::uint32_t index, const CellPlane& plane,
-          NormalScratch& scratch) {
-  if (cell.IsSaddle()) return;
-  scratch.normal[index] = {static_cast<float>(plane.normal_x), static_cast<float>(plane.normal_y)};
-}
+ private:
+  std::uint32_t CellOf(std::size_t segment) const {
+    return input_.crossings.segments[input_.topology.segments[segment]].cell;
+  }
 
-// Gives the places in `next` their cells' normals; those without one go.
-void Remember(std::span<const std::uint32_t> order, const NormalScratch& scratch,
-              std::vector<CellNormal>& next) {
+  // The previous normal of a cell, or nullptr.
+  const CellNormal* PreviousOf(std::uint32_t cell) const {
+    const std::uint32_t index = scratch_.previous[cell];
+    return index == kNoIndex ? nullptr : &previous_[index];
+  }
+
+  // Computes the planes of the segments [first, last), which are whole groups.
+  void Estimate(std::size_t first, std::size_t last) {
+    const RingTopology& rings = input_.topology;
+    // Cells are scattered in memory. Reading all indices first overlaps the cache misses.
+    std::array<std::uint32_t, kSegmentsAtOnce + kSegmentsOfGroup> cells;
+    std::array<bool, kSegmentsAtOnce + kSegmentsOfGroup> begins_group;
+    for (std::size_t k = first; k < last; ++k) cells[k - first] = CellOf(k);
+    auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
+    for (std::size_t k = first; k < last; ++k) {
+      if (k == *end) ++end;
+      planes_[k].cell = input_.crossings.cells[cells[k - first]];
+      planes_[k].entry = rings.entry_points[k];
+      planes_[k].exit = rings.entry_points[k + 1 == *end ? *(end - 1) : k + 1];
+      begins_group[k - first] = BeginsGroup(k - *(end - 1));
+    }
+    if (traits_.takes_particles) {
+      const FarthestParticle rule(input_.bins.tiles, input_.field);
+      for (std::size_t k = first; k < last; ++k) rule.SampleAtMean(planes_[k]);
+    } else {
+      auto groups =
+          CollectPoints<Point>([&](std::span<const FieldPoints> points) { Sample(points); });
+      for (std::size_t k = first; k < last; ++k) {
+        if (begins_group[k - first]) groups.Part();
+        AddPoints(input_.bins.tiles, k, traits_.refines, planes_[k], groups);
+      }
+      groups.Finish();
+    }
+    for (std::size_t k = first; k < last; ++k) SetReliableNormal(cells[k - first], planes_[k]);
+  }
+
+  void Sample(std::span<const FieldPoints> groups) {
+    std::array<FieldSamples, kQueriesAtOnce> samples;
+    input_.field.Sample(groups, samples);
+    for (std::size_t q = 0; q < groups.size(); ++q) {
+      for (std::size_t k = 0; k < groups[q].count; ++k) {
+        SetSample(groups[q].vertices[k], samples[q][k], planes_);
+      }
+    }
+  }
+
+  // Sets the normal of a plane, unless its gradient is weak.
+  void SetReliableNormal(std::uint32_t cell, CellPlane& plane) {
+    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
+                    kWeakGradientSquare;
+    if (plane.is_weak) {
+      any_is_weak_.store(true, std::memory_order_relaxed);
+      return;
+    }
+    SetNormal(plane.gradient_x, plane.gradient_y, plane);
+    Orient(PreviousOf(cell), plane);
+    StoreNormal(cell, plane);
+  }
+
+  // Sets the weak normals of the ring with the segments [first, last); reliable ones are set.
+  void ReplaceWeakNormals(std::size_t first, std::size_t last) {
+    const std::span<CellPlane> planes = planes_.subspan(first, last - first);
+    const std::size_t count = planes.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      CellPlane& plane = planes[k];
+      if (!plane.is_weak) continue;
+      const std::uint32_t cell = CellOf(first + k);
+      if (const CellNormal* memory = PreviousOf(cell)) {
+        SetNormal(memory->x, memory->y, plane);
+      } else {
+        double x = 0, y = 0;
+        for (const std::size_t near : {(k + count - 1) % count, (k + 1) % count}) {
+          if (planes[near].is_weak) continue;
+          x += planes[near].normal_x;
+          y += planes[near].normal_y;
+        }
+        if (x * x + y * y < kWeakGradientSquare) {
+          x = plane.OutwardX();
+          y = plane.OutwardY();
+        }
+        SetNormal(x, y, plane);
+      }
+      StoreNormal(cell, plane);
+    }
+  }
+
+  // Stores a normal for the next frame, unless its cell has two normals.
+  void StoreNormal(std::uint32_t cell, const CellPlane& plane) {
+    if (plane.cell.IsSaddle()) return;
+    scratch_.normal[cell] = {static_cast<float>(plane.normal_x),
+                             static_cast<float>(plane.normal_y)};
+  }
+
+  const NormalInput& input_;
+  const PlacementTraits& traits_;
+  std::span<const CellNormal> previous_;
+  NormalScratch& scratch_;
+  std::span<CellPlane> planes_;
+  std::atomic<bool> any_is_weak_ = false;
+};
+
+// Writes the stored normals to `next`, and removes the cells without one.
+void WriteNormals(std::span<const std::uint32_t> order, const NormalScratch& scratch,
+                  std::vector<CellNormal>& next) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto& [x, y] = scratch.normal[order[k]];
@@ -136,94 +234,19 @@ void Remember(std::span<const std::uint32_t> order, const NormalScratch& scratch
 
 }  // namespace
 
-void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
-                     const RingTopology& rings, const LevelSetSampler& field,
-                     const ReconstructionParameters& parameters,
-                     std::span<const CellNormal> previous, NormalScratch& scratch,
-                     std::vector<CellPlane>& planes, std::vector<CellNormal>& next) {
-  if (!parameters.normal_memory) previous = {};
-  // A saddle has two planes and so no normal of its own to remember.
+void EstimateNormals(const NormalInput& input, std::span<const CellNormal> previous,
+                     NormalScratch& scratch, std::vector<CellPlane>& planes,
+                     std::vector<CellNormal>& next) {
+  if (!input.parameters.normal_memory) previous = {};
+  const Crossings& crossings = input.crossings;
+  // A saddle has two planes and stores no normal.
   const std::span<const std::uint32_t> order = scratch.cells_by_row.List(
-      bins.tiles, crossings, [](const ActiveCell& cell) { return !cell.IsSaddle(); });
-  MatchPrevious(previous, order, bins.tiles, crossings, scratch, next);
-  // The normal that a cell had in the frame before, or nullptr.
-  const auto previous_of = [&](std::uint32_t cell) {
-    const std::uint32_t index = scratch.previous[cell];
-    return index == kNoIndex ? nullptr : &previous[index];
-  };
-  planes.resize(rings.segments.size());
+      input.bins.tiles, crossings, [](const ActiveCell& cell) { return !cell.IsSaddle(); });
+  MatchPrevious(previous, order, input.bins.tiles, crossings, scratch, next);
+  planes.resize(input.topology.segments.size());
   scratch.normal.assign(crossings.cells.size(), {0, 0});
-  std::atomic<bool> any_is_weak = false;
-  const auto set_normal = [&](std::uint32_t cell, CellPlane& plane) {
-    plane.is_weak = plane.gradient_x * plane.gradient_x + plane.gradient_y * plane.gradient_y <
-                    kWeakGradientSquare;
-    if (plane.is_weak) {
-      any_is_weak.store(true, std::memory_order_relaxed);
-      return;
-    }
-    SetNormal(plane.gradient_x, plane.gradient_y, plane);
-    Orient(previous_of(cell), plane);
-    Keep(plane.cell, cell, plane, scratch);
-  };
-  const auto sample = [&](std::span<const FieldPoints> groups) {
-    std::array<FieldSamples, kQueriesAtOnce> samples;
-    field.Sample(groups, samples);
-    for (std::size_t q = 0; q < groups.size(); ++q) {
-      for (std::size_t k = 0; k < groups[q].count; ++k) {
-        SetSample(groups[q].vertices[k], samples[q][k], planes);
-      }
-    }
-  };
-  const PlacementTraits& traits = TraitsOf(parameters.placement);
-  const auto estimate = [&](std::size_t first, std::size_t last) {
-    // Cells lie anywhere in memory: all are looked up before anything waits for one of them.
-    std::array<std::uint32_t, kSegmentsAtOnce + kSegmentsOfGroup> cells;
-    std::array<bool, kSegmentsAtOnce + kSegmentsOfGroup> begins_group;
-    for (std::size_t k = first; k < last; ++k) {
-      cells[k - first] = crossings.segments[rings.segments[k]].cell;
-    }
-    auto end = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), first);
-    for (std::size_t k = first; k < last; ++k) {
-      if (k == *end) ++end;
-      planes[k].cell = crossings.cells[cells[k - first]];
-      planes[k].entry = rings.entry_points[k];
-      planes[k].exit = rings.entry_points[k + 1 == *end ? *(end - 1) : k + 1];
-      begins_group[k - first] = BeginsGroup(k - *(end - 1));
-    }
-    if (traits.takes_particles) {
-      const FarthestParticle rule(bins.tiles, field);
-      for (std::size_t k = first; k < last; ++k) rule.SampleAtMean(planes[k]);
-    } else {
-      auto groups = CollectPoints<Point>(sample);
-      for (std::size_t k = first; k < last; ++k) {
-        if (begins_group[k - first]) groups.Part();
-        AddPoints(bins.tiles, k, traits.refines, planes[k], groups);
-      }
-      groups.Finish();
-    }
-    for (std::size_t k = first; k < last; ++k) set_normal(cells[k - first], planes[k]);
-  };
-  ParallelForRanges(planes.size(), kSegmentsAtOnce, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; k += kSegmentsAtOnce) {
-      estimate(GroupOf(rings, k), GroupOf(rings, std::min(k + kSegmentsAtOnce, end)));
-    }
-  });
-  if (any_is_weak) {
-    for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-      const std::size_t first = rings.offsets[ring];
-      const std::size_t count = rings.offsets[ring + 1] - first;
-      MendWeakNormals(
-          std::span(rings.segments).subspan(first, count),
-          [&](std::uint32_t segment) { return previous_of(crossings.segments[segment].cell); },
-          std::span(planes).subspan(first, count));
-    }
-    for (std::size_t k = 0; k < planes.size(); ++k) {
-      if (!planes[k].is_weak) continue;
-      const std::uint32_t index = crossings.segments[rings.segments[k]].cell;
-      Keep(planes[k].cell, index, planes[k], scratch);
-    }
-  }
-  Remember(order, scratch, next);
+  NormalEstimation(input, previous, scratch, planes).Run();
+  WriteNormals(order, scratch, next);
 }
 
 }  // namespace partiemc

@@ -20,11 +20,11 @@ namespace partiemc {
 /// mean at the cell's centre where vertices are particles (placement_traits.h).
 /// Sums of floats stay floats, because the planes of a frame do not fit into a cache.
 struct CellPlane {
-  ActiveCell cell;       ///< Of the segment: along a ring, cells lie anywhere in memory.
-  bool is_weak = false;  ///< The gradient was too small; the normal is a fallback.
-  Point point;           ///< Lattice coordinates of the world, in cells.
-  Point entry, exit;     ///< The segment's ends: linear crossings of lattice edges.
-  float value = 0;       ///< F at the point.
+  ActiveCell cell;  ///< The cell of the segment, copied, as cells of a ring are not contiguous.
+  bool is_weak = false;                  ///< The gradient was too small; the normal is a fallback.
+  Point point;                           ///< Lattice coordinates of the world, in cells.
+  Point entry, exit;                     ///< The segment's ends: linear crossings of lattice edges.
+  float value = 0;                       ///< F at the point.
   float gradient_x = 0, gradient_y = 0;  ///< Of F; of phi where vertices are particles.
   double normal_x = 0, normal_y = 0;     ///< Unit, oriented (Eq. 11).
   /// `virtual-plane` only: F and its gradient at `entry`.
@@ -36,30 +36,39 @@ struct CellPlane {
   double OutwardY() const { return entry.x - exit.x; }
 };
 
-/// Segments of a task.
+/// Number of segments processed together.
 inline constexpr std::size_t kSegmentsAtOnce = 64;
 
-/// Below this squared length a gradient of F or phi says nothing about direction (METHOD, 14).
+/// A gradient of F or phi with a smaller squared length is weak: its direction is unreliable.
 inline constexpr double kWeakGradientSquare = 1e-3;
 
 /// Warm buffers of EstimateNormals.
 struct NormalScratch {
   CellsByRow cells_by_row;
-  std::vector<std::uint32_t> previous;  ///< By active cell: which of the previous normals is its.
-  /// By active cell: its normal to remember; 0 where it has none.
-  std::vector<std::array<float, 2>> normal;
+  std::vector<std::uint32_t> previous;       ///< By active cell: index of its previous normal.
+  std::vector<std::array<float, 2>> normal;  ///< By active cell: normal to store; 0 if none.
 };
 
-/// One plane per segment of `rings`, in their order. `previous` are the cell normals of the frame
-/// before (State::normals); `next` receives those of this one, sorted the same way.
-/// Orientation: by the previous normal of the cell where there is one and parameters ask for it,
-/// else by the segment. Weak gradients take the previous normal, else the mean of the ring's
-/// neighbouring reliable ones, else the segment's own.
-/// Deterministic, in parallel over segments. Cost: a field sample per segment.
-void EstimateNormals(const ParticleBins& bins, const Crossings& crossings,
-                     const RingTopology& rings, const LevelSetSampler& field,
-                     const ReconstructionParameters& parameters,
-                     std::span<const CellNormal> previous, NormalScratch& scratch,
-                     std::vector<CellPlane>& planes, std::vector<CellNormal>& next);
+/// Results of the earlier stages.
+struct NormalInput {
+  const ParticleBins& bins;
+  const Crossings& crossings;
+  const RingTopology& topology;
+  const LevelSetSampler& field;
+  const ReconstructionParameters& parameters;
+};
+
+/// Computes one plane for each segment of the topology, in the order of the segments.
+///
+/// `previous` are the cell normals of the last frame (State::normals); `next` receives the normals
+/// of this frame in the same order. A normal is oriented by the previous normal of its cell, if
+/// there is one and `parameters.normal_memory` is set, else by the segment. If the gradient is
+/// weak, the normal is the previous one, else the mean of the reliable neighbours on the ring, else
+/// the normal of the segment.
+///
+/// Deterministic. Parallel over segments. Cost: one or two field samples for each segment.
+void EstimateNormals(const NormalInput& input, std::span<const CellNormal> previous,
+                     NormalScratch& scratch, std::vector<CellPlane>& planes,
+                     std::vector<CellNormal>& next);
 
 }  // namespace partiemc
