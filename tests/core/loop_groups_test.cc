@@ -19,8 +19,7 @@ using testing::Rectangle;
 using testing::Region;
 using testing::Reversed;
 
-/// Regions beside each other, of all kinds: what a strip takes, what it refuses and what has one
-/// loop or many.
+/// Separate regions of all kinds: suitable for a strip, unsuitable, with one loop or many.
 std::vector<Region> Regions(std::size_t count) {
   Random random(8);
   std::vector<Region> regions;
@@ -47,7 +46,7 @@ std::vector<Region> Regions(std::size_t count) {
   return regions;
 }
 
-/// All loops, first those that come first in their regions, as rings come before staircases.
+/// All loops, the first loops of all regions first, as rings come before staircases.
 Region Deal(const std::vector<Region>& regions, LoopGroups& groups) {
   Region all;
   std::vector<std::uint32_t> first;
@@ -70,14 +69,14 @@ Region Deal(const std::vector<Region>& regions, LoopGroups& groups) {
       all.AddLoop(points);
       const bool reversed = k % 2 == 1;
       if (reversed) std::reverse(points.begin(), points.end());
-      for (const std::uint32_t point : points) groups.AddPoint(point);
+      groups.AddPoints(points);
       groups.EndLoop(2 * k, reversed);  // Every second group has no loop.
     }
   }
   return all;
 }
 
-TEST(LoopGroups, RegionsOfAllKindsAreCoveredWhateverTheNumberOfThreads) {
+TEST(LoopGroups, CoverAllRegionsForAnyNumberOfThreads) {
   const std::vector<Region> regions = Regions(400);
   std::vector<std::uint32_t> expected;
   for (const unsigned threads : {1u, 2u, 7u}) {

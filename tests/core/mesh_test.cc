@@ -52,7 +52,7 @@ class MeshOf : public testing::TestWithParam<std::tuple<Scene, Placement>> {
   }
 };
 
-TEST_P(MeshOf, EveryFillKeepsWhatAResultPromises) {
+TEST_P(MeshOf, EveryFillKeepsTheGuarantees) {
   for (const Fill fill : AllFills()) {
     const Result result = With(fill);
     if (!IsFarthest()) {
@@ -80,11 +80,11 @@ TEST_P(MeshOf, NoFillChangesARingByABit) {
   }
 }
 
-TEST_P(MeshOf, EveryFillTellsHowManyTrianglesGridWouldHaveMade) {
+TEST_P(MeshOf, EveryFillReportsTrianglesOfGrid) {
   const std::uint64_t grid = With(Fill::kGrid).mesh.TriangleCount();
   for (const Fill fill : AllFills()) {
     const Result result = With(fill);
-    // A collapsed triangle of farthest-particle is only known once there is a mesh.
+    // The collapsed triangles of farthest-particle are known only after the mesh was made.
     if (IsFarthest() && (fill == Fill::kNone || fill == Fill::kPolygon)) continue;
     EXPECT_EQ(result.statistics.triangles_grid, grid) << Name(fill);
   }
@@ -106,7 +106,7 @@ std::set<Triangle> TrianglesOf(const Mesh& mesh, TriangleClass wanted) {
   return triangles;
 }
 
-TEST_P(MeshOf, TheBandIsTheSameForGridGreedyAndConforming) {
+TEST_P(MeshOf, BandIsTheSameForGridGreedyAndConforming) {
   const auto grid = TrianglesOf(With(Fill::kGrid).mesh, TriangleClass::kBoundary);
   EXPECT_EQ(TrianglesOf(With(Fill::kGreedy).mesh, TriangleClass::kBoundary), grid);
   EXPECT_EQ(TrianglesOf(With(Fill::kConforming).mesh, TriangleClass::kBoundary), grid);
@@ -120,7 +120,7 @@ TEST_P(MeshOf, PolygonHasNoInteriorVertex) {
       0);
 }
 
-TEST_P(MeshOf, TrianglesThatAreFoldedAreCounted) {
+TEST_P(MeshOf, FoldedTrianglesAreCounted) {
   for (const Fill fill : AllFills()) {
     const Result result = With(fill);
     std::uint64_t folded = 0;
@@ -208,7 +208,7 @@ TEST_P(GreedyRectangles, AreDisjointAndCoverTheInteriorCellsExactly) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, GreedyRectangles, testing::Range(1, 11));
 
-TEST(Mesh, ARectangleOfCellsIsOneRectangleHoweverTilesCutIt) {
+TEST(Mesh, RectangleAcrossTilesStaysWhole) {
   TileDirectory directory;
   for (std::int32_t y = 0; y <= 2; ++y) {
     for (std::int32_t x = 0; x <= 2; ++x) directory.Insert({y, x});
@@ -241,7 +241,7 @@ TEST(Mesh, ARectangleOfCellsIsOneRectangleHoweverTilesCutIt) {
   EXPECT_EQ(staircases.pinches, 0u);
 }
 
-TEST(Mesh, CellsThatTouchAtANodeOnlyArePinchedThere) {
+TEST(Mesh, DiagonalCellsMakeAPinch) {
   TileDirectory directory;
   directory.Insert({0, 0});
   directory.Seal();

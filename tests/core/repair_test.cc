@@ -32,8 +32,8 @@ std::vector<double> Reversed(const std::vector<double>& ring) {
   return result;
 }
 
-// Moves `rings` from `roots`, repairs them, and checks that nothing crosses and that they were
-// measured as they are now.
+// Moves `rings` from `roots` and repairs them. Checks that nothing crosses and that the measures
+// are up to date.
 Rings Repaired(const Rings& roots, Rings rings) {
   RepairScratch scratch;
   EXPECT_TRUE(RepairRings(roots.points, scratch, rings));
@@ -45,25 +45,25 @@ Rings Repaired(const Rings& roots, Rings rings) {
   return rings;
 }
 
-TEST(Repair, LeavesRingsAloneThatAreInTheirPlaces) {
+TEST(Repair, LeavesCorrectRingsUnchanged) {
   const Rings roots = RingsOf({Square(0, 0, 10), Reversed(Square(0, 0, 3))}, 1);
   const Rings moved = RingsOf({Square(0, 0, 10.5), Reversed(Square(0.5, 0, 2))}, 1);
   EXPECT_EQ(Repaired(roots, moved).points, moved.points);
 }
 
-TEST(Repair, BringsCrossingSegmentsBackOnlyAsFarAsItTakes) {
+TEST(Repair, MovesCrossingSegmentsBackPartly) {
   const Rings roots = RingsOf({Square(0, 0, 1), Square(3, 0, 1)}, 2);
   Rings moved = roots;
   moved.points[2] = 2.1;  // The lower right corner of the first, now inside of the second.
   const Rings repaired = Repaired(roots, moved);
   EXPECT_LT(repaired.points[2], 2.0);
   EXPECT_GT(repaired.points[2], 1.0) << "half way is enough here";
-  // The far corners of the second square were not near it.
+  // The far corners of the second square do not move.
   EXPECT_EQ(repaired.points[8 + 2], 4);
 }
 
-TEST(Repair, FindsARingThatAnotherOneHasPassedOverWithoutCrossing) {
-  // A small ring beside a large one, which has grown over it.
+TEST(Repair, FindsRingThatAnotherHasPassedOver) {
+  // A small ring next to a large one that has grown over it.
   const Rings roots = RingsOf({Square(0, 0, 5), Square(7, 0, 0.5)}, 2);
   Rings moved = roots;
   for (std::size_t k = 0; k < 8; ++k) moved.points[k] *= 2;
@@ -71,14 +71,14 @@ TEST(Repair, FindsARingThatAnotherOneHasPassedOverWithoutCrossing) {
   EXPECT_EQ(repaired.points, roots.points);
 }
 
-TEST(Repair, FindsAnIslandThatHasLeftTheHoleThatItLiesIn) {
+TEST(Repair, FindsIslandThatLeftItsHole) {
   Rings roots = RingsOf({Square(0, 0, 10), Square(0, 0, 1), Reversed(Square(0, 0, 5))}, 2);
   Rings moved = roots;
   for (std::size_t k = 8; k < 16; k += 2) moved.points[k] += 7.5;  // Into the fluid.
   EXPECT_EQ(Repaired(roots, moved).points, roots.points);
 }
 
-TEST(Repair, FindsARingThatWasTurnedInsideOut) {
+TEST(Repair, FindsRingTurnedInsideOut) {
   const Rings roots = RingsOf({Square(0, 0, 1)}, 1);
   Rings moved = roots;
   for (double& coordinate : moved.points) coordinate *= -1;  // Half a turn: still fine.
@@ -89,7 +89,7 @@ TEST(Repair, FindsARingThatWasTurnedInsideOut) {
   EXPECT_EQ(Repaired(roots, moved).points, roots.points);
 }
 
-TEST(Repair, FindsOneHoleThatLeftAPlateOfThousands) {
+TEST(Repair, FindsOneOfThousandsOfHolesOutsideItsPlate) {
   constexpr int kSide = 60;
   std::vector<std::vector<double>> points{Square(2.0 * kSide, 2.0 * kSide, 2.0 * kSide + 2)};
   for (int k = 0; k < kSide * kSide; ++k) {
@@ -106,14 +106,14 @@ TEST(Repair, FindsOneHoleThatLeftAPlateOfThousands) {
   }
 }
 
-/// Each round frees one square, which then meets the next: as many rounds as there are squares, if
-/// nothing were to end them.
-TEST(Repair, EndsInSimpleRingsHoweverManyRoundsItWouldTake) {
+/// Each round frees one square, which then meets the next one. Without a limit there would be one
+/// round for each square.
+TEST(Repair, EndsInSimpleRingsAfterTheLastRound) {
   constexpr int kSquares = 200;
   std::vector<std::vector<double>> at_roots, elsewhere;
   for (int k = 0; k < kSquares; ++k) {
     at_roots.push_back(Square(3 * k, 0, 1));
-    // Where the next one belongs, but for the last, which stays: it meets the one before.
+    // Each square takes the position of the next one. The last square stays.
     elsewhere.push_back(k + 1 < kSquares ? Square(3 * k + 3, 0, 1) : Square(3 * k, 0, 1));
   }
   const Rings roots = RingsOf(at_roots, kSquares);
@@ -142,7 +142,7 @@ TEST(Repair, FailsIfARingIsMisplacedAtItsRoot) {
   EXPECT_FALSE(RepairRings(roots.points, scratch, rings));
 }
 
-TEST(Repair, SeparatesPointsThatFellTogether) {
+TEST(Repair, SeparatesCoincidentPoints) {
   const Rings roots = RingsOf({Square(0, 0, 1)}, 1);
   Rings moved = roots;
   moved.points[2] = moved.points[0];

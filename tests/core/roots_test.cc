@@ -1,6 +1,6 @@
-// An attempt to break the argument that rings through the roots of `virtual-plane` are simple and
-// nested (core/METHOD.md, "Why rings are simple"): level sets of every evil kind, vertices that
-// want to be anywhere, edge vertices thinned in every pattern, and the repair that relies on it.
+// Tests that rings through the roots of `virtual-plane` are simple and nested (core/METHOD.md, "Why
+// rings are simple"). Uses adversarial level sets, arbitrary vertices, edge vertices thinned in
+// every pattern, and the repair, which relies on it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace {
 using support::Random;
 using support::Stages;
 
-// Where the lattice may lie: round the origin, within one tile, and as far as positions may.
+// Positions of the lattice: around the origin, within one tile, and at the limit of positions.
 constexpr TileCoordinate kPlaces[] = {{0, 0}, {7, -13}, {(1 << 25) - 2, (1 << 25) - 2}};
 
 // Stages 3 and 4 of a random patch of 12 x 12 nodes across the corner of four tiles, or within one.
@@ -38,7 +38,7 @@ void TraceRandomPatch(Random& random, Stages& stages) {
                  {.spacing = kSpacings[random.Below(4)], .clean = false});
 }
 
-// What a vertex on its way to a root goes through, and what tests leave out to see themselves fail.
+// The steps from a vertex to its root. A test leaves out one of them to see that it is needed.
 enum class Clamping {
   kWhole,     // As the placement does.
   kNone,      // The vertex stays where the Newton step put it.
@@ -72,7 +72,7 @@ Point BareCrossing(const Stages& stages, const Segment& segment) {
           origin.y + kCornerY[a] + t * (kCornerY[b] - kCornerY[a])};
 }
 
-// Where the vertices of a lattice's cells want to be.
+// Target positions of the cell vertices.
 enum class Aim { kNewton, kAnywhere, kCorners, kOnePoint, kCount };
 
 Point Aimed(Random& random, Aim aim, const CellPlane& plane, Point target) {
@@ -91,8 +91,8 @@ Point Aimed(Random& random, Aim aim, const CellPlane& plane, Point target) {
   return VirtualPlaneVertex(plane, VirtualPlaneConstants{}.newton_step);
 }
 
-// The plane of a segment with a value and gradient that have nothing to do with the level set:
-// from just weak to beyond all measure.
+// The plane of a segment with an arbitrary value and gradient, from weak to extremely large,
+// unrelated to the level set.
 CellPlane RandomPlane(Random& random, const Stages& stages, const Segment& segment) {
   const ActiveCell& cell = stages.crossings.cells[segment.cell];
   CellPlane plane;
@@ -140,7 +140,7 @@ void RingsThroughRoots(Random& random, const Stages& stages, Clamping clamping, 
   rings.outer_of = topology.outer_of;
 }
 
-TEST(Roots, RingsThroughThemAreSimpleAndNestedWhateverTheLevelSet) {
+TEST(Roots, RingsAreSimpleAndNestedForAnyLevelSet) {
   Stages stages;
   Result result;
   std::size_t rings = 0, saddles = 0, thinned = 0;
@@ -154,16 +154,16 @@ TEST(Roots, RingsThroughThemAreSimpleAndNestedWhateverTheLevelSet) {
     for (const ActiveCell& cell : stages.crossings.cells) saddles += cell.IsSaddle();
     thinned += 2 * stages.topology.segments.size() - result.rings.PointCount();
   }
-  // What was tried is what the argument is about.
+  // The test covered the cases of the argument.
   EXPECT_GT(rings, 100'000u);
   EXPECT_GT(saddles, 100'000u);
   EXPECT_GT(thinned, 100'000u);
 }
 
-// The test above sees each clamp that is left out, and sees it soon.
+// The test above fails soon if any clamp is left out.
 class RootsWithout : public testing::TestWithParam<Clamping> {};
 
-TEST_P(RootsWithout, AClampCrossOrTouch) {
+TEST_P(RootsWithout, AnyClampCrossOrTouch) {
   Stages stages;
   Result result;
   std::size_t broken = 0;
@@ -187,9 +187,9 @@ INSTANTIATE_TEST_SUITE_P(Clamps, RootsWithout,
                                          Clamping::kToNodes),
                          NameOf);
 
-// Points thrown about, far over other rings: whatever stood there before, the repair ends with
-// rings that are simple and nested, because it can always go back to the roots.
-TEST(Roots, TheRepairFindsBackToThemFromAnywhere) {
+// Points moved at random, far over other rings. The repair ends with simple, nested rings, because
+// it can always return to the roots.
+TEST(Roots, RepairReturnsFromAnywhere) {
   Stages stages;
   Result result;
   RepairScratch scratch;
@@ -214,8 +214,9 @@ TEST(Roots, TheRepairFindsBackToThemFromAnywhere) {
   EXPECT_GT(crossing, 1'000u);
 }
 
-// The placement itself, on level sets that its particles contradict: its gradients point anywhere.
-TEST(Roots, ThoseOfThePlacementAreSimpleWithAnyEdgeVerticesAndSoIsWhatItMakesOfThem) {
+// The placement itself, on level sets that contradict the particles, so that gradients are
+// arbitrary.
+TEST(Roots, PlacementIsSimpleWithAnyEdgeVertices) {
   Stages stages;
   std::size_t points = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {

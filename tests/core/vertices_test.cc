@@ -48,7 +48,7 @@ struct NoisyStages : Stages {
   }
 };
 
-TEST(Vertices, OfMarchingSquaresAreLinearInterpolationsOnLatticeEdges) {
+TEST(Vertices, MarchingSquaresInterpolatesOnLatticeEdges) {
   support::Random random(1);
   Stages stages;
   stages.Run(support::Scaled(support::Blob(random, 9), 0.3),
@@ -74,7 +74,7 @@ TEST(Vertices, OfMarchingSquaresAreLinearInterpolationsOnLatticeEdges) {
 
 class VerticesInCells : public testing::TestWithParam<std::tuple<int, Placement>> {};
 
-TEST_P(VerticesInCells, StayStrictlyInsideTheirCellAndInASaddleOnTheirSide) {
+TEST_P(VerticesInCells, StayInsideTheirCellOrHalfOfASaddle) {
   const auto [seed, placement] = GetParam();
   const NoisyStages stages(static_cast<std::uint64_t>(seed), placement);
   int saddles = 0;
@@ -106,8 +106,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, VerticesInCells,
                                           testing::Values(Placement::kVirtualPlane,
                                                           Placement::kQef)));
 
-TEST(Vertices,
-     OfTheVirtualPlaneWithoutItsStepsLieNearerToTheLevelSetThanTheMiddlesOfTheirSegments) {
+TEST(Vertices, VirtualPlaneRootsAreNearTheLevelSet) {
   support::Random random(2);
   Stages stages;
   stages.variant.steps = VirtualPlaneSteps::None();
@@ -124,7 +123,7 @@ TEST(Vertices,
   EXPECT_LT(vertices, 0.2 * middles);
 }
 
-TEST(Vertices, OfTheVirtualPlaneTakeOneBoundedStepAlongTheGradient) {
+TEST(Vertices, VirtualPlaneTakesOneBoundedStep) {
   constexpr double kRounding = 1e-7;  // Of F and its gradient.
   const auto vertex = [](float value, float gx, float gy, bool weak = false) {
     CellPlane plane;
@@ -150,8 +149,8 @@ TEST(Vertices, OfTheVirtualPlaneTakeOneBoundedStepAlongTheGradient) {
   EXPECT_EQ(weak.y, 20);
 }
 
-// One inside node at (10, 10), whose cell (10, 10) is cut at (10.5, 10) and (10, 10.5), and a lone
-// particle: the level set round it has normals that point away from it.
+// One inside node at (10, 10), so that cell (10, 10) is cut at (10.5, 10) and (10, 10.5), and a
+// lone particle. The normals of its level set point away from it.
 struct Corner : Stages {
   Corner(double px, double py) {
     Particles particle;
@@ -168,7 +167,7 @@ struct Corner : Stages {
   }
 };
 
-TEST(Vertices, OfTheQefLieOnTheCornerOfTwoStraightLines) {
+TEST(Vertices, QefFindsCornerOfTwoLines) {
   for (const auto& [px, py] :
        {std::pair(10.1, 10.2), {10.15, 10.1}, {9.9, 10.1}, {10.386, 10.265}}) {
     const Corner corner(px, py);
@@ -184,8 +183,8 @@ TEST(Vertices, OfTheQefLieOnTheCornerOfTwoStraightLines) {
   }
 }
 
-TEST(Vertices, OfTheQefStayAtTheMiddleAlongADirectionThatNormalsDoNotConstrain) {
-  // From far away both normals are nearly the same: only their common direction counts.
+TEST(Vertices, QefStaysAtMiddleAlongFreeDirection) {
+  // Far from the particle both normals are nearly equal, so only their common direction counts.
   const Corner corner(8.2, 8.2);
   const Frame frame = corner.particles.AsFrame();
   const std::size_t k = corner.SegmentInCell(10, 10);
@@ -194,7 +193,7 @@ TEST(Vertices, OfTheQefStayAtTheMiddleAlongADirectionThatNormalsDoNotConstrain) 
   EXPECT_NEAR(vertex.x + vertex.y, 20.5, 0.1);
 }
 
-TEST(Vertices, OfTheQefBeyondTheirCellAreMovedToItsSide) {
+TEST(Vertices, QefClampsToTheCell) {
   bool clamped = false;
   for (const auto& [px, py] : {std::pair(10.386, 10.265), {10.265, 10.386}, {10.1, 10.2}}) {
     const Corner corner(px, py);
@@ -212,8 +211,8 @@ TEST(Vertices, OfTheQefBeyondTheirCellAreMovedToItsSide) {
   EXPECT_TRUE(clamped);
 }
 
-// Section 3.5 by brute force, from the equations on.
-TEST(Vertices, OfTheFarthestParticleAreTheParticlesThatTheSectionPicks) {
+// Section 3.5 of the paper, computed directly from its equations by brute force.
+TEST(Vertices, FarthestParticleAgreesWithBruteForce) {
   int picked = 0, none = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -258,7 +257,7 @@ TEST(Vertices, OfTheFarthestParticleAreTheParticlesThatTheSectionPicks) {
   EXPECT_GT(none, 10);
 }
 
-TEST(Vertices, OfTheFarthestParticleMoveOutwardByTheSurfaceOffset) {
+TEST(Vertices, FarthestParticleAddsSurfaceOffset) {
   support::Random random(3);
   const Particles particles = support::Scaled(support::Blob(random, 8), 0.1);
   Stages plain, moved;
@@ -274,7 +273,7 @@ TEST(Vertices, OfTheFarthestParticleMoveOutwardByTheSurfaceOffset) {
   }
 }
 
-TEST(Vertices, OfTheFarthestParticleDropConsecutiveDuplicatesAndCollapsedRings) {
+TEST(Vertices, FarthestParticleDropsDuplicatesAndCollapsedRings) {
   Particles particles = support::Disc(8);
   particles.Add(30, 30);  // All cells round a lone particle choose it: no ring is left.
   Stages stages;
@@ -288,7 +287,7 @@ TEST(Vertices, OfTheFarthestParticleDropConsecutiveDuplicatesAndCollapsedRings) 
     const std::size_t next = (k + 2) % points.size();
     EXPECT_FALSE(points[k] == points[next] && points[k + 1] == points[next + 1]);
   }
-  // Every segment knows the point that its vertex became.
+  // Every segment refers to its vertex.
   for (std::size_t k = 0; k < stages.planes.size(); ++k) {
     const std::uint32_t point = stages.placed.point_of_segment[k];
     if (point == kNoPoint) {

@@ -1,4 +1,4 @@
-// The default placement as a whole: what its steps promise on shapes whose truth is known.
+// The default placement as a whole, on shapes with a known truth.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -52,8 +52,8 @@ Result Reconstructed(const std::vector<double>& positions,
   return Reconstructed(positions, parameters, state, {.steps = steps});
 }
 
-// Root mean square of the distance of the first ring from its mean radius, sampled along its
-// segments, so that it does not matter where the vertices are.
+// Root mean square deviation of the first ring from its mean radius. Sampled along segments, so
+// that the distribution of the vertices has no effect.
 double Roughness(const Rings& rings) {
   constexpr int kSamples = 10;
   const std::span<const double> points = rings.RingPoints(0);
@@ -84,7 +84,7 @@ TEST(VirtualPlane, FindsTheRadiusOfADisc) {
   }
 }
 
-// Area of a disc without the area step and without the others that `steps` lacks.
+// Area of a disc without the area step; `steps` selects the other steps.
 double DiscArea(double radius, VirtualPlaneSteps steps) {
   steps.area = false;
   const Result result = Reconstructed(Disc(radius, 0.05, 5), {}, steps);
@@ -93,7 +93,7 @@ double DiscArea(double radius, VirtualPlaneSteps steps) {
 
 // The kernel moves a boundary of curvature kappa by h^2 kappa / 2: around a disc these add up to
 // pi h^2, whatever its radius.
-TEST(VirtualPlane, GivesADiscBackWhatTheKernelRounds) {
+TEST(VirtualPlane, CorrectsRoundingOfTheKernelOnADisc) {
   VirtualPlaneSteps steps, no_curvature;
   steps.support = no_curvature.support = no_curvature.curvature = false;
   for (const double radius : {6.0, 12.0, 24.0}) {
@@ -102,8 +102,8 @@ TEST(VirtualPlane, GivesADiscBackWhatTheKernelRounds) {
   }
 }
 
-// Of what particles tell only the variation along a ring counts.
-TEST(VirtualPlane, KeepsTheAreaOfADiscWhateverTheMeanOfItsSupport) {
+// Only the variation of the support along a ring counts.
+TEST(VirtualPlane, MeanOfSupportDoesNotChangeTheArea) {
   VirtualPlaneSteps steps, no_support;
   no_support.support = false;
   for (const double radius : {6.0, 12.0, 24.0}) {
@@ -122,7 +122,7 @@ TEST(VirtualPlane, IsSmootherThanItsStartUnderNoise) {
   EXPECT_LT(smooth, 0.9 * rough);
 }
 
-TEST(VirtualPlane, MatchesTheVolumeOfTheParticlesWhereItIsKnown) {
+TEST(VirtualPlane, MatchesKnownVolume) {
   const std::vector<double> positions = Disc(12, 0.1, 3);
   const auto volume = static_cast<double>(positions.size() / 2);
   const ReconstructionParameters small{.reference_radius = 0.78};  // About 0.06 spacings inward.
@@ -134,7 +134,7 @@ TEST(VirtualPlane, MatchesTheVolumeOfTheParticlesWhereItIsKnown) {
   EXPECT_LT(after, 0.4 * before);
 }
 
-TEST(VirtualPlane, ChangesItsAreaOffsetByLittleAFrameAndRemembersItInTheState) {
+TEST(VirtualPlane, LimitsAndStoresChangeOfAreaOffset) {
   const std::vector<double> positions = Disc(12, 0.05, 4);
   const double change = VirtualPlaneConstants{}.area_change;
   State state;
@@ -152,7 +152,7 @@ TEST(VirtualPlane, ChangesItsAreaOffsetByLittleAFrameAndRemembersItInTheState) {
   }
 }
 
-TEST(VirtualPlane, AsksNoSprayForItsArea) {
+TEST(VirtualPlane, SprayDoesNotCountForTheArea) {
   std::vector<double> positions = Disc(12, 0.05, 4);
   State alone, beside_spray;
   Reconstructed(positions, {}, alone);
@@ -163,7 +163,7 @@ TEST(VirtualPlane, AsksNoSprayForItsArea) {
   EXPECT_EQ(beside_spray.area_offset, alone.area_offset);
 }
 
-TEST(VirtualPlane, DoesNotMoveTheOutlineByMoreThanItsLimitForAnyVolume) {
+TEST(VirtualPlane, LimitsAreaOffsetForAnyVolume) {
   const std::vector<double> positions = Disc(12, 0.05, 5);
   for (const float volume : {0.5f, 1.5f}) {
     const std::vector<float> volumes(positions.size() / 2, volume);
@@ -180,9 +180,9 @@ TEST(VirtualPlane, DoesNotMoveTheOutlineByMoreThanItsLimitForAnyVolume) {
   }
 }
 
-// Vertices on an axis, which such an offset would move to 1e-300, where no product of two
-// coordinates is told from 0.
-TEST(VirtualPlane, LeavesVerticesOnAnAxisWhenTheOffsetHasDecayedToNextToNothing) {
+// Vertices on an axis. A tiny offset would move them to 1e-300, where products of two coordinates
+// underflow to 0.
+TEST(VirtualPlane, TinyOffsetLeavesVerticesOnAnAxis) {
   // A drop whose ring is too short to be refined, and has vertices at x = 0 exactly.
   const std::vector<double> positions = {0, 7.5, 0, 7.5};
   for (const double offset : {1e-300, -1e-300, 5e-324}) {
@@ -208,7 +208,7 @@ TEST(VirtualPlane, KeepsFewMoreVerticesThanMarchingSquares) {
 }
 
 // A ring of many stretches, and bodies of more points than one batch of the mesh.
-TEST(VirtualPlane, HasTheSameBitsForAnyNumberOfThreadsAndAnyInstructionSet) {
+TEST(VirtualPlane, SameBitsForAnyThreadsAndInstructionSet) {
   std::vector<double> positions = Disc(170, 0.2, 11);
   for (int k = 0; k < 60; ++k) {
     const std::vector<double> island = Disc(12, 0.2, k);
@@ -235,7 +235,7 @@ TEST(VirtualPlane, HasTheSameBitsForAnyNumberOfThreadsAndAnyInstructionSet) {
 }
 
 // Ends and sides of an ellipse, 40 lattices at random angles, shaken: how far out each is drawn.
-TEST(VirtualPlane, BendsAreWhereTheyAreAtAnyKernelRadius) {
+TEST(VirtualPlane, BendsDoNotDependOnTheKernelRadius) {
   constexpr double kA = 30, kB = 12;
   for (const double kernel_radius : {2.0, 3.0, 4.0, 6.0}) {
     double ends = 0, sides = 0;
@@ -271,8 +271,8 @@ TEST(VirtualPlane, BendsAreWhereTheyAreAtAnyKernelRadius) {
         }
       }
     }
-    // Seen: -.02, the same for all of them. With a correction that does not grow with the square of
-    // the radius, -.15 at 6.
+    // Measured: -.02 for all radii. A correction that does not grow with the square of the radius
+    // gives -.15 at 6.
     EXPECT_NEAR(ends / end_count, sides / side_count, .04) << "kernel radius " << kernel_radius;
   }
 }

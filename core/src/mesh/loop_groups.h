@@ -20,9 +20,7 @@ class LoopGroups {
  public:
   void Clear();
 
-  /// Appends a point to the current loop.
-  void AddPoint(std::uint32_t point) { points_.push_back(point); }
-  /// Appends the points [first, last).
+  /// Appends the points [first, last) to the current loop.
   void AddPoints(std::uint32_t first, std::uint32_t last) {
     points_.resize(points_.size() + (last - first));
     std::iota(points_.end() - (last - first), points_.end(), first);

@@ -8,7 +8,7 @@
 
 namespace partiemc {
 
-/// Samples planes and chooses vertices. Refers to its arguments; safe to share between threads.
+/// Samples planes and selects vertices. Refers to its arguments. Thread-safe.
 class FarthestParticle {
  public:
   FarthestParticle(const TileDirectory& directory, const LevelSetSampler& field)
@@ -18,9 +18,9 @@ class FarthestParticle {
   /// gradient to grad phi there (Eq. 9). Where no particle reaches the mean, the gradient is 0.
   void SampleAtMean(CellPlane& plane) const;
 
-  /// The vertex of a plane in world units: the particle farthest along its normal, among those
-  /// that are not below the plane and within the smaller of a cell and the kernel radius of its
-  /// point; without one the middle of the segment. Moved outward by the surface offset.
+  /// The vertex of a plane, in world units: the position of the particle farthest along its normal.
+  /// Candidates are not below the plane, and lie within one cell and within the kernel radius of
+  /// its point. Without a candidate, returns the middle of the segment. Adds the surface offset.
   Point Vertex(const CellPlane& plane, const Frame& frame,
                const ReconstructionParameters& parameters, const Scale& scale) const;
 

@@ -197,9 +197,9 @@ void ForEachPairBetween(const Search& s, const Block& first, const Block& second
   }
 }
 
-/// Calls visit(i, j) for all pairs that count between segments of a block and of later blocks. The
-/// lower left corner of a touching block is neither above nor to the right of this block's box, and
-/// less than one cell below or to the left of it.
+/// Calls visit(i, j) for all pairs that count between segments of a block and of later blocks.
+/// Searches the cells that can contain the lower left corner of a touching block: those that meet
+/// the block's box, one more column on the left and one more row below.
 template <typename Visit>
 void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t index, Visit visit) {
   const std::span<const Block> blocks = s.buffers.blocks;

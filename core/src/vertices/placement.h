@@ -1,4 +1,4 @@
-// Where the vertex of one cell goes, for each placement (paper, sections 3.4-3.5).
+// Places the vertex of one cell (paper, sections 3.4-3.5).
 #pragma once
 
 #include <algorithm>
@@ -7,17 +7,16 @@
 
 namespace partiemc {
 
-/// Vertices keep this share of a cell away from its sides, so that neighbouring vertices neither
-/// meet nor change sides when they are rounded to world coordinates.
+/// Distance between clamped vertices and the sides of their cells, in cells. It keeps neighbouring
+/// vertices apart, and on their sides, when they are rounded to world coordinates.
 inline constexpr double kCellMargin = 1.0 / 1024;
 
-/// A point of a saddle's cell, kCellMargin or more away from its sides, moved into the half of it
-/// that belongs to `segment`. Relative to the cell.
+/// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. Coordinates
+/// are relative to the cell. Requires: the point is at least kCellMargin away from the sides.
 Point ClampToHalf(const Segment& segment, Point point);
 
-/// `point` moved into the cell of `segment`, a little away from its sides; in a saddle into the
-/// half of the cell that belongs to the segment, so that its two segments never meet. Only there
-/// the segment is looked at.
+/// Moves `point` into its cell, kCellMargin away from the sides. In a saddle moves it into the half
+/// that belongs to `segment`, so that the two segments never meet; other cells ignore `segment`.
 inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
                          const Segment& segment, Point point) {
   const Point origin = CellOrigin(directory, cell);
@@ -27,8 +26,9 @@ inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
   return {origin.x + of_cell.x, origin.y + of_cell.y};
 }
 
-/// Minimiser of sum_j (n_j . (v - p_j))^2 over the segment's two ends (Eq. 14), in closed form;
-/// directions that the normals hardly constrain stay at the middle. In lattice coordinates.
+/// Minimises sum_j (n_j . (v - p_j))^2 over the segment's two ends (Eq. 14), in closed form. Along
+/// a direction that the normals barely constrain, the vertex stays at the middle of the segment. In
+/// lattice coordinates.
 Point QefVertex(const VertexInput& input, const CellPlane& plane);
 
 }  // namespace partiemc

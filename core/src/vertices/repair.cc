@@ -9,13 +9,14 @@
 namespace partiemc {
 namespace {
 
+// Rounds in which points move half way only.
 constexpr int kGentleRounds = 4;
 
-// Frames may be made that need a round for every few of their points: after so many everything goes
-// back at once. Ordinary frames need none, frames made to hurt up to nine.
+// After this number of rounds all points return at once: adversarial frames could need a round for
+// every few points. Ordinary frames need none; hostile test frames need up to nine.
 constexpr int kMostRounds = 24;
 
-// Rings of a round that lie on the wrong side of others. Hardly any frame has one.
+// With more misplaced rings in a round, all rings return. Hardly any frame has one.
 constexpr std::size_t kMostMisplaced = 100;
 
 // Marks both ends of a segment and the points before and after it.
@@ -41,7 +42,7 @@ Box BoxOf(const Rings& rings, std::size_t ring) {
   return box;
 }
 
-// The point with the smallest x, of those the one with the smallest y.
+// The point with the smallest x; ties are broken by the smallest y.
 Point LeftmostOf(const Rings& rings, std::size_t ring) {
   Point leftmost = PointAt(rings.points, rings.offsets[ring]);
   for (std::uint32_t k = rings.offsets[ring] + 1; k < rings.offsets[ring + 1]; ++k) {
@@ -51,10 +52,9 @@ Point LeftmostOf(const Rings& rings, std::size_t ring) {
   return leftmost;
 }
 
-// Lists the rings that are turned inside out or lie on the wrong side of others. Requires: rings
-// were measured, and do not cross. Then one is in its place if and only if the others wind around
-// it as often as around the region outside of an outer ring (0), or around the fluid that a hole
-// lies in (1).
+// Lists the misplaced rings. An outer ring is misplaced if the winding number of the others around
+// it is not 0, a hole if it is not 1.
+// Requires: rings were measured, and do not cross.
 void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   scratch.misplaced.clear();
   scratch.ring_depths.Find(rings.points, rings.offsets);
@@ -66,8 +66,8 @@ void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   }
 }
 
-// Marks the misplaced rings and those around them, by their boxes. If they are many, every ring: to
-// look for those around each would take too long.
+// Marks the misplaced rings, and the rings whose boxes surround them. Marks all rings if many are
+// misplaced, as searching around each would take too long.
 void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   if (scratch.misplaced.size() > kMostMisplaced) {
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
@@ -83,7 +83,7 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
     const Box box = BoxOf(rings, other);
     for (std::size_t k = 0; k < scratch.misplaced.size(); ++k) {
       const Point& point = scratch.leftmost[k];
-      // A box that begins as far left goes by the number of its ring: of two, one is around.
+      // Equal left sides are ordered by the number of the ring.
       const bool begins_before =
           box.left != point.x ? box.left < point.x : other < scratch.misplaced[k];
       if (!begins_before || point.x > box.right || point.y < box.bottom || point.y > box.top) {
@@ -95,7 +95,7 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   }
 }
 
-// Moves the marked points; returns whether any was not at its root yet.
+// Moves the marked points towards their roots; returns whether any point moved.
 bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratch& scratch,
              Rings& rings) {
   bool has_moved = false;

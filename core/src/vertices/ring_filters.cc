@@ -46,8 +46,8 @@ HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
 }
 
 // Processes the vertices [begin, end) in blocks. Calls start(first vertex) for each block. Then
-// calls add(j, w) for every offset in the window of one of the block's vertices: j is the neighbour
-// of the first vertex, w has the weights, 0 beyond a window. At the end calls finish(block).
+// calls add(j, w) for every offset in the window of any of its vertices. Here j is the neighbour of
+// the first vertex, and w are the weights, 0 beyond a window. At the end calls finish(block).
 template <typename Start, typename Add, typename Finish>
 HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {

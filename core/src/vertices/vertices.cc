@@ -16,15 +16,15 @@
 namespace partiemc {
 namespace {
 
-// Puts coordinates closer to an axis than this many cells on it: an offset that has decayed to next
-// to nothing would else move a vertex from 0 to where the predicates (predicates.h) are not exact.
+// Coordinates closer to an axis than this, in cells, become 0. A tiny offset could otherwise move a
+// vertex from 0 into the range where the predicates (predicates.h) are not exact.
 constexpr double kAxisReach = 0x1p-96;
 
 void SnapToAxes(double cell_size, std::span<double> coordinates) {
   const double reach = kAxisReach * cell_size;
   for (double& coordinate : coordinates) {
     const bool is_near = (coordinate != 0) & (std::abs(coordinate) < reach);
-    coordinate = is_near ? 0 : coordinate;  // Written in any case, which makes vectors of it.
+    coordinate = is_near ? 0 : coordinate;  // An unconditional store allows vectorisation.
   }
 }
 
@@ -33,7 +33,7 @@ void Store(Point point, double cell_size, double* target) {
   target[1] = point.y * cell_size;
 }
 
-// The vertices of segment k of the topology; `virtual-plane` goes ring by ring, below.
+// Writes the vertices of segment k to `target`. Not for `virtual-plane` (PlaceRefinedRings).
 void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   const CellPlane& plane = input.planes[k];
   const double cell_size = input.scale.cell_size;
@@ -53,7 +53,7 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   }
 }
 
-// Outward normals of the cell and of its entry edge, which it shares with the segment before.
+// Appends the unit vector along (x, y), or the segment's own normal if (x, y) is too short.
 void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>& normals) {
   double square = x * x + y * y;
   if (square < kWeakGradientSquare) {
@@ -66,12 +66,14 @@ void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>
   normals.push_back(static_cast<float>(y / length));
 }
 
-// +1 or -1: what turns the plane's normal outward. The memory of earlier frames may have turned a
-// cell's normal inward; what is told to the outside is always outward.
+// The sign that makes the plane's normal point outward: +1 or -1. The memory of normals may have
+// turned it inward, but reported normals point outward.
 double OutwardSign(const CellPlane& plane) {
   return plane.normal_x * plane.OutwardX() + plane.normal_y * plane.OutwardY() < 0 ? -1 : 1;
 }
 
+// Appends the normals of the vertices of segment `here`. An edge vertex gets the mean of the
+// normals of the two cells that share the edge.
 void AppendNormals(const VertexInput& input, std::size_t before, std::size_t here, Rings& rings) {
   const CellPlane& a = input.planes[before];
   const CellPlane& b = input.planes[here];
@@ -89,8 +91,8 @@ void AppendNormals(const VertexInput& input, std::size_t before, std::size_t her
 
 bool AreEqual(const double* a, const double* b) { return a[0] == b[0] && a[1] == b[1]; }
 
-// Appends one ring's points without consecutive duplicates. Takes it back and returns false if
-// fewer than three remain.
+// Appends the points of one ring without consecutive duplicates. Returns false, and appends
+// nothing, if fewer than three points remain.
 bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment,
                 std::span<const double> points, PlacedVertices& placed, Rings& rings) {
   const std::size_t first = input.topology.offsets[ring];
@@ -106,7 +108,7 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment,
     }
     placed.point_of_segment[k] = static_cast<std::uint32_t>(rings.PointCount() - 1);
   }
-  // The ring is closed: its last point may repeat the first.
+  // The ring is closed, so its last points may repeat the first one.
   std::size_t end = rings.PointCount();
   while (end > start + 1 &&
          AreEqual(rings.points.data() + 2 * (end - 1), rings.points.data() + 2 * start)) {
@@ -148,7 +150,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
          i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
       if (!vertices.is_kept[i]) continue;
-      // Of the two vertices of segment i / 2, the cell's comes second and is always kept.
+      // The cell vertex of segment i / 2 overwrites the edge vertex; it is always kept.
       placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
       Store(vertices.point[i], cell_size, &rings.points[2 * point]);
       Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
@@ -188,7 +190,7 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
     if (outer != kNoRing) outer = placed.kept_as[outer];
   }
   MeasureRings(rings);
-  // The others do not cross: Validate checks that claim, the hot path trusts it.
+  // Rings of the other placements do not cross. Only Validate checks this.
   if (!traits.takes_particles) return;
   placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }

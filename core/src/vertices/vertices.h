@@ -18,35 +18,34 @@ namespace partiemc {
 
 struct VirtualPlaneVariant;  // core/internal/research.h
 
-/// Marks a segment whose ring was dropped in PlacedVertices::point_of_segment.
+/// Value of PlacedVertices::point_of_segment for a segment whose ring was dropped.
 inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 
-/// How the points of Rings belong to the rings of RingTopology and their segments.
+/// Maps rings and segments of RingTopology to rings and points of Rings.
 struct PlacedVertices {
-  /// Per segment: index in Rings::points of the vertex of its cell (of its entry crossing for
-  /// `marching-squares`), or kNoPoint.
+  /// By segment: index in Rings::points of its cell's vertex (for `marching-squares` of its entry
+  /// crossing), or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
-  std::vector<std::uint32_t> kept_as;  ///< Per ring: its index in Rings, or kNoRing.
-  /// `virtual-plane` only: where each point of the rings may retreat to, interleaved, in world
-  /// units.
+  std::vector<std::uint32_t> kept_as;  ///< By ring: its index in Rings, or kNoRing.
+  /// `virtual-plane` only: the anchor of each point, to which the repair may move it; interleaved,
+  /// in world units.
   std::vector<double> roots;
-  std::uint64_t self_intersections = 0;  ///< Of placements that do not promise to have none.
+  std::uint64_t self_intersections = 0;  ///< 0 for placements that guarantee simple rings.
 };
 
-/// Unit, outward.
+/// A unit normal, pointing outward.
 struct VertexNormal {
   float x = 0, y = 0;
 };
 
-/// Two vertices per segment of the topology, ring after ring: the crossing of its entry edge, then
-/// the vertex of its cell. Lengths in cells, positions in lattice coordinates of the world. Segment
-/// k has vertices 2 k and 2 k + 1.
+/// Vertices of `virtual-plane`, ring by ring. Vertex 2 k is the edge vertex of segment k of the
+/// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Lengths in cells, lattice
+/// coordinates of the world.
 struct RingVertices {
   std::vector<Point> point;
-  /// Where a vertex may always retreat to: with all vertices there, rings are simple.
-  std::vector<Point> root;
+  std::vector<Point> root;  ///< The anchor: with all vertices at their anchors, rings are simple.
   std::vector<VertexNormal> normal;
-  std::vector<std::uint8_t> is_kept;  ///< 0 for vertices that thinning dropped.
+  std::vector<std::uint8_t> is_kept;  ///< 0 if thinning dropped the vertex.
   PeriodicRings periodic_rings;       ///< Scratch of the steps.
 
   void Resize(std::size_t count) {
@@ -59,13 +58,13 @@ struct RingVertices {
 
 /// Warm buffers of PlaceVertices.
 struct VertexScratch {
-  std::vector<double> points;  ///< One or two per segment, in world units, before duplicates go.
-  RingVertices vertices;       ///< Of `virtual-plane`, on their way.
-  std::vector<double> offset_points;
+  std::vector<double> points;         ///< One or two points for each segment, in world units.
+  RingVertices vertices;              ///< `virtual-plane` only.
+  std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
 };
 
-/// What the placements need of the stages before.
+/// Results of the earlier stages.
 struct VertexInput {
   const Frame& frame;
   const ParticleBins& bins;
@@ -80,16 +79,16 @@ struct VertexInput {
 };
 
 /// Places the vertices of every ring and measures the rings.
-///   marching-squares   the crossings of lattice edges, by linear interpolation of F;
-///   qef                those, and in each cell the minimiser of Eq. 14, kept in the cell;
-///   virtual-plane      one vertex per cell and crossed edge, moved to the plane that its
-///                      surroundings support (virtual_plane.h), matched to the particles' area
-///                      (volume_correction.h) and repaired (repair.h).
-/// marching-squares and qef keep every vertex in its cell or on its edge, so that rings are simple
-/// by construction (core/METHOD.md, "Why rings are simple"); virtual-plane may leave the cells and
-/// is simple by its repair. Placements that take particles as vertices (placement_traits.h) drop
-/// consecutive equal vertices, and rings with fewer than three points left.
-/// `area_offset`: of `virtual-plane`, that of the last frame, then of this one
+///   - marching-squares: the crossings of lattice edges, by linear interpolation of F.
+///   - qef: the same, and in each cell the minimiser of Eq. 14, clamped to the cell.
+///   - virtual-plane: a vertex for each cell and crossed edge, moved to a plane that nearby
+///   particles
+///     support (virtual_plane.h), matched to their area (volume_correction.h), repaired (repair.h).
+/// The rings of marching-squares and qef are simple because each vertex stays in its cell or on its
+/// edge (core/METHOD.md, "Why rings are simple"). Vertices of virtual-plane may leave their cells;
+/// its repair makes rings simple. Placements with particles as vertices (placement_traits.h) drop
+/// consecutive equal vertices, and rings with fewer than three points left. `area_offset`, used by
+/// virtual-plane only, is the offset of the last frame and becomes the offset of this frame
 /// (volume_correction.h). Returns false if the repair failed, which is a bug.
 /// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
 [[nodiscard]] bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,

@@ -17,7 +17,7 @@
 namespace partiemc {
 namespace {
 
-// How many segments before its turn a plane is prefetched.
+// Prefetch distance for planes, in segments.
 constexpr std::size_t kFetchedAhead = 24;
 
 double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
@@ -29,21 +29,21 @@ VertexNormal UnitOf(const Point& v) {
   return {static_cast<float>(v.x * inverse), static_cast<float>(v.y * inverse)};
 }
 
-// `point`, where F has this value and gradient, moved by one Newton step towards F = 0, of at most
-// `max_step` cells; `point` itself where the gradient is weak.
+// Moves `point`, with the given value and gradient of F, by one Newton step towards F = 0, by at
+// most `max_step` cells. Returns `point` if the gradient is weak.
 Point NewtonStep(Point point, double value, Point gradient, double max_step) {
   const double square = Dot(gradient, gradient);
   if (square < kWeakGradientSquare) return point;
   double step = -value / square;
-  // Its length is that of the gradient times as much.
+  // The step has the length |step| |gradient|.
   if (step * step * square > max_step * max_step) {
     step = std::copysign(max_step / std::sqrt(square), step);
   }
   return {point.x + step * gradient.x, point.y + step * gradient.y};
 }
 
-// Where a point in or next to a cell is: in most cases in the cell's own tile, which is indexed as
-// it has an active cell.
+// Finds the tile of a point in or near a cell. It is usually the cell's own tile, which is indexed
+// as it has an active cell.
 FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point& point) {
   const Point origin = CellOrigin(input.bins.tiles, cell);
   const double x = point.x - origin.x + cell.i;
@@ -56,9 +56,10 @@ FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point&
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
-// Step 1 of a segment: both vertices on the level set, by one Newton step each. Along its gradient
-// that of a distance stays the same: unless a step is long, normals are those of the points that it
-// begins at.
+// Step 1 for a segment: moves both vertices to the level set by one Newton step each. Near the
+// surface F behaves like a distance, so a short step along the gradient does not change the
+// gradient. The normal is therefore taken at the starting point unless the step exceeds
+// `long_step`.
 void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   const VirtualPlaneConstants& constants = input.variant.constants;
   const CellPlane& plane = input.planes[segment];
@@ -87,7 +88,7 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
 }
 
-// Numbers of vertices and margin of a ring: none for a ring that stays at its roots.
+// Size of a ring with its margin; 0 vertices if the ring is too short for steps 2 and 3.
 PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
@@ -107,7 +108,7 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   return size;
 }
 
-// Copies what the steps need, and measures the ring.
+// Copies coordinates and normals into `ring`, and computes arc lengths and weights.
 void CopyRing(const RingVertices& v, std::size_t first, const PeriodicRing& ring) {
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     ring.x[k] = RingUnits(v.point[first + k].x);
@@ -120,7 +121,7 @@ void CopyRing(const RingVertices& v, std::size_t first, const PeriodicRing& ring
   MeasureArc(ring);
 }
 
-// Calls body(begin, end) for stretches of a ring, in parallel where it is long.
+// Calls body(begin, end) for stretches of a ring, in parallel if the ring is long.
 template <typename Body>
 void ForEachStretch(const PeriodicRing& ring, Body body) {
   constexpr std::ptrdiff_t kStretch = 512;
@@ -134,7 +135,7 @@ void ForEachStretch(const PeriodicRing& ring, Body body) {
   });
 }
 
-// Step 2: normals averaged along the ring, first by distance, then also by angle.
+// Step 2: averages normals along the ring, first by distance, then by distance and angle.
 void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   const VirtualPlaneConstants& c = input.variant.constants;
   for (const bool by_angle : {false, true}) {
@@ -149,7 +150,7 @@ void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   }
 }
 
-// Mean of a ring's values by length.
+// Mean of values along a ring, weighted by length.
 double MeanOf(const PeriodicRing& ring, const float* values) {
   double sum = 0, weight = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
@@ -159,9 +160,9 @@ double MeanOf(const PeriodicRing& ring, const float* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
-// How far outside of a plane the boundary is, in cells: by the mean distance of the particles that
-// support it, plus half a spacing, at most the support's height either way. Then the variance of
-// these distances, in squared spacings. Both 0 where nothing supports the plane.
+// Estimates the distance of the boundary above a plane, in cells, and the variance of the
+// supporting particles' heights, in squared spacings. The distance is the mean height plus half a
+// spacing, clamped to the support's height. Both are 0 if no particle supports the plane.
 std::pair<double, double> EstimateOf(const SupportSums& sums, const SupportShape& support) {
   if (!(sums.weight > 0)) return {};
   const double mean = sums.distance / sums.weight;
@@ -180,9 +181,9 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
   SumSupports(std::span(queries).first(groups.size()), support, sums);
 }
 
-// Step 3: how far each vertex's plane moves along its normal. Of the estimates only the variation
-// along the ring counts: their mean depends on how the particles are arranged, not on the shape.
-// The more the particles that support a ring's planes scatter, the less they are believed.
+// Step 3: computes the shift `base` of each vertex's plane along its normal. The mean of the
+// estimates along the ring is subtracted: it depends on the arrangement of the particles, not on
+// the shape. A larger variance of the supporting particles reduces the weight of the estimates.
 void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
@@ -193,7 +194,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
                              .height = c.support_height * h,
                              .spacing = h,
                              .depth = c.support_depth};
-  // What the kernel takes off a bend grows with the square of its radius R: R^2 kappa / 18.
+  // The kernel moves a boundary of curvature kappa inward by R^2 kappa / 18.
   const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
   float* scatter = ring.next_x;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -215,10 +216,10 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
       if (BeginsGroup(k / 2)) planes.Part();
       const ActiveCell& cell = input.planes[first_segment + k / 2].cell;
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
-        // Nothing bends within less than a spacing.
+        // A radius of curvature below one spacing is noise.
         const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
         ring.base[i] = steps.curvature ? static_cast<float>(rounding * curvature) : 0;
-        ring.shift[i] = -ring.base[i];  // What is kept where nothing tells where a plane belongs.
+        ring.shift[i] = -ring.base[i];  // Kept if no particle supports the plane.
         scatter[i] = 0;
         if (!steps.support) continue;
         const FieldPoint at = Locate(input, cell, v.point[2 * first_segment + i]);
@@ -243,9 +244,9 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
   ring.Repeat(ring.base, 0, ring.count);
 }
 
-// Step 3, its end: every vertex to the weighted mean of what its neighbours' planes say, along its
-// normal. A circle stays as it is: of two points of it, the mean normal is perpendicular to their
-// chord.
+// End of step 3: moves every vertex along its normal to the weighted mean of its neighbours'
+// planes. A circle does not change, since the mean normal of two of its points is perpendicular to
+// their chord.
 void SmoothPositions(const VertexInput& input, std::size_t first, const PeriodicRing& ring,
                      RingVertices& v) {
   const double reach = input.variant.constants.smoothing_reach * input.scale.spacing;
@@ -264,7 +265,7 @@ void SmoothPositions(const VertexInput& input, std::size_t first, const Periodic
   });
 }
 
-// Steps 2 and 3 of a ring.
+// Steps 2 and 3 for a ring.
 void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, RingVertices& v) {
   const std::size_t first_segment = input.topology.offsets[r];
   CopyRing(v, 2 * first_segment, ring);
@@ -273,7 +274,7 @@ void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, Ring
   SmoothPositions(input, 2 * first_segment, ring, v);
 }
 
-// Drops edge vertices that lie on the chord of the cell vertices beside them.
+// Drops edge vertices that lie on the chord of the neighbouring cell vertices.
 void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const double min_distance = input.variant.constants.thinning_distance * input.scale.spacing;
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
@@ -290,7 +291,7 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   }
 }
 
-// Step 1 of a ring.
+// Step 1 for a ring.
 void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const std::size_t begin = input.topology.offsets[ring];
   ParallelForRanges(input.topology.offsets[ring + 1] - begin, kSegmentsAtOnce,
@@ -316,7 +317,7 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   vertices.Resize(2 * topology.segments.size());
   PeriodicRings& periodic = vertices.periodic_rings;
   periodic.sizes().assign(topology.RingCount(), {});
-  // Short rings as a whole, one after the other: all that belongs to one stays in the cache.
+  // A task computes all steps of a short ring, so that its data stay in the cache.
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     FindRingRoots(input, ring, vertices);
     const PeriodicRings::Size size = SizeOf(input, ring, vertices);

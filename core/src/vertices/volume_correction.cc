@@ -14,7 +14,7 @@ namespace {
 // Longest mitre, as a multiple of the offset.
 constexpr double kMaxMitre = 2;
 
-// Sum of the volumes of an outer ring's particles, in cells.
+// Sum of the volumes of an outer ring's particles, in squared cells.
 double VolumeOf(const VertexInput& input, std::size_t ring) {
   if (input.frame.volumes.empty()) {
     const double each = input.scale.spacing * input.scale.spacing;
@@ -23,7 +23,7 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
-// The offset that a frame alone would ask for, in spacings. Nothing without large components.
+// The target of the offset for this frame, in spacings; nullopt without large components.
 std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.variant.constants;
   MeasureRings(rings);
@@ -31,7 +31,7 @@ std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& 
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const bool is_outer = rings.outer_of[ring] == kNoRing;
     const std::size_t outer = is_outer ? ring : rings.outer_of[ring];
-    // Spray: its area says how it broke off.
+    // Spray does not count: its area depends on how it broke off.
     if (rings.measures[outer].perimeter < constants.ShortestRing() * spacing) continue;
     if (is_outer) volume += VolumeOf(input, ring);
     area += rings.measures[ring].area;
@@ -46,7 +46,7 @@ std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& 
 }  // namespace
 
 void OffsetRing(std::span<const double> points, double offset, double* target) {
-  // To the right of the segment from one point to another; 0 where they are the same.
+  // Unit normal to the right of the segment between two points; 0 if they are equal.
   const auto normal_of = [](const Point& from, const Point& to) {
     const Point normal{to.y - from.y, from.x - to.x};
     const double length = std::sqrt(normal.x * normal.x + normal.y * normal.y);
@@ -58,7 +58,7 @@ void OffsetRing(std::span<const double> points, double offset, double* target) {
   for (std::size_t k = 0; k < count; ++k) {
     const Point next = PointAt(points, k + 1 < count ? k + 1 : 0);
     const Point after = normal_of(point, next);
-    // (a + b) / (1 + a . b) has length 1 / cos of half the turn.
+    // The length of (a + b) / (1 + a . b) is 1 / cos(half the turn).
     const double divisor =
         std::max(1 + before.x * after.x + before.y * after.y, 2 / (kMaxMitre * kMaxMitre));
     target[2 * k] = point.x + offset * (before.x + after.x) / divisor;

@@ -1,4 +1,4 @@
-// The area of the outline matched to the volume of the particles, where that is known.
+// Matches the area of the outline to the volume of the particles, if the volume is known.
 #pragma once
 
 #include <optional>
@@ -10,21 +10,23 @@
 
 namespace partiemc {
 
-/// Writes to `target` the points of a closed ring, interleaved, moved by `offset` along the mitres
-/// of their segments: to the right of its way, so outward where the inside lies on the left. A
-/// mitre is at most twice as long as the offset; a segment of length 0 has no direction. Requires:
-/// at least one point, room for as many in `target`, which is not `points`.
+/// Moves the points of a closed ring by `offset` along the mitres of their segments, to the right
+/// of the ring's direction: outward if the inside lies on the left. A mitre is at most twice as
+/// long as the offset; a segment of length 0 has no direction. `points` and `target` are
+/// interleaved.
+/// Requires: at least one point; `target` has the size of `points` and does not overlap it.
 void OffsetRing(std::span<const double> points, double offset, double* target);
 
-/// Moves all vertices along mitred normals by one offset, so that the area of the components whose
-/// outlines are at least VirtualPlaneConstants::ShortestRing() long approaches the sum of their
-/// volumes. Does nothing where volumes are unknown: neither given nor implied by a given spacing.
+/// Moves all vertices along mitred normals by one offset. Its target matches the area to the sum of
+/// the volumes, over the components whose outer rings are at least
+/// VirtualPlaneConstants::ShortestRing() long. Does nothing if volumes are unknown: neither given
+/// nor implied by a given spacing.
 ///
-/// The offset is bounded, as volumes are off by some percent, and changes by little from frame to
-/// frame, so that outlines do not tremble with their area: `offset`, in spacings, is that of the
-/// frame before (nothing at first: then this frame's alone) and becomes this frame's.
-/// Cost: linear in the points. Leaves the rings' measures undefined.
-/// `scratch` is a warm buffer.
+/// `offset`, in spacings, is the offset of the last frame, if there is one, and becomes the offset
+/// of this frame. Its size is limited, since volumes have errors of a few percent. Its change is
+/// limited, so that outlines do not tremble with their area. The first frame uses the target.
+/// `scratch` is a warm buffer. Leaves the measures of the rings undefined.
+/// Cost: linear in the points.
 void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
                    std::optional<double>& offset, Rings& rings);
 
