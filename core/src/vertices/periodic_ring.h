@@ -22,12 +22,14 @@ struct PeriodicRingSize {
 /// of the ring.
 inline constexpr double kRingUnitsPerCell = 1 << 22;
 
-/// Converts cells to units, rounding towards 0. Requires: |cells| < 2^41.
+/// Converts cells to units, rounding towards 0.
+/// Requires: |cells| < 2^41.
 inline std::int32_t RingUnits(double cells) {
   return static_cast<std::int32_t>(static_cast<std::int64_t>(cells * kRingUnitsPerCell));
 }
 
-/// The difference `to` - `from`. Requires: less than 512 cells apart.
+/// The difference `to` - `from`.
+/// Requires: less than 512 cells apart.
 inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) -
                                    static_cast<std::uint32_t>(from));
@@ -42,7 +44,8 @@ inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
 
 /// The size of a closed ring. Its margin is the largest number of vertices that a window of `reach`
 /// cells needs beyond either end. Uses the lengths of LengthInUnits, as windows do: nearly
-/// coincident vertices must not be missed. Cost: linear in the vertices.
+/// coincident vertices must not be missed.
+/// Cost: linear in the vertices.
 PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach);
 
 /// One ring. Arrays are indexed by vertex, 0 <= k < count. They extend by `margin` elements beyond

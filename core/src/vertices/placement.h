@@ -12,7 +12,8 @@ namespace partiemc {
 inline constexpr double kCellMargin = 1.0 / 1024;
 
 /// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. Coordinates
-/// are relative to the cell. Requires: the point is at least kCellMargin away from the sides.
+/// are relative to the cell.
+/// Requires: the point is at least kCellMargin away from the sides.
 Point ClampToHalf(const Segment& segment, Point point);
 
 /// Moves `point` into its cell, kCellMargin away from the sides. In a saddle moves it into the half

@@ -81,16 +81,18 @@ struct VertexInput {
 /// Places the vertices of every ring and measures the rings.
 ///   - marching-squares: the crossings of lattice edges, by linear interpolation of F.
 ///   - qef: the same, and in each cell the minimiser of Eq. 14, clamped to the cell.
-///   - virtual-plane: a vertex for each cell and crossed edge, moved to a plane that nearby
-///   particles
+///   - virtual-plane: a vertex for each cell and crossed edge, moved to a plane that particles
 ///     support (virtual_plane.h), matched to their area (volume_correction.h), repaired (repair.h).
+///
 /// The rings of marching-squares and qef are simple because each vertex stays in its cell or on its
 /// edge (core/METHOD.md, "Why rings are simple"). Vertices of virtual-plane may leave their cells;
 /// its repair makes rings simple. Placements with particles as vertices (placement_traits.h) drop
-/// consecutive equal vertices, and rings with fewer than three points left. `area_offset`, used by
-/// virtual-plane only, is the offset of the last frame and becomes the offset of this frame
-/// (volume_correction.h). Returns false if the repair failed, which is a bug.
-/// Deterministic, in parallel over segments. Cost: linear in segments and the particles near them.
+/// consecutive equal vertices, and rings with fewer than three points left.
+///
+/// `area_offset`, used by virtual-plane only, is the offset of the last frame and becomes the
+/// offset of this frame (volume_correction.h). Returns false if the repair failed, which is a bug.
+/// Deterministic. Parallel over segments.
+/// Cost: linear in segments and the particles near them.
 [[nodiscard]] bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
                                  VertexScratch& scratch, PlacedVertices& placed, Rings& rings);
 
