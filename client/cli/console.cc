@@ -54,7 +54,7 @@ std::string AsFlag(const absl::Status& status) {
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
   line.erase(0, kPrefix.size());
-  // Sections come from flags that may be given again, or are lists.
+  // --slice and --isolines take several values; the index means nothing to a user.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:")}) {

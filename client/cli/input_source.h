@@ -1,4 +1,4 @@
-// An input as a person names it: a recording of our own, or anything else that Sequence reads.
+// Opens the input of a verb: a recording, or any other format that Sequence reads.
 #pragma once
 
 #include <memory>
@@ -17,10 +17,10 @@ namespace partiemc::client {
 
 struct InputSource {
   std::unique_ptr<Sequence> frames;
-  std::optional<double> spacing = {};  ///< World units, where the recording knows it.
+  std::optional<double> spacing = {};  ///< World units, if the recording holds it.
 };
 
-/// Errors: those of Sequence::Open.
+/// Errors: as Sequence::Open.
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
 
 /// Adds --attributes, a list of names.
