@@ -65,7 +65,7 @@ absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string
   const auto count = (*file)->Read(magic, sizeof(magic));
   if (!count.ok()) return count.status();
   const Packing packing = RecognisePacking(std::string_view(magic, *count));
-  // Opened again rather than rewound: a ByteSource only goes forward.
+  // A ByteSource cannot be rewound, so the file is opened again.
   file = OpenFile(path);
   if (!file.ok()) return file.status();
   auto unpacked = Unpack(packing, path, *std::move(file));
@@ -137,7 +137,7 @@ absl::Status ReadUpTo(ByteSource& source, std::size_t size, std::vector<char>& b
   bytes.clear();
   while (bytes.size() < size) {
     const std::size_t old_size = bytes.size();
-    // Doubling: what is allocated stays within twice of what has arrived.
+    // Doubling keeps the allocation within twice the bytes that have arrived.
     const std::size_t step = std::min(size - old_size, std::max(kBlockBytes, old_size));
     bytes.resize(old_size + step);
     const auto count = source.Read(bytes.data() + old_size, step);

@@ -55,7 +55,7 @@ class InflateSource final : public ByteSource {
         stream_.avail_in = static_cast<uInt>(*count);
       }
       if (absl::Status status = Step(); !status.ok()) return status;
-      // A full output may hide bytes that zlib still holds.
+      // zlib may hold more bytes if the output is full.
       flushing_ = stream_.avail_out == 0 && !between_members_ && !finished_;
     }
     return wanted - stream_.avail_out;
@@ -66,7 +66,7 @@ class InflateSource final : public ByteSource {
 
   absl::Status Step() {
     if (between_members_) {
-      // Padding after the last member (tar and tapes write zeros) is no member.
+      // Zeros after the last member are padding (tar, tapes).
       if (members_ > 0 && *stream_.next_in == 0) {
         stream_.avail_in = 0;
         finished_ = true;
@@ -124,7 +124,7 @@ class ZstdSource final : public ByteSource {
       const std::size_t rest = ZSTD_decompressStream(stream_.get(), &output, &input_);
       if (ZSTD_isError(rest) != 0) return Damaged(name_, "zstd", ZSTD_getErrorName(rest));
       between_frames_ = rest == 0;
-      // A full output may hide bytes that the decoder still holds.
+      // The decoder may hold more bytes if the output is full.
       flushing_ = rest != 0 && output.pos == output.size;
     }
     return output.pos;

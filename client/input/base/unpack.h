@@ -1,4 +1,4 @@
-// gzip, zstd and raw deflate as byte sources.
+// Decompresses gzip, zstd and raw deflate.
 #pragma once
 
 #include <memory>

@@ -36,7 +36,7 @@ std::uint64_t LittleEndian(std::string_view bytes, std::size_t at, std::size_t s
   return value;
 }
 
-// A part of a file.
+// A byte range of a file.
 class FilePart final : public ByteSource {
  public:
   FilePart(const std::string& path, std::uint64_t offset, std::uint64_t size)

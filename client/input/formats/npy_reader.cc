@@ -9,7 +9,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// A row per particle has a few columns; more is a transposed array.
+// A row has a few columns. More columns indicate a transposed array.
 constexpr std::size_t kMaxColumns = 4096;
 
 class NpyReader final : public OneFrameReader {

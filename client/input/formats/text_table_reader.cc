@@ -1,4 +1,4 @@
-// One frame per file: CSV and its relatives.
+// One frame per file: CSV and similar tables.
 #include <utility>
 
 #include "client/input/base/text.h"

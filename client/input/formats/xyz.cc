@@ -47,7 +47,7 @@ class XyzReader final : public FrameReader {
                                 Concat("frame ", frame_, ": ", message));
   }
 
-  // Reads the count and the comment; false at the end of the file.
+  // Reads the count and the comment. Returns false at the end of the file.
   absl::StatusOr<bool> ReadHead(std::uint64_t& count) {
     std::string_view line;
     do {
