@@ -1,4 +1,4 @@
-// What the relay's thread is to do: what others posted, and what came over the bus.
+// The queue of the relay thread: posted actions and messages from the bus.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 
 namespace partiemc::server {
 
-/// Safe from any thread. Held by shared_ptr only: handlers of the bus may outlive the relay.
+/// Thread-safe. Held by shared_ptr, because handlers of the bus may outlive the relay.
 class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
  public:
   struct Work {
@@ -23,17 +23,17 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
     std::deque<std::string> messages;
   };
 
-  /// Messages of more than `max_bytes` together do not wait: those that come then are lost.
+  /// Drops messages while the queue holds `max_bytes`.
   explicit RelayQueue(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
   void Post(std::function<void()> action);
-  /// From now on what comes to `subject` waits here. Null as MessageBus::Subscribe says.
+  /// Queues the messages of `subject`. Returns null if memory is exhausted.
   std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject);
 
-  /// Takes all that waits, in the order in which it came, into `work`, which is empty; waits for
-  /// something for at most this time. False once the queue has stopped and no action is left.
+  /// Moves all queued items to `work`, in order; waits for the first one up to `patience`. Returns
+  /// false after Stop if no action is left. Requires: `work` is empty.
   bool Take(std::chrono::milliseconds patience, Work& work);
-  /// No more messages come in.
+  /// Drops all further messages.
   void Stop();
 
   std::uint64_t lost_messages() const;
