@@ -109,7 +109,9 @@ void ImportedStream::Came(relay::v1::Result& result, Clock::time_point now) {
 
 void ImportedStream::Came(const relay::v1::FetchEnd& end, Clock::time_point now) {
   if (ended_) return;
-  if (end.gone()) return End({std::string(kReasonProducerLost), "the producer has gone", {}});
+  if (end.gone()) {
+    return Lost({std::string(kReasonProducerLost), "the producer has gone", {}}, now);
+  }
   if (end.fetch() == 0) {
     if (!fetching_ && next_number_ != 0 && end.last_number() >= next_number_) {
       FetchFrom(next_number_, now);
@@ -198,6 +200,13 @@ void ImportedStream::End(const WatchEnd& end) {
   ended_ = true;
   broadcaster_->End(end);
   TellWaiting(NoSuchStream(stream_.name()));
+}
+
+// Without an answer to what is fetched. The end may be known already.
+void ImportedStream::Lost(const WatchEnd& otherwise, Clock::time_point now) {
+  if (ended_) return;
+  if (end_) FetchEnded(end_->last_number(), now);
+  End(otherwise);
 }
 
 void ImportedStream::Fail(const absl::Status& status) {

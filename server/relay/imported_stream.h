@@ -53,6 +53,8 @@ class ImportedStream {
   void Came(const relay::v1::StreamEnd& end, Clock::time_point now);
   /// What has come meanwhile may be missing, the end too: asks for it.
   void FetchAgain(Clock::time_point now);
+  /// Its replica answers no more. Ends as the replica has told if it has, else with `otherwise`.
+  void Lost(const WatchEnd& otherwise, Clock::time_point now);
   /// No more comes.
   void End(const WatchEnd& end);
   /// Who waits to join is told this instead.

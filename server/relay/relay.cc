@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <random>
 #include <utility>
@@ -26,6 +27,9 @@ constexpr seconds kReplicaPatience(3);
 // For which all is taken for unchanged that cannot be heard.
 constexpr seconds kBusPatience(30);
 constexpr seconds kExportLease(3);
+// A fetch is answered this often while results of this server's streams wait to be sent: an answer
+// has up to 4 MiB.
+constexpr milliseconds kAnswerEvery(20);
 // For which those who were away can hear that a stream has ended.
 constexpr seconds kEndKept(30);
 // A stream that its replica does not announce any more has ended: it is asked how, and has so long.
@@ -38,7 +42,10 @@ constexpr milliseconds kSearchPatience(1500), kAskEvery(100);
 // Until the bus is connected for the first time.
 constexpr seconds kFirstConnection(2);
 constexpr milliseconds kDrainPatience(300);
-constexpr std::size_t kQueueBytes = std::size_t{64} << 20;
+// Also if the bus blocks.
+constexpr seconds kLongestDrain(2);
+// Of news, which have results, and of fetches.
+constexpr std::array kQueueBytes = {std::size_t{64} << 20, std::size_t{4} << 20};
 // What announcements may have.
 constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
 
@@ -96,14 +103,18 @@ bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
 }
 
 void Relay::Run() {
-  for (const std::string& subject :
-       {std::string(kReplicasSubject), SubjectOfAsking(replica_), SubjectOfAnswers(replica_)}) {
-    subscriptions_.push_back(queue_->Listen(*bus_, subject));
-  }
-  for (RelayQueue::Work work; queue_->Take(kTickEvery, work); work = {}) {
+  using Queue = RelayQueue;
+  subscriptions_.push_back(queue_->Listen(*bus_, kReplicasSubject, Queue::kNews));
+  subscriptions_.push_back(queue_->Listen(*bus_, SubjectOfAnswers(replica_), Queue::kNews));
+  subscriptions_.push_back(queue_->Listen(*bus_, SubjectOfAsking(replica_), Queue::kAsked));
+  const auto patience = [this] { return fetches_.empty() ? kTickEvery : milliseconds(0); };
+  for (Queue::Work work; queue_->Take(patience(), work); work = {}) {
     for (const auto& action : work.actions) action();
-    for (const std::string& piece : work.messages) Take(piece);
+    for (const std::string& piece : work.messages[Queue::kNews]) Take(piece);
+    for (const std::string& piece : work.messages[Queue::kAsked]) TakeAsked(piece);
     const auto now = Clock::now();
+    if (work.actions.empty() || now - answered_ >= kAnswerEvery) AnswerNextFetch(now);
+    if (std::exchange(was_asked_, false)) Announce(now, false, false);
     if (changed_ || now - ticked_ >= kTickEvery || draining_since_) Tick(now);
   }
   subscriptions_.clear();
@@ -268,8 +279,8 @@ void Relay::LookAtImports(Clock::time_point now) {
       import.missing_since = now;
       import.stream->FetchAgain(now);
     } else if (now - *import.missing_since > kLastWord) {
-      import.stream->End(
-          {std::string(kReasonProducerLost), "the producer's connection is gone", {}});
+      import.stream->Lost(
+          {std::string(kReasonProducerLost), "the producer's connection is gone", {}}, now);
     }
   }
   std::erase_if(imports_, [now](const Import& import) { return import.stream->IsIdle(now); });
@@ -281,8 +292,9 @@ void Relay::Lost(const std::string& replica) {
   joiner_.Forget(replica);
   for (Import& import : imports_) {
     if (import.stream->stream().replica != replica) continue;
-    import.stream->End(
-        {std::string(kReasonProducerLost), "the server that had the stream is gone", {}});
+    import.stream->Lost(
+        {std::string(kReasonProducerLost), "the server that had the stream is gone", {}},
+        Clock::now());
   }
 }
 
@@ -301,8 +313,6 @@ void Relay::Take(const std::string& piece) {
   switch (message.message_case()) {
     case Message::kAnnouncement:
       return Take(message.replica(), message.announcement());
-    case Message::kFetch:
-      return Take(message.replica(), message.fetch());
     case Message::kFetchEnd:
       return tell(message.fetch_end().stream_id(),
                   [&](ImportedStream& stream) { stream.Came(message.fetch_end(), now); });
@@ -312,6 +322,7 @@ void Relay::Take(const std::string& piece) {
     case Message::kStreamEnd:
       return tell(message.stream_end().stream_id(),
                   [&](ImportedStream& stream) { stream.Came(message.stream_end(), now); });
+    case Message::kFetch:  // TakeAsked.
     case Message::MESSAGE_NOT_SET:
       break;
   }
@@ -324,12 +335,33 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
   }
   const auto now = Clock::now();
   if (directory_.Announced(replica, announcement, now)) changed_ = true;
-  if (!announcement.asks()) return;
+  // One announcement answers all who ask at once. While this server drains, the next one is that it
+  // leaves, after the ends of its streams.
+  if (!announcement.asks() || draining_since_) return;
   if (registry_.changes() != local_changes_) LookAtLocalStreams();
-  Announce(now, false, draining_since_.has_value());
+  was_asked_ = true;
 }
 
-void Relay::Take(const std::string& replica, const relay::v1::Fetch& fetch) {
+// The export is wanted from now on, whenever the fetch is answered.
+void Relay::TakeAsked(const std::string& piece) {
+  const auto whole = asked_joiner_.Add(piece);
+  relay::v1::RelayMessage message;
+  if (!whole || !message.ParseFromString(*whole) || !message.has_fetch() ||
+      message.replica() == replica_) {
+    return;
+  }
+  const auto exported = exports_.find(message.fetch().stream_id());
+  if (exported != exports_.end()) exported->second->WantedUntil(Clock::now() + kExportLease);
+  fetches_.Add(message.replica(), message.fetch());
+  dropped_fetches_ = fetches_.dropped();
+}
+
+void Relay::AnswerNextFetch(Clock::time_point now) {
+  answered_ = now;
+  if (const auto next = fetches_.TakeNext()) Answer(next->replica, next->fetch);
+}
+
+void Relay::Answer(const std::string& replica, const relay::v1::Fetch& fetch) {
   if (registry_.changes() != local_changes_) LookAtLocalStreams();
   const auto local = local_.find(fetch.stream_id());
   auto exported = exports_.find(fetch.stream_id());
@@ -403,7 +435,7 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_
   } else {
     // Listens first, so that nothing falls between what is fetched and what comes.
     Import import;
-    import.results = queue_->Listen(*bus_, SubjectOfResults(remote.id()));
+    import.results = queue_->Listen(*bus_, SubjectOfResults(remote.id()), RelayQueue::kNews);
     import.stream = std::make_unique<ImportedStream>(
         remote, search.from_sequence, dispatcher_,
         ImportedStream::Limits{.broadcaster = limits_.broadcaster,
@@ -448,7 +480,7 @@ void Relay::Drain() {
   std::call_once(drain_once_, [this] {
     refuses_ = true;
     Post([this] { draining_since_ = Clock::now(); });
-    drained_.get_future().wait();
+    drained_.get_future().wait_for(kLongestDrain);
   });
 }
 
@@ -456,8 +488,9 @@ void Relay::GoOnDraining(Clock::time_point now) {
   if (has_drained_) return;
   for (const Search& search : std::exchange(searches_, {})) search.done(DrainingError());
   for (Import& import : imports_) import.stream->Refuse(DrainingError());
-  const bool has_more =
-      std::ranges::any_of(exports_, [](const auto& item) { return item.second->live(); });
+  const bool has_more = !fetches_.empty() || std::ranges::any_of(exports_, [](const auto& item) {
+    return item.second->live();
+  });
   if (has_more && now - *draining_since_ < kDrainPatience) {
     // Streams that have not ended yet end with this server.
     if (now - *draining_since_ > kDrainPatience / 2) {

@@ -20,6 +20,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/relay/exported_stream.h"
+#include "server/relay/fetch_queue.h"
 #include "server/relay/imported_stream.h"
 #include "server/relay/message_bus.h"
 #include "server/relay/pieces.h"
@@ -30,8 +31,10 @@
 
 namespace partiemc::server {
 
-/// The public part is safe from any thread; all else is done by the relay's own. What others send
-/// and there is no room for in its queue is lost: whoever misses something fetches it.
+/// The public part is safe from any thread; all else is done by the relay's own. Messages of other
+/// replicas beyond what its queues hold are lost, and fetched again. The work of this server comes
+/// first, then messages, then one fetch at a time: a peer that floods delays neither results nor a
+/// drain for long.
 class Relay final : private RelayPort {
  public:
   using Clock = std::chrono::steady_clock;
@@ -76,15 +79,17 @@ class Relay final : private RelayPort {
 
   /// From now on the others send no stream here. Drain comes next.
   void WillDrain();
-  /// Says goodbye: what waits for a stream is refused, the last results and ends are sent, and
-  /// nothing more. For some 300 ms at most beside what the bus takes.
+  /// Refuses searches for streams, and sends the last results and ends. Takes at most some 300 ms
+  /// beside what the bus takes, and two seconds with it.
   void Drain();
 
   bool connected() const { return connected_; }
   std::size_t exported_streams() const { return exported_count_; }
   std::size_t imported_streams() const { return imported_count_; }
   /// Of other replicas, that came faster than they were handled, or could not be sent.
-  std::uint64_t lost_messages() const { return unsent_ + queue_->lost_messages(); }
+  std::uint64_t lost_messages() const {
+    return unsent_ + dropped_fetches_ + queue_->lost_messages();
+  }
 
  private:
   static constexpr std::size_t kMaxAddresses = 16;
@@ -121,7 +126,9 @@ class Relay final : private RelayPort {
   void Lost(const std::string& replica);
   void Take(const std::string& piece);
   void Take(const std::string& replica, const relay::v1::Announcement& announcement);
-  void Take(const std::string& replica, const relay::v1::Fetch& fetch);
+  void TakeAsked(const std::string& piece);
+  void AnswerNextFetch(Clock::time_point now);
+  void Answer(const std::string& replica, const relay::v1::Fetch& fetch);
   bool TryFind(const Search& search, Clock::time_point now);
   void Watch(const RemoteStream& remote, const Search& search, Clock::time_point now);
   void LookAtSearches(Clock::time_point now);
@@ -137,10 +144,11 @@ class Relay final : private RelayPort {
   const std::shared_ptr<RelayQueue> queue_;
   std::atomic<bool> connected_ = false, refuses_ = false;
   std::atomic<std::size_t> exported_count_ = 0, imported_count_ = 0;
-  std::atomic<std::uint64_t> unsent_ = 0;
+  std::atomic<std::uint64_t> unsent_ = 0, dropped_fetches_ = 0;
 
   // Of the relay's thread:
-  PieceJoiner joiner_;
+  PieceJoiner joiner_, asked_joiner_{FetchQueue::kFetchBytes};
+  FetchQueue fetches_;
   std::uint64_t sent_ = 0;
   std::vector<std::unique_ptr<MessageBus::Subscription>> subscriptions_;
   std::map<std::string, LocalStream> local_;
@@ -150,9 +158,10 @@ class Relay final : private RelayPort {
   std::uint64_t local_changes_ = 0;
   bool told_away_ = false;  // That the bus is not connected.
   bool changed_ = false;    // Streams came or went, here or elsewhere.
+  bool was_asked_ = false;  // To announce the streams.
   bool will_drain_ = false;
   const Clock::time_point began_ = Clock::now();
-  Clock::time_point announced_, asked_, ticked_, disconnected_ = began_;
+  Clock::time_point announced_, asked_, ticked_, answered_, disconnected_ = began_;
   std::optional<Clock::time_point> connected_since_, draining_since_;
   std::promise<void> drained_;
   bool has_drained_ = false;

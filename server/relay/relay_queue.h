@@ -1,6 +1,7 @@
-// What the relay's thread is to do: what others posted, and what came over the bus.
+// Queues the work of the relay's thread: actions of this server, and messages of the bus.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -15,23 +16,37 @@
 
 namespace partiemc::server {
 
-/// Safe from any thread. Held by shared_ptr only: handlers of the bus may outlive the relay.
+/// Actions are taken all at once, and messages in small numbers, so that a flood on the bus delays
+/// no stream and no drain. Safe from any thread. Held by shared_ptr only: handlers of the bus may
+/// outlive the relay.
 class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
  public:
+  /// Messages whose senders are bounded apart from each other.
+  enum Lane : std::size_t {
+    kNews,   ///< Announcements, results and answers.
+    kAsked,  ///< Fetches.
+  };
+  static constexpr std::size_t kLanes = 2;
+
+  /// Messages of one lane that Take takes at a time.
+  static constexpr std::size_t kMostMessages = 64;
+
   struct Work {
     std::deque<std::function<void()>> actions;
-    std::deque<std::string> messages;
+    std::array<std::deque<std::string>, kLanes> messages;
   };
 
-  /// Messages of more than `max_bytes` together do not wait: those that come then are lost.
-  explicit RelayQueue(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+  /// Messages of a lane beyond its `max_bytes` are lost.
+  explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes) : max_bytes_(max_bytes) {}
 
   void Post(std::function<void()> action);
-  /// From now on what comes to `subject` waits here. Null as MessageBus::Subscribe says.
-  std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject);
+  /// Queues the messages of `subject` from now on. Null as MessageBus::Subscribe says.
+  std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject,
+                                                   Lane lane);
 
-  /// Takes all that waits, in the order in which it came, into `work`, which is empty; waits for
-  /// something for at most this time. False once the queue has stopped and no action is left.
+  /// Takes all actions and the next messages, in the order in which they came, into `work`, which
+  /// is empty. Waits at most `patience` for work. False once the queue has stopped and no action is
+  /// left.
   bool Take(std::chrono::milliseconds patience, Work& work);
   /// No more messages come in.
   void Stop();
@@ -39,11 +54,11 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
   std::uint64_t lost_messages() const;
 
  private:
-  const std::size_t max_bytes_;
+  const std::array<std::size_t, kLanes> max_bytes_;
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable came_;
   Work work_;
-  std::size_t message_bytes_ = 0;
+  std::array<std::size_t, kLanes> message_bytes_{};
   std::uint64_t lost_messages_ = 0;
   bool stopped_ = false;
 };

