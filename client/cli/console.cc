@@ -1,10 +1,12 @@
 #include "client/cli/console.h"
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "common/printable.h"
 
 namespace partiemc::client {
@@ -70,6 +72,14 @@ std::string AsFlag(const absl::Status& status) {
 int ComplainOfServer(const absl::Status& status) {
   const bool wrong_flag = status.code() == absl::StatusCode::kInvalidArgument;
   return Complain(wrong_flag ? kUsage : kServer, AsFlag(status));
+}
+
+std::string WaitingText(const Reconnecting& reconnecting) {
+  const auto seconds = [](std::chrono::milliseconds time) {
+    return std::chrono::duration_cast<std::chrono::seconds>(time).count();
+  };
+  return OneLine(absl::StrCat(reconnecting.loss, ", trying again: ", seconds(reconnecting.elapsed),
+                              " of ", seconds(reconnecting.give_up_after), " s"));
 }
 
 void CatchInterrupts() {

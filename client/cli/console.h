@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "absl/status/status.h"
+#include "partiemc/client/frame_stream.h"
 
 namespace partiemc::client {
 
@@ -35,7 +36,11 @@ std::string AsFlag(const absl::Status& status);
 /// INVALID_ARGUMENT tells; returns kServer or kUsage.
 int ComplainOfServer(const absl::Status& status);
 
-/// From here on SIGINT and SIGTERM only set a flag, the second one ends the program at once.
+/// The search for a server as a line of progress: "lost HOST:PORT (WHY), trying again: 12 of 300
+/// s".
+std::string WaitingText(const Reconnecting& reconnecting);
+
+/// After this call the first SIGINT or SIGTERM sets a flag and the second ends the program.
 void CatchInterrupts();
 bool Interrupted();
 

@@ -16,25 +16,26 @@
 namespace partiemc::client {
 namespace {
 
-// Copies all frames; what ends it early is told.
-ExitCode CopyFrames(Sequence& input, RecordingWriter& writer, Progress& progress) {
+// How the copying ended.
+struct CopyEnd {
+  ExitCode code = kGood;
+  std::string error;  // Empty for kGood.
+};
+
+CopyEnd CopyFrames(Sequence& input, RecordingWriter& writer, Progress& progress) {
   RecordedFrame frame;
   while (!Interrupted()) {
     const auto more = input.Next(frame);
-    if (!more.ok()) {
-      progress.Note("partiemc: " + OneLine(more.status()));
-      return kInput;
-    }
-    if (!*more) return kGood;
+    if (!more.ok()) return {kInput, OneLine(more.status())};
+    if (!*more) return {};
     const absl::Status added = writer.Add(frame);
     if (!added.ok()) {
-      progress.Note("partiemc: " + OneLine(added));
-      return added.code() == absl::StatusCode::kInvalidArgument ? kInput : kFailed;
+      return {added.code() == absl::StatusCode::kInvalidArgument ? kInput : kFailed,
+              OneLine(added)};
     }
     progress.Update(writer.frame_count());
   }
-  progress.Note("partiemc: interrupted; nothing was written");
-  return kInterrupted;
+  return {kInterrupted, "interrupted; nothing was written"};
 }
 
 }  // namespace
@@ -60,6 +61,7 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       ->type_name("FILE");
   verb->add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B");
+  AddExpansionFlag(*verb, flags.sequence);
   verb->add_option("--spacing", flags.spacing,
                    "Particle spacing in world units, kept in the recording for replay")
       ->type_name("S");
@@ -111,12 +113,12 @@ int Convert(const ConvertFlags& flags) {
   progress_options.quiet = flags.quiet;
   progress_options.total = input->frames->FrameCount();
   Progress progress(std::move(progress_options));
-  const ExitCode ended = CopyFrames(*input->frames, **writer, progress);
+  const CopyEnd ended = CopyFrames(*input->frames, **writer, progress);
   progress.Finish();
   if (!flags.quiet) {
     for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
   }
-  if (ended != kGood) return ended;
+  if (ended.code != kGood) return Complain(ended.code, ended.error);
   if ((*writer)->frame_count() == 0) {
     return Complain(kInput, Concat(flags.input, ": has no frame to convert; look at --frames"));
   }

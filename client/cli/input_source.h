@@ -26,6 +26,9 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
 /// Adds --attributes, a list of names.
 CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what);
 
+/// Adds --max-expansion, a bound for packed input.
+CLI::Option* AddExpansionFlag(CLI::App& app, SequenceOptions& options);
+
 /// The last part of a path: "dam_break.pemc" of "client/recordings/dam_break.pemc".
 std::string BaseName(const std::string& path);
 

@@ -59,6 +59,7 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B")
       ->group(kGroup);
+  AddExpansionFlag(app, flags.sequence)->group(kGroup);
   app.add_option("--rate", flags.rate, "Frames per second to send at, or max")
       ->type_name("FPS")
       ->capture_default_str()
@@ -106,6 +107,12 @@ void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_option("--deadline", flags.deadline_seconds, "Seconds that an answer may take")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--give-up-after", flags.give_up_after_seconds,
+                 "How long to try to mend a lost connection, in seconds; 0: not at all (default: "
+                 "300, with --policy latest 30)")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->type_name("SECONDS")
       ->group(kGroup);
 }
 

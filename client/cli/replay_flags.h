@@ -26,7 +26,8 @@ struct ReplayFlags {
   std::uint32_t checkpoint_interval = 4;
   int threads = 0;  ///< 0: one for each processor.
   double deadline_seconds = 30;
-  std::string name;  ///< Of the stream; empty: the server makes one up.
+  std::optional<double> give_up_after_seconds;  ///< Absent: kPatience, kShortPatience for latest.
+  std::string name;                             ///< Stream name; empty: chosen by the server.
   bool echo_particles = false;
 
   std::string placement = "virtual-plane";

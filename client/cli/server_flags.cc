@@ -53,10 +53,12 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
   return server;
 }
 
-std::chrono::milliseconds QueryFlags::Deadline() const {
+std::chrono::milliseconds ToMilliseconds(double seconds) {
   return std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(deadline_seconds));
+      std::chrono::duration<double>(seconds));
 }
+
+std::chrono::milliseconds QueryFlags::Deadline() const { return ToMilliseconds(deadline_seconds); }
 
 void AddQueryFlags(CLI::App& app, QueryFlags& flags) {
   AddServerFlags(app, flags.server, "Server");

@@ -23,7 +23,9 @@ struct ServerFlags {
 /// place for a secret.
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group);
 
-/// Of a verb that asks a server one question and prints the answer.
+std::chrono::milliseconds ToMilliseconds(double seconds);
+
+/// The flags of a verb that sends one request and prints the response.
 struct QueryFlags {
   ServerFlags server;
   double deadline_seconds = 5;

@@ -27,11 +27,6 @@ using Clock = std::chrono::steady_clock;
 // How soon Ctrl-C is seen while no frame comes.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
-std::chrono::milliseconds Milliseconds(double seconds) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(seconds));
-}
-
 FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sections_in_plane) {
   return {.index = frame.sequence - 1,  // As a replay numbers its files.
           .time = frame.time,
@@ -94,7 +89,10 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
       ended.dropped += watcher.end().dropped;
       return ended.With(kServer, OneLine(received.status()));
     }
-    if (*received == Received::kNothingYet) continue;
+    if (*received == Received::kNothingYet) {
+      if (const auto lost = watcher.reconnecting()) progress.Wait(WaitingText(*lost));
+      continue;
+    }
     if (*received == Received::kEnd) {
       const bool finished = watcher.end().reason == "FINISHED";
       ended.dropped += watcher.end().dropped;
@@ -139,8 +137,8 @@ absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
                         .from_sequence = FromSequence(flags.from),
                         .credentials = flags.server.credentials,
                         .fallback_addresses = {servers.begin() + 1, servers.end()},
-                        .rejoin = {.give_up_after = Milliseconds(flags.rejoin_seconds)},
-                        .deadline = Milliseconds(flags.deadline_seconds)});
+                        .rejoin = {.give_up_after = ToMilliseconds(flags.give_up_after_seconds)},
+                        .deadline = ToMilliseconds(flags.deadline_seconds)});
 }
 
 void PrintSummary(const Summary& summary, const Ended& ended, double seconds) {
@@ -187,8 +185,9 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->check(CLI::Range(1, 64))
       ->type_name("N")
       ->capture_default_str();
-  verb->add_option("--rejoin", flags.rejoin_seconds,
-                   "Seconds for which a lost stream is looked for, at every server; 0: not at all")
+  verb->add_option(
+          "--give-up-after,--rejoin", flags.give_up_after_seconds,
+          "How long to look for a lost stream, at every server, in seconds; 0: do not look")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   verb->add_option("--deadline", flags.deadline_seconds,

@@ -227,6 +227,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   if (!request.ok()) return request.status();
   recording.request = *std::move(request);
   recording.request.attributes = options.attributes;
+  recording.request.max_expansion = options.max_expansion;
   const auto range = ParseFrameRange(options.frames);
   if (!range.ok()) return range.status();
   recording.range = *range;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
 #include "client/input/base/particle_attribute.h"
 
 namespace partiemc::client {
@@ -67,6 +68,9 @@ struct SequenceOptions {
   /// "A:B" or "A:B:STEP": frames A, A + STEP, ... below B; each part may be left out. "A" is one
   /// frame. Empty: all.
   std::string frames = {};
+
+  /// A packed file may unpack to 64 MiB, and to this many times its size beyond.
+  double max_expansion = input::kMaxExpansion;
 };
 
 /// Frames of one input, read one at a time in natural order of the file names. Not thread safe.
@@ -80,11 +84,11 @@ struct SequenceOptions {
 /// If several axes are constant, the last of them is dropped. A later frame that leaves the plane
 /// is an error.
 ///
-/// Errors are one line that says what, where (file, line, frame) and what to do:
-/// kInvalidArgument an option is wrong; kNotFound no such input; kPermissionDenied it cannot be
-/// read; kUnimplemented a format that is not read; kFailedPrecondition the input needs a decision
-/// (several series, columns without names, 3D); kDataLoss it is damaged or truncated.
-/// Files are not trusted: memory grows with the bytes that are there, never with a declared count.
+/// Errors are one line with the problem, the place (file, line, frame) and the remedy:
+/// kInvalidArgument: a wrong option; kNotFound, kPermissionDenied: the file; kUnimplemented: an
+/// unsupported format; kFailedPrecondition: the input is ambiguous (several series, columns without
+/// names, 3D); kDataLoss: damaged or truncated input; kResourceExhausted: it unpacks to too much.
+/// Files are not trusted: memory grows with the bytes read, never with a declared count.
 class Sequence {
  public:
   /// Finds the files, recognises their format and reads the beginning of the first one.

@@ -38,6 +38,10 @@ class Progress {
   /// shown where there is room for it.
   void Update(std::uint64_t done, std::string detail = {});
 
+  /// Shows `text` instead of the state until the next Update, while no frame can arrive. Without a
+  /// terminal it prints a line at once and then every ten seconds.
+  void Wait(std::string_view text);
+
   /// Shows a line of its own without tearing the bar (a warning, a refused frame), also when
   /// quiet, because it is no progress.
   void Note(std::string_view line);
@@ -47,12 +51,14 @@ class Progress {
 
  private:
   void Show();
+  void ShowLine(std::string_view line);
   std::string Bar(double seconds) const;
   std::string Line(double seconds) const;
 
   Options options_;
   Clock::time_point start_;
   std::optional<Clock::time_point> shown_at_;
+  std::optional<Clock::time_point> wait_shown_at_;  // While waiting.
   std::uint64_t done_ = 0;
   std::string detail_;
   std::optional<std::uint64_t> shown_done_;

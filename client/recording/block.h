@@ -14,6 +14,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
 
 namespace partiemc::client::recording {
 
@@ -54,11 +55,13 @@ class BlockReader {
     kTruncated,  ///< The file ends, here or within a piece.
   };
 
-  /// Reads the first mark. Errors: kNotFound, kPermissionDenied, kUnimplemented (another version),
-  /// kDataLoss (no recording).
-  static absl::StatusOr<BlockReader> Open(const std::string& path);
+  /// Reads the first mark. `max_expansion` as in input::ExpandsTooMuch. Errors: kNotFound,
+  /// kPermissionDenied, kUnimplemented (another version), kDataLoss (not a recording).
+  static absl::StatusOr<BlockReader> Open(const std::string& path,
+                                          double max_expansion = input::kMaxExpansion);
 
-  /// Errors: kDataLoss. `block` is valid until the next call.
+  /// Errors: kDataLoss; kResourceExhausted where blocks expand too much. `block` is valid until the
+  /// next call.
   absl::StatusOr<Piece> Next(std::string_view& block);
 
   /// The frame count that the tail names; valid once Next gave kTail.
@@ -69,16 +72,19 @@ class BlockReader {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
   };
 
-  explicit BlockReader(std::ifstream file);
-  bool Fill();  // False at the end of the file.
+  BlockReader(std::ifstream file, double max_expansion);
+  bool Fill();  // Returns false at the end of the file.
   std::string_view Peek(std::size_t size);
   absl::StatusOr<Piece> Unpack(std::string_view& block);
   absl::StatusOr<Piece> ReadTail();
 
   std::ifstream file_;
   std::unique_ptr<ZSTD_DCtx, Free> context_;
-  std::string input_;         // Bytes of the file,
-  std::size_t position_ = 0;  // of which these are used up.
+  double max_expansion_;
+  std::uint64_t read_ = 0;      // Bytes read from the file.
+  std::uint64_t unpacked_ = 0;  // Bytes of the blocks before this one.
+  std::string input_;           // Bytes of the file.
+  std::size_t position_ = 0;    // Number of consumed bytes of input_.
   std::string block_;
   std::uint64_t frame_count_ = 0;
 };

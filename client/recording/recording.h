@@ -77,10 +77,10 @@ bool IsRecording(const std::string& path);
 /// delivered as they are; velocities of a frame, only where all of them are finite.
 class RecordingReader final : public Sequence {
  public:
-  /// `frames` and `in_space` as in SequenceOptions. Errors: those of Sequence.
-  static absl::StatusOr<std::unique_ptr<RecordingReader>> Open(const std::string& path,
-                                                               const std::string& frames,
-                                                               bool in_space = false);
+  /// `frames`, `in_space` and `max_expansion` as in SequenceOptions. Errors: as Sequence.
+  static absl::StatusOr<std::unique_ptr<RecordingReader>> Open(
+      const std::string& path, const std::string& frames, bool in_space = false,
+      double max_expansion = input::kMaxExpansion);
   ~RecordingReader() override;
 
   const RecordingHeader& header() const;

@@ -212,9 +212,11 @@ class RecordingReader::Impl {
   }
 
   absl::Status Located(const absl::Status& status) const {
-    return absl::Status(status.code(), absl::StrCat(path_, ": damaged after ", next_index_,
-                                                    " frames: ", status.message(),
-                                                    "; the frames before are whole"));
+    const bool is_damage = !absl::IsResourceExhausted(status);
+    return absl::Status(
+        status.code(), absl::StrCat(path_, is_damage ? ": damaged after " : ": after ", next_index_,
+                                    " frames: ", status.message(),
+                                    is_damage ? "; the frames before are whole" : ""));
   }
 
   const std::string path_;
@@ -240,11 +242,12 @@ bool IsRecording(const std::string& path) {
 
 absl::StatusOr<std::unique_ptr<RecordingReader>> RecordingReader::Open(const std::string& path,
                                                                        const std::string& frames,
-                                                                       bool in_space) {
+                                                                       bool in_space,
+                                                                       double max_expansion) {
   absl::StatusOr<input::FrameRange> range = input::FrameRange{};
   if (!frames.empty()) range = input::ParseFrameRange(frames);
   if (!range.ok()) return range.status();
-  auto blocks = BlockReader::Open(path);
+  auto blocks = BlockReader::Open(path, max_expansion);
   if (!blocks.ok()) {
     return absl::Status(blocks.status().code(),
                         absl::StrCat(path, ": ", blocks.status().message()));

@@ -85,6 +85,7 @@ class LoadedStream {
 
   absl::Status Open() {
     StreamOptions options{.name = name_, .credentials = shared_.flags.server.credentials};
+    options.reconnect.give_up_after = kShortPatience;
     options.parameters.spacing = 1;
     auto stream = Stream::Open(shared_.flags.server.address, options);
     if (!stream.ok()) return stream.status();

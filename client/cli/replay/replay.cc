@@ -44,27 +44,36 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
     if (!stream.ok()) return stream.status();
     return *std::move(stream);
   }
-  const auto deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(flags.deadline_seconds));
+  const std::chrono::milliseconds patience = flags.policy == "latest" ? kShortPatience : kPatience;
   const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
-  auto stream =
-      Stream::Open(servers.front(), {.name = flags.name,
-                                     .parameters = parameters,
-                                     .outputs = {.mesh = parameters.fill != Fill::kNone,
-                                                 .normals = normals,
-                                                 .echo_particles = flags.echo_particles,
-                                                 .attributes = flags.sequence.attributes},
-                                     .labels = {{"input", InputLabel(flags.input)}},
-                                     .credentials = flags.server.credentials,
-                                     .deadline = deadline,
-                                     .fallback_addresses = {servers.begin() + 1, servers.end()},
-                                     .checkpoint_interval = flags.checkpoint_interval,
-                                     .reconnect = {.announce = true}});
+  auto stream = Stream::Open(
+      servers.front(),
+      {.name = flags.name,
+       .parameters = parameters,
+       .outputs = {.mesh = parameters.fill != Fill::kNone,
+                   .normals = normals,
+                   .echo_particles = flags.echo_particles,
+                   .attributes = flags.sequence.attributes},
+       .labels = {{"input", InputLabel(flags.input)}},
+       .credentials = flags.server.credentials,
+       .deadline = ToMilliseconds(flags.deadline_seconds),
+       .fallback_addresses = {servers.begin() + 1, servers.end()},
+       .checkpoint_interval = flags.checkpoint_interval,
+       .reconnect = {.give_up_after = flags.give_up_after_seconds
+                                          ? ToMilliseconds(*flags.give_up_after_seconds)
+                                          : patience,
+                     .announce = true}});
   if (!stream.ok()) return stream.status();
   return *std::move(stream);
 }
 
-// The receiving half of a replay: answers -> check -> outputs, until the stream ends.
+// How a replay ended.
+struct ReplayEnd {
+  ExitCode code = kGood;
+  std::string error = {};  // Empty for kGood and kInterrupted.
+};
+
+// The receiving half of a replay: responses -> check -> outputs, until the stream ends.
 class Receiver {
  public:
   Receiver(const ReplayFlags& flags, FrameStream& stream, FrameFeeder& feeder,
@@ -76,25 +85,20 @@ class Receiver {
         progress_(progress),
         sections_in_plane_(SectionsInPlane(stream.info().parameters)) {}
 
-  /// kGood when every frame was answered, else the code of what ended the replay, which is told
-  /// unless it was Ctrl-C.
-  ExitCode Run() {
+  /// kGood if every frame has a response.
+  ReplayEnd Run() {
     while (!Interrupted()) {
       const auto received = stream_.Receive(event_, kPollInterval);
       for (const auto& refused : feeder_.TakeRefused()) Refuse(refused.source, refused.message);
-      if (!received.ok()) {
-        progress_.Note("partiemc: " + OneLine(received.status()));
-        return kServer;
+      if (!received.ok()) return {kServer, OneLine(received.status())};
+      if (*received == Received::kEnd) return {};
+      if (*received == Received::kNothingYet) {
+        if (const auto lost = stream_.reconnecting()) progress_.Wait(WaitingText(*lost));
+        continue;
       }
-      if (*received == Received::kEnd) return kGood;
-      if (*received == Received::kNothingYet) continue;
-      const absl::Status status = Take();
-      if (!status.ok()) {
-        progress_.Note("partiemc: " + OneLine(status));
-        return kFailed;
-      }
+      if (const absl::Status status = Take(); !status.ok()) return {kFailed, OneLine(status)};
     }
-    return kInterrupted;
+    return {kInterrupted};
   }
 
   std::uint64_t answered() const { return answered_; }
@@ -235,8 +239,8 @@ int Replay(const ReplayFlags& flags) {
                      flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock,
                      flags.sequence.attributes);
   Receiver receiver(flags, **stream, feeder, *outputs, progress);
-  const ExitCode ended = receiver.Run();
-  if (ended != kGood) feeder.Stop();
+  const ReplayEnd ended = receiver.Run();
+  if (ended.code != kGood) feeder.Stop();
   const absl::Status input_status = feeder.Join();
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   progress.Finish();
@@ -248,7 +252,7 @@ int Replay(const ReplayFlags& flags) {
                              " skipped, because newer ones came (--policy latest)"));
     }
   }
-  const std::string early = WhyEarly(ended, input_status);
+  const std::string early = WhyEarly(ended.code, input_status);
   if (!early.empty()) outputs->EndEarly(early);
   const Summary& summary = outputs->summary();
   absl::Status finished;
@@ -258,13 +262,13 @@ int Replay(const ReplayFlags& flags) {
   } else if (early.empty()) {
     return Complain(kInput, Concat(flags.input, ": has no frame to replay; look at --frames"));
   }
-  // What failed before says why what is left of it cannot be finished.
-  if (!finished.ok() && ended != kFailed) Complain(kFailed, finished);
-  if (ended == kInterrupted) {
+  // After kFailed the outputs cannot be completed, for the same reason.
+  if (!finished.ok() && ended.code != kFailed) Complain(kFailed, finished);
+  if (ended.code == kInterrupted) {
     return Complain(kInterrupted,
                     Concat("interrupted after ", Plural(receiver.answered(), "frame")));
   }
-  if (ended != kGood) return ended;
+  if (ended.code != kGood) return Complain(ended.code, ended.error);
   if (!input_status.ok()) return Complain(kInput, input_status);
   if (!finished.ok()) return kFailed;
   return Conclude(flags, *parameters, *outputs, receiver.failed_checks());

@@ -47,6 +47,16 @@ absl::Status CannotOpen(const std::string& path, int error) {
 
 }  // namespace
 
+bool ExpandsTooMuch(std::uint64_t unpacked, std::uint64_t packed, double max_expansion) {
+  return unpacked > kFreeExpansionBytes &&
+         static_cast<double>(unpacked) > max_expansion * static_cast<double>(packed);
+}
+
+std::string ExpansionRule(double max_expansion) {
+  return Concat("unpacks to more than 64 MiB and ", max_expansion,
+                " times its size; give a larger --max-expansion if it is meant to");
+}
+
 absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path) {
   struct stat found = {};
   if (stat(path.c_str(), &found) != 0) return CannotOpen(path, errno);
@@ -58,7 +68,8 @@ absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path) {
   return std::make_unique<FileSource>(path, file);
 }
 
-absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string& path) {
+absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string& path,
+                                                               double max_expansion) {
   auto file = OpenFile(path);
   if (!file.ok()) return file.status();
   char magic[4] = {};
@@ -68,7 +79,7 @@ absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string
   // Opened again rather than rewound: a ByteSource only goes forward.
   file = OpenFile(path);
   if (!file.ok()) return file.status();
-  auto unpacked = Unpack(packing, path, *std::move(file));
+  auto unpacked = Unpack(packing, path, *std::move(file), max_expansion);
   if (!unpacked.ok()) return unpacked.status();
   return std::unique_ptr<InputStream>(
       new InputStream(path, *std::move(unpacked), packing != Packing::kNone));

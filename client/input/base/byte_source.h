@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -16,7 +17,17 @@ namespace partiemc::client::input {
 /// positions).
 inline constexpr std::size_t kMaxParticles = std::size_t{1} << 26;
 
-/// Bytes in order, once.
+/// Largest ratio of unpacked to packed bytes of a file, beyond kFreeExpansionBytes. Particle dumps
+/// pack to a third of their size, or to a hundredth if nothing moves.
+inline constexpr double kMaxExpansion = 1000;
+inline constexpr std::uint64_t kFreeExpansionBytes = std::uint64_t{64} << 20;
+
+/// Whether `unpacked` bytes are more than `packed` bytes are allowed to become.
+bool ExpandsTooMuch(std::uint64_t unpacked, std::uint64_t packed, double max_expansion);
+/// The broken rule and the remedy, for an error message.
+std::string ExpansionRule(double max_expansion);
+
+/// A stream of bytes that is read once, in order.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
@@ -32,7 +43,9 @@ absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path);
 /// first.
 class InputStream final : public ByteSource {
  public:
-  static absl::StatusOr<std::unique_ptr<InputStream>> Open(const std::string& path);
+  /// Errors: also kResourceExhausted for a file that expands too much, when it is read so far.
+  static absl::StatusOr<std::unique_ptr<InputStream>> Open(const std::string& path,
+                                                           double max_expansion = kMaxExpansion);
 
   absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override;
 

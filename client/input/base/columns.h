@@ -13,6 +13,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
 
 namespace partiemc::client::input {
 
@@ -29,8 +30,9 @@ struct Condition {
 /// What the caller says about columns.
 struct ColumnRequest {
   std::vector<Condition> conditions;
-  std::vector<std::string> attributes;  ///< SequenceOptions::attributes.
-  std::vector<std::string> columns;     ///< SequenceOptions::columns, split; empty: by names.
+  std::vector<std::string> attributes;   ///< SequenceOptions::attributes.
+  std::vector<std::string> columns;      ///< SequenceOptions::columns, split; empty: by names.
+  double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
 };
 
 /// kInvalidArgument if an expression is not "COLUMN=VALUE" or an entry of `columns` is empty.

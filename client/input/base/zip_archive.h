@@ -23,12 +23,14 @@ struct ZipEntry {
 /// The directory of an archive. Not trusted: every offset and size is checked against the file.
 class ZipArchive {
  public:
-  /// kDataLoss if the file is no zip archive, is truncated or has over 65,535 entries.
+  /// kDataLoss if the file is not a zip archive, is truncated, has over 65,535 entries or bytes
+  /// behind its directory.
   static absl::StatusOr<ZipArchive> Open(const std::string& path);
 
   const std::vector<ZipEntry>& entries() const { return entries_; }
 
-  /// The bytes of an entry. At the end the checksum is verified: kDataLoss if it is another.
+  /// The bytes of an entry. At the end the checksum and the size are verified: kDataLoss if they
+  /// differ.
   /// kUnimplemented for other methods and encrypted entries.
   absl::StatusOr<std::unique_ptr<ByteSource>> OpenEntry(const ZipEntry& entry) const;
 

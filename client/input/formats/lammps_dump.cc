@@ -248,7 +248,7 @@ class LammpsDumpReader final : public FrameReader {
 
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenLammpsDump(const std::string& path,
                                                             const ColumnRequest& request) {
-  auto stream = InputStream::Open(path);
+  auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   return std::make_unique<LammpsDumpReader>(*std::move(stream), request);
 }

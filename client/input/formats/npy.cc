@@ -133,7 +133,13 @@ absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& n
 
 absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const std::string& name,
                              std::vector<char>& bytes) {
-  return ReadExactly(source, header.element_count() * ElementBytes(header.type), name, bytes);
+  const std::size_t size = header.element_count() * ElementBytes(header.type);
+  if (absl::Status status = ReadExactly(source, size, name, bytes); !status.ok()) return status;
+  char surplus = 0;
+  const auto count = source.Read(&surplus, 1);
+  if (!count.ok()) return count.status();
+  if (*count == 0) return absl::OkStatus();
+  return Damaged(name, Concat("has bytes behind the ", size, " of the array; save one array"));
 }
 
 std::vector<ArrayColumn> NpyColumns(const NpyHeader& header, const std::vector<char>& bytes) {

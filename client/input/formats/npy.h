@@ -26,7 +26,7 @@ struct NpyHeader {
 /// 4 GiB are kDataLoss.
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);
 
-/// Reads the elements that follow the header. kDataLoss if there are fewer than it says.
+/// Reads the elements that follow the header. kDataLoss if `source` holds fewer or more bytes.
 absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const std::string& name,
                              std::vector<char>& bytes);
 

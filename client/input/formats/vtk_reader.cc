@@ -290,7 +290,7 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenVtk(const std::string& path,
     return absl::InvalidArgumentError(Concat(
         path, ": --columns does not apply to VTK files, which know where their positions are"));
   }
-  const auto stream = InputStream::Open(path);
+  const auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   const auto head = (*stream)->Peek(kHeadBytes);
   if (!head.ok()) return head.status();

@@ -86,7 +86,7 @@ class XyzReader final : public FrameReader {
 
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenXyz(const std::string& path,
                                                      const ColumnRequest& request) {
-  auto stream = InputStream::Open(path);
+  auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   auto plan = PlanNamedColumns({"type", "x", "y", "z"}, request);
   if (!plan.ok()) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "client/output/text.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -116,6 +117,7 @@ TEST_F(ProgressTest, QuietShowsNothingButNotes) {
     Progress progress(options);
     now_ += std::chrono::seconds(10);
     progress.Update(5);
+    progress.Wait("lost it");
     progress.Finish();
     EXPECT_THAT(shown_, IsEmpty());
   }
@@ -123,6 +125,26 @@ TEST_F(ProgressTest, QuietShowsNothingButNotes) {
   options.quiet = true;
   Progress(options).Note("frame 3: refused");
   EXPECT_THAT(shown_, ElementsAre("frame 3: refused\n"));
+}
+
+TEST_F(ProgressTest, WaitingIsShownInPlaceOfTheState) {
+  for (const bool terminal : {true, false}) {
+    shown_.clear();
+    Progress progress(Options(terminal, 10));
+    now_ += std::chrono::seconds(3);
+    progress.Update(5);
+    shown_.clear();
+    for (int k = 0; k <= 250; ++k) {
+      progress.Wait(Concat("lost it, ", k / 10, " s"));
+      now_ += std::chrono::milliseconds(100);
+    }
+    EXPECT_EQ(shown_.size(), terminal ? 251u : 3u);
+    EXPECT_EQ(shown_.back(), terminal ? "\r\x1b[Klost it, 25 s" : "lost it, 20 s\n");
+    progress.Update(6);
+    EXPECT_THAT(shown_.back(), HasSubstr(terminal ? "6/10" : "6 of 10"));
+    progress.Wait("lost it again");
+    EXPECT_THAT(shown_.back(), HasSubstr("again"));
+  }
 }
 
 TEST_F(ProgressTest, ANoteDoesNotTearTheBar) {
