@@ -44,11 +44,20 @@ void MakeEmpty(Result& result) {
   result.sections.clear();
 }
 
-void Prepare(std::size_t attributes, std::size_t sections, Result& result) {
+// An outline without points has its attributes, too.
+void Name(std::span<const Attribute> attributes, std::vector<AttributeValues>& values) {
+  values.resize(attributes.size());
+  for (std::size_t k = 0; k < attributes.size(); ++k) {
+    values[k].name = attributes[k].name;
+    values[k].components = attributes[k].components;
+  }
+}
+
+void Prepare(std::span<const Attribute> attributes, std::size_t sections, Result& result) {
   result.Clear();
-  result.attributes.resize(attributes);
+  Name(attributes, result.attributes);
   result.sections.resize(sections);
-  for (Result& section : result.sections) section.attributes.resize(attributes);
+  for (Result& section : result.sections) Name(attributes, section.attributes);
 }
 
 // `parameters` of a stream, not resolved, as they are for a section.
@@ -304,7 +313,7 @@ absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& para
 absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Workspace& workspace,
                                         Result& result, const FrameControl& control) const {
   const CancellationScope scope(control.cancelled);
-  Prepare(frame.attributes.size(), sections_.size(), result);
+  Prepare(frame.attributes, sections_.size(), result);
   absl::Status status;
   try {
     status = ReconstructOrThrow(frame, state, workspace.buffers(), result, control);

@@ -27,7 +27,8 @@ absl::Status CheckAttribute(const Frame& frame, std::size_t k) {
   const auto is_printable = [](char c) { return c >= ' ' && c <= '~'; };
   if (attribute.name.empty() || attribute.name.size() > kMostNameBytes ||
       !std::ranges::all_of(attribute.name, is_printable)) {
-    return InvalidFrame(kReasonOutOfRange, field + ".name", Escaped(attribute.name),
+    return InvalidFrame(kReasonOutOfRange, field + ".name",
+                        attribute.name.empty() ? "empty" : Escaped(attribute.name),
                         absl::StrCat("must be 1 to ", kMostNameBytes, " bytes of ASCII"));
   }
   for (const Attribute& before : frame.attributes.first(k)) {
