@@ -1,4 +1,4 @@
-// What particles carry besides: whether it is usable, and what of it is wanted.
+// Checks the attributes of a frame and selects the requested ones.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 64;
 
-// Errors reach logs and messages, which take text only.
+// Errors go to logs and messages, so values must be printable.
 std::string Escaped(std::string_view name) { return absl::CHexEscape({name.data(), name.size()}); }
 
 absl::Status CheckAttribute(const Frame& frame, std::size_t k) {
