@@ -56,6 +56,7 @@ struct ReconstructedFrame {
 
 v1::Placement ToWire(Placement placement);
 v1::Fill ToWire(Fill fill);
+v1::Doubt ToWire(Doubt doubt);
 
 /// Defaults filled in for absent fields; the values are checked by the core's Validate.
 /// Errors: INVALID_ARGUMENT with a Violation for an enum value that this version does not know.

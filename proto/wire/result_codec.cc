@@ -133,20 +133,6 @@ absl::Status EncodeMesh(const Result& result, v1::ReconstructedFrame& message) {
                       *mesh.mutable_points());
 }
 
-v1::Doubt ToWire(Doubt doubt) {
-  switch (doubt) {
-    case Doubt::kSpacingProvisional:
-      return v1::DOUBT_SPACING_PROVISIONAL;
-    case Doubt::kSpacingContradicted:
-      return v1::DOUBT_SPACING_CONTRADICTED;
-    case Doubt::kVolumesContradictSpacing:
-      return v1::DOUBT_VOLUMES_CONTRADICT_SPACING;
-    case Doubt::kPositionsCoarse:
-      return v1::DOUBT_POSITIONS_COARSE;
-  }
-  return v1::DOUBT_UNSPECIFIED;
-}
-
 void EncodeStatistics(const FrameStatistics& statistics, v1::FrameStatistics& message) {
   message.set_particles(statistics.particles);
   message.set_tiles(statistics.tiles);
@@ -422,6 +408,20 @@ absl::Status DecodeOutline(const v1::ReconstructedFrame& message, Result& result
 }
 
 }  // namespace
+
+v1::Doubt ToWire(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kSpacingProvisional:
+      return v1::DOUBT_SPACING_PROVISIONAL;
+    case Doubt::kSpacingContradicted:
+      return v1::DOUBT_SPACING_CONTRADICTED;
+    case Doubt::kVolumesContradictSpacing:
+      return v1::DOUBT_VOLUMES_CONTRADICT_SPACING;
+    case Doubt::kPositionsCoarse:
+      return v1::DOUBT_POSITIONS_COARSE;
+  }
+  return v1::DOUBT_UNSPECIFIED;
+}
 
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message) {
