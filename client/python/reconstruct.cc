@@ -13,6 +13,7 @@
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
+#include "client/python/research.h"
 #include "client/python/results.h"
 #include "common/stage_clock.h"
 #include "partiemc/arena.h"
@@ -31,7 +32,9 @@ class Sequence {
       const auto threads = arguments.attr("pop")("threads").cast<std::optional<unsigned>>();
       if (threads.value_or(0) > 0) arena_ = std::make_unique<Arena>(*threads);
     }
-    auto reconstructor = Reconstructor::Create(TakeParameters(arguments));
+    ReconstructionParameters parameters = TakeParameters(arguments);
+    TakeResearch(arguments, parameters);
+    auto reconstructor = Reconstructor::Create(parameters);
     ExpectNothingElse(arguments, "reconstruct");
     RaiseUnlessOk(reconstructor.status());
     reconstructor_ = *std::move(reconstructor);
