@@ -32,9 +32,8 @@ class Sequence {
       const auto threads = arguments.attr("pop")("threads").cast<std::optional<unsigned>>();
       if (threads.value_or(0) > 0) arena_ = std::make_unique<Arena>(*threads);
     }
-    ReconstructionParameters parameters = TakeParameters(arguments);
-    TakeResearch(arguments, parameters);
-    auto reconstructor = Reconstructor::Create(parameters);
+    const VirtualPlaneVariant variant = TakeResearch(arguments);
+    auto reconstructor = CreateVariant(TakeParameters(arguments), variant);
     ExpectNothingElse(arguments, "reconstruct");
     RaiseUnlessOk(reconstructor.status());
     reconstructor_ = *std::move(reconstructor);

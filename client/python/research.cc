@@ -2,11 +2,9 @@
 
 #include <pybind11/stl.h>
 
-#include <array>
 #include <map>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "client/python/results.h"
 #include "partiemc/validate.h"
@@ -16,61 +14,47 @@ namespace {
 
 namespace py = pybind11;
 
-struct NamedStep {
-  std::string_view name;
-  bool VirtualPlaneSteps::*flag;
-};
-constexpr std::array<NamedStep, 6> kSteps = {{
-    {"edge-vertices", &VirtualPlaneSteps::edge_vertices},
-    {"normals", &VirtualPlaneSteps::normals},
-    {"curvature", &VirtualPlaneSteps::curvature},
-    {"support", &VirtualPlaneSteps::support},
-    {"smoothing", &VirtualPlaneSteps::smoothing},
-    {"area", &VirtualPlaneSteps::area},
-}};
-
-bool& Find(VirtualPlaneSteps& steps, const std::string& name) {
-  for (const NamedStep& step : kSteps) {
-    if (step.name == name) return steps.*step.flag;
-  }
-  throw py::key_error("_research: no step is called '" + name + "'");
-}
-
-double& Find(VirtualPlaneConstants& constants, const std::string& name) {
-  for (const NamedConstant& constant : AllConstants()) {
-    if (constant.name == name) return constants.*constant.value;
-  }
-  throw py::key_error("_research: no constant is called '" + name + "'");
-}
-
-template <typename Value, typename Target>
-void TakeAll(py::dict& research, const char* kind, Target& target) {
+// Sets what the dict research[kind] names, of all `named` members of `target`.
+template <typename Value, typename Named, typename Target>
+void TakeAll(py::dict& research, const char* kind, const Named& named, Target& target) {
   if (!research.contains(kind)) return;
   const auto given = research.attr("pop")(kind).cast<std::map<std::string, Value>>();
-  for (const auto& [name, value] : given) Find(target, name) = value;
+  for (const auto& [name, value] : given) {
+    bool known = false;
+    for (const auto& one : named) {
+      if (one.name != name) continue;
+      target.*one.value = value;
+      known = true;
+    }
+    if (!known)
+      throw py::key_error("_research: none of the " + std::string(kind) + " is '" + name + "'");
+  }
+}
+
+template <typename Named, typename Target>
+py::dict AllOf(const Named& named, const Target& target) {
+  py::dict values;
+  for (const auto& one : named) values[py::str(std::string(one.name))] = target.*one.value;
+  return values;
 }
 
 py::dict Defaults() {
-  const ReconstructionParameters parameters;
-  py::dict steps, constants;
-  for (const NamedStep& step : kSteps) {
-    steps[py::str(std::string(step.name))] = parameters.steps.*step.flag;
-  }
-  for (const NamedConstant& constant : AllConstants()) {
-    constants[py::str(std::string(constant.name))] = parameters.constants.*constant.value;
-  }
+  const VirtualPlaneVariant variant;
   using namespace py::literals;
-  return py::dict("steps"_a = steps, "constants"_a = constants);
+  return py::dict("steps"_a = AllOf(AllSteps(), variant.steps),
+                  "constants"_a = AllOf(AllConstants(), variant.constants));
 }
 
 }  // namespace
 
-void TakeResearch(py::dict& arguments, ReconstructionParameters& parameters) {
-  if (!arguments.contains("_research")) return;
+VirtualPlaneVariant TakeResearch(py::dict& arguments) {
+  VirtualPlaneVariant variant;
+  if (!arguments.contains("_research")) return variant;
   py::dict research(arguments.attr("pop")("_research").attr("copy")());
-  TakeAll<bool>(research, "steps", parameters.steps);
-  TakeAll<double>(research, "constants", parameters.constants);
+  TakeAll<bool>(research, "steps", AllSteps(), variant.steps);
+  TakeAll<double>(research, "constants", AllConstants(), variant.constants);
   if (!research.empty()) throw py::key_error("_research: must be a dict of steps, constants");
+  return variant;
 }
 
 void DefineResearch(py::module_& module) {

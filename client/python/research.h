@@ -4,14 +4,14 @@
 
 #include <pybind11/pybind11.h>
 
-#include "partiemc/parameters.h"
+#include "core/internal/research.h"
 
 namespace partiemc::python {
 
 /// Removes `_research` from `arguments`: a dict {"steps": {name: bool}, "constants": {name:
 /// float}} of what differs from the default. Raises KeyError for an unknown name, TypeError for a
 /// value of another kind.
-void TakeResearch(pybind11::dict& arguments, ReconstructionParameters& parameters);
+VirtualPlaneVariant TakeResearch(pybind11::dict& arguments);
 
 /// Adds `_research()`, which returns the steps and constants with their default values in the same
 /// form, and `_count_t_junctions(result)`.
