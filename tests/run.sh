@@ -16,7 +16,7 @@ Steps, all of them by default:
   contract    the .proto as buf lints it, and that it breaks nobody (where npm can fetch buf)
   release     the whole project, optimised, and all of its tests
   recordings  the bundled recordings replayed, and the files that come out checked (after release)
-  viewer      the page in the browser: its parts by node, the whole in Chromium (after release)
+  viewer      page and report: unit tests by node, both in Chromium (after release)
   sanitized   core, sessions, client streams and the gateway under AddressSanitizer and
               UndefinedBehaviorSanitizer
   threads     core and sessions under ThreadSanitizer, as far as threads meet in them

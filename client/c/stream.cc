@@ -117,8 +117,8 @@ client::StreamOptions StreamOptionsOf(const partiemc_options& options,
   result.credentials = CredentialsOf(options);
   result.connect_timeout = Milliseconds(options.connect_timeout, result.connect_timeout);
   result.deadline = Milliseconds(options.deadline, result.deadline);
-  auto& give_up_after = result.reconnect.give_up_after;
-  give_up_after = Milliseconds(options.give_up_after, give_up_after);
+  result.reconnect.give_up_after = Milliseconds(
+      options.give_up_after, options.latest != 0 ? client::kShortPatience : client::kPatience);
   if (options.send_timeout > 0) result.send_timeout = Milliseconds(options.send_timeout, {});
   result.parts.parts = options.parts;
   result.parts.part = options.part;

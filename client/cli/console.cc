@@ -1,10 +1,12 @@
 #include "client/cli/console.h"
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "common/printable.h"
 
 namespace partiemc::client {
@@ -54,7 +56,7 @@ std::string AsFlag(const absl::Status& status) {
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
   line.erase(0, kPrefix.size());
-  // Sections come from flags that may be given again, or are lists.
+  // --slice and --isolines take several values; the index means nothing to a user.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:")}) {
@@ -70,6 +72,14 @@ std::string AsFlag(const absl::Status& status) {
 int ComplainOfServer(const absl::Status& status) {
   const bool wrong_flag = status.code() == absl::StatusCode::kInvalidArgument;
   return Complain(wrong_flag ? kUsage : kServer, AsFlag(status));
+}
+
+std::string WaitingText(const Reconnecting& reconnecting) {
+  const auto seconds = [](std::chrono::milliseconds time) {
+    return std::chrono::duration_cast<std::chrono::seconds>(time).count();
+  };
+  return OneLine(absl::StrCat(reconnecting.loss, ", trying again: ", seconds(reconnecting.elapsed),
+                              " of ", seconds(reconnecting.give_up_after), " s"));
 }
 
 void CatchInterrupts() {

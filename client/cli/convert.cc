@@ -16,25 +16,26 @@
 namespace partiemc::client {
 namespace {
 
-// Copies all frames; what ends it early is told.
-ExitCode CopyFrames(Sequence& input, RecordingWriter& writer, Progress& progress) {
+// How the copying ended.
+struct CopyEnd {
+  ExitCode code = kGood;
+  std::string error;  // Empty for kGood.
+};
+
+CopyEnd CopyFrames(Sequence& input, RecordingWriter& writer, Progress& progress) {
   RecordedFrame frame;
   while (!Interrupted()) {
     const auto more = input.Next(frame);
-    if (!more.ok()) {
-      progress.Note("partiemc: " + OneLine(more.status()));
-      return kInput;
-    }
-    if (!*more) return kGood;
+    if (!more.ok()) return {kInput, OneLine(more.status())};
+    if (!*more) return {};
     const absl::Status added = writer.Add(frame);
     if (!added.ok()) {
-      progress.Note("partiemc: " + OneLine(added));
-      return added.code() == absl::StatusCode::kInvalidArgument ? kInput : kFailed;
+      return {added.code() == absl::StatusCode::kInvalidArgument ? kInput : kFailed,
+              OneLine(added)};
     }
     progress.Update(writer.frame_count());
   }
-  progress.Note("partiemc: interrupted; nothing was written");
-  return kInterrupted;
+  return {kInterrupted, "interrupted; nothing was written"};
 }
 
 }  // namespace
@@ -54,20 +55,20 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
   verb->add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
       ->type_name("NAMES");
   AddAttributesFlag(*verb, flags.sequence,
-                    "What particles carry that is kept, too: columns, or arrays of two or three "
-                    "components; of a recording all are");
+                    "Particle attributes to keep: column names, or arrays of two or three "
+                    "components; a recording keeps all of its attributes");
   verb->add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
       ->type_name("FILE");
   verb->add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B");
+  AddExpansionFlag(*verb, flags.sequence);
   verb->add_option("--spacing", flags.spacing,
-                   "Particle spacing in world units, kept in the recording for replay")
+                   "Particle spacing in world units, stored in the recording")
       ->type_name("S");
-  verb->add_option("--title", flags.title, "A few words on what this is, kept in the recording")
-      ->type_name("TEXT");
+  verb->add_option("--title", flags.title, "Title to store in the recording")->type_name("TEXT");
   verb->add_flag("--in-space", flags.sequence.in_space,
-                 "Keep all three coordinates, of particles that fill space, for --slice of replay");
-  verb->add_flag("--float64", flags.float64, "Positions as float64 instead of float32");
+                 "Keep all three coordinates of particles in 3D, for `partiemc replay --slice`");
+  verb->add_flag("--float64", flags.float64, "Store positions as float64 instead of float32");
   verb->add_option("--compression-level", flags.compression_level, "1 (fast) to 19 (small)")
       ->check(CLI::Range(1, 19))
       ->capture_default_str();
@@ -77,13 +78,12 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       "  partiemc convert frames/ dam_break.pemc --spacing 0.0303\n"
       "  partiemc convert drum.lammpstrj.gz drum.pemc --select type=1 --frames 0:100\n"
       "  partiemc convert 'tank_*.vtu' tank.pemc --in-space --spacing 0.02\n"
-      "A recording holds time, position, id, volume, velocity and --attributes of the particles, "
-      "compressed;\n"
-      "if it is cut off, only its last frames are lost.");
+      "A recording holds time, position, id, volume, velocity and --attributes of the particles,\n"
+      "compressed. A truncated recording loses only its last frames.");
   verb->parse_complete_callback([&flags] {
     if (!std::string_view(flags.output).ends_with(".pemc")) {
       throw CLI::ValidationError(
-          Concat("OUTPUT: '", flags.output, "'; must end in .pemc, the recording's own format"));
+          Concat("OUTPUT: '", flags.output, "'; must end in .pemc, the format of recordings"));
     }
     if (!flags.spacing.empty() && !PositiveNumber(flags.spacing)) {
       throw CLI::ValidationError(
@@ -99,7 +99,7 @@ int Convert(const ConvertFlags& flags) {
     const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kInput, input.status());
   }
-  CatchInterrupts();  // Before there is a temporary file to take away.
+  CatchInterrupts();  // Before the first temporary file exists.
   const auto writer = RecordingWriter::Create(
       flags.output,
       {.spacing = flags.spacing.empty() ? input->spacing : PositiveNumber(flags.spacing),
@@ -111,14 +111,14 @@ int Convert(const ConvertFlags& flags) {
   progress_options.quiet = flags.quiet;
   progress_options.total = input->frames->FrameCount();
   Progress progress(std::move(progress_options));
-  const ExitCode ended = CopyFrames(*input->frames, **writer, progress);
+  const CopyEnd ended = CopyFrames(*input->frames, **writer, progress);
   progress.Finish();
   if (!flags.quiet) {
     for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
   }
-  if (ended != kGood) return ended;
+  if (ended.code != kGood) return Complain(ended.code, ended.error);
   if ((*writer)->frame_count() == 0) {
-    return Complain(kInput, Concat(flags.input, ": has no frame to convert; look at --frames"));
+    return Complain(kInput, Concat(flags.input, ": has no frame to convert; check --frames"));
   }
   const absl::Status finished = (*writer)->Finish();
   if (!finished.ok()) return Complain(kFailed, finished);

@@ -1,4 +1,4 @@
-// `partiemc convert`: any input as a recording of our own.
+// `partiemc convert`: writes any input as a recording (.pemc).
 #pragma once
 
 #include <string>
@@ -15,8 +15,8 @@ struct ConvertFlags {
   std::string input;
   std::string output;
   SequenceOptions sequence;
-  std::string spacing;  ///< World units; empty: what the input knows.
-  std::string title;    ///< Empty: the input's name.
+  std::string spacing;  ///< World units; empty: the spacing of the input, if it has one.
+  std::string title;    ///< Empty: the name of the input.
   bool float64 = false;
   int compression_level = 3;
   bool quiet = false;

@@ -1,5 +1,4 @@
-// What a verb that gets results frame by frame leaves behind, whichever way they come: files of
-// frames, statistics, and the numbers of its table.
+// The outputs of a verb that receives results frame by frame: files, statistics and summary.
 #pragma once
 
 #include <optional>
@@ -17,13 +16,13 @@ namespace partiemc::client {
 
 class FrameOutputs {
  public:
-  /// As the flags of the same names; empty: none.
+  /// The values of the flags with the same names. Empty: no such output.
   struct Places {
     std::string output_dir, format, stats, color_by;
   };
 
-  /// Opens each, so that a place that cannot be written is known before the work.
-  /// Errors: INVALID_ARGUMENT for a wrong format or extension, those of AtomicFile.
+  /// Opens every output, so that an unwritable path is reported before the work begins.
+  /// Errors: INVALID_ARGUMENT for a wrong format or extension; the errors of AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether the files show the normals of the vertices.
@@ -33,7 +32,7 @@ class FrameOutputs {
   void AddRefused() { summary_.AddRefused(); }
   void EndEarly(std::string why) { summary_.EndEarly(std::move(why)); }
 
-  /// Completes the statistics, which do not exist before.
+  /// Writes the statistics file. It does not exist before.
   absl::Status Finish();
 
   const Summary& summary() const { return summary_; }

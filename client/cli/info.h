@@ -1,4 +1,4 @@
-// `partiemc info`: what a server is and what it allows.
+// `partiemc info`: prints the version, limits and load of a server.
 #pragma once
 
 #include <string>

@@ -25,7 +25,8 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
                      " is a recording, which has no columns and knows its times; leave it out, or "
                      "give it to `partiemc convert` with the original"));
   }
-  auto reader = RecordingReader::Open(input, options.frames, options.in_space);
+  auto reader =
+      RecordingReader::Open(input, options.frames, options.in_space, options.max_expansion);
   if (!reader.ok()) return reader.status();
   const auto spacing = (*reader)->header().spacing;
   return InputSource{.frames = *std::move(reader), .spacing = spacing};
@@ -36,6 +37,16 @@ CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const st
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAMES");
+}
+
+CLI::Option* AddExpansionFlag(CLI::App& app, SequenceOptions& options) {
+  return app
+      .add_option("--max-expansion", options.max_expansion,
+                  "Refuse packed input (.gz, .zst, .pemc) that unpacks to more than 64 MiB and "
+                  "RATIO times its size")
+      ->check(CLI::Range(1.0, 1e15))
+      ->type_name("RATIO")
+      ->capture_default_str();
 }
 
 std::string BaseName(const std::string& path) {

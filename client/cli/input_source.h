@@ -1,4 +1,4 @@
-// An input as a person names it: a recording of our own, or anything else that Sequence reads.
+// Opens the input of a verb: a recording, or any other format that Sequence reads.
 #pragma once
 
 #include <memory>
@@ -17,14 +17,17 @@ namespace partiemc::client {
 
 struct InputSource {
   std::unique_ptr<Sequence> frames;
-  std::optional<double> spacing = {};  ///< World units, where the recording knows it.
+  std::optional<double> spacing = {};  ///< World units, if the recording holds it.
 };
 
-/// Errors: those of Sequence::Open.
+/// Errors: as Sequence::Open.
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
 
 /// Adds --attributes, a list of names.
 CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what);
+
+/// Adds --max-expansion, a bound for packed input.
+CLI::Option* AddExpansionFlag(CLI::App& app, SequenceOptions& options);
 
 /// The last part of a path: "dam_break.pemc" of "client/recordings/dam_break.pemc".
 std::string BaseName(const std::string& path);

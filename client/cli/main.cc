@@ -1,4 +1,4 @@
-// `partiemc`: the command line. Only wires flags to verbs.
+// `partiemc`: the command line. Connects flags with verbs.
 #include <cstdlib>
 
 #include "CLI/CLI.hpp"
@@ -16,7 +16,7 @@ namespace {
 
 using partiemc::client::Complain;
 
-// A wrong flag: what is wrong, and where the right ones are told.
+// Reports a wrong flag and refers to the help of its verb.
 int ComplainUsage(const CLI::App& app, const CLI::ParseError& error) {
   std::string help = "partiemc";
   for (const CLI::App* verb : app.get_subcommands()) help += " " + verb->get_name();
@@ -27,14 +27,14 @@ int ComplainUsage(const CLI::App& app, const CLI::ParseError& error) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // gRPC's own words about a connection are for its developers; what went wrong is told in ours.
+  // gRPC's log lines are for its developers. This program reports connection errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*replace=*/0);
   CLI::App app("Outlines and meshes of streamed particle frames (SPH, granular), stable over time.",
                "partiemc");
   app.set_version_flag("--version", "partiemc " PARTIEMC_VERSION);
   app.require_subcommand(1);
   app.get_formatter()->column_width(32);
-  app.footer("`partiemc VERB --help` tells more and has examples.");
+  app.footer("`partiemc VERB --help` shows the options of a verb and examples.");
   partiemc::client::ReplayFlags replay;
   partiemc::client::WatchFlags watch;
   partiemc::client::QueryFlags streams;

@@ -13,22 +13,22 @@ namespace {
 
 absl::Status CheckCombinations(const CLI::App& app) {
   if (app.count("--threads") > 0 && app.count("--local") == 0) {
-    return absl::InvalidArgumentError("--threads: goes with --local; a server has its own");
+    return absl::InvalidArgumentError("--threads: requires --local; a server has its own threads");
   }
   if (app.count("--format") > 0 && app.count("--output-dir") == 0) {
-    return absl::InvalidArgumentError("--format: goes with --output-dir, the place of the files");
+    return absl::InvalidArgumentError("--format: requires --output-dir");
   }
   if (app.count("--color-by") > 0 &&
       (app.count("--attributes") == 0 ||
        (app.count("--output-dir") == 0 && app.count("--report") == 0))) {
     return absl::InvalidArgumentError(
-        "--color-by: goes with --attributes, which names it, and --output-dir or --report");
+        "--color-by: requires --attributes with this name, and --output-dir or --report");
   }
   if (app.count("--loop") > 0) {
     for (const char* output : {"--output-dir", "--stats", "--report"}) {
       if (app.count(output) > 0) {
         return absl::InvalidArgumentError(
-            Concat("--loop: has no end, hence no ", output, "; leave one of them out"));
+            Concat("--loop: cannot be combined with ", output, ", because a loop has no end"));
       }
     }
   }
@@ -50,8 +50,8 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       ->group(kGroup);
   AddAttributesFlag(
       app, flags.sequence,
-      "What particles carry that is wanted at the vertices, too: columns, arrays of two "
-      "or three components, or velocity")
+      "Particle attributes to interpolate to the vertices: column names, arrays of two or three "
+      "components, or velocity")
       ->group(kGroup);
   app.add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
       ->type_name("FILE")
@@ -59,53 +59,63 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B")
       ->group(kGroup);
+  AddExpansionFlag(app, flags.sequence)->group(kGroup);
   app.add_option("--rate", flags.rate, "Frames per second to send at, or max")
       ->type_name("FPS")
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--policy", flags.policy,
-                 "Where frames come faster than they are taken: block (they wait, none is lost) or "
-                 "latest (the newest is sent, others are skipped and counted)")
+                 "What to do with frames while the server is busy: block (wait, no frame is lost) "
+                 "or latest "
+                 "(send the newest, skip and count the others)")
       ->check(CLI::IsMember({"block", "latest"}))
       ->type_name("WHICH")
       ->capture_default_str()
       ->group(kGroup);
   app.add_flag("--loop", flags.loop,
-               "Begin anew when the input ends, until Ctrl-C, for others to watch; writes no files")
+               "Start over when the input ends, until Ctrl-C; for watchers, writes no files")
       ->group(kGroup);
 }
 
 void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
-  constexpr const char* kGroup = "Where";
+  constexpr const char* kGroup = "Server";
   CLI::Option* const server = AddServerFlags(app, flags.server, kGroup);
-  server->description("Server: HOST:PORT or unix:PATH; several, to go on with when one is lost")
+  server->description("Server address, HOST:PORT or unix:PATH. Give several to fail over")
       ->multi_option_policy(CLI::MultiOptionPolicy::Join)
       ->delimiter(',');
   app.add_option("--checkpoint-interval", flags.checkpoint_interval,
-                 "A server sends what another one needs to go on with every such frame; 0: never, "
-                 "and a lost server ends the replay")
+                 "Request a checkpoint with every K-th frame, to resume from after a lost "
+                 "connection; 0: none, "
+                 "a lost connection ends the replay")
       ->type_name("K")
       ->check(CLI::Range(0u, 1'000'000u))
       ->capture_default_str()
       ->group(kGroup);
   CLI::Option* const name =
-      app.add_option("--name", flags.name, "Of the stream, for `partiemc watch NAME`")
+      app.add_option("--name", flags.name, "Stream name, for `partiemc watch NAME`")
           ->type_name("NAME")
           ->group(kGroup);
   CLI::Option* const echo =
-      app.add_flag("--echo-particles", flags.echo_particles, "Who watches gets the particles too")
+      app.add_flag("--echo-particles", flags.echo_particles, "Send the particles to watchers too")
           ->group(kGroup);
   app.add_flag("--local", flags.local, "Reconstruct in this process, without a server")
       ->excludes(server)
       ->excludes(name)
       ->excludes(echo)
       ->group(kGroup);
-  app.add_option("--threads", flags.threads, "Threads with --local; all processors by default")
+  app.add_option("--threads", flags.threads,
+                 "Number of threads with --local (default: one per processor)")
       ->check(CLI::Range(1, 1024))
       ->group(kGroup);
-  app.add_option("--deadline", flags.deadline_seconds, "Seconds that an answer may take")
+  app.add_option("--deadline", flags.deadline_seconds, "Timeout of a response, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--give-up-after", flags.give_up_after_seconds,
+                 "How long to try to mend a lost connection, in seconds; 0: not at all (default: "
+                 "300, with --policy latest 30)")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->type_name("SECONDS")
       ->group(kGroup);
 }
 
@@ -120,21 +130,24 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("NAME")
       ->capture_default_str()
       ->group(kGroup);
-  app.add_option("--spacing", flags.spacing,
-                 "Particle spacing in world units, first-frame or every-frame (estimated); by "
-                 "default what the recording knows, else first-frame")
+  app.add_option(
+         "--spacing", flags.spacing,
+         "Particle spacing in world units; first-frame or every-frame estimate it. Default: the "
+         "spacing of the recording, else first-frame")
       ->type_name("S|RULE")
       ->group(kGroup);
   app.add_option("--slice", flags.slices,
-                 "Of particles in space the section with a plane: x=C, y=C, z=C, or six numbers, a "
-                 "point of it and its normal; wants --spacing. Given again: of one more plane")
+                 "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal; requires "
+                 "--spacing. "
+                 "Repeat for more planes")
       ->type_name("z=C|OX,OY,OZ,NX,NY,NZ")
       ->allow_extra_args(false)
       ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
       ->group(kGroup);
   app.add_option("--isolines", flags.isolines,
-                 "Beside the outline, on each slice, isolines of the density, which is about 1 "
-                 "inside of bodies and .5 on their boundaries: a list of values in [.01, 10]")
+                 "Isovalues of the density in [.01, 10], drawn beside the outline on each slice; "
+                 "the density "
+                 "is about 1 inside bodies and .5 at their boundaries")
       ->type_name("V,...")
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -157,22 +170,22 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->capture_default_str()
       ->group(kGroup);
   app.add_flag("--no-normal-memory", flags.no_normal_memory,
-               "Orient normals without those of the frame before")
+               "Orient normals without the normals of the previous frame")
       ->group(kGroup);
   app.add_option("--clean", flags.clean,
-                 "Drop tiny holes and components without a particle: on, off or auto")
+                 "Drop tiny holes and components without particles: on, off or auto")
       ->type_name("WHEN")
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--min-area", flags.min_area,
-                 "Drop spray: components of less area, in squared spacings")
+                 "Drop spray: components smaller than this area, in squared spacings")
       ->type_name("A")
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--min-particles", flags.min_particles,
-                 "Drop spray: components of fewer particles")
+                 "Drop spray: components with fewer particles")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber)  // Else "-1" is read as the largest number there is.
+      ->check(CLI::NonNegativeNumber)  // CLI11 would read "-1" as the largest unsigned number.
       ->capture_default_str()
       ->group(kGroup);
 }
@@ -186,24 +199,24 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_option("--output-dir", flags.output_dir, "Write DIR/frame_000000.EXT for every frame")
       ->type_name("DIR")
       ->group(kGroup);
-  app.add_option("--format", flags.format, "Of these files, a list of " + formats)
+  app.add_option("--format", flags.format, "Formats of these files, from " + formats)
       ->type_name("LIST")
       ->capture_default_str()
       ->group(kGroup);
-  app.add_option(
-         "--color-by", flags.color_by,
-         "Colour the pictures of svg and report by this one of --attributes; of a vector its "
-         "length. Values are those at the vertices: --fill grid has most of them")
+  app.add_option("--color-by", flags.color_by,
+                 "Attribute that colours the pictures of svg and report; a vector by its length. "
+                 "The values "
+                 "are taken at the vertices: --fill grid has the most")
       ->type_name("NAME")
       ->group(kGroup);
-  app.add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
+  app.add_option("--stats", flags.stats, "Statistics of every frame, as CSV or JSON by extension")
       ->type_name("FILE")
       ->group(kGroup);
-  app.add_option("--report", flags.report, "One HTML page to look at, frame by frame")
+  app.add_option("--report", flags.report, "HTML page that shows every frame")
       ->type_name("FILE.html")
       ->group(kGroup);
-  app.add_flag("--check", flags.check, "Check every guarantee of every result")->group(kGroup);
-  app.add_flag("--keep-going", flags.keep_going, "End well although frames were refused")
+  app.add_flag("--check", flags.check, "Check every result against the guarantees")->group(kGroup);
+  app.add_flag("--keep-going", flags.keep_going, "Exit with 0 even if frames were refused")
       ->group(kGroup);
   app.add_flag("--quiet", flags.quiet, "No progress and no table")->group(kGroup);
 }
@@ -233,9 +246,8 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "
       "watch "
       "dam\n"
-      "However it ends, --stats and --report have the frames that came through, and the report "
-      "tells "
-      "why\nit ended early.\n"
+      "If the replay ends early, --stats and --report hold the frames received so far, and the\n"
+      "report states the reason.\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 3 input, 4 server, 130 interrupted.");
   return verb;
 }

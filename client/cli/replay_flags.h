@@ -16,7 +16,7 @@ class App;
 
 namespace partiemc::client {
 
-/// The flags, as text where CLI11 has nothing to check.
+/// The values of the flags. ParametersOf parses those that are still text.
 struct ReplayFlags {
   std::string input;
   SequenceOptions sequence;
@@ -26,14 +26,15 @@ struct ReplayFlags {
   std::uint32_t checkpoint_interval = 4;
   int threads = 0;  ///< 0: one for each processor.
   double deadline_seconds = 30;
-  std::string name;  ///< Of the stream; empty: the server makes one up.
+  std::optional<double> give_up_after_seconds;  ///< Absent: kPatience, kShortPatience for latest.
+  std::string name;                             ///< Stream name; empty: chosen by the server.
   bool echo_particles = false;
 
   std::string placement = "virtual-plane";
   std::string fill = "greedy";
-  std::vector<std::string> slices;  ///< "z=0.5" or six numbers each; a section for each but one.
-  std::vector<double> isolines;     ///< Of the density, of each slice.
-  std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: as the input says.
+  std::vector<std::string> slices;  ///< "z=0.5" or six numbers. The first is the outline.
+  std::vector<double> isolines;     ///< Isovalues of the density, drawn on each slice.
+  std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   double kernel_radius = 3;
   double cell_size = 1;
   std::optional<double> reference_radius;

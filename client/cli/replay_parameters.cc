@@ -32,7 +32,7 @@ std::optional<double> Number(std::string_view text) {
   return value;
 }
 
-// Numbers with commas between them.
+// Six numbers, separated by commas.
 std::optional<std::array<double, 6>> SixNumbers(std::string_view text) {
   std::array<double, 6> numbers{};
   for (std::size_t k = 0; k < numbers.size(); ++k) {
@@ -46,7 +46,7 @@ std::optional<std::array<double, 6>> SixNumbers(std::string_view text) {
   return numbers;
 }
 
-// Nothing for what is neither of the two forms of --slice.
+// Parses --slice. Empty if the text has neither of its two forms.
 std::optional<SlicePlane> SliceOf(std::string_view text) {
   if (text.size() > 2 && text[1] == '=' && text[0] >= 'x' && text[0] <= 'z') {
     const auto at = Number(text.substr(2));
@@ -54,7 +54,7 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
     const auto axis = static_cast<std::size_t>(text[0] - 'x');
     SlicePlane slice{.normal = {}};
     slice.origin[axis] = *at;
-    // So that the picture has the two other axes in their order.
+    // With this sign the picture shows the two other axes in alphabetical order.
     slice.normal[axis] = axis == 1 ? -1 : 1;
     return slice;
   }
@@ -66,7 +66,8 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
   return slice;
 }
 
-// Slice by slice: its outline, where it is not the stream's own, then its isolines.
+// Adds, for each slice, its outline (except for the first slice, which is the stream's outline) and
+// its isolines.
 absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   const auto add_isolines = [&](const std::optional<SlicePlane>& slice) {
     for (const double isovalue : flags.isolines) {

@@ -1,4 +1,4 @@
-// What the flags of `partiemc replay` mean.
+// Parses the flags of `partiemc replay`.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace partiemc::client {
 
-/// `recorded_spacing` is used where the flags name none.
+/// Uses `recorded_spacing` if the flags give no spacing.
 /// Errors: INVALID_ARGUMENT, one line that names the flag.
 absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                                       std::optional<double> recorded_spacing);

@@ -10,15 +10,15 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
   Credentials& credentials = flags.credentials;
   CLI::Option* server =
       app.add_option("--server", flags.address,
-                     "Server: HOST:PORT or unix:PATH; PARTIEMC_SERVER names another default")
+                     "Server address, HOST:PORT or unix:PATH. PARTIEMC_SERVER sets another default")
           ->type_name("ADDRESS")
           ->capture_default_str()
           ->group(group);
   app.add_flag("--tls", credentials.tls,
-               "Speak TLS, and only to a server whose certificate is for that host")
+               "Use TLS and require a certificate for the host of the address")
       ->envname("PARTIEMC_TLS")
       ->group(group);
-  // Whoever names a certificate wants TLS.
+  // Setting a certificate enables TLS.
   const auto add_file = [&](const char* name, std::string& file, const char* what,
                             const char* variable) {
     return app
@@ -34,18 +34,17 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
         ->group(group);
   };
   add_file("--tls-ca", credentials.ca_file,
-           "TLS; authorities that may have signed the server's certificate (PEM), instead of the "
-           "system's",
+           "Certificate authorities (PEM) to trust instead of the system's; enables TLS",
            "PARTIEMC_TLS_CA");
-  CLI::Option* certificate =
-      add_file("--tls-cert", credentials.cert_file,
-               "TLS; own certificate (PEM), for a server that asks for one", "PARTIEMC_TLS_CERT");
-  CLI::Option* key =
-      add_file("--tls-key", credentials.key_file, "Its private key (PEM)", "PARTIEMC_TLS_KEY");
+  CLI::Option* certificate = add_file(
+      "--tls-cert", credentials.cert_file,
+      "Client certificate (PEM), for servers that require one; enables TLS", "PARTIEMC_TLS_CERT");
+  CLI::Option* key = add_file("--tls-key", credentials.key_file, "Private key of --tls-cert (PEM)",
+                              "PARTIEMC_TLS_KEY");
   certificate->needs(key);
   key->needs(certificate);
   app.add_option("--token-file", credentials.token_file,
-                 "File with the bearer token for the server; or the token itself in PARTIEMC_TOKEN")
+                 "File with the bearer token. PARTIEMC_TOKEN holds the token itself")
       ->type_name("FILE")
       ->envname("PARTIEMC_TOKEN_FILE")
       ->group(group);
@@ -53,17 +52,19 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
   return server;
 }
 
-std::chrono::milliseconds QueryFlags::Deadline() const {
+std::chrono::milliseconds ToMilliseconds(double seconds) {
   return std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(deadline_seconds));
+      std::chrono::duration<double>(seconds));
 }
+
+std::chrono::milliseconds QueryFlags::Deadline() const { return ToMilliseconds(deadline_seconds); }
 
 void AddQueryFlags(CLI::App& app, QueryFlags& flags) {
   AddServerFlags(app, flags.server, "Server");
-  app.add_option("--deadline", flags.deadline_seconds, "Seconds that the answer may take")
+  app.add_option("--deadline", flags.deadline_seconds, "Timeout of the response, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
-  app.add_flag("--json", flags.json, "One JSON object on one line");
+  app.add_flag("--json", flags.json, "Print one JSON object on one line");
 }
 
 }  // namespace partiemc::client

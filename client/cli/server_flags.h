@@ -1,4 +1,4 @@
-// The flags of every verb that speaks to a server: where it is and how to be sure of each other.
+// The flags of every verb that connects to a server: address, TLS and token.
 #pragma once
 
 #include <chrono>
@@ -18,12 +18,14 @@ struct ServerFlags {
   Credentials credentials;
 };
 
-/// Adds --server, --tls, --tls-ca, --tls-cert, --tls-key and --token-file; gives --server. `flags`
-/// outlives the parsing. The token itself is read from PARTIEMC_TOKEN alone: a command line is no
-/// place for a secret.
+/// Adds --server, --tls, --tls-ca, --tls-cert, --tls-key and --token-file. Returns --server.
+/// Requires: `flags` outlives the parsing. The token itself comes from PARTIEMC_TOKEN only, because
+/// every user of the machine can read a command line.
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group);
 
-/// Of a verb that asks a server one question and prints the answer.
+std::chrono::milliseconds ToMilliseconds(double seconds);
+
+/// The flags of a verb that sends one request and prints the response.
 struct QueryFlags {
   ServerFlags server;
   double deadline_seconds = 5;

@@ -63,8 +63,9 @@ absl::StatusOr<StreamRecorder> StreamRecorder::Create(const std::string& path,
 absl::Status StreamRecorder::Add(WatchedFrame& frame) {
   if (frame.particles.empty() && frame.frame.result.statistics.particles > 0) {
     return absl::FailedPreconditionError(
-        "--record: the stream does not show its particles; its producer must send them to "
-        "watchers, as `partiemc replay --echo-particles` does");
+        "--record: the stream does not echo its particles; its producer must set echo_particles, "
+        "as "
+        "`partiemc replay --echo-particles` does");
   }
   if (writer_->frame_count() == 0) first_sequence_ = frame.sequence;
   missed_ += frame.dropped + frame.gap;
@@ -93,11 +94,11 @@ std::string StreamRecorder::Summary() const {
                             "; partiemc replay ", path_, " --local", flags_, "\n");
   if (first_sequence_ > 1) {
     AppendAll(text, "begins with frame ", first_sequence_,
-              ": a replay lacks what the stream remembered of those before\n");
+              ": a replay lacks the state of the stream before it\n");
   }
   if (missed_ > 0) {
     AppendAll(text, "lacks at most ", Plural(missed_, "frame"),
-              ": a replay lacks what the stream remembered of them\n");
+              ": a replay may differ after each gap\n");
   }
   return text;
 }

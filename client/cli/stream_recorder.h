@@ -1,5 +1,5 @@
-// `partiemc watch --record`: what a stream's producer sent, as a recording that replays to the same
-// bits.
+// `partiemc watch --record`: records the frames that a producer sends. A replay of the recording
+// has the same bits.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,25 @@
 
 namespace partiemc::client {
 
-/// Writes the echoed particles of a watch, in float64. One thread; memory: one block of a
-/// recording.
+/// Writes the echoed particles of a watched stream, as float64. Not thread-safe. Memory: one block
+/// of a recording.
 class StreamRecorder {
  public:
-  /// Errors: those of RecordingWriter::Create.
+  /// Errors: as RecordingWriter::Create.
   static absl::StatusOr<StreamRecorder> Create(const std::string& path,
                                                const std::string& stream_name,
                                                const WatchedStream& stream);
 
-  /// Takes the arrays of the particles out of `frame`, and puts them back.
-  /// Errors: FAILED_PRECONDITION where the producer does not echo its particles; those of
+  /// Writes the particles of `frame`, which is unchanged afterwards.
+  /// Errors: FAILED_PRECONDITION if the producer does not echo its particles; the errors of
   /// RecordingWriter.
   absl::Status Add(WatchedFrame& frame);
 
-  /// The file appears, unless there was no frame.
+  /// Writes the file, unless there was no frame.
   absl::Status Finish();
 
-  /// Lines for a person: where the recording lies, how it is replayed, and why that would not give
-  /// the same bits, if it would not.
+  /// Lines for a user: the path, the command that replays the recording, and why a replay would
+  /// have other bits, if it would.
   std::string Summary() const;
 
  private:
@@ -40,14 +40,14 @@ class StreamRecorder {
       : path_(std::move(path)), flags_(std::move(flags)), writer_(std::move(writer)) {}
 
   std::string path_;
-  std::string flags_;  // Of `partiemc replay`.
+  std::string flags_;  // For `partiemc replay`.
   std::unique_ptr<RecordingWriter> writer_;
   RecordedFrame frame_;
   std::uint64_t first_sequence_ = 0, missed_ = 0;
 };
 
-/// The flags of `partiemc replay` that differ from its defaults, each behind a space; the spacing
-/// is left out where it is given, as recordings hold it.
+/// The flags of `partiemc replay` for these parameters, each after a space, without the defaults.
+/// A given spacing is left out, because the recording holds it.
 std::string ReplayFlagsOf(const ReconstructionParameters& parameters);
 
 }  // namespace partiemc::client

@@ -84,7 +84,7 @@ CLI::App* AddStreams(CLI::App& app, QueryFlags& flags) {
       "Examples:\n"
       "  partiemc streams\n"
       "  partiemc streams --server unix:/run/partiemc.sock --json\n"
-      "  partiemc watch NAME shows one of them.");
+      "`partiemc watch NAME` follows one of them.");
   return verb;
 }
 

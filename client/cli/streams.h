@@ -1,4 +1,4 @@
-// `partiemc streams`: what is being streamed through a server now.
+// `partiemc streams`: lists the open streams of a server.
 #pragma once
 
 #include <span>

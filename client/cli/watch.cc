@@ -24,16 +24,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How soon Ctrl-C is seen while no frame comes.
+// Poll interval for Ctrl-C while waiting for a frame.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
-std::chrono::milliseconds Milliseconds(double seconds) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(seconds));
-}
-
 FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sections_in_plane) {
-  return {.index = frame.sequence - 1,  // As a replay numbers its files.
+  return {.index = frame.sequence - 1,  // A replay numbers its files in the same way.
           .time = frame.time,
           .result = frame.frame.result,
           .particles = frame.particles,
@@ -54,17 +49,17 @@ std::optional<std::uint64_t> ParseFrom(std::string_view text) {
   return number;
 }
 
-// What WatcherOptions::from_sequence is to be.
+// The value of WatcherOptions::from_sequence.
 std::optional<std::uint64_t> FromSequence(std::string_view from) {
   return from == kOldest ? std::optional<std::uint64_t>(0) : ParseFrom(from);
 }
 
-// How a watch ended.
+// Exit code and counts of a watch.
 struct Ended {
   ExitCode code = kGood;
   std::uint64_t dropped = 0;
-  std::uint64_t gaps = 0, in_gaps = 0;  // Where the watch was joined again; frames, at most.
-  std::string word;                     // Of the end, unless it is what was asked for.
+  std::uint64_t gaps = 0, in_gaps = 0;  // Reconnections; upper bound of the frames missed.
+  std::string word;                     // Why it ended; empty for a regular end.
 
   Ended With(ExitCode end_code, std::string end_word) const {
     Ended ended = *this;
@@ -94,7 +89,10 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
       ended.dropped += watcher.end().dropped;
       return ended.With(kServer, OneLine(received.status()));
     }
-    if (*received == Received::kNothingYet) continue;
+    if (*received == Received::kNothingYet) {
+      if (const auto lost = watcher.reconnecting()) progress.Wait(WaitingText(*lost));
+      continue;
+    }
     if (*received == Received::kEnd) {
       const bool finished = watcher.end().reason == "FINISHED";
       ended.dropped += watcher.end().dropped;
@@ -116,16 +114,16 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
   return ended;
 }
 
-// What --record asks of the other flags.
+// Checks and sets the flags that --record requires.
 void CompleteRecording(WatchFlags& flags, bool has_mode) {
   if (flags.record.empty()) return;
   if (!std::string_view(flags.record).ends_with(".pemc")) {
     throw CLI::ValidationError(
-        Concat("--record: '", flags.record, "'; must end in .pemc, the recording's own format"));
+        Concat("--record: '", flags.record, "'; must end in .pemc, the format of recordings"));
   }
   if (has_mode && flags.mode != "every") {
     throw CLI::ValidationError(
-        Concat("--record: with --mode ", flags.mode, "; must have every frame, --mode every"));
+        Concat("--record: with --mode ", flags.mode, "; requires --mode every"));
   }
   flags.mode = "every";
   if (flags.from.empty()) flags.from = kOldest;
@@ -139,8 +137,8 @@ absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
                         .from_sequence = FromSequence(flags.from),
                         .credentials = flags.server.credentials,
                         .fallback_addresses = {servers.begin() + 1, servers.end()},
-                        .rejoin = {.give_up_after = Milliseconds(flags.rejoin_seconds)},
-                        .deadline = Milliseconds(flags.deadline_seconds)});
+                        .rejoin = {.give_up_after = ToMilliseconds(flags.give_up_after_seconds)},
+                        .deadline = ToMilliseconds(flags.deadline_seconds)});
 }
 
 void PrintSummary(const Summary& summary, const Ended& ended, double seconds) {
@@ -148,7 +146,7 @@ void PrintSummary(const Summary& summary, const Ended& ended, double seconds) {
   std::fputs(summary.Table(seconds).c_str(), stdout);
   std::fputs(Concat("dropped frames: ", ended.dropped, "\n").c_str(), stdout);
   if (ended.gaps > 0) {
-    std::fputs(Concat("missed while the stream was lost ", ended.gaps, " times: at most ",
+    std::fputs(Concat("missed during ", ended.gaps, " reconnections: at most ",
                       Plural(ended.in_gaps, "frame"), "\n")
                    .c_str(),
                stdout);
@@ -158,41 +156,45 @@ void PrintSummary(const Summary& summary, const Ended& ended, double seconds) {
 }  // namespace
 
 CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
-  CLI::App* verb =
-      app.add_subcommand("watch", "Show what a stream of somebody else gives, while it is running");
-  verb->add_option("STREAM", flags.stream, "Its name, as `partiemc streams` tells it")->required();
+  CLI::App* verb = app.add_subcommand("watch", "Follow a stream of another producer while it runs");
+  verb->add_option("STREAM", flags.stream, "Stream name, as listed by `partiemc streams`")
+      ->required();
   AddServerFlags(*verb, flags.server, "Server")
-      ->description("Server: HOST:PORT or unix:PATH; several, where the stream may be on any")
+      ->description(
+          "Server address, HOST:PORT or unix:PATH. Give several if the stream may be on any of "
+          "them")
       ->multi_option_policy(CLI::MultiOptionPolicy::Join)
       ->delimiter(',');
   auto* const mode =
-      verb->add_option("--mode", flags.mode,
-                       "latest: the newest frame whenever there is room, others are dropped and "
-                       "counted; every: all of them, or be disconnected for falling behind")
+      verb->add_option(
+              "--mode", flags.mode,
+              "latest: receive the newest frame, drop and count the others; every: receive all "
+              "frames, disconnected if too slow")
           ->check(CLI::IsMember({"latest", "every"}))
           ->type_name("MODE")
           ->capture_default_str();
   verb->add_option("--from", flags.from,
-                   "Go back: begin with frame N, or with the oldest that the server still holds, "
-                   "and follow from there; frames are numbered from 1")
+                   "Begin with frame N, counted from 1, or with the oldest frame in the history of "
+                   "the server")
       ->check([](const std::string& text) -> std::string {
         if (text == kOldest || ParseFrom(text)) return {};
         return "--from: " + text + "; must be a frame number or `oldest`";
       })
       ->type_name("N|oldest");
-  verb->add_option("--frames", flags.frames, "Leave after as many; by default when the stream ends")
+  verb->add_option("--frames", flags.frames, "Stop after N frames (default: when the stream ends)")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62))
       ->type_name("N");
-  verb->add_option("--credits", flags.credits, "Frames on their way at once")
+  verb->add_option("--credits", flags.credits, "Number of frames in flight")
       ->check(CLI::Range(1, 64))
       ->type_name("N")
       ->capture_default_str();
-  verb->add_option("--rejoin", flags.rejoin_seconds,
-                   "Seconds for which a lost stream is looked for, at every server; 0: not at all")
+  verb->add_option(
+          "--give-up-after,--rejoin", flags.give_up_after_seconds,
+          "How long to look for a lost stream, at every server, in seconds; 0: do not look")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   verb->add_option("--deadline", flags.deadline_seconds,
-                   "Seconds that the server may take to accept")
+                   "Timeout for opening the watch, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
   std::string formats;
@@ -200,30 +202,31 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
     AppendAll(formats, formats.empty() ? "" : ",", Name(format));
   }
   auto* const output_dir =
-      verb->add_option("--output-dir", flags.output_dir,
-                       "Write DIR/frame_000000.EXT for every frame, numbered as its producer does")
+      verb->add_option(
+              "--output-dir", flags.output_dir,
+              "Write DIR/frame_000000.EXT for every frame, with the numbers of the producer")
           ->type_name("DIR");
-  verb->add_option("--format", flags.format, "Of these files, a list of " + formats)
+  verb->add_option("--format", flags.format, "Formats of these files, from " + formats)
       ->needs(output_dir)
       ->type_name("LIST")
       ->capture_default_str();
-  verb->add_option("--color-by", flags.color_by,
-                   "Colour the pictures of svg by this attribute of the stream; of a vector its "
-                   "length")
+  verb->add_option(
+          "--color-by", flags.color_by,
+          "Attribute of the stream that colours the pictures of svg; a vector by its length")
       ->type_name("NAME")
       ->needs(output_dir);
-  verb->add_option("--stats", flags.stats, "Numbers of every frame, CSV or JSON by extension")
+  verb->add_option("--stats", flags.stats, "Statistics of every frame, as CSV or JSON by extension")
       ->type_name("FILE");
-  verb->add_option("--record", flags.record,
-                   "Write what the producer sent as a recording, FILE.pemc, which replays to the "
-                   "same bits; turns on --mode every, and --from oldest unless told otherwise")
+  verb->add_option(
+          "--record", flags.record,
+          "Record the particles that the producer sends; a replay of FILE.pemc has the same bits. "
+          "Sets --mode every and, unless --from is given, --from oldest")
       ->type_name("FILE");
   verb->add_flag("--quiet", flags.quiet, "No progress and no table");
   verb->footer(
-      "A watcher never slows the stream. One that joins late gets the newest frame at once, or\n"
-      "with --from what the server still holds (its --history-bytes); one that lost its "
-      "connection\n"
-      "in mode every, or with --from, goes on where it was.\n"
+      "A watcher never slows the stream. A watcher that joins late receives the newest frame at\n"
+      "once, or with --from the history of the server (its --history-bytes). After a lost\n"
+      "connection, --mode every and --from continue with the next frame.\n"
       "Examples:\n"
       "  partiemc streams --server simulator:50051\n"
       "  partiemc watch dam-break --server simulator:50051\n"
@@ -237,7 +240,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
 }
 
 int Watch(const WatchFlags& flags) {
-  CatchInterrupts();  // Before there are temporary files to take away.
+  CatchInterrupts();  // Before the first temporary file exists.
   auto outputs = FrameOutputs::Create({.output_dir = flags.output_dir,
                                        .format = flags.format,
                                        .stats = flags.stats,
@@ -263,7 +266,7 @@ int Watch(const WatchFlags& flags) {
   const auto& held = (*watcher)->stream().held;
   if (from && held && held->oldest_sequence > *from) {
     progress.Note(Concat("partiemc: frames before ", held->oldest_sequence,
-                         " are no longer held; begins there"));
+                         " are no longer in the history; begins there"));
   }
   const Clock::time_point start = Clock::now();
   const Ended ended = ReceiveAll(flags, **watcher, *outputs, recorder, progress);

@@ -1,4 +1,4 @@
-// `partiemc watch`: the results of somebody else's stream, while they are made.
+// `partiemc watch`: receives the results of another producer's stream while it runs.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct WatchFlags {
   std::uint32_t credits = 2;
   std::uint64_t frames = 0;  ///< 0: until the stream ends.
   double deadline_seconds = 30;
-  double rejoin_seconds = 30;  ///< 0: a watch that is lost is over.
+  double give_up_after_seconds = 30;  ///< 0: a lost connection ends the watch.
   std::string output_dir;
   std::string format = "geojson";
   std::string color_by;

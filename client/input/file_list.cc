@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A file name taken apart: "run1_007.csv" has the texts "run", "_", ".csv" and the numbers "1",
-// "007". There is one text more than numbers.
+// The texts and numbers of a file name: "run1_007.csv" has the texts "run", "_", ".csv" and the
+// numbers "1", "007". There is one text more than numbers.
 struct NameParts {
   std::vector<std::string> texts = {""};
   std::vector<std::string> numbers;
@@ -39,7 +39,7 @@ NameParts TakeApart(const std::string& name) {
   return parts;
 }
 
-// The name with its numbers replaced by "*", where `replace` says so.
+// The name with "*" for each number that `replace` selects.
 std::string PatternOf(const NameParts& parts, const std::vector<bool>& replace) {
   std::string pattern = parts.texts.front();
   for (std::size_t k = 0; k < parts.numbers.size(); ++k) {
@@ -48,7 +48,7 @@ std::string PatternOf(const NameParts& parts, const std::vector<bool>& replace) 
   return pattern;
 }
 
-// Which of the numbers are not the same in all names. All names have the same texts.
+// Selects the numbers that differ between the names. Requires: all names have the same texts.
 std::vector<bool> VaryingNumbers(const std::vector<NameParts>& names) {
   std::vector<bool> varying(names.front().numbers.size(), false);
   for (const NameParts& name : names) {
@@ -59,8 +59,8 @@ std::vector<bool> VaryingNumbers(const std::vector<NameParts>& names) {
   return varying;
 }
 
-// Groups files by what their names have in common. `one_number`: members differ in one number, the
-// last one that varies; else they may differ in any.
+// Groups files into series. With `one_number` the names of a series differ only in the last number
+// that varies; otherwise they may differ in all numbers.
 std::vector<FileSeries> GroupBySeries(std::vector<std::string> files, bool one_number) {
   std::sort(files.begin(), files.end(), NaturalLess);
   std::map<std::vector<std::string>, std::vector<std::string>> by_texts;

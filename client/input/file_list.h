@@ -1,4 +1,4 @@
-// From what a person names to the files that are meant.
+// Finds the files of an input: a file, a directory or a pattern.
 #pragma once
 
 #include <cstddef>
@@ -14,24 +14,23 @@ namespace partiemc::client::input {
 struct FileSeries {
   std::string pattern;  ///< "WaterBlock_*.vtp", or the name of the only file.
   std::vector<std::string> files;
-  std::size_t bytes = 0;  ///< Of all files together.
+  std::size_t bytes = 0;  ///< Total size of the files.
 };
 
 enum class InputKind { kFile, kDirectory, kPattern };
 
 struct InputFiles {
   InputKind kind = InputKind::kFile;
-  std::string directory;           ///< Where the files are, "" for the working directory.
+  std::string directory;           ///< Directory of the files; "" is the working directory.
   std::vector<FileSeries> series;  ///< At least one, in natural order of their patterns.
 };
 
-/// Lists what `input` names; hidden files and folders within a directory are left out. In a
-/// directory a series is what differs in one number ("run1_*" and "run2_*" are two), in a pattern
-/// what differs in numbers only: who writes a pattern has chosen.
-/// Errors: kNotFound if there is no such file or nothing in the directory.
+/// Lists the files of `input`, without hidden files and folders. In a directory the names of a
+/// series differ in one number ("run1_*" and "run2_*" are two series); with a pattern they may
+/// differ in several numbers. Errors: kNotFound without a file.
 absl::StatusOr<InputFiles> ListInput(const std::string& input);
 
-/// The refusal of an input that holds several series: names them and proposes the largest.
+/// The error for an input with several series. Lists them and suggests the largest.
 absl::Status SeveralSeries(const std::string& input, const InputFiles& files);
 
 }  // namespace partiemc::client::input

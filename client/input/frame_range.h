@@ -1,4 +1,4 @@
-// Which frames of an input are wanted.
+// The selected frames of an input.
 #pragma once
 
 #include <cstddef>
@@ -18,14 +18,14 @@ struct FrameRange {
   bool Contains(std::size_t index) const {
     return index >= begin && index < end && (index - begin) % step == 0;
   }
-  /// How many of the frames 0 .. count - 1 are in the range.
+  /// The number of selected frames among 0 .. count - 1.
   std::size_t CountOf(std::size_t count) const {
     const std::size_t last = end < count ? end : count;
     return last > begin ? (last - begin - 1) / step + 1 : 0;
   }
 };
 
-/// Parses SequenceOptions::frames. kInvalidArgument if it is no range.
+/// Parses SequenceOptions::frames. Errors: kInvalidArgument.
 absl::StatusOr<FrameRange> ParseFrameRange(std::string_view text);
 
 }  // namespace partiemc::client::input

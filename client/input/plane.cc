@@ -13,7 +13,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// Rounding in text output with six digits is below it, a real third dimension far above.
+// Above the rounding error of text with six digits, and far below a real third dimension.
 constexpr double kFlatRelativeTolerance = 1e-6;
 
 constexpr std::string_view kAxisNames[] = {"x", "y", "z"};
@@ -40,7 +40,7 @@ bool HasThreeAxes(const ParticleRows& rows) {
 
 constexpr std::array<std::size_t, 3> kAllAxes = {0, 1, 2};
 
-// The two others.
+// The two other axes.
 std::span<const std::size_t> AxesWithout(std::size_t dropped) {
   static constexpr std::array<std::array<std::size_t, 2>, 3> kOthers = {{{1, 2}, {0, 2}, {0, 1}}};
   return kOthers[dropped];
@@ -94,7 +94,7 @@ absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& f
     for (std::size_t i = 0; i < rows.count; ++i) frame.positions[components * i + c] = along[i];
   }
   if (HasThreeAxes(rows) && components == 2) {
-    // A spoiled particle stays spoiled, also where only the dropped coordinate is not finite.
+    // A particle with a non-finite coordinate stays non-finite, even if that coordinate is dropped.
     const std::vector<double>& off_plane = rows.positions[3 - (*axes)[0] - (*axes)[1]];
     for (std::size_t i = 0; i < rows.count; ++i) {
       if (!std::isfinite(off_plane[i])) frame.positions[2 * i] = off_plane[i];

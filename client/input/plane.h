@@ -1,4 +1,4 @@
-// Three-component recordings of 2D simulations: which plane they lie in.
+// Finds the plane of a 2D simulation whose recording has three coordinates.
 #pragma once
 
 #include <array>
@@ -16,27 +16,27 @@
 
 namespace partiemc::client::input {
 
-/// Turns the rows of a sequence's frames into frames of the plane that its first particles lie in,
-/// or leaves them in space.
+/// Projects the rows of a sequence's frames into the plane of its first particles, or keeps all
+/// three coordinates.
 class PlaneProjection {
  public:
   explicit PlaneProjection(bool in_space = false) : in_space_(in_space) {}
 
-  /// Fills everything of `frame` but `index`. What a reader should know is appended to `notices`,
-  /// each once. Errors: kFailedPrecondition if the particles are 3D or leave the plane, or if they
-  /// should be 3D and have two coordinates.
+  /// Fills every field of `frame` except `index`. Appends notices for the user, each once.
+  /// Errors: kFailedPrecondition if the particles are 3D or leave the plane, or, with `in_space`,
+  /// if they have two coordinates.
   absl::Status Project(const ParticleRows& rows, RecordedFrame& frame,
                        std::vector<std::string>& notices);
 
  private:
   struct Plane {
     std::size_t dropped_axis;
-    double offset;  // Of the plane on the dropped axis.
+    double offset;  // Position of the plane on the dropped axis.
   };
 
   absl::Status Decide(const ParticleRows& rows, std::vector<std::string>& notices);
   absl::Status CheckStaysInPlane(const ParticleRows& rows);
-  // The axes that a frame keeps, of which there are two or three.
+  // The two or three axes that a frame keeps.
   using Axes = std::span<const std::size_t>;
   absl::StatusOr<Axes> AxesFor(const ParticleRows& rows, std::vector<std::string>& notices);
   void CopyOptionalArrays(const ParticleRows& rows, Axes axes, RecordedFrame& frame,
@@ -44,7 +44,7 @@ class PlaneProjection {
 
   bool in_space_;
   std::optional<Plane> plane_;
-  double largest_extent_ = 0;  // Of the frames so far: what the tolerance is relative to.
+  double largest_extent_ = 0;  // Largest extent of the frames so far; scale of the tolerance.
   bool told_volumes_ = false;
   bool told_velocities_ = false;
   bool told_ids_ = false;

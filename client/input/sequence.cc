@@ -18,14 +18,14 @@ namespace {
 
 using namespace input;
 
-// Files below this are scanned to count their frames: a fraction of a second.
+// Largest total size that is scanned to count frames, in a fraction of a second.
 constexpr std::size_t kMaxScannedBytes = std::size_t{64} << 20;
 
-// What was found by Sequence::Open.
+// The files of the input and their format.
 struct Recording {
   std::vector<std::string> files;
   std::size_t bytes = 0;
-  const Format* format = nullptr;  // Of the first file.
+  const Format* format = nullptr;  // Format of the first file.
   ColumnRequest request;
   FrameRange range;
   std::optional<FrameTimes> times;
@@ -38,7 +38,7 @@ class FileSequence final : public Sequence {
   FileSequence(Recording recording, bool in_space)
       : recording_(std::move(recording)), projection_(in_space) {}
 
-  // Shows at once what is wrong with the first file. Needed before Next.
+  // Opens the first file, so that its errors are reported at once. Required before Next.
   absl::Status OpenFirstFile() { return OpenNextFile(); }
 
   absl::StatusOr<bool> Next(RecordedFrame& frame) override {
@@ -128,7 +128,7 @@ class FileSequence final : public Sequence {
     }
   }
 
-  // Passes over all frames without parsing them. Nothing if a file is damaged: Next tells where.
+  // Counts all frames without parsing them. Empty if a file is damaged; Next reports the place.
   std::optional<std::size_t> ScanFrames() const {
     std::size_t count = 0;
     for (const std::string& path : recording_.files) {
@@ -148,8 +148,8 @@ class FileSequence final : public Sequence {
 
   Recording recording_;
   std::unique_ptr<FrameReader> reader_;
-  std::size_t file_ = 0;   // The next one to open.
-  std::size_t index_ = 0;  // Of the next frame.
+  std::size_t file_ = 0;   // Index of the next file to open.
+  std::size_t index_ = 0;  // Index of the next frame.
   ParticleRows rows_;
   PlaneProjection projection_;
   absl::Status failure_;
@@ -158,15 +158,15 @@ class FileSequence final : public Sequence {
   std::optional<std::size_t> count_;
 };
 
-// Whether the first file of a series can be read as far as its head.
+// Whether the head of the first file of a series can be read.
 absl::Status CanBeOpened(const FileSeries& series, const ColumnRequest& request) {
   const auto format = RecogniseFormat(series.files.front());
   if (!format.ok()) return format.status();
   return (*format)->open(series.files.front(), request).status();
 }
 
-// The one series of the input that holds frames. Series of a directory or pattern that cannot be
-// read are passed over with a notice; times.csv among them gives the times.
+// Selects the only series of the input that holds frames. Skips unreadable series of a directory or
+// pattern with a notice, and uses a times.csv among them for the times.
 absl::StatusOr<FileSeries> ChooseSeries(const std::string& input, InputFiles files,
                                         Recording& recording) {
   if (files.kind == InputKind::kFile) return std::move(files.series.front());
@@ -227,6 +227,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   if (!request.ok()) return request.status();
   recording.request = *std::move(request);
   recording.request.attributes = options.attributes;
+  recording.request.max_expansion = options.max_expansion;
   const auto range = ParseFrameRange(options.frames);
   if (!range.ok()) return range.status();
   recording.range = *range;

@@ -1,4 +1,4 @@
-// Times of frames from a file beside the frames.
+// Reads the times of frames from a separate file.
 #pragma once
 
 #include <cstddef>
@@ -11,13 +11,13 @@
 
 namespace partiemc::client::input {
 
-/// Time by 0-based index of the frame in the input.
+/// The time by index of the frame in the input, from 0.
 using FrameTimes = std::map<std::size_t, double>;
 
 /// Reads a times file as SequenceOptions::times describes it.
 absl::StatusOr<FrameTimes> ReadTimes(const std::string& path);
 
-/// Whether `path` is called times.csv and names the columns frame and t (or time).
+/// Whether `path` has the name times.csv and columns frame and t (or time).
 bool IsTimesFile(const std::string& path);
 
 }  // namespace partiemc::client::input

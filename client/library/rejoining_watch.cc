@@ -45,7 +45,7 @@ class RejoiningWatch::Calls final : public Attempts {
 
   void Drop() override { watch_.SetCall(nullptr); }
 
-  void Wait(Clock::time_point until) override {
+  void Wait(TimePoint until) override {
     if (watch_.call_ != nullptr) {
       news_ = watch_.call_->WaitUntilOpened(until);
     } else {

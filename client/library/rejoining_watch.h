@@ -35,6 +35,9 @@ class RejoiningWatch final : public Watcher {
   const WatchedStream& stream() const override { return stream_; }
   absl::StatusOr<Received> Receive(WatchedFrame& frame,
                                    std::optional<std::chrono::milliseconds> wait) override;
+  std::optional<Reconnecting> reconnecting() const override {
+    return retry_.lost() && !joined_ ? std::optional(retry_.Progress()) : std::nullopt;
+  }
   const WatchEnd& end() const override { return end_; }
   void Cancel() override;
 

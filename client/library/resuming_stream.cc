@@ -423,6 +423,11 @@ void ResumingStream::Adopt(Lock& lock, StreamConnector::Opened opened, std::size
   monitor_.changed.notify_all();
 }
 
+std::optional<Reconnecting> ResumingStream::reconnecting() const {
+  const Lock lock(monitor_.mutex);
+  return call_ == nullptr ? connector_.Progress() : std::nullopt;
+}
+
 std::size_t ResumingStream::InFlight() const {
   const Lock lock(monitor_.mutex);
   return resend_.end() - next_answer_;

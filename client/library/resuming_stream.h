@@ -42,6 +42,7 @@ class ResumingStream final : public Stream {
   absl::Status FinishSending() override;
   absl::StatusOr<Received> Receive(Event& event,
                                    std::optional<std::chrono::milliseconds> wait) override;
+  std::optional<Reconnecting> reconnecting() const override;
   std::size_t InFlight() const override;
   void Cancel() override;
 

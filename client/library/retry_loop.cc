@@ -1,7 +1,6 @@
 #include "client/library/retry_loop.h"
 
 #include <algorithm>
-#include <random>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -15,12 +14,14 @@ constexpr std::size_t kMaxLearned = 16;
 }  // namespace
 
 RetryLoop::RetryLoop(std::vector<std::string> addresses, const char* call,
-                     const ReconnectPolicy& policy, std::chrono::milliseconds connect_timeout)
+                     const ReconnectPolicy& policy, std::chrono::milliseconds connect_timeout,
+                     const TimeAndChance& surroundings)
     : addresses_(std::move(addresses)),
       given_(addresses_.size()),
       call_(call),
       policy_(policy),
-      connect_timeout_(connect_timeout) {}
+      connect_timeout_(connect_timeout),
+      surroundings_(surroundings) {}
 
 void RetryLoop::Learn(const std::vector<std::string>& addresses) {
   const std::string current = address();
@@ -36,8 +37,8 @@ void RetryLoop::Learn(const std::vector<std::string>& addresses) {
 
 void RetryLoop::Lose(std::string story) {
   if (backoff_) return;
-  backoff_.emplace(policy_, addresses_.size(), std::random_device{}());
-  lost_at_ = attempt_at_ = Clock::now();
+  backoff_.emplace(policy_, addresses_.size(), surroundings_.random->Next());
+  lost_at_ = attempt_at_ = Now();
   story_ = std::move(story);
 }
 
@@ -48,15 +49,15 @@ void RetryLoop::TryNext(absl::Status refusal) {
 
 void RetryLoop::TryAgain(absl::Status refusal) {
   refusal_ = std::move(refusal);
-  attempt_at_ = Clock::now() + backoff_->NextPause();
+  attempt_at_ = Now() + backoff_->NextPause();
 }
 
 absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
-                                                  std::optional<Clock::time_point> until) {
+                                                  std::optional<TimePoint> until) {
   const auto give_up_at = lost_at_ + policy_.give_up_after;
   for (;;) {
     if (attempts.Cancelled()) return Outcome::kCancelled;
-    const auto now = Clock::now();
+    const auto now = Now();
     if (attempt_until_) {
       bool retryable = false;
       auto opened = attempts.Check(retryable);
@@ -88,9 +89,15 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
   }
 }
 
+Reconnecting RetryLoop::Progress() const {
+  return {.loss = story_,
+          .refusal = std::string(refusal_.message()),
+          .elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(Now() - lost_at_),
+          .give_up_after = policy_.give_up_after};
+}
+
 std::string RetryLoop::Story() const {
-  return absl::StrCat(story_, ", went on at ", address(), " after ",
-                      Seconds(Clock::now() - lost_at_));
+  return absl::StrCat(story_, ", went on at ", address(), " after ", Seconds(Now() - lost_at_));
 }
 
 }  // namespace partiemc::client

@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/library/backoff.h"
+#include "client/library/clock.h"
 #include "partiemc/client/stream.h"
 
 namespace partiemc::client {
@@ -17,7 +18,7 @@ namespace partiemc::client {
 /// Who makes the attempts: opens calls, one at a time.
 class Attempts {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
 
   virtual ~Attempts() = default;
 
@@ -30,18 +31,18 @@ class Attempts {
   /// Gives the attempt up.
   virtual void Drop() = 0;
   /// Waits until then, or for news of the attempt or a Cancel.
-  virtual void Wait(Clock::time_point until) = 0;
+  virtual void Wait(TimePoint until) = 0;
 };
 
 /// Not thread-safe.
 class RetryLoop {
  public:
-  using Clock = Attempts::Clock;
+  using TimePoint = Clock::TimePoint;
   enum class Outcome { kOpened, kNotYet, kGaveUp, kCancelled };
 
   /// At least one address. `call` is what is opened, for messages: "stream", "watcher".
   RetryLoop(std::vector<std::string> addresses, const char* call, const ReconnectPolicy& policy,
-            std::chrono::milliseconds connect_timeout);
+            std::chrono::milliseconds connect_timeout, const TimeAndChance& surroundings = {});
 
   const std::vector<std::string>& addresses() const { return addresses_; }
   /// The one in use, or to be tried next.
@@ -65,25 +66,30 @@ class RetryLoop {
 
   /// Makes attempts until one has opened a call, nothing later than `until`. Requires lost().
   /// Errors: those of `attempts`.
-  absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<Clock::time_point> until);
+  absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<TimePoint> until);
 
+  /// Of the loss that is being mended. Requires lost().
+  Reconnecting Progress() const;
   /// Of the last loss, recovered or not: that of Lose, and where it has gone on, in one line.
   std::string Story() const;
   /// Of the last attempt.
   const absl::Status& refusal() const { return refusal_; }
 
  private:
+  TimePoint Now() const { return surroundings_.clock->Now(); }
+
   std::vector<std::string> addresses_;
   const std::size_t given_;  // Of them, at the front.
   const char* const call_;
   const ReconnectPolicy policy_;
   const std::chrono::milliseconds connect_timeout_;
+  const TimeAndChance surroundings_;
 
   std::size_t address_ = 0;
   std::optional<Backoff> backoff_;  // From Lose to Recovered.
-  Clock::time_point lost_at_, attempt_at_;
+  TimePoint lost_at_, attempt_at_;
   std::string story_;
-  std::optional<Clock::time_point> attempt_until_;  // While one is under way.
+  std::optional<TimePoint> attempt_until_;  // While one is under way.
   absl::Status refusal_;
 };
 

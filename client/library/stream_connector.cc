@@ -79,9 +79,7 @@ class StreamConnector::Calls final : public Attempts {
 
   void Drop() override { StreamConnector::Drop(lock_, std::move(connector_.attempt_)); }
 
-  void Wait(Clock::time_point until) override {
-    connector_.monitor_.changed.wait_until(lock_, until);
-  }
+  void Wait(TimePoint until) override { connector_.monitor_.changed.wait_until(lock_, until); }
 
   // Once one is open.
   Opened TakeOpened() { return {std::move(connector_.attempt_), std::move(message_)}; }

@@ -50,6 +50,10 @@ class StreamConnector {
   /// The stream has got on: the next loss is another one.
   void Recovered() { retry_.Recovered(); }
 
+  /// Absent unless a loss is being mended.
+  std::optional<Reconnecting> Progress() const {
+    return retry_.lost() ? std::optional(retry_.Progress()) : std::nullopt;
+  }
   /// Where and why the stream was lost, and where it has gone on, in one line.
   std::string Story() const { return retry_.Story(); }
 

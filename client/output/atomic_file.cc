@@ -17,25 +17,25 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 64 * 1024;
 
-// Names that earlier processes of the same id may have left behind, as in a container where the
-// id is always 1.
+// Attempts to find an unused name. A process of the same id may have left files, for example in a
+// container, where the id is always 1.
 constexpr int kMaxLeftOverNames = 1000;
 
 std::string_view Advice(int error) {
   switch (error) {
     case ENOENT:
-      return "make its directory first";
+      return "create its directory first";
     case ENOTDIR:
-      return "a part of its path is a file: choose another place";
+      return "a part of its path is a file: choose another path";
     case EISDIR:
       return "this is a directory: give the name of a file";
     case EACCES:
     case EPERM:
     case EROFS:
-      return "choose a place that you may write to";
+      return "choose a path with write permission";
     case ENOSPC:
     case EDQUOT:
-      return "make room or choose another disk";
+      return "free disk space or choose another disk";
     case EFBIG:
       return "raise the limit of file sizes or write less";
     case ENAMETOOLONG:
@@ -44,19 +44,19 @@ std::string_view Advice(int error) {
     case ENFILE:
       return "raise the limit of open files";
     default:
-      return "check the disk or choose another place";
+      return "check the disk or choose another path";
   }
 }
 
 absl::Status WriteError(int error, const std::filesystem::path& path) {
   absl::StatusCode code = absl::ErrnoToStatusCode(error);
   if (error == EROFS) code = absl::StatusCode::kPermissionDenied;
-  // A name may hold line breaks, the message may not.
+  // The message must stay one line even if the name has line breaks.
   return absl::Status(code, Concat(absl::Utf8SafeCHexEscape(path.native()), ": cannot be written: ",
                                    std::generic_category().message(error), "; ", Advice(error)));
 }
 
-// Where a write to `path` ends up: behind its symbolic links, so that a link stays one.
+// The target of `path` after its symbolic links, so that Commit does not replace a link.
 std::filesystem::path FollowLinks(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_symlink(path, error)) return path;
@@ -85,7 +85,7 @@ AtomicFile::~AtomicFile() {
 }
 
 absl::StatusOr<AtomicFile> AtomicFile::Create(const std::filesystem::path& path) {
-  if (path.empty()) return absl::InvalidArgumentError("no file name given; give one");
+  if (path.empty()) return absl::InvalidArgumentError("the file name is empty; give one");
   struct stat found;
   if (::stat(path.c_str(), &found) == 0) {
     if (S_ISDIR(found.st_mode)) return WriteError(EISDIR, path);
@@ -141,7 +141,7 @@ absl::Status AtomicFile::Flush(std::string_view bytes) {
 absl::Status AtomicFile::Commit() {
   if (status_.ok()) status_ = Flush(buffer_);
   buffer_.clear();
-  // A network file system tells of a full disk only here.
+  // A network file system may report a full disk only here.
   if (::close(std::exchange(descriptor_, -1)) != 0 && status_.ok()) {
     status_ = WriteError(errno, target_);
   }

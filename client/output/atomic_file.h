@@ -1,4 +1,4 @@
-// Files that are there as a whole or not at all.
+// Files that appear complete or not at all.
 #pragma once
 
 #include <filesystem>
@@ -10,27 +10,27 @@
 
 namespace partiemc::client {
 
-/// A file that is written under a hidden temporary name beside its place and moved there by
-/// Commit. Until then an older file of that name stays as it is; without Commit nothing is left.
-/// A device or a pipe (/dev/stdout) is written straight away, a symbolic link is followed.
-/// Survives the end of the process at any moment; a loss of power is the file system's matter.
+/// A file that is written under a hidden temporary name in its directory. Commit renames it. Before
+/// Commit an older file of the same name is unchanged; without Commit nothing remains. A device or
+/// a pipe (/dev/stdout) is written directly. A symbolic link is followed. The process may end at
+/// any moment; protection from a power loss depends on the file system.
 ///
-/// Errors of all calls: one line "FILE: cannot be written: WHY; WHAT TO DO" under NOT_FOUND (no
-/// such directory), PERMISSION_DENIED, RESOURCE_EXHAUSTED (disk full) or what else errno means.
+/// Errors of all calls: one line "FILE: cannot be written: CAUSE; REMEDY" with the code NOT_FOUND
+/// (no such directory), PERMISSION_DENIED, RESOURCE_EXHAUSTED (disk full) or another one for errno.
 class AtomicFile {
  public:
-  /// Opens the temporary file, so that a place that cannot be written is known before the work.
+  /// Opens the temporary file, so that a path that cannot be written fails early.
   static absl::StatusOr<AtomicFile> Create(const std::filesystem::path& path);
 
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
   ~AtomicFile();
 
-  /// Appends through a buffer of 64 KiB: an error may be reported by a later call. After an error
-  /// nothing more is written, and Commit fails too.
+  /// Appends through a buffer of 64 KiB, so a later call may report an error. After an error
+  /// nothing more is written, and Commit fails.
   absl::Status Append(std::string_view bytes);
 
-  /// Writes what is left and gives the file its name. To be called once, last.
+  /// Writes the buffer and renames the file. Call once, last.
   absl::Status Commit();
 
  private:
@@ -38,13 +38,13 @@ class AtomicFile {
   absl::Status Flush(std::string_view bytes);
 
   std::filesystem::path target_;
-  std::filesystem::path temporary_;  // Empty for what is written straight away.
+  std::filesystem::path temporary_;  // Empty for a device or pipe.
   int descriptor_ = -1;
   std::string buffer_;
   absl::Status status_;
 };
 
-/// Writes `bytes` as the whole content of `path`.
+/// Replaces the content of `path` by `bytes`.
 absl::Status WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes);
 
 }  // namespace partiemc::client

@@ -8,7 +8,7 @@
 namespace partiemc::client {
 namespace {
 
-// The viewer's rampStops (client/viewer/src/draw/ramp.ts) on a light ground.
+// rampStops(false) of client/viewer/src/draw/ramp.ts; a test there compares both.
 constexpr std::array<std::array<double, 3>, 9> kStops{{{0x3d, 0x00, 0x6f},
                                                        {0x28, 0x26, 0x88},
                                                        {0x03, 0x47, 0x7c},

@@ -1,5 +1,5 @@
-// Colours of numbers, in pictures: the map of the viewer's page, violet over teal to yellow-green,
-// its lightness in equal steps.
+// Colours of an attribute in SVG pictures: the page's map from violet over teal to yellow-green,
+// with lightness in equal steps.
 #pragma once
 
 #include <cstddef>
@@ -11,27 +11,27 @@
 
 namespace partiemc::client {
 
-/// So many colours tell numbers apart in a picture.
+/// Number of colours in a picture.
 inline constexpr std::size_t kColorBands = 32;
 
-/// "#rrggbb" of a share from 0 to 1; what lies outside has the colour of the end.
+/// "#rrggbb" of a share, clamped to 0 to 1.
 std::string ColorOf(double share);
 
-/// The attribute of this name; none for an empty name, and where there is none.
+/// The attribute of this name, or null.
 const AttributeValues* FindAttribute(const Result& result, const std::string& name);
 
-/// An attribute as one number a point: of a vector its length.
+/// One number per point: the value of a scalar, the length of a vector.
 std::vector<double> MagnitudesOf(const AttributeValues& attribute);
 
-/// What the colours reach from and to.
+/// Range of the colours.
 struct ValueRange {
   double low = 0, high = 0;
 
-  /// 0 to 1; .5 where there is only one number.
+  /// Position of a value in the range, 0 to 1; .5 if the range is empty.
   double ShareOf(double value) const { return high > low ? (value - low) / (high - low) : .5; }
 };
 
-/// Of `values`, which are finite; 0 to 0 without any.
+/// Range of finite values; 0 to 0 without values.
 ValueRange RangeOf(std::span<const double> values);
 
 }  // namespace partiemc::client

@@ -5,7 +5,7 @@ namespace partiemc::client {
 
 namespace {
 
-// As RFC 4180 wants it: a name may hold any printable character.
+// Quotes a name as in RFC 4180, because it may have any printable character.
 std::string Cell(const std::string& text) {
   if (text.find_first_of(",\"") == std::string::npos) return text;
   std::string cell = "\"";

@@ -13,12 +13,12 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
 std::string EncodeObj(const FrameRecord& frame);
 std::string EncodeCsv(const FrameRecord& frame);
 #ifdef PARTIEMC_HAVE_VTK
-/// Errors: INTERNAL when VTK's writer fails.
+/// Errors: INTERNAL if VTK's writer fails.
 absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame);
 #endif
 
-/// Whether the mesh begins with the points of the rings, bit for bit (guarantee M3 of result.h,
-/// which `farthest-particle` may break), so that both can share their vertices.
+/// Whether the mesh starts with the points of the rings, bit for bit (guarantee M3 of result.h,
+/// except for `farthest-particle`), so that both can share vertices.
 bool MeshSharesRingPoints(const Result& result);
 
 }  // namespace partiemc::client

@@ -1,4 +1,4 @@
-// One reconstructed frame as every writer of this room sees it.
+// One reconstructed frame, as input of the writers.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@
 
 namespace partiemc::client {
 
-/// A frame of a replay with what is known about it. Owns nothing; views must outlive the call.
+/// A frame of a replay. Owns nothing: all views must outlive the call.
 struct FrameRecord {
-  std::uint64_t index = 0;  ///< Of the frame in the input, from 0; names the files.
+  std::uint64_t index = 0;  ///< Index in the input, from 0; part of file names.
   double time = 0;          ///< Simulation time, in the simulation's own unit.
   const Result& result;
   std::span<const double> particles = {};          ///< x0, y0, x1, y1, ... or empty.
@@ -27,13 +27,13 @@ struct FrameRecord {
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
   std::span<const OutlineDigests> section_digests = {};  ///< Of result.sections; or empty.
-  /// Sections, from 0 on, whose rings the picture of the frame shows, too, as thin lines.
+  /// Indices of the sections that the picture of the frame shows as thin lines.
   std::span<const std::size_t> sections_in_plane = {};
   std::size_t section = 0;  ///< 1 for the first of a frame's sections; 0: its own outline.
 };
 
-/// Section `k` of a frame, from 0 on, as a record of its own: without particles, which need not lie
-/// in its plane, and without times, which are the frame's.
+/// Section `k` of a frame, from 0 on, as a record. Has no particles, which may lie outside its
+/// plane, and no times, which belong to the frame.
 inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
   const OutlineDigests digests =
       k < frame.section_digests.size() ? frame.section_digests[k] : OutlineDigests();
@@ -45,7 +45,7 @@ inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
           .section = k + 1};
 }
 
-/// The sections of a stream that lie in the plane of its own outline: isolines.
+/// Indices of the sections in the plane of the stream's own outline: isolines.
 inline std::vector<std::size_t> SectionsInPlane(const ReconstructionParameters& parameters) {
   std::vector<std::size_t> sections;
   for (std::size_t k = 0; k < parameters.sections.size(); ++k) {
@@ -55,7 +55,7 @@ inline std::vector<std::size_t> SectionsInPlane(const ReconstructionParameters& 
   return sections;
 }
 
-/// The names of doubts, a blank between two of them.
+/// The names of doubts, separated by blanks.
 inline std::string DoubtsText(Doubts doubts) {
   std::string text;
   for (const Doubt doubt : kAllDoubts) {
@@ -66,7 +66,7 @@ inline std::string DoubtsText(Doubts doubts) {
   return text;
 }
 
-/// An axis-parallel box in world units; empty until something is included.
+/// An axis-parallel box in world units; initially empty.
 struct Box {
   double min_x = std::numeric_limits<double>::infinity();
   double min_y = std::numeric_limits<double>::infinity();

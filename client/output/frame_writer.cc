@@ -62,7 +62,7 @@ absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view name
         AppendAll(known, known.empty() ? "" : ",", Name(name));
       const bool needs_vtk = word == Name(FrameFormat::kVtp);
       return absl::InvalidArgumentError(Concat("format: '", absl::Utf8SafeCHexEscape(word), "'",
-                                               needs_vtk ? " needs a build with VTK" : "",
+                                               needs_vtk ? " requires a build with VTK" : "",
                                                "; must be some of ", known));
     }
     if (std::find(formats.begin(), formats.end(), *format) == formats.end()) {
@@ -113,7 +113,7 @@ absl::StatusOr<FrameWriter> FrameWriter::Create(FrameWriterOptions options) {
     return absl::Status(
         absl::ErrnoToStatusCode(error.value()),
         Concat(absl::Utf8SafeCHexEscape(options.directory.native()),
-               ": the directory cannot be made: ", error.message(), "; choose another one"));
+               ": the directory cannot be created: ", error.message(), "; choose another one"));
   }
   return FrameWriter(std::move(options));
 }

@@ -1,4 +1,4 @@
-// Frames as files: DIR/frame_000042.geojson and its like.
+// Writes frames as files, for example DIR/frame_000042.geojson.
 #pragma once
 
 #include <cstddef>
@@ -18,11 +18,14 @@ namespace partiemc::client {
 
 enum class FrameFormat : std::uint8_t {
   /// RFC 7946 FeatureCollection: one Polygon per outer ring with its holes, outer rings
-  /// counter-clockwise, holes clockwise whatever the result says, first point repeated at the end.
-  /// Properties: area (without the holes), perimeter (with the holes'), particles, ring, identity,
-  /// parents, frame, time. A ring of `farthest-particle` that crosses itself is written as it is.
+  /// counter-clockwise, holes clockwise in any case, first point repeated at the end. Properties:
+  /// area
+  /// (without holes), perimeter (with holes), particles, ring, identity, parents, frame, time. A
+  /// ring
+  /// of `farthest-particle` that crosses itself is written unchanged.
   kGeoJson,
-  /// A picture: mesh edges, outline, particles; y up; longer side 1000 units, rounded to 0.001.
+  /// A picture of mesh edges, outline and particles; y up; longer side 1000 units, rounded to
+  /// 0.001.
   kSvg,
   /// Wavefront: "v x y 0", groups "mesh" (faces) and "rings" (closed polylines), 1-based.
   kObj,
@@ -30,50 +33,50 @@ enum class FrameFormat : std::uint8_t {
   /// and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for triangles); point data:
   /// the attributes; field data TimeValue. Only in builds with VTK.
   kVtp,
-  /// ring,index,x,y,nx,ny: one row per vertex of the rings; nx,ny empty without normals. Behind
-  /// them a column for each attribute, NAME:0, NAME:1 and NAME:2 for a vector.
+  /// ring,index,x,y,nx,ny: one row per vertex of the rings; nx,ny empty without normals. Then a
+  /// column
+  /// for each attribute; NAME:0, NAME:1 and NAME:2 for a vector.
   kCsv,
 };
 
-/// The formats that this build writes.
+/// The formats of this build.
 std::span<const FrameFormat> AllFrameFormats();
 
 /// "geojson", "svg", "obj", "vtp", "csv": the name on command lines and the file's extension.
 std::string_view Name(FrameFormat format);
 
 /// Formats from a list of names separated by commas, each once, in the order given.
-/// Errors: INVALID_ARGUMENT naming the word and what may stand there.
+/// Errors: INVALID_ARGUMENT with the unknown word and the known ones.
 absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names);
 
 struct FrameWriterOptions {
   std::filesystem::path directory = {};  ///< Made, with its parents, when it is not there.
   std::vector<FrameFormat> formats = {};
-  /// What a picture shows, in world units, so that all pictures of a sequence share it; what lies
-  /// outside is cut off. Absent: each frame is fitted to itself.
+  /// Visible box of all pictures of a sequence, in world units. Parts outside are cut off. Absent:
+  /// each picture fits its frame.
   std::optional<Box> picture_box = {};
   bool picture_particles = true;  ///< Draw the particles where the record has them.
-  /// Colour pictures by this attribute, of a vector its length, with a legend; empty: none. A frame
-  /// without it has the usual colours.
+  /// Attribute to colour pictures by, with a legend; the length of a vector. Empty, or missing in a
+  /// frame: plain colours.
   std::string color_by = {};
 };
 
 /// The bytes of a frame in one of AllFrameFormats().
-/// Errors: DATA_LOSS when a coordinate is not finite; INTERNAL from VTK.
+/// Errors: DATA_LOSS if a coordinate is not finite; INTERNAL from VTK.
 absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
                                         const FrameWriterOptions& options);
 
-/// Writes each frame and each of its sections in each format; every file appears as a whole or not
-/// at all.
+/// Writes each frame and each of its sections in each format. Files appear complete or not at all.
 class FrameWriter {
  public:
-  /// Errors: those of AtomicFile, for the directory.
+  /// Errors: as for AtomicFile, for the directory.
   static absl::StatusOr<FrameWriter> Create(FrameWriterOptions options);
 
-  /// Errors: those of EncodeFrame and AtomicFile. Formats before the one that failed are written.
+  /// Errors: as for EncodeFrame and AtomicFile. Formats before the failed one are written.
   absl::Status Write(const FrameRecord& frame) const;
 
-  /// DIR/frame_%06d.EXT, with more digits for an index that needs them; of section K
-  /// DIR/frame_%06d_section_K.EXT.
+  /// DIR/frame_%06d.EXT, with more digits for larger indices; DIR/frame_%06d_section_K.EXT for
+  /// section K.
   std::filesystem::path PathOf(const FrameRecord& frame, FrameFormat format) const;
 
  private:

@@ -7,8 +7,7 @@
 namespace partiemc::client {
 namespace {
 
-/// Twice the signed area, taken about the first point, so that a ring far from the origin keeps
-/// its sign.
+/// Twice the signed area relative to the first point, which keeps the sign far from the origin.
 double TwiceArea(std::span<const double> ring) {
   double sum = 0;
   for (std::size_t k = 2; k + 3 < ring.size(); k += 2) {
@@ -18,7 +17,7 @@ double TwiceArea(std::span<const double> ring) {
   return sum;
 }
 
-/// The ring from its first point on, in the asked sense, its first point again at the end.
+/// The ring in the given orientation, with the first point repeated at the end.
 void AppendRing(std::string& out, std::span<const double> ring, bool counter_clockwise) {
   const double area = TwiceArea(ring);
   const bool backwards = counter_clockwise ? area < 0 : area > 0;
@@ -39,7 +38,7 @@ void AppendTime(std::string& out, double time) {
   if (std::isfinite(time)) {
     AppendNumber(out, time);
   } else {
-    out += "null";  // JSON has no word for it.
+    out += "null";  // JSON has no infinity and no NaN.
   }
 }
 

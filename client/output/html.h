@@ -1,4 +1,4 @@
-// Text inside of HTML pages.
+// Text in HTML pages.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace partiemc::client {
 
-/// `text` as HTML shows it: harmless between tags and in quoted attributes, whatever it holds. File
-/// names, stream names and messages are untrusted.
+/// Escapes `text` for use between tags and in quoted attributes. File names, stream names and
+/// messages are untrusted.
 std::string EscapeHtml(std::string_view text);
 
 }  // namespace partiemc::client

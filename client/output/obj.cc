@@ -14,7 +14,7 @@ void AppendVertices(std::string& out, std::span<const double> points) {
   }
 }
 
-/// `base`: the number of the rings' first vertex.
+/// `base`: number of the first vertex of the rings.
 void AppendRings(std::string& out, const Rings& rings, std::size_t base) {
   out += "g rings\n";
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {

@@ -16,8 +16,9 @@ namespace {
 
 constexpr auto kRedrawInterval = std::chrono::milliseconds(100);
 constexpr auto kLineInterval = std::chrono::seconds(2);
+constexpr auto kWaitLineInterval = std::chrono::seconds(10);
 
-// A bar below this many characters says nothing, above it only gets longer.
+// Narrowest and widest useful bar, in characters.
 constexpr std::size_t kShortestBar = 10;
 constexpr std::size_t kLongestBar = 40;
 
@@ -72,6 +73,7 @@ Progress::Progress(Options options) : options_(std::move(options)), start_(optio
 void Progress::Update(std::uint64_t done, std::string detail) {
   done_ = done;
   detail_ = std::move(detail);
+  wait_shown_at_.reset();
   if (options_.quiet || finished_) return;
   const auto now = options_.now();
   if (options_.terminal) {
@@ -86,13 +88,26 @@ void Progress::Update(std::uint64_t done, std::string detail) {
 void Progress::Show() {
   shown_done_ = done_;
   const double seconds = std::chrono::duration<double>(options_.now() - start_).count();
+  ShowLine(options_.terminal ? Bar(seconds) : Line(seconds));
+}
+
+void Progress::Wait(std::string_view text) {
+  if (options_.quiet || finished_) return;
+  const auto now = options_.now();
+  const auto interval = options_.terminal ? Clock::duration(kRedrawInterval) : kWaitLineInterval;
+  if (wait_shown_at_ && now - *wait_shown_at_ < interval) return;
+  wait_shown_at_ = now;
+  ShowLine(text);
+}
+
+void Progress::ShowLine(std::string_view line) {
   if (!options_.terminal) {
-    options_.write(Concat(Line(seconds), "\n"));
+    options_.write(Concat(line, "\n"));
     return;
   }
   // A line as wide as the terminal would wrap and could not be drawn over.
   const std::size_t columns = std::max<std::size_t>(options_.columns(), 2);
-  options_.write(Concat(kRestartLine, Bar(seconds).substr(0, columns - 1)));
+  options_.write(Concat(kRestartLine, line.substr(0, columns - 1)));
 }
 
 std::string Progress::Bar(double seconds) const {

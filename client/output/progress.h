@@ -1,4 +1,4 @@
-// How far a replay has come, for the person who waits.
+// The progress bar of a replay.
 #pragma once
 
 #include <chrono>
@@ -10,9 +10,9 @@
 
 namespace partiemc::client {
 
-/// On a terminal one line that is drawn anew (at most ten times a second) and never wraps;
-/// elsewhere plain lines, at most one every two seconds; nothing at all when quiet. The last
-/// state is always shown. Not for several threads at once.
+/// On a terminal: one line, redrawn at most ten times per second, that never wraps. Elsewhere:
+/// plain lines, at most one every two seconds. Nothing if quiet. Always shows the last state. Not
+/// thread-safe.
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;
@@ -26,7 +26,7 @@ class Progress {
     std::function<void(std::string_view)> write;  ///< Gets text as it is to be shown.
   };
 
-  /// Options for the standard error stream: its kind and width are asked from the system.
+  /// Options for the standard error stream, with its kind and width from the system.
   static Options ForStandardError();
 
   explicit Progress(Options options);
@@ -34,12 +34,14 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done` frames are through, counted from the start; `detail` is a word about the last of them,
-  /// shown where there is room for it.
+  /// `done`: frames completed since the start; `detail`: about the last one, shown if it fits.
   void Update(std::uint64_t done, std::string detail = {});
 
-  /// Shows a line of its own without tearing the bar (a warning, a refused frame), also when
-  /// quiet, because it is no progress.
+  /// Shows `text` instead of the state until the next Update, while no frame can arrive. Without a
+  /// terminal it prints a line at once and then every ten seconds.
+  void Wait(std::string_view text);
+
+  /// Shows a separate line, such as a warning, without breaking the bar. Also if quiet.
   void Note(std::string_view line);
 
   /// Shows the last state and ends the line. Further calls do nothing.
@@ -47,12 +49,14 @@ class Progress {
 
  private:
   void Show();
+  void ShowLine(std::string_view line);
   std::string Bar(double seconds) const;
   std::string Line(double seconds) const;
 
   Options options_;
   Clock::time_point start_;
   std::optional<Clock::time_point> shown_at_;
+  std::optional<Clock::time_point> wait_shown_at_;  // While waiting.
   std::uint64_t done_ = 0;
   std::string detail_;
   std::optional<std::uint64_t> shown_done_;

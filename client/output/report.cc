@@ -14,27 +14,23 @@
 
 namespace partiemc::client {
 
-// The files of report/, embedded by embed.cmake.
+// report_page.html, embedded by embed.cmake.
 namespace page {
-extern const std::string_view kReportHtml;
-extern const std::string_view kReportCss;
-extern const std::string_view kGeometryJs;
-extern const std::string_view kChartsJs;
-extern const std::string_view kReportJs;
+extern const std::string_view kReportPageHtml;
 }  // namespace page
 
 namespace {
 
 constexpr std::string_view kFramesMark = "{{frames}}";
 
-// Digits of a number that is read by eye, not calculated with.
+// Digits of a displayed number.
 constexpr int kShownDigits = 7;
 
-// Outer rings below this share of the largest one do not decide what the picture shows: spray
-// that has left the scene would shrink everything else to a dot.
+// Rings below this share of the largest area do not extend the initial view. Otherwise spray that
+// has left the scene would shrink everything else to a dot.
 constexpr double kMinorShare = 0.01;
 
-/// Replaces every {{name}} of `text` by value(name). What a value holds is not looked at again.
+/// Replaces every {{name}} of `text` by value(name). Values are not expanded.
 std::string Expand(std::string_view text,
                    const std::function<std::string(std::string_view)>& value) {
   std::string out;
@@ -75,7 +71,7 @@ void AppendBox(std::string& out, const Box& box) {
   out += ']';
 }
 
-/// The box of the rings that matter; of the particles where there is no ring.
+/// The box of the rings without spray, or of the particles of a frame without rings.
 Box MainBox(const FrameRecord& frame) {
   const Rings& rings = frame.result.rings;
   double largest = 0;
@@ -100,7 +96,7 @@ void AppendMeasures(std::string& out, const Rings& rings) {
     AppendShown(out, measures.area);
     out += ',';
     AppendShown(out, measures.perimeter);
-    // As text: the script's numbers end at 2^53.
+    // Identities are strings because numbers of JavaScript are exact up to 2^53 only.
     AppendAll(out, ",", measures.particle_count, ",\"", measures.identity, "\",[");
     bool first = true;
     for (const std::uint64_t parent : rings.ParentsOf(ring)) {
@@ -116,14 +112,19 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
   const Result& result = frame.result;
   const FrameStatistics& statistics = result.statistics;
   std::string out = Concat(R"({"frame":)", frame.index, R"(,"particles":)", statistics.particles,
-                           R"(,"polylines":)", result.rings.RingCount(), R"(,"vertices":)",
-                           result.rings.PointCount(), R"(,"triangles_grid":)",
-                           statistics.triangles_grid, R"(,"triangles":)", statistics.triangles);
+                           R"(,"triangles_grid":)", statistics.triangles_grid, R"(,"triangles":)",
+                           statistics.triangles);
   AppendAll(out, R"(,"self_intersections":)", statistics.self_intersections,
             R"(,"folded_triangles":)", statistics.folded_triangles, R"(,"dropped_holes":)",
             statistics.dropped_holes, R"(,"dropped_components":)", statistics.dropped_components,
-            R"(,"dropped_spray":)", statistics.dropped_spray, R"(,"doubts":")",
-            DoubtsText(statistics.doubts), "\"");
+            R"(,"dropped_spray":)", statistics.dropped_spray, R"(,"doubts":[)");
+  bool first = true;
+  for (const Doubt doubt : kAllDoubts) {
+    if (!statistics.doubts.Has(doubt)) continue;
+    AppendAll(out, first ? "\"" : ",\"", Explanation(doubt), "\"");
+    first = false;
+  }
+  out += ']';
   const std::pair<std::string_view, double> numbers[] = {
       {"time", frame.time},
       {"area", statistics.area},
@@ -135,13 +136,13 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
     AppendAll(out, ",\"", name, "\":");
     AppendShown(out, value);
   }
-  out += R"(,"stages":[)";
+  out += R"(,"stages":{)";
   for (std::size_t k = 0; k < kStageCount; ++k) {
-    if (k > 0) out += ',';
+    AppendAll(out, k > 0 ? ",\"" : "\"", kStageNames[k], "\":");
     AppendShown(out, frame.stages_ms[k]);
   }
   const std::size_t particles = frame.particles.size() / 2;
-  AppendAll(out, R"(],"particles_shown":)", std::min(particles, options.max_particles),
+  AppendAll(out, R"(},"particles_shown":)", std::min(particles, options.max_particles),
             R"(,"particles_given":)", particles, R"(,"mesh_shown":)",
             result.mesh.TriangleCount() <= options.max_triangles ? "true" : "false",
             R"(,"rings_digest":")", DigestText(frame.rings_digest), R"(","mesh_digest":")",
@@ -194,12 +195,6 @@ std::string Text(const SlicePlane& slice) {
   return Concat("through ", text(slice.origin), ", normal ", text(slice.normal));
 }
 
-std::string StageNames() {
-  std::string out;
-  for (const std::string_view name : kStageNames) AppendAll(out, out.empty() ? "" : " ", name);
-  return out;
-}
-
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> DescribeParameters(
@@ -246,11 +241,13 @@ absl::StatusOr<ReportWriter> ReportWriter::Create(const std::filesystem::path& p
   absl::StatusOr<AtomicFile> file = AtomicFile::Create(path);
   if (!file.ok()) return file.status();
   ReportWriter writer(*std::move(file), std::move(options));
-  const std::string_view head = page::kReportHtml.substr(0, page::kReportHtml.find(kFramesMark));
+  const std::string_view head =
+      page::kReportPageHtml.substr(0, page::kReportPageHtml.find(kFramesMark));
   const ReportOptions& shown = writer.options_;
   absl::Status status = writer.file_.Append(Expand(head, [&](std::string_view name) {
-    return name == "style" ? std::string(page::kReportCss)
-                           : EscapeHtml(name == "title" ? shown.title : shown.subtitle);
+    return EscapeHtml(name == "title"      ? shown.title
+                      : name == "subtitle" ? shown.subtitle
+                                           : shown.color_by);
   }));
   if (!status.ok()) return status;
   return writer;
@@ -268,14 +265,11 @@ absl::Status ReportWriter::Add(const FrameRecord& frame) {
 
 absl::Status ReportWriter::Finish(const Summary& summary, double wall_seconds) {
   const std::string_view tail =
-      page::kReportHtml.substr(page::kReportHtml.find(kFramesMark) + kFramesMark.size());
+      page::kReportPageHtml.substr(page::kReportPageHtml.find(kFramesMark) + kFramesMark.size());
   absl::Status status = file_.Append(Expand(tail, [&](std::string_view name) {
     if (name == "headline") return EscapeHtml(summary.Headline(wall_seconds));
     if (name == "summary") return SummaryRows(summary);
-    if (name == "parameters") return ParameterRows(options_.parameters);
-    if (name == "stages") return StageNames();
-    if (name == "color") return EscapeHtml(options_.color_by);
-    return Concat(page::kGeometryJs, page::kChartsJs, page::kReportJs);
+    return ParameterRows(options_.parameters);
   }));
   if (!status.ok()) return status;
   return file_.Commit();

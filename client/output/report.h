@@ -1,4 +1,4 @@
-// `--report FILE.html`: a replay as one page that can be looked at.
+// Writes `--report FILE.html`: the frames of a replay as one page.
 #pragma once
 
 #include <filesystem>
@@ -16,34 +16,33 @@
 namespace partiemc::client {
 
 struct ReportOptions {
-  std::string title = {};     ///< Any text: the input's name, say. Escaped here, as all text is.
-  std::string subtitle = {};  ///< Any text, one line below the title.
-  /// Name and value of what the replay was run with, in the order shown.
+  std::string title = {};     ///< Any text, for example the input's name. Escaped.
+  std::string subtitle = {};  ///< Any text. Escaped.
+  /// Names and values of the replay's parameters, in the order shown.
   std::vector<std::pair<std::string, std::string>> parameters = {};
-  /// A frame with more shows an even choice of its particles, and the page says so.
+  /// A frame with more particles shows an even selection, with a note.
   std::size_t max_particles = 20'000;
-  /// A frame with more triangles shows no mesh, and the page says so.
+  /// A frame with more triangles shows no mesh, with a note.
   std::size_t max_triangles = 300'000;
-  std::string color_by = {};  ///< As FrameWriterOptions has it.
+  std::string color_by = {};  ///< As in FrameWriterOptions.
 };
 
-/// The parameters of a reconstruction as lines for ReportOptions::parameters.
+/// The parameters of a reconstruction, for ReportOptions::parameters.
 std::vector<std::pair<std::string, std::string>> DescribeParameters(
     const ReconstructionParameters& parameters);
 
-/// Writes one HTML file that needs nothing else: no network, no other file. Frames go to the file
-/// as they come; memory does not grow with them. The file appears with Finish.
-/// Size: about four bytes per particle and vertex, eight per triangle and 200 per ring.
-/// Geometry is rounded to 1/128 of the spacing: it is there to be looked at.
+/// Writes one HTML file that requires no network and no other file. Frames are written at once, so
+/// memory does not grow. The file appears with Finish. Size: 140 kB, about four bytes per particle
+/// and vertex, eight per triangle and 200 per ring. Geometry is rounded to 1/128 of the spacing.
 class ReportWriter {
  public:
-  /// Errors: those of AtomicFile.
+  /// Errors: as for AtomicFile.
   static absl::StatusOr<ReportWriter> Create(const std::filesystem::path& path,
                                              ReportOptions options);
 
   absl::Status Add(const FrameRecord& frame);
 
-  /// Completes the page with the table of `summary`.
+  /// Adds the table of `summary` and completes the file.
   absl::Status Finish(const Summary& summary, double wall_seconds);
 
  private:

@@ -15,17 +15,16 @@
 namespace partiemc::client {
 namespace {
 
-// Steps per spacing: a hundredth of a spacing cannot be seen, and differences between neighbours
-// still fit two bytes.
+// Steps per spacing. Finer than visible, and differences between neighbours fit two bytes.
 constexpr double kStepsPerSpacing = 128;
 
-// Steps across a frame for which no spacing is known.
+// Steps across a frame without a spacing.
 constexpr double kStepsPerFrame = 65536;
 
-// The script adds up differences in 32 bits: coarser steps for a frame wider than this.
+// Limit on steps across a frame, because the decoder adds differences in 32 bits.
 constexpr double kMaxSteps = 1 << 28;
 
-// Height of the rows that particles are sorted into, in steps: two spacings.
+// Height of the rows in which particles are sorted, in steps: two spacings.
 constexpr std::int64_t kParticleRow = 2 * static_cast<std::int64_t>(kStepsPerSpacing);
 
 class Encoder {
@@ -136,7 +135,7 @@ void EncodeMesh(const Result& result, std::size_t max_triangles, Encoder& encode
   }
 }
 
-/// Sorted into rows of about two spacings, so that neighbours in the order are neighbours in space.
+/// Sorts particles into rows of two spacings, so that successive particles are close in space.
 void EncodeParticles(std::span<const double> particles, std::size_t max_particles,
                      Encoder& encoder) {
   const std::size_t count = particles.size() / 2;
@@ -144,7 +143,7 @@ void EncodeParticles(std::span<const double> particles, std::size_t max_particle
   std::vector<std::pair<std::int64_t, std::int64_t>> points;
   points.reserve(shown);
   for (std::size_t k = 0; k < shown; ++k) {
-    // An even choice: the k-th of `shown` stands for count / shown particles.
+    // An even selection of `shown` particles.
     const std::size_t particle = shown == count ? k : k * count / shown;
     const double x = particles[2 * particle], y = particles[2 * particle + 1];
     if (std::isfinite(x) && std::isfinite(y)) points.push_back(encoder.Quantise(x, y));
@@ -179,7 +178,7 @@ void EncodeColors(const Result& result, const ReportGeometryOptions& options, En
   if (attribute == nullptr) return encoder.Count(0);
   const std::vector<double> values = MagnitudesOf(*attribute);
   const ValueRange range = RangeOf(values);
-  // Those of the rings come first, and are the mesh's too where it shares them.
+  // Values of the rings' points come first. A mesh that shares these points continues them.
   const bool has_mesh = result.mesh.TriangleCount() > 0 &&
                         result.mesh.TriangleCount() <= options.max_triangles &&
                         values.size() == result.mesh.PointCount();

@@ -1,4 +1,4 @@
-// The geometry of a frame as the report's script reads it (report/geometry.js).
+// Encodes the geometry of a frame for a report. client/viewer/src/report/geometry.ts decodes it.
 #pragma once
 
 #include <cstddef>
@@ -11,25 +11,26 @@ namespace partiemc::client {
 struct ReportGeometryOptions {
   std::size_t max_particles = 0;
   std::size_t max_triangles = 0;
-  std::string color_by = {};  ///< An attribute; empty: none.
+  std::string color_by = {};  ///< Attribute, or empty.
 };
 
-/// Bytes, before base64. Integers are LEB128 varints, signed ones zigzagged; a coordinate is a
-/// multiple of `step` from the origin, written as the difference to the one before.
+/// Bytes, before base64. Integers are LEB128 varints, with zigzag encoding if signed. A coordinate
+/// is a multiple of `step` from the origin, written as the difference from the previous coordinate.
 ///
 ///   float64 origin_x, origin_y, step       little-endian
-///   rings       count; per ring: points, outer ring + 1 (0: is one itself)
+///   rings       count; per ring: number of points, index of its outer ring + 1 (0: an outer ring)
 ///   points      x, y differences of all points of the rings
-///   normals     count (0 or that of the points); per point one byte, 256 to the full turn
-///   mesh points count of those after the rings' points; x, y differences. A mesh that does not
-///               share the rings' points has them all here, and `shared` is 0
-///   triangles   shared (0 or 1), count; per triangle (a - previous a) << 1 | interior as zigzag of
-///               the difference, then b - a, c - a
+///   normals     count (0 or the number of points); per point one byte, 256 per full turn
+///   mesh points count, x, y differences: the points after those of the rings, or all points of a
+///   mesh
+///               that does not share the points of the rings
+///   triangles   shared (1 if the mesh shares the points of the rings), count; per triangle
+///               (a - previous a) * 2 + interior, b - a, c - a
 ///   particles   count; x, y differences, in an order that keeps them small
-///   isolines    count of rings; of each its points; x, y differences of all of them
-///   colours     count (0, that of the mesh's points or that of the rings'); per point one byte,
-///   its
-///               share of the frame's range of the attribute, 255 to the whole
+///   isolines    count of rings; number of points of each; x, y differences of all points
+///   colours     count (0, points of the mesh, or points of the rings); per point one byte, the
+///   position
+///               in the frame's range of the attribute from 0 to 255
 std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryOptions& options);
 
 }  // namespace partiemc::client

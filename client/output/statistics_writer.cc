@@ -29,7 +29,7 @@ constexpr std::array<std::string_view, 11> kAfterStages = {"perimeter",
                                                            "section"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
-// "vertices" is a count and a stage: the unit keeps the names of columns apart.
+// "vertices" is a count and a stage, so stages have the suffix "_ms".
 constexpr std::string_view kStageSuffix = "_ms";
 
 const std::array<std::string_view, kColumnCount>& Columns() {
@@ -105,7 +105,7 @@ class Row {
     }
   }
   void Digest(std::uint64_t value) { Words(DigestText(value)); }
-  // Without a quote or a comma.
+  // Has no quote and no comma.
   void Words(const std::string& words) {
     values_[next_++] = json_ ? Concat("\"", words, "\"") : words;
   }

@@ -1,4 +1,4 @@
-// `--stats FILE`: one row of numbers per frame and section.
+// Writes `--stats FILE`: one row of numbers per frame and section.
 #pragma once
 
 #include <filesystem>
@@ -12,21 +12,20 @@
 
 namespace partiemc::client {
 
-/// The columns in their order: frame, particles, polylines, vertices, triangles_grid, triangles,
-/// area, milliseconds; one per stage, "bins_ms" to "attributes_ms" ("vertices" alone would stand
-/// there twice); perimeter, self_intersections, folded_triangles, dropped_holes,
-/// dropped_components, dropped_spray, rings_digest, mesh_digest, time, doubts (their names, a blank
-/// between two of them), section (0: the frame's own outline; a row for each follows it). Digests
-/// are 16 hexadecimal digits, times milliseconds of wall time, areas and lengths world units;
-/// `vertices` are those of the polylines.
+/// The columns in order: frame, particles, polylines, vertices, triangles_grid, triangles, area,
+/// milliseconds; one per stage, "bins_ms" to "attributes_ms"; perimeter, self_intersections,
+/// folded_triangles, dropped_holes, dropped_components, dropped_spray, rings_digest, mesh_digest,
+/// time, doubts (names separated by blanks), section (0: the frame's own outline; then a row per
+/// section). Digests have 16 hexadecimal digits, times are milliseconds of wall time, areas and
+/// lengths world units. `polylines` counts rings, `vertices` their vertices.
 std::span<const std::string_view> StatisticsColumns();
 
-/// Writes CSV with a header line, or JSON as an array of one object per row (a number that is
-/// not finite is null there), as the rows come. The file appears with Finish.
+/// Writes CSV with a header line, or a JSON array with one object per row, in which non-finite
+/// numbers are null. Rows are written at once; the file appears with Finish.
 class StatisticsWriter {
  public:
-  /// CSV or JSON by the extension of `path`.
-  /// Errors: INVALID_ARGUMENT for any other extension; those of AtomicFile.
+  /// Selects CSV or JSON by the extension of `path`.
+  /// Errors: INVALID_ARGUMENT for other extensions; as for AtomicFile.
   static absl::StatusOr<StatisticsWriter> Create(const std::filesystem::path& path);
 
   absl::Status Add(const FrameRecord& frame);

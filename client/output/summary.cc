@@ -16,7 +16,7 @@ double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-/// The smallest value that at least `percent` of all do not exceed.
+/// The nearest-rank percentile.
 double Percentile(std::vector<double> values, double percent) {
   if (values.empty()) return 0;
   std::sort(values.begin(), values.end());
@@ -25,7 +25,7 @@ double Percentile(std::vector<double> values, double percent) {
   return values[std::clamp<std::size_t>(rank, 1, values.size()) - 1];
 }
 
-/// With a comma between thousands: 1,234,567.8.
+/// A number with commas: 1,234,567.8.
 std::string Grouped(double value, int decimals) {
   std::string text = absl::StrFormat("%.*f", decimals, value);
   std::size_t end = text.find('.');
@@ -51,7 +51,7 @@ void Summary::Add(const FrameRecord& frame) {
   const auto grid = static_cast<double>(statistics.triangles_grid);
   const auto triangles = static_cast<double>(statistics.triangles);
   particles_.push_back(static_cast<double>(statistics.particles));
-  polylines_.push_back(static_cast<double>(frame.result.rings.RingCount()));
+  rings_.push_back(static_cast<double>(frame.result.rings.RingCount()));
   vertices_.push_back(static_cast<double>(frame.result.rings.PointCount()));
   triangles_grid_.push_back(grid);
   triangles_.push_back(triangles);
@@ -80,7 +80,7 @@ double Summary::MeanReductionPercent() const { return Mean(reduction_); }
 std::vector<SummaryRow> Summary::Rows() const {
   std::vector<SummaryRow> rows = {
       Row("particles", particles_, 1, 0),
-      Row("polylines", polylines_, 1, 0),
+      Row("rings", rings_, 1, 0),
       Row("vertices", vertices_, 1, 0),
       Row("triangles unmerged", triangles_grid_, 1, 0),
       Row("triangles merged", triangles_, 1, 0),

@@ -1,4 +1,4 @@
-// What a replay comes to: the table at its end.
+// The summary of a replay: the table at its end.
 #pragma once
 
 #include <array>
@@ -11,46 +11,46 @@
 
 namespace partiemc::client {
 
-/// One line of the table, its numbers as text. A heading has no numbers.
+/// One line of the table, with numbers as text. A heading has no numbers.
 struct SummaryRow {
   std::string label;
   std::string mean, p50, p99;
 };
 
-/// Gathers the numbers of a replay. Memory: about 120 bytes per frame.
+/// Collects the numbers of a replay. Memory: about 120 bytes per frame.
 class Summary {
  public:
   void Add(const FrameRecord& frame);
 
-  /// Counts a frame that was answered by an error.
+  /// Counts a refused frame.
   void AddRefused() { ++refused_; }
 
-  /// The headline tells that not all frames came through, and why.
+  /// Adds to the headline that the replay ended early, and the reason.
   void EndEarly(std::string why) { ended_early_ = std::move(why); }
 
   std::uint64_t frame_count() const { return particles_.size(); }
   std::uint64_t refused_count() const { return refused_; }
 
-  /// Mean over the frames with a grid of 1 - triangles / triangles_grid, in percent; 0 without.
+  /// Mean of 1 - triangles / triangles_grid, in percent, over frames with triangles; 0 without.
   double MeanReductionPercent() const;
 
-  /// Mean, median and 99th percentile (nearest rank) over the frames: particles, polylines,
-  /// vertices, triangles unmerged and merged and the reduction, milliseconds by stage and in all.
-  /// Cost: n log n in the frames.
+  /// Mean, median and 99th percentile (nearest rank) over frames: particles, rings, vertices,
+  /// triangles unmerged and merged, reduction, milliseconds by stage and in total. Cost: n log n in
+  /// the frames.
   std::vector<SummaryRow> Rows() const;
 
-  /// One line for each kind of doubt that there was: in how many frames, and what helps.
+  /// One line per kind of doubt: number of frames, explanation.
   std::vector<std::string> Warnings() const;
 
-  /// One line: frames, refused ones, seconds, frames per second, why it ended early. Wall time of
-  /// the whole replay.
+  /// One line: frames, refused frames, seconds, frames per second, reason of an early end.
+  /// `wall_seconds`: of the whole replay.
   std::string Headline(double wall_seconds) const;
 
   /// The headline, then the rows as an aligned plain-text table; every line ends in '\n'.
   std::string Table(double wall_seconds) const;
 
  private:
-  std::vector<double> particles_, polylines_, vertices_, triangles_grid_, triangles_, reduction_;
+  std::vector<double> particles_, rings_, vertices_, triangles_grid_, triangles_, reduction_;
   std::array<std::vector<double>, kStageCount> stages_ms_;
   std::vector<double> total_ms_;
   std::array<std::uint64_t, kAllDoubts.size()> doubted_{};  // Frames, by kind.

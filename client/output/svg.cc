@@ -14,36 +14,37 @@
 namespace partiemc::client {
 namespace {
 
-// Viewers calculate in single precision: world coordinates far from the origin would tremble.
+// Size of the picture. Readers of SVG use single precision, which world coordinates can exceed.
 constexpr double kLongerSide = 1000;
-constexpr double kSteps = 1000;  // Rounding steps per unit: finer than any screen shows.
+constexpr double kSteps = 1000;  // Rounding steps per unit.
 
-// Air around the box, as a share of its longer side.
+// Margin around the box, as a share of its longer side.
 constexpr double kMargin = 0.02;
 
-// Particles are drawn as dots of this share of the spacing; without one, as small dots.
+// Diameter of a particle's dot in spacings; in units without a spacing; smallest in units.
 constexpr double kDotSpacings = 0.4;
 constexpr double kDefaultDot = 1.5;
 constexpr double kSmallestDot = 0.4;
 
+// Colours of the page's light theme (client/viewer/src/draw/colours.ts).
 constexpr std::string_view kStyle =
     "<style>"
     "path{stroke-linecap:round;stroke-linejoin:round}"
-    ".inside{fill:#dcebf7;fill-rule:evenodd}"
-    ".mesh{fill:none;stroke:#9dbfdc;stroke-width:.6}"
-    ".particles{fill:none;stroke:#6f8597}"
+    ".inside{fill:#dfecf7;fill-rule:evenodd}"
+    ".mesh{fill:none;stroke:#5f93c0;stroke-width:.6}"
+    ".particles{fill:none;stroke:#44596b}"
     ".outline{fill:none;stroke:#0b4f86;stroke-width:2}"
-    ".isoline{fill:none;stroke:#b4521e;stroke-width:1}"
+    ".isoline{fill:none;stroke:#a3470f;stroke-width:1}"
     ".bands path{stroke-width:.7}"
     ".lines path{fill:none;stroke-width:3}"
     ".legend{font:22px sans-serif;fill:#333}"
     "</style>\n";
 
-// Below the picture, where it is coloured by an attribute: a bar of all colours with its two ends.
+// Legend below a picture that is coloured by an attribute: a bar and the ends of the range.
 constexpr double kLegendHeight = 70;
 constexpr double kLegendBar = 400;
 
-/// World to picture: y up becomes y down, the box's upper left corner becomes (0, 0).
+/// Maps world to picture coordinates: y points down, the upper left corner of the box is (0, 0).
 class Picture {
  public:
   explicit Picture(Box box) {
@@ -70,7 +71,7 @@ class Picture {
   }
 
  private:
-  // Adding 0 turns -0 into 0.
+  // Adding 0 converts -0 to 0.
   static double Round(double value) { return std::round(value * kSteps) / kSteps + 0.0; }
 
   double left_, top_, scale_, width_, height_;
@@ -96,7 +97,7 @@ std::string RingPath(const Rings& rings, const Picture& picture) {
   return path;
 }
 
-/// Every edge once, although two triangles share it.
+/// Path of the edges. Every edge occurs once.
 std::string EdgePath(const Mesh& mesh, const Picture& picture) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
   edges.reserve(mesh.triangles.size());
@@ -118,7 +119,7 @@ std::string EdgePath(const Mesh& mesh, const Picture& picture) {
   return path;
 }
 
-/// A line without length and with round ends is a dot.
+/// Path of dots: lines without length, for round line caps.
 std::string DotPath(std::span<const double> particles, const Picture& picture) {
   std::string path;
   for (std::size_t k = 0; k + 1 < particles.size(); k += 2) {
@@ -130,13 +131,13 @@ std::string DotPath(std::span<const double> particles, const Picture& picture) {
   return path;
 }
 
-/// A corner of what is left of a triangle, and its share of the range of colours.
+/// A corner of a clipped triangle, with its position in the colour range.
 struct Corner {
   double x, y, share;
 };
 
-/// The part of a convex polygon whose shares lie on one side of `bound`: above for side 1, below
-/// for -1. (Sutherland and Hodgman, "Reentrant polygon clipping", 1974.)
+/// The part of a convex polygon with shares above `bound` (side 1) or below (side -1).
+/// Source: Sutherland and Hodgman, "Reentrant polygon clipping", 1974.
 std::vector<Corner> Clip(const std::vector<Corner>& polygon, double bound, double side) {
   std::vector<Corner> kept;
   for (std::size_t k = 0; k < polygon.size(); ++k) {
@@ -156,7 +157,7 @@ std::size_t BandOf(double share) {
   return std::min(static_cast<std::size_t>(band), kColorBands - 1);
 }
 
-/// For each band of colours the path of what lies in it. The attribute is linear in each triangle.
+/// Paths of the mesh, one per colour. The attribute is linear in each triangle.
 using BandPaths = std::array<std::string, kColorBands>;
 
 void AppendTriangle(const std::array<Corner, 3>& triangle, const Picture& picture,
@@ -193,7 +194,7 @@ BandPaths InsideByBand(const Mesh& mesh, std::span<const double> values, const V
   return paths;
 }
 
-/// Each segment of the rings in the colour of its middle.
+/// Paths of the segments of rings, by the colour at their centre.
 BandPaths RingsByBand(const Rings& rings, std::span<const double> values, const ValueRange& range,
                       const Picture& picture) {
   BandPaths paths;
@@ -258,7 +259,7 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   const std::vector<double> values =
       attribute != nullptr ? MagnitudesOf(*attribute) : std::vector<double>();
   const ValueRange range = RangeOf(values);
-  // The values are those of the rings' points, then of what points the mesh has more.
+  // Values of the rings' points, then of further points of the mesh.
   const bool inside = values.size() == mesh.PointCount() && !mesh.triangles.empty();
   if (inside) AppendBands(out, "bands", InsideByBand(mesh, values, range, picture));
   AppendAll(out, R"(<path class="mesh" d=")", EdgePath(frame.result.mesh, picture), "\"/>\n");

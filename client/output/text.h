@@ -1,4 +1,4 @@
-// Text out of parts: words, and numbers in the shortest form that reads back the same.
+// Joins text and numbers.
 #pragma once
 
 #include <charconv>
@@ -10,9 +10,8 @@
 
 namespace partiemc::client {
 
-/// Appends `value` in the shortest form that reads back the same bits in its own type; never
-/// depends on the locale. Infinities and NaN become "inf", "-inf" and "nan": a format that has no
-/// word for them must not get here with one.
+/// Appends `value` in the shortest form that parses to the same bits; independent of the locale.
+/// Infinities and NaN become "inf", "-inf" and "nan".
 template <typename Number>
 requires(std::integral<Number> || std::floating_point<Number>) void AppendNumber(std::string& out,
                                                                                  Number value) {
@@ -20,8 +19,8 @@ requires(std::integral<Number> || std::floating_point<Number>) void AppendNumber
   out.append(buffer, std::to_chars(buffer, buffer + sizeof(buffer), value).ptr);
 }
 
-/// Appends each part: text as it is, numbers as AppendNumber does. (absl::StrCat rounds numbers to
-/// six digits, and knows no std::string_view in the abseil that distributions ship.)
+/// Appends text and numbers, numbers by AppendNumber. (absl::StrCat rounds to six digits, and does
+/// not accept std::string_view in Debian's abseil.)
 template <typename... Parts>
 void AppendAll(std::string& out, const Parts&... parts) {
   const auto append = [&out](const auto& part) {
@@ -29,7 +28,7 @@ void AppendAll(std::string& out, const Parts&... parts) {
     if constexpr (std::is_same_v<Part, char>) {
       out += part;
     } else if constexpr (std::is_arithmetic_v<Part>) {
-      static_assert(!std::is_same_v<Part, bool>, "say what is meant by it");
+      static_assert(!std::is_same_v<Part, bool>, "pass a text instead of a bool");
       AppendNumber(out, part);
     } else {
       out += std::string_view(part);

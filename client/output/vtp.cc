@@ -19,7 +19,7 @@
 namespace partiemc::client {
 namespace {
 
-// Values of the cell array "class" above those of TriangleClass.
+// Values of the cell array "class" of rings. Triangles have the values of TriangleClass.
 constexpr unsigned char kOuterRingClass = 2;
 constexpr unsigned char kHoleClass = 3;
 
@@ -36,7 +36,7 @@ void AddField(vtkPolyData* data, const char* name, double value) {
   data->GetFieldData()->AddArray(array);
 }
 
-// At the points, which are those of the mesh, or of the rings where there is none.
+// Adds the attributes at the points of the mesh, or of the rings without a mesh.
 void AddAttributes(const Result& result, vtkPolyData* data) {
   for (const AttributeValues& attribute : result.attributes) {
     vtkNew<vtkFloatArray> array;
@@ -91,15 +91,14 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   data->GetCellData()->AddArray(classes);
   data->GetCellData()->AddArray(ring_of);
   AddField(data, "TimeValue", frame.time);
-  // Where the mesh does not begin with the points of the rings, there are no values for all of
-  // them.
+  // A mesh that does not start with the points of the rings has more points than values.
   if (shared || mesh.points.empty()) AddAttributes(frame.result, data);
   vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);
   writer->WriteToOutputStringOn();
   if (writer->Write() == 0) {
     return absl::InternalError(
-        Concat("frame ", frame.index, ": VTK could not write it; choose another format"));
+        Concat("frame ", frame.index, ": VTK cannot write it; choose another format"));
   }
   return writer->GetOutputString();
 }

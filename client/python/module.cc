@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 
 #include "client/python/reconstruct.h"
+#include "client/python/research.h"
 #include "client/python/results.h"
 #include "client/python/streams.h"
 
@@ -9,5 +10,6 @@ PYBIND11_MODULE(_native, module) {
   module.attr("version") = PARTIEMC_VERSION;
   partiemc::python::DefineResults(module);
   partiemc::python::DefineReconstructor(module);
+  partiemc::python::DefineResearch(module);
   partiemc::python::DefineStreams(module);
 }

@@ -160,8 +160,9 @@ client::Credentials TakeCredentials(py::dict arguments) {
   return credentials;
 }
 
-client::StreamOptions TakeStreamOptions(py::dict arguments) {
+client::StreamOptions TakeStreamOptions(py::dict arguments, bool latest) {
   client::StreamOptions options;
+  if (latest) options.reconnect.give_up_after = client::kShortPatience;
   options.parameters = TakeParameters(arguments);
   options.credentials = TakeCredentials(arguments);
   options.outputs.mesh = options.parameters.fill != Fill::kNone;

@@ -15,8 +15,9 @@ ReconstructionParameters TakeParameters(pybind11::dict arguments);
 /// Takes tls, ca_file, cert_file, key_file, token and token_file. Whoever names a certificate wants
 /// TLS.
 client::Credentials TakeCredentials(pybind11::dict arguments);
-/// Takes all else that a stream may be opened with, parameters included.
-client::StreamOptions TakeStreamOptions(pybind11::dict arguments);
+/// Takes all else that a stream may be opened with, parameters included. `latest`: of a producer
+/// that skips frames.
+client::StreamOptions TakeStreamOptions(pybind11::dict arguments, bool latest);
 client::WatcherOptions TakeWatcherOptions(pybind11::dict arguments);
 /// Raises TypeError where something is left.
 void ExpectNothingElse(const pybind11::dict& arguments, const char* function);

@@ -13,6 +13,7 @@
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
+#include "client/python/research.h"
 #include "client/python/results.h"
 #include "common/stage_clock.h"
 #include "partiemc/arena.h"
@@ -31,7 +32,8 @@ class Sequence {
       const auto threads = arguments.attr("pop")("threads").cast<std::optional<unsigned>>();
       if (threads.value_or(0) > 0) arena_ = std::make_unique<Arena>(*threads);
     }
-    auto reconstructor = Reconstructor::Create(TakeParameters(arguments));
+    const VirtualPlaneVariant variant = TakeResearch(arguments);
+    auto reconstructor = CreateVariant(TakeParameters(arguments), variant);
     ExpectNothingElse(arguments, "reconstruct");
     RaiseUnlessOk(reconstructor.status());
     reconstructor_ = *std::move(reconstructor);

@@ -76,7 +76,7 @@ std::string AddressOf(const std::optional<std::string>& address) {
 class ProducerStream {
  public:
   ProducerStream(const std::optional<std::string>& address, bool latest, py::dict arguments) {
-    const client::StreamOptions options = TakeStreamOptions(arguments);
+    const client::StreamOptions options = TakeStreamOptions(arguments, latest);
     ExpectNothingElse(arguments, "connect");
     if (latest && options.parts.parts > 0) {
       throw py::value_error("latest: True; must be False where frames come in parts");

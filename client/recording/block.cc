@@ -62,16 +62,16 @@ absl::StatusOr<std::string_view> BlockPacker::Pack(std::string_view block) {
   return std::string_view(packed_).substr(0, size);
 }
 
-BlockReader::BlockReader(std::ifstream file)
-    : file_(std::move(file)), context_(ZSTD_createDCtx()) {}
+BlockReader::BlockReader(std::ifstream file, double max_expansion)
+    : file_(std::move(file)), context_(ZSTD_createDCtx()), max_expansion_(max_expansion) {}
 
-absl::StatusOr<BlockReader> BlockReader::Open(const std::string& path) {
+absl::StatusOr<BlockReader> BlockReader::Open(const std::string& path, double max_expansion) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     return absl::Status(absl::ErrnoToStatusCode(errno),
                         absl::StrCat("cannot be read: ", std::strerror(errno)));
   }
-  BlockReader reader(std::move(file));
+  BlockReader reader(std::move(file), max_expansion);
   const std::string_view bytes = reader.Peek(kMarkBytes);
   const auto version =
       bytes.size() == kMarkBytes ? ParseMark(bytes, kFileTag) : std::optional<std::uint64_t>();
@@ -94,6 +94,7 @@ bool BlockReader::Fill() {
   input_.resize(size + kInputBytes);
   file_.read(input_.data() + size, kInputBytes);
   input_.resize(size + static_cast<std::size_t>(file_.gcount()));
+  read_ += input_.size() - size;
   return input_.size() > size;
 }
 
@@ -136,7 +137,11 @@ absl::StatusOr<BlockReader::Piece> BlockReader::Unpack(std::string_view& block) 
     position_ = in.pos;
     used = out.pos;
     if (ZSTD_isError(left)) return absl::DataLossError(ZSTD_getErrorName(left));
+    if (input::ExpandsTooMuch(unpacked_ + used, read_, max_expansion_)) {
+      return absl::ResourceExhaustedError(input::ExpansionRule(max_expansion_));
+    }
   }
+  unpacked_ += used;
   block = std::string_view(block_).substr(0, used);
   return Piece::kBlock;
 }

@@ -1,4 +1,4 @@
-// The pieces that a recording file is made of: marks and compressed blocks.
+// The elements of a recording file: marks and compressed blocks.
 #pragma once
 
 #include <zstd.h>
@@ -14,10 +14,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
 
 namespace partiemc::client::recording {
 
-/// At most this much is unpacked from one block: a frame of 2^24 particles with everything.
+/// Largest decompressed size of a block: a frame of 2^24 particles with all arrays.
 inline constexpr std::size_t kMaxBlockBytes = std::size_t{1} << 30;
 
 inline constexpr std::string_view kFileTag = "PEMCFILE";
@@ -30,7 +31,7 @@ std::string MakeMark(std::string_view tag, std::uint64_t value);
 /// The value of a mark with this tag. Requires: bytes.size() == kMarkBytes.
 std::optional<std::uint64_t> ParseMark(std::string_view bytes, std::string_view tag);
 
-/// Packs blocks.
+/// Compresses blocks.
 class BlockPacker {
  public:
   explicit BlockPacker(int compression_level);
@@ -49,19 +50,21 @@ class BlockPacker {
 class BlockReader {
  public:
   enum class Piece : std::uint8_t {
-    kBlock,      ///< A whole block whose checksum is right.
-    kTail,       ///< The mark at the end of a whole recording.
-    kTruncated,  ///< The file ends, here or within a piece.
+    kBlock,      ///< A complete block with a valid checksum.
+    kTail,       ///< The mark at the end of a complete recording.
+    kTruncated,  ///< The file ends without a tail.
   };
 
-  /// Reads the first mark. Errors: kNotFound, kPermissionDenied, kUnimplemented (another version),
-  /// kDataLoss (no recording).
-  static absl::StatusOr<BlockReader> Open(const std::string& path);
+  /// Reads the first mark. `max_expansion` as in input::ExpandsTooMuch. Errors: kNotFound,
+  /// kPermissionDenied, kUnimplemented (another version), kDataLoss (not a recording).
+  static absl::StatusOr<BlockReader> Open(const std::string& path,
+                                          double max_expansion = input::kMaxExpansion);
 
-  /// Errors: kDataLoss. `block` is valid until the next call.
+  /// Errors: kDataLoss; kResourceExhausted where blocks expand too much. `block` is valid until the
+  /// next call.
   absl::StatusOr<Piece> Next(std::string_view& block);
 
-  /// The frame count that the tail names; valid once Next gave kTail.
+  /// The frame count of the tail; valid after Next has returned kTail.
   std::uint64_t frame_count() const { return frame_count_; }
 
  private:
@@ -69,16 +72,19 @@ class BlockReader {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
   };
 
-  explicit BlockReader(std::ifstream file);
-  bool Fill();  // False at the end of the file.
+  BlockReader(std::ifstream file, double max_expansion);
+  bool Fill();  // Returns false at the end of the file.
   std::string_view Peek(std::size_t size);
   absl::StatusOr<Piece> Unpack(std::string_view& block);
   absl::StatusOr<Piece> ReadTail();
 
   std::ifstream file_;
   std::unique_ptr<ZSTD_DCtx, Free> context_;
-  std::string input_;         // Bytes of the file,
-  std::size_t position_ = 0;  // of which these are used up.
+  double max_expansion_;
+  std::uint64_t read_ = 0;      // Bytes read from the file.
+  std::uint64_t unpacked_ = 0;  // Bytes of the blocks before this one.
+  std::string input_;           // Bytes of the file.
+  std::size_t position_ = 0;    // Number of consumed bytes of input_.
   std::string block_;
   std::uint64_t frame_count_ = 0;
 };

@@ -1,18 +1,16 @@
-// The project's own recordings of particle frames: FILE.pemc.
+// The .pemc format for recordings of particle frames.
 //
 //   mark     zstd skippable frame: "PEMCFILE", version (uint64, 1)
 //   block    zstd frame with checksum: RecordingHeader
-//   block    zstd frame with checksum: 1 to 8 x ParticleFrame       each message behind its length,
+//   block    zstd frame with checksum: 1 to 8 x ParticleFrame       each message after its length,
 //   ...                                                             a varint
 //   mark     zstd skippable frame: "PEMCTAIL", number of frames (uint64)
 //
-// Every block stands alone, so that a file that was cut off loses its last block and nothing else.
-// The whole is a valid zstd file: `zstd -dc FILE` gives the messages, length-delimited as other
-// Protobuf tools know them.
+// Blocks are independent, so a truncated file loses only its last block. The file is a valid zstd
+// file: `zstd -dc FILE` prints the length-delimited messages for other Protobuf tools.
 //
-// Positions are float32 unless float64 was asked for: 24 bits are 1e-4 of a spacing up to a
-// thousand spacings from the origin, and half of the size. They are read back with exactly these
-// bits.
+// Positions are float32 unless float64 is requested. float32 resolves 1e-4 of a spacing up to a
+// thousand spacings from the origin and takes half of the size. Reading returns the same bits.
 #pragma once
 
 #include <cstddef>
@@ -31,30 +29,31 @@ namespace partiemc::client {
 
 struct RecordingHeader {
   std::optional<double> spacing = {};  ///< Particle spacing, world units, positive.
-  std::string title = {};              ///< For a person: what was recorded.
+  std::string title = {};              ///< Description of the content.
 };
 
 struct RecordingOptions {
-  /// Positions as float64. Otherwise float32, and a frame that would lose more than 1e-4 spacings
-  /// by it is refused (spacing: the header's, else what the frame's box and count suggest).
+  /// Store positions as float64. With float32, a frame whose rounding error exceeds 1e-4 spacings
+  /// is refused (spacing: from the header, else estimated from the box and the number of
+  /// particles).
   bool float64 = false;
-  /// Of zstd, 1 to 19. 3 writes 200 MB/s; 19 makes files 20 % smaller and writes 2 MB/s.
+  /// Compression level of zstd, 1 to 19. 3 writes 200 MB/s; 19 makes files 20 % smaller and writes
+  /// 2 MB/s.
   int compression_level = 3;
 };
 
-/// Writes a recording; the file appears with Finish. Memory: one block.
+/// Writes a recording. Finish creates the file. Memory: one block.
 class RecordingWriter {
  public:
-  /// Errors: INVALID_ARGUMENT for an option or header out of range; those of AtomicFile.
+  /// Errors: INVALID_ARGUMENT for an option or header out of range; the errors of AtomicFile.
   static absl::StatusOr<std::unique_ptr<RecordingWriter>> Create(const std::filesystem::path& path,
                                                                  const RecordingHeader& header,
                                                                  const RecordingOptions& options);
   ~RecordingWriter();
 
-  /// Appends a frame: time, positions, ids, volumes, velocities and attributes; its index is its
-  /// place in the recording. A frame without a time gets its index as time and loses its
-  /// velocities, which tell nothing without one. Errors: INVALID_ARGUMENT (float32 is not enough);
-  /// those of AtomicFile.
+  /// Appends a frame with its arrays. Frames are numbered in the order of calls. A frame without a
+  /// time gets its number as time and loses its velocities. Errors: INVALID_ARGUMENT (float32 is
+  /// too coarse); the errors of AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
   absl::Status Finish();
@@ -68,19 +67,19 @@ class RecordingWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether the file begins as a recording does, whatever its name.
+/// Whether the file starts with the mark of a recording.
 bool IsRecording(const std::string& path);
 
-/// Reads a recording. A file that was cut off ends after its last whole block with a notice; a
-/// damaged block is kDataLoss. Every block is checked before a frame of it is delivered. The file
-/// is not trusted: a block is at most 1 GiB, memory grows with what is really in it. Ids are
-/// delivered as they are; velocities of a frame, only where all of them are finite.
+/// Reads a recording. A truncated file ends after its last complete block, with a notice; a damaged
+/// block is kDataLoss. Every block is checked before its frames are delivered. Files are not
+/// trusted: a block is at most 1 GiB, and memory grows with its actual content. Ids are returned
+/// unchanged; velocities only if all of a frame are finite.
 class RecordingReader final : public Sequence {
  public:
-  /// `frames` and `in_space` as in SequenceOptions. Errors: those of Sequence.
-  static absl::StatusOr<std::unique_ptr<RecordingReader>> Open(const std::string& path,
-                                                               const std::string& frames,
-                                                               bool in_space = false);
+  /// `frames`, `in_space` and `max_expansion` as in SequenceOptions. Errors: as Sequence.
+  static absl::StatusOr<std::unique_ptr<RecordingReader>> Open(
+      const std::string& path, const std::string& frames, bool in_space = false,
+      double max_expansion = input::kMaxExpansion);
   ~RecordingReader() override;
 
   const RecordingHeader& header() const;

@@ -95,7 +95,7 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   return absl::OkStatus();
 }
 
-// Takes the next length-delimited message from the front of `block`.
+// Removes the next length-delimited message from `block`.
 template <typename Message>
 absl::Status TakeMessage(std::string_view& block, Message& message) {
   google::protobuf::io::CodedInputStream stream(reinterpret_cast<const std::uint8_t*>(block.data()),
@@ -111,7 +111,7 @@ absl::Status TakeMessage(std::string_view& block, Message& message) {
   return absl::OkStatus();
 }
 
-// The number of frames as the last bytes of the file tell it: a hint, checked while reading.
+// The number of frames from the tail of the file. A hint; checked while reading.
 std::optional<std::size_t> CountAtTail(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   file.seekg(-static_cast<std::streamoff>(recording::kMarkBytes), std::ios::end);
@@ -184,7 +184,8 @@ class RecordingReader::Impl {
                                  "--in-space"));
   }
 
-  // The next message into `message_`; false at the end, which is told where it comes too early.
+  // Reads the next message into `message_`. Returns false at the end; adds a notice if it is
+  // premature.
   absl::StatusOr<bool> Take() {
     if (block_.empty()) {
       const auto piece = blocks_.Next(block_);
@@ -212,9 +213,11 @@ class RecordingReader::Impl {
   }
 
   absl::Status Located(const absl::Status& status) const {
-    return absl::Status(status.code(), absl::StrCat(path_, ": damaged after ", next_index_,
-                                                    " frames: ", status.message(),
-                                                    "; the frames before are whole"));
+    const bool is_damage = !absl::IsResourceExhausted(status);
+    return absl::Status(
+        status.code(), absl::StrCat(path_, is_damage ? ": damaged after " : ": after ", next_index_,
+                                    " frames: ", status.message(),
+                                    is_damage ? "; the frames before are whole" : ""));
   }
 
   const std::string path_;
@@ -222,7 +225,7 @@ class RecordingReader::Impl {
   const input::FrameRange range_;
   const bool in_space_;
   RecordingHeader header_;
-  std::string_view block_;  // What is left of the block that was read last.
+  std::string_view block_;  // Unread part of the current block.
   v1::ParticleFrame message_;
   std::size_t next_index_ = 0;
   bool over_ = false;
@@ -240,11 +243,12 @@ bool IsRecording(const std::string& path) {
 
 absl::StatusOr<std::unique_ptr<RecordingReader>> RecordingReader::Open(const std::string& path,
                                                                        const std::string& frames,
-                                                                       bool in_space) {
+                                                                       bool in_space,
+                                                                       double max_expansion) {
   absl::StatusOr<input::FrameRange> range = input::FrameRange{};
   if (!frames.empty()) range = input::ParseFrameRange(frames);
   if (!range.ok()) return range.status();
-  auto blocks = BlockReader::Open(path);
+  auto blocks = BlockReader::Open(path, max_expansion);
   if (!blocks.ok()) {
     return absl::Status(blocks.status().code(),
                         absl::StrCat(path, ": ", blocks.status().message()));

@@ -19,10 +19,10 @@
 namespace partiemc::client {
 namespace {
 
-// What a cut loses at most, against the size: the bundled dam break is 1.89 MB with 8 frames a
-// block, 2.16 MB with one, 1.73 MB in a single block.
+// Most frames per block: a compromise between the frames that a truncation loses and the size. The
+// bundled dam break takes 1.89 MB with 8 frames per block, 2.16 MB with 1, 1.73 MB in one block.
 constexpr int kFramesPerBlock = 8;
-// A block of large frames gains nothing from their company.
+// Large frames do not compress better together.
 constexpr std::size_t kFullBlockBytes = std::size_t{8} << 20;
 
 constexpr double kPrecisionSpacings = 1e-4;
@@ -32,8 +32,8 @@ void AppendDelimited(const google::protobuf::MessageLite& message, std::string& 
   google::protobuf::util::SerializeDelimitedToZeroCopyStream(message, &stream);
 }
 
-// The spacing of particles that fill their box evenly, or, where that is wider, a line along it; 0
-// where there is no box.
+// The spacing of particles that fill their bounding box evenly, or lie on a line along it,
+// whichever is larger; 0 for an empty box.
 double SuggestedSpacing(const RecordedFrame& frame) {
   const auto axes = static_cast<std::size_t>(frame.components);
   const double count = static_cast<double>(frame.ParticleCount());
@@ -81,7 +81,7 @@ class RecordingWriter::Impl {
     if (!status.ok()) return status;
     wire::AssignBytes(std::span<const std::uint64_t>(frame.ids), *message_.mutable_ids());
     wire::AssignBytes(std::span<const float>(frame.volumes), *message_.mutable_volumes());
-    // The index that stands for a missing time is not the time that velocities are about.
+    // Velocities are useless with an index instead of a time.
     wire::AssignBytes(
         frame.time ? std::span<const float>(frame.velocities) : std::span<const float>(),
         *message_.mutable_velocities());

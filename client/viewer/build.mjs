@@ -1,10 +1,11 @@
-// Builds the page: messages from the .proto files, type check, one script and one style sheet, and
-// the packed copies that the server sends. Fails where the page is above its limit.
+// Builds the page and the report: messages from the .proto files, type check, scripts, style sheets.
+// Fails if the page exceeds its size limit.
 //
-//   node build.mjs [--out DIR] [--debug]
+//   node build.mjs [--out DIR] [--debug]    the page, in DIR (default: build/page)
+//   node build.mjs --report                 the report, in client/output/report_page.html
 //
-// What comes out lies in DIR (default: build/page): index.html, page.js, page.css, icon.svg, and
-// the .gz of each.
+// The page has index.html, page.js, page.css, icon.svg, each with a compressed copy (.gz). The
+// report is one file, which C++ completes. It is committed, so that `partiemc` builds without npm.
 import { execFileSync } from 'node:child_process';
 import { cpSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
@@ -12,7 +13,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 import { build } from 'esbuild';
 
-/** Bytes of the whole page as it is sent, packed. */
+/** Limit of the compressed page in bytes. */
 const LIMIT = 150_000;
 
 const here = path.dirname(fileURLToPath(import.meta.url));
@@ -21,7 +22,7 @@ const debug = process.argv.includes('--debug');
 const given = process.argv.indexOf('--out');
 const out = path.resolve(given > 0 ? process.argv[given + 1] : path.join(here, 'build/page'));
 
-/** TypeScript of the messages, by protoc and protoc-gen-es. */
+/** Generates TypeScript of the messages. */
 export function generate() {
   const generated = path.join(here, 'build/generated');
   mkdirSync(generated, { recursive: true });
@@ -41,25 +42,45 @@ function check() {
   execFileSync(tsc, ['--noEmit', '--project', here], { stdio: 'inherit', cwd: here });
 }
 
-async function bundle() {
+const OPTIONS = {
+  bundle: true,
+  target: 'es2022',
+  minify: !debug,
+  sourcemap: debug ? 'inline' : false,
+  legalComments: 'none',
+  tsconfig: path.join(here, 'tsconfig.json'),
+  absWorkingDir: here,
+  logLevel: 'warning',
+};
+
+/** Replaces {{include FILE}} by a fragment of src/ui. */
+function expand(name) {
+  return readFileSync(path.join(here, 'src', name), 'utf8').replace(/\{\{include (.*)\}\}\n/g,
+    (_, fragment) => readFileSync(path.join(here, 'src/ui', fragment), 'utf8'));
+}
+
+async function buildPage() {
   rmSync(out, { recursive: true, force: true });
   mkdirSync(out, { recursive: true });
   await build({
-    entryPoints: { page: path.join(here, 'src/ui/main.ts') },
-    outdir: out,
-    bundle: true,
-    format: 'esm',
-    target: 'es2022',
-    minify: !debug,
-    sourcemap: debug ? 'inline' : false,
-    legalComments: 'none',
-    tsconfig: path.join(here, 'tsconfig.json'),
-    absWorkingDir: here,
-    logLevel: 'warning',
+    ...OPTIONS, entryPoints: { page: path.join(here, 'src/ui/main.ts') }, outdir: out, format: 'esm',
   });
-  for (const name of ['index.html', 'icon.svg']) {
-    cpSync(path.join(here, 'src/ui', name), path.join(out, name));
+  writeFileSync(path.join(out, 'index.html'), expand('ui/index.html'));
+  cpSync(path.join(here, 'src/ui/icon.svg'), path.join(out, 'icon.svg'));
+}
+
+/** The report as one file. The marks that are left are filled in by client/output/report.cc. */
+export async function buildReport() {
+  const { outputFiles } = await build({
+    ...OPTIONS, entryPoints: { report: path.join(here, 'src/report/main.ts') }, outdir: out,
+    format: 'iife', charset: 'utf8', write: false,
+  });
+  const text = (ending) => outputFiles.find((file) => file.path.endsWith(ending)).text.trim();
+  const parts = { style: text('.css'), script: text('.js') };
+  for (const [name, part] of Object.entries(parts)) {
+    if (/\{\{|<\/(script|style)/.test(part)) throw new Error(`the ${name} of the report contains "{{" or "</script"`);
   }
+  return expand('report/report.html').replace(/\{\{(style|script)\}\}/g, (_, name) => parts[name]);
 }
 
 function pack() {
@@ -69,13 +90,21 @@ function pack() {
     const packed = gzipSync(bytes, { level: 9 });
     writeFileSync(path.join(out, `${name}.gz`), packed);
     total += packed.length;
-    console.log(`${name}: ${bytes.length} bytes, packed ${packed.length}`);
+    console.log(`${name}: ${bytes.length} bytes, compressed ${packed.length}`);
   }
-  console.log(`the page: ${total} bytes packed, at most ${LIMIT}`);
-  if (!debug && total > LIMIT) throw new Error(`the page has ${total} bytes, at most ${LIMIT}`);
+  console.log(`the page: ${total} bytes compressed, limit ${LIMIT}`);
+  if (!debug && total > LIMIT) throw new Error(`the page has ${total} bytes, limit ${LIMIT}`);
 }
 
-generate();
-check();
-await bundle();
-pack();
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  generate();
+  check();
+  if (process.argv.includes('--report')) {
+    const report = await buildReport();
+    writeFileSync(path.join(root, 'client/output/report_page.html'), report);
+    console.log(`the report: ${report.length} characters`);
+  } else {
+    await buildPage();
+    pack();
+  }
+}

@@ -1,8 +1,9 @@
 #!/bin/bash
-# Builds the page into DIR (default: build/page beside this script); fetches its packages by npm the
-# first time. Needs node, npm and protoc: docker/install.sh viewer service.
+# Builds the page into DIR (default: build/page beside this script), and fetches its packages by npm
+# if they are missing. Requires node, npm and protoc: docker/install.sh viewer service.
 #   client/viewer/build.sh [--out DIR]
-#   client/viewer/build.sh --packages     fetches them only
+#   client/viewer/build.sh --report       writes client/output/report_page.html
+#   client/viewer/build.sh --packages     only fetches packages
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
@@ -13,7 +14,7 @@ for program in node npm protoc; do
   fi
 done
 
-# Installed anew only when the list of packages has changed: npm leaves a copy of it behind.
+# npm leaves a copy of the package list, which shows whether the list has changed.
 mark=$here/node_modules/.package-lock.json
 if [[ ! -f $mark || $here/package-lock.json -nt $mark ]]; then
   (cd "$here" && npm ci --ignore-scripts --no-audit --no-fund)

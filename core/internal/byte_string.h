@@ -1,4 +1,5 @@
-// Numbers as bytes, little-endian whatever the machine: how states and checkpoints are written.
+// Writes numbers to strings of bytes and reads them back: the format of states and checkpoints.
+// Little-endian on every machine.
 #pragma once
 
 #include <bit>
@@ -10,7 +11,7 @@
 
 namespace partiemc {
 
-/// Appends a number of 4 or 8 bytes.
+/// Appends a number of 4 or 8 bytes to `bytes`.
 template <typename T>
 void PutNumber(T value, std::string& bytes) {
   auto bits =
@@ -23,7 +24,7 @@ void PutNumber(T value, std::string& bytes) {
   bytes.append(text, sizeof(T));
 }
 
-/// Takes the number that `bytes` begins with. Requires: there are sizeof(T) bytes.
+/// Removes the first number from `bytes` and returns it. Requires: sizeof(T) bytes.
 template <typename T>
 T TakeNumber(std::string_view& bytes) {
   using Bits = std::conditional_t<sizeof(T) == 8, std::uint64_t, std::uint32_t>;
@@ -35,7 +36,7 @@ T TakeNumber(std::string_view& bytes) {
   return std::bit_cast<T>(bits);
 }
 
-/// FNV-1a of 64 bits: tells bytes that were damaged, not bytes that were made up.
+/// 64-bit FNV-1a. Detects accidental damage, not forgery.
 inline std::uint64_t ChecksumOf(std::string_view bytes) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const char byte : bytes) {

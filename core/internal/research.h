@@ -1,6 +1,6 @@
 // Experiments with the default placement: switch its steps off, vary its constants.
 // Not installed and not on the wire: for the evaluation, the tests and this repository's Python
-// module. Everybody else uses Reconstructor::Create, which is the method as METHOD.md describes it.
+// module. Programs use Reconstructor::Create.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace partiemc {
 
 /// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). All on is the method.
 struct VirtualPlaneSteps {
-  bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, beside the cell's.
+  bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, besides the cell's.
   bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
   bool curvature = true;      ///< Undo the kernel's rounding of curved boundaries.
   bool support = true;        ///< Shift planes to the particles that support them.

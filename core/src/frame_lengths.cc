@@ -15,20 +15,20 @@
 namespace partiemc {
 namespace {
 
-// The spacing estimated from a later frame may leave the lattice's by these factors at most, so
-// that a kernel always spans a sensible number of cells.
+// Limits of a spacing that is estimated in a later frame, in cells of the existing lattice: a
+// kernel must span a sensible number of cells.
 constexpr double kMinSpacingInCells = 0.25;
 constexpr double kMaxSpacingInCells = 4;
 
-// Particles of one frame may stand for areas this far from h^2: beyond it a single particle would
-// decide the guard of the whole frame, and float sums would lose the others.
+// Volumes of one frame may differ from h^2 by this factor. A smaller particle would decide the
+// guard of the whole frame, and float sums would lose the others.
 constexpr double kMaxVolumeRatio = 1e6;
 
-// Volumes of a frame are doubtful where more than half of them are this many times the squared
-// spacing, or less than its inverse: discs of a diameter h are at 0.79, hexagonal packing at 0.87.
+// Volumes are doubtful if more than half of them are above this times h^2, or below its inverse.
+// Disks of diameter h have 0.79 h^2, hexagonal packing 0.87 h^2.
 constexpr double kDoubtfulVolumeRatio = 2;
 
-// The side of the square of the median volume.
+// The side of a square with the median volume.
 double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scratch) {
   scratch.assign(volumes.begin(), volumes.end());
   const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(scratch.size() / 2);
@@ -36,8 +36,8 @@ double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scr
   return std::sqrt(*middle);
 }
 
-// The spacing that a frame tells by itself; nothing where it tells none. What its particles do not
-// agree on is only a guess, for which volumes are better than distances.
+// The spacing that the particles of a frame show; empty without an estimate. If the particles do
+// not agree, the volumes give a better estimate than the distances.
 absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(const Frame& frame, Plane plane,
                                                           SpacingScratch& scratch) {
   std::optional<SpacingEstimate> own = EstimateSpacing(frame, plane, scratch);
@@ -90,7 +90,7 @@ absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& 
       return ViolationError(
           absl::StatusCode::kInvalidArgument,
           {std::string(kReasonOutOfRange), absl::StrCat("volumes[", k, "]"), ShortestNumber(volume),
-           absl::StrCat("must be within a factor of 1e6 of that of a particle by the spacing, ",
+           absl::StrCat("must be within a factor of 1e6 of the volume by the spacing, ",
                         ShortestNumber(usual))});
     }
     lightest = std::min(lightest, volume);

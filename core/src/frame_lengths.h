@@ -1,4 +1,4 @@
-// Spacing and lattice of a frame: where they come from, and what speaks against them.
+// Decides the spacing and the lattice of a frame, and finds the doubts about them.
 #pragma once
 
 #include <optional>
@@ -18,23 +18,22 @@ namespace partiemc {
 /// In world units.
 struct Lengths {
   double spacing, cell_size;
-  bool is_provisional;  ///< No spacing is given, and no frame so far has agreed on one.
+  bool is_provisional;  ///< No spacing is given or agreed on so far.
 };
 
-/// The lengths of a checked frame, by parameters, state and the particles themselves, in this
-/// order; nothing while there is not even a guess. Errors: INVALID_ARGUMENT for a spacing that the
-/// particles agree on but that is out of range.
+/// Returns the lengths of a checked frame: from the parameters, else the state, else the particles.
+/// Empty if nothing gives even an estimate. Errors: INVALID_ARGUMENT if the agreed spacing exceeds
+/// its range.
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);
 
-/// The smallest volume of the frame, `usual` where particles have none: h^2, of a slice h^3. Adds
-/// the doubt that volumes give reason for. Errors: INVALID_ARGUMENT for a volume that is too far
-/// from the usual one.
+/// Returns the smallest volume of the frame, or `usual` (h^2, of a slice h^3) if particles have
+/// none. Adds the doubts about volumes. Errors: INVALID_ARGUMENT for a volume too far from `usual`.
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
 
-/// Adds the doubts that the bins give reason for. Errors: see CheckResolution (resolution.h); none
-/// where lengths are provisional. Particles of a slab tell nothing of their spacing.
+/// Adds the doubts about spacing and resolution. A slab has no doubts about the spacing, as it does
+/// not show it. Errors: as CheckResolution (resolution.h), except if lengths are provisional.
 absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& lengths,
                           const Scale& scale, const ParticleBins& bins, Doubts& doubts);
 

@@ -21,7 +21,7 @@
 namespace partiemc {
 namespace {
 
-// Runs a stage, and tells the observer when it begins and ends.
+// Runs a stage and reports it to the observer.
 template <typename Run>
 auto InStage(StageObserver* observer, Stage stage, Run run) {
   ThrowIfCancelled();
@@ -37,21 +37,30 @@ auto InStage(StageObserver* observer, Stage stage, Run run) {
   return run();
 }
 
-// Of a frame that has none; buffers of rings and mesh stay.
+// Empties a result; rings and mesh keep their buffers.
 void MakeEmpty(Result& result) {
   result.Clear();
   result.attributes.clear();
   result.sections.clear();
 }
 
-void Prepare(std::size_t attributes, std::size_t sections, Result& result) {
-  result.Clear();
-  result.attributes.resize(attributes);
-  result.sections.resize(sections);
-  for (Result& section : result.sections) section.attributes.resize(attributes);
+// An outline without points has its attributes, too.
+void Name(std::span<const Attribute> attributes, std::vector<AttributeValues>& values) {
+  values.resize(attributes.size());
+  for (std::size_t k = 0; k < attributes.size(); ++k) {
+    values[k].name = attributes[k].name;
+    values[k].components = attributes[k].components;
+  }
 }
 
-// `parameters` of a stream, not resolved, as they are for a section.
+void Prepare(std::span<const Attribute> attributes, std::size_t sections, Result& result) {
+  result.Clear();
+  Name(attributes, result.attributes);
+  result.sections.resize(sections);
+  for (Result& section : result.sections) Name(attributes, section.attributes);
+}
+
+// The unresolved parameters of a section.
 ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const Section& section) {
   parameters.sections.clear();
   if (section.slice) parameters.slice = section.slice;
@@ -59,12 +68,12 @@ ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const
   return parameters;
 }
 
-// What outlines of a frame reserve, one after the other: what is done stays.
+// Reserves memory for the outlines of a frame, one after another. Earlier outlines keep theirs.
 class OutlineMemory {
  public:
   explicit OutlineMemory(MemoryGuard* guard) : guard_(guard) {}
 
-  // RESOURCE_EXHAUSTED if there is no room for an outline of this size beside those that are done.
+  // RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier ones.
   absl::Status Reserve(const FrameSize& size) {
     last_ = WorkspaceBytes(size);
     const std::uint64_t bytes = done_ + last_;
@@ -73,8 +82,8 @@ class OutlineMemory {
         absl::StatusCode::kResourceExhausted,
         {std::string(kReasonOutOfMemory), "positions",
          absl::StrCat(size.tiles, " tiles of 32 x 32 cells"),
-         absl::StrCat("must not take ", (bytes >> 20) + 1,
-                      " MiB, which there is no room for: reach fewer tiles, or try again later")});
+         absl::StrCat("must fit into the memory budget, but needs ", (bytes >> 20) + 1,
+                      " MiB: reach fewer tiles, or try again later")});
   }
   void Done() { done_ += last_; }
 
@@ -83,7 +92,7 @@ class OutlineMemory {
   std::uint64_t done_ = 0, last_ = 0;
 };
 
-// What the stages have not told themselves.
+// Fills in the statistics that no stage sets.
 void Summarise(const Workspace::Buffers& b, Result& result) {
   FrameStatistics& statistics = result.statistics;
   statistics.tiles = b.bins.tiles.size();
@@ -97,8 +106,8 @@ void Summarise(const Workspace::Buffers& b, Result& result) {
   }
 }
 
-// Nothing is remembered of a frame whose lengths are a guess, hence no identity either.
-void Untrack(Rings& rings) {
+// Removes the identities of a frame with provisional lengths, which leaves no state.
+void ClearIdentities(Rings& rings) {
   for (RingMeasures& measures : rings.measures) measures.identity = 0;
   rings.parents.clear();
   rings.parent_offsets.assign(1, 0);
@@ -110,7 +119,7 @@ std::uint64_t AttributeValuesOf(const Frame& frame) {
   return values;
 }
 
-// As soon as its segments are known.
+// Requires: segments are known.
 FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  const Workspace::Buffers& b) {
   FrameSize size{.particles = frame.ParticleCount(),
@@ -121,7 +130,7 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   return size;
 }
 
-// The inputs of one outline of a frame.
+// The input of one outline of a frame.
 struct OutlineTask {
   const ReconstructionParameters& parameters;
   const VirtualPlaneVariant variant;
@@ -129,11 +138,12 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;  // Of the frame, which is checked then.
+  bool is_first;  // The first outline checks the frame.
 };
 
-// Stage 1 of a frame that CheckFrame has passed: sets `seen` to what the stages see of it, of a
-// slice its slab. `lengths` stay empty where nothing tells them. Errors: see Reconstruct.
+// Stage 1 of a frame that CheckFrame has passed. Sets `seen` to the particles that the later stages
+// use: the frame, or the slab around a slice. `lengths` stays empty without any estimate. Errors:
+// see Reconstruct.
 absl::Status SortParticles(const ReconstructionParameters& parameters, const FrameLimits& limits,
                            const Frame& frame, const State& state, Workspace::Buffers& b,
                            Frame& seen, std::optional<Lengths>& lengths, Scale& scale,
@@ -164,7 +174,7 @@ absl::Status SortParticles(const ReconstructionParameters& parameters, const Fra
   return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
 }
 
-// The stages up to the rings.
+// Runs the stages field, crossings and rings.
 void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
                StageObserver* observer, Workspace::Buffers& b) {
   InStage(observer, Stage::kField, [&] {
@@ -178,8 +188,8 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
-// The stages from the rings on. Errors: INTERNAL for a bug in
-// RepairRings or BuildMesh, which say why there should be none.
+// Runs the stages from normals to mesh. Errors: INTERNAL for a bug in RepairRings or BuildMesh,
+// whose comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
                          Workspace::Buffers& b, Result& result) {
   const ReconstructionParameters& parameters = task.parameters;
@@ -214,7 +224,7 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   return absl::OkStatus();
 }
 
-// One outline of the frame. Errors: see Reconstruct.
+// Computes one outline and its next state. Errors: see Reconstruct.
 absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
                                 Workspace::Buffers& b, NextState& next, Result& result) {
   const ReconstructionParameters& parameters = task.parameters;
@@ -249,7 +259,7 @@ absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
   }
   Summarise(b, result);
   if (lengths->is_provisional) {
-    Untrack(result.rings);
+    ClearIdentities(result.rings);
     return absl::OkStatus();
   }
   next.is_kept = true;
@@ -261,8 +271,8 @@ absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
   return absl::OkStatus();
 }
 
-// Has `state` remember what an outline leaves; `next` takes its buffers.
-void Keep(NextState& next, State& state) {
+// Commits the new state; swaps buffers with `next`.
+void CommitState(NextState& next, State& state) {
   if (!next.is_kept) return;
   state.cell_size = next.state.cell_size;
   state.spacing = next.state.spacing;
@@ -304,12 +314,12 @@ absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& para
 absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Workspace& workspace,
                                         Result& result, const FrameControl& control) const {
   const CancellationScope scope(control.cancelled);
-  Prepare(frame.attributes.size(), sections_.size(), result);
+  Prepare(frame.attributes, sections_.size(), result);
   absl::Status status;
   try {
     status = ReconstructOrThrow(frame, state, workspace.buffers(), result, control);
   } catch (...) {
-    // Wherever it was left, there are half-made buffers.
+    // The buffers may be in any state.
     workspace = Workspace();
     MakeEmpty(result);
     try {
@@ -344,9 +354,9 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
   }
   if (!status.ok()) return status;
   state.sections.resize(sections_.size());
-  Keep(b.next_states[0], state);
+  CommitState(b.next_states[0], state);
   for (std::size_t k = 0; k < sections_.size(); ++k) {
-    Keep(b.next_states[k + 1], state.sections[k]);
+    CommitState(b.next_states[k + 1], state.sections[k]);
   }
   return absl::OkStatus();
 }

@@ -1,4 +1,4 @@
-// The buffers of all stages, kept warm from frame to frame.
+// The buffers of all stages. They are reused from frame to frame.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@
 
 namespace partiemc {
 
-// What an outline leaves for the next frame, until all outlines of this one are done.
+// The next state of an outline, committed when all outlines of the frame are done.
 struct NextState {
-  bool is_kept = false;  // Else the stream remembers what it did.
+  bool is_kept = false;  // False: the stream keeps its state.
   State state;
 };
 
@@ -49,7 +49,7 @@ struct Workspace::Buffers {
   RingHistory next_history;
   MeshScratch mesh_scratch;
   AttributeScratch attribute_scratch;
-  std::vector<NextState> next_states;  // By outline: the stream's own, then its sections.
+  std::vector<NextState> next_states;  // By outline: the main one, then the sections.
 };
 
 }  // namespace partiemc

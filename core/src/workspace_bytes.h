@@ -1,38 +1,38 @@
-// How much memory a frame takes.
+// Estimates the memory of a frame.
 #pragma once
 
 #include <cstdint>
 
 namespace partiemc {
 
-/// What the memory of a frame follows.
+/// The counts that determine the memory of a frame.
 struct FrameSize {
   std::uint64_t particles = 0;
   std::uint64_t tiles = 0;
-  std::uint64_t segments = 0;          ///< Of the isoline, through one cell each.
-  std::uint64_t grid_cells = 0;        ///< Interior cells, where the fill is `grid`; else 0.
-  std::uint64_t attribute_values = 0;  ///< Of each particle, and of each vertex.
+  std::uint64_t segments = 0;          ///< Pieces of the outline, one per cell.
+  std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
+  std::uint64_t attribute_values = 0;  ///< Per particle, and per vertex.
 };
 
-/// Measured over frames of all kinds, with room for vectors that grow by doubling: a compact body
-/// takes 45 bytes a particle, a tile with next to nothing in it 7 kB, a segment 500 to 900 bytes,
-/// with ids or without, a cell of a grid 66 bytes.
+/// Bytes per item: measured over frames of all kinds, plus a margin for vectors that grow by
+/// doubling. Measured: 45 bytes per particle of a compact body, 7 kB per nearly empty tile, 500 to
+/// 900 bytes per segment (with or without ids), 66 bytes per grid cell.
 inline constexpr std::uint64_t kBytesPerParticle = 60;
 inline constexpr std::uint64_t kBytesPerTile = 10'000;
 inline constexpr std::uint64_t kBytesPerSegment = 1'000;
 inline constexpr std::uint64_t kBytesPerGridCell = 80;
 
-/// And where particles carry attributes: for sorting them, and of each value at a vertex.
+/// Additional bytes if particles carry attributes: to sort them, and per value at a vertex.
 inline constexpr std::uint64_t kBytesPerCarryingParticle = 16;
 inline constexpr std::uint64_t kBytesPerCarryingTile = 4'200;
 inline constexpr std::uint64_t kBytesPerValueOfSegment = 24;
 inline constexpr std::uint64_t kBytesPerValueOfGridCell = 8;
 
-/// Whatever the frame.
+/// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
-/// No less than what a new Workspace, Result and State hold after frames of this size, and not much
-/// more (tests/core/allocation_test.cc: up to 2.2 times as much, where it is more than a few MB).
+/// Upper bound of the memory of a new Workspace, Result and State after frames of this size. At
+/// most 2.2 times the actual memory, if that exceeds a few MB (tests/core/allocation_test.cc).
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +

@@ -30,7 +30,7 @@ absl::StatusOr<std::uint16_t> ParsePort(const std::string& text, const std::stri
 absl::StatusOr<Address> ParseUnix(const std::string& text) {
   Address address;
   address.unix_path = text.substr(sizeof(kUnixScheme) - 1);
-  // gRPC takes unix:///path too.
+  // gRPC accepts unix:///path, too.
   if (absl::StartsWith(address.unix_path, "//")) address.unix_path.erase(0, 2);
   if (address.unix_path.empty() || address.unix_path.size() >= sizeof(sockaddr_un::sun_path)) {
     return absl::InvalidArgumentError(absl::StrCat("address \"", text,

@@ -1,4 +1,4 @@
-// Text as JSON has it.
+// Text in JSON.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace partiemc {
 
-/// `text` as a JSON string, quotes and all. Control characters are escaped, so that a terminal does
-/// not obey what is printed; what is no UTF-8 becomes U+FFFD.
+/// `text` as a JSON string with its quotes. Control characters are escaped, so that the output is
+/// safe to print on a terminal. Invalid UTF-8 becomes U+FFFD.
 std::string JsonString(std::string_view text);
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-// The time that the stages of a frame take, as answers tell it.
+// The wall-clock time of the stages of a frame, for responses.
 #pragma once
 
 #include <array>
@@ -10,12 +10,12 @@
 
 namespace partiemc {
 
-/// Reads the clock for the core, which has none.
+/// Reads the clock on behalf of the core.
 class StageClock final : public StageObserver {
  public:
-  /// Wall time of each stage in milliseconds; 0 for one that did not run.
+  /// Wall-clock time of each stage in milliseconds; 0 for a stage that did not run.
   const std::array<double, kStageCount>& stages_ms() const { return stages_ms_; }
-  /// Since the clock was made.
+  /// Milliseconds since the construction of this object.
   double TotalMs() const { return MillisecondsSince(start_); }
 
   void StageBegins(Stage) override { stage_start_ = Clock::now(); }

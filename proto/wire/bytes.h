@@ -1,4 +1,4 @@
-// Arrays of numbers as the `bytes` of a message: little-endian, tightly packed.
+// Arrays of numbers in `bytes` fields: little-endian, tightly packed.
 #pragma once
 
 #include <bit>
@@ -12,9 +12,9 @@
 namespace partiemc::wire {
 
 static_assert(std::endian::native == std::endian::little,
-              "the wire is little-endian and arrays are copied and viewed as they are");
+              "the wire is little-endian; arrays are copied and viewed without conversion");
 
-/// Replaces `bytes` by the numbers of `values`, reusing its buffer.
+/// Replaces `bytes` by the numbers in `values`. Reuses its buffer.
 template <typename T>
 void AssignBytes(std::span<const T> values, std::string& bytes) {
   if (values.empty()) {
@@ -24,15 +24,17 @@ void AssignBytes(std::span<const T> values, std::string& bytes) {
   }
 }
 
-/// `bytes` seen as numbers, without a copy. Requires: its size is a multiple of sizeof(T).
-/// A std::string allocates at 16 bytes, and libstdc++ keeps short strings at a multiple of 8.
+/// A view of `bytes` as numbers. Requires: the size is a multiple of sizeof(T). The alignment
+/// suffices: std::string allocates at multiples of 16 and stores short strings at multiples of 8
+/// (libstdc++).
 template <typename T>
 std::span<const T> ViewBytes(const std::string& bytes) {
   assert(reinterpret_cast<std::uintptr_t>(bytes.data()) % alignof(T) == 0);
   return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
 }
 
-/// Replaces `values` by the numbers in `bytes`. Requires: its size is a multiple of sizeof(T).
+/// Replaces `values` by the numbers in `bytes`. Requires: the size of `bytes` is a multiple of
+/// sizeof(T).
 template <typename T>
 void CopyBytes(const std::string& bytes, std::vector<T>& values) {
   values.resize(bytes.size() / sizeof(T));

@@ -123,7 +123,7 @@ v1::Plane ToWire(Plane plane) {
   return v1::PLANE_UNSPECIFIED;
 }
 
-// How a PositionFormat lays out a particle; 0 components for a format that is not known.
+// The layout of a particle in a PositionFormat; 0 components for an unknown format.
 struct PositionLayout {
   int components = 0;
   std::size_t component_bytes = 0;
@@ -160,7 +160,7 @@ std::size_t ComponentsOf(const v1::NamedScalar& scalar) {
   return std::max<std::size_t>(1, scalar.components());
 }
 
-// `bytes` is empty or has `particle_bytes` for each of `particles`.
+// Checks that `bytes` is empty or has `particle_bytes` for each particle.
 absl::Status CheckOptionalArray(std::string field, const std::string& bytes, std::size_t particles,
                                 std::size_t particle_bytes) {
   if (bytes.empty() || bytes.size() == particles * particle_bytes) return absl::OkStatus();
@@ -196,7 +196,7 @@ absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, const Positio
   return absl::OkStatus();
 }
 
-// A frame without particles may leave out what they would carry.
+// A frame without particles may omit its attributes.
 bool IsThere(const v1::NamedScalar& scalar, std::size_t particles) {
   return particles == 0 || !scalar.values().empty();
 }

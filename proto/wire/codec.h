@@ -1,5 +1,5 @@
-// The codec: the only place where messages of partiemc.v1 meet the types of the core. The server
-// decodes requests and encodes results with it, the client does the reverse.
+// The codec converts between messages of partiemc.v1 and types of the core. No other file does. The
+// server decodes requests and encodes results, the client encodes requests and decodes results.
 #pragma once
 
 #include <array>
@@ -20,12 +20,12 @@
 
 namespace partiemc::wire {
 
-/// The reasons that the codec gives, beside the core's (proto/PROTOCOL.md).
+/// The reasons of the codec's violations (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonByteCount = "BYTE_COUNT";
 inline constexpr std::string_view kReasonUnsupported = "UNSUPPORTED";
 using partiemc::kReasonResolution;
 
-/// What a client wants back, as resolved (v1::Outputs).
+/// The requested outputs (v1::Outputs), with defaults filled in.
 struct Outputs {
   bool rings = true;
   bool mesh = true;
@@ -37,17 +37,17 @@ struct Outputs {
   friend bool operator==(const Outputs&, const Outputs&) = default;
 };
 
-/// Milliseconds of wall time, of each stage in their order and of the whole frame.
+/// Wall-clock milliseconds of each stage, in order, and of the whole frame.
 struct FrameTimes {
   std::array<double, kStageCount> stages_ms{};
   double total_ms = 0;
 };
 
-/// A result with what the wire says about it.
+/// A result with its metadata from the wire.
 struct ReconstructedFrame {
   std::uint64_t sequence = 0;
   double time = 0;
-  Result result;  ///< Parts that were not asked for are empty.
+  Result result;  ///< Outputs that were not requested are empty.
   FrameTimes times;
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
@@ -56,52 +56,52 @@ struct ReconstructedFrame {
 
 v1::Placement ToWire(Placement placement);
 v1::Fill ToWire(Fill fill);
+v1::Doubt ToWire(Doubt doubt);
 
-/// Defaults filled in for absent fields; the values are checked by the core's Validate.
-/// Errors: INVALID_ARGUMENT with a Violation for an enum value that this version does not know.
+/// Decodes parameters and fills in defaults. The core's Validate checks the values.
+/// Errors: INVALID_ARGUMENT with a Violation for an unknown enum value.
 absl::StatusOr<ReconstructionParameters> DecodeParameters(
     const v1::ReconstructionParameters& message);
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
-/// Errors: INVALID_ARGUMENT with a Violation: normals without rings, a format or attributes for
-/// nothing, too many attributes or one of them twice.
+/// `present`: whether the request sets the message. Errors: INVALID_ARGUMENT with a Violation for
+/// normals without rings, for a format or attributes without rings and mesh, and for too many or
+/// repeated attributes.
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 
-/// What the views of a frame's attributes lie in; kept from frame to frame.
+/// Storage for the views of a frame's attributes; reused from frame to frame.
 struct AttributeViews {
   std::vector<Attribute> carried, chosen;
 };
 
-/// A view into `message`, which must outlive it unchanged; as `names` and `views` where particles
-/// carry what is named. Checks the format and every byte count
-/// against the number of particles, copies nothing; values are checked by the core. No copy is
-/// needed for alignment either: a std::string keeps its bytes at a multiple of 8 (asserted).
-/// Errors: INVALID_ARGUMENT with a Violation (reasons BYTE_COUNT, UNSUPPORTED, OUT_OF_RANGE of the
-/// components of a scalar, NO_SUCH_ATTRIBUTE).
+/// Returns a view into `message`, with the attributes in `names` that the message has. Checks the
+/// format and every byte count against the number of particles; the core checks the values. Copies
+/// nothing. Requires: `message` and `views` outlive the result unchanged.
+/// Errors: INVALID_ARGUMENT with a Violation: BYTE_COUNT, UNSUPPORTED, OUT_OF_RANGE for the
+/// components of a scalar, NO_SUCH_ATTRIBUTE.
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message,
                                   std::span<const std::string> names, AttributeViews& views);
-/// The same where nothing is named.
+/// DecodeFrame without attributes.
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message);
-/// Replaces what the core uses of `message` (all but its sequence), reusing its buffers.
+/// Writes every field of `message` except its sequence. Reuses the buffers of `message`.
 /// Requires: frame.components is 2 or 3.
 void EncodeFrame(const Frame& frame, v1::ParticleFrame& message);
 
-/// Writes everything but sequence, time and checkpoint, reusing the buffers of `message`. Digests
-/// are those of the whole result, whatever `outputs` leaves out.
-/// Errors: OUT_OF_RANGE with a Violation (reason RESOLUTION) when relative float32 coordinates
-/// would move a vertex by more than 1e-4 spacings; rings, mesh and sections of `message` are then
-/// absent.
+/// Writes every field except sequence and time. Reuses the buffers of `message`. The digests cover
+/// the whole result, even if `outputs` omits a part of it. Errors: OUT_OF_RANGE with a Violation
+/// (RESOLUTION) if relative float32 coordinates would move a vertex by more than 1e-4 spacings.
+/// Rings, mesh and sections of `message` are then absent.
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message);
 
-/// The reverse, for clients. The message is untrusted: every count and index is checked.
-/// Errors: DATA_LOSS naming the field and the rule that it breaks; `frame.result` is then empty.
+/// Decodes a result, for clients. Checks every count and index, because the message is untrusted.
+/// Errors: DATA_LOSS with the field and the broken rule. `frame.result` is then empty.
 absl::Status DecodeResult(const v1::ReconstructedFrame& message, ReconstructedFrame& frame);
 
-/// A FrameError for `status`, with the parts of its Violation; a status without one gives its
-/// code's name as reason and its message.
+/// Writes a FrameError with the Violation of `status`. A status without a Violation gives the name
+/// of its code as reason, and its message.
 void EncodeFrameError(const absl::Status& status, std::uint64_t sequence,
                       std::uint64_t next_sequence, v1::FrameError& message);
 

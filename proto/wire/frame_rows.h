@@ -1,4 +1,4 @@
-// The arrays of a frame, wherever they come from, as its message holds them.
+// The arrays of a frame in the order of its message, for any memory layout of the caller.
 #pragma once
 
 #include <cstddef>
@@ -11,13 +11,13 @@
 
 namespace partiemc::wire {
 
-/// An array of rows, which somebody else writes.
+/// An array of rows with a function that writes them, or in contiguous memory.
 struct RowArray {
   std::size_t rows = 0;       ///< 0: none.
   std::size_t row_bytes = 1;  ///< At most 24.
-  /// Writes rows [begin, end) to memory that has room for them. Without `in_place` only.
+  /// Writes rows [begin, end) to `to`. Used if `in_place` is null.
   std::function<void(std::size_t begin, std::size_t end, std::byte* to)> write = {};
-  /// Where all rows lie one after the other as the message has them, if they do.
+  /// All rows in the format of the message, contiguous; or null.
   const std::byte* in_place = nullptr;
 
   std::size_t bytes() const { return rows * row_bytes; }
@@ -34,9 +34,9 @@ struct AttributeRows {
   RowArray values;
 };
 
-/// A frame without its arrays, and them. A view.
+/// A view of a frame, with its arrays separate from its scalars.
 struct FrameRows {
-  /// `positions` is empty and tells the type of coordinates; there are no attributes.
+  /// `positions` is empty but has the type of the coordinates; there are no attributes.
   Frame scalars;
   RowArray positions, ids, volumes, velocities;
   std::vector<AttributeRows> attributes = {};

@@ -18,8 +18,8 @@ using google::protobuf::internal::WireFormatLite;
 using google::protobuf::io::CodedInputStream;
 using google::protobuf::io::CodedOutputStream;
 
-// Of one piece of memory that a message is written into: so large that pieces cost nothing, so
-// small that malloc has them at hand again.
+// Size of one slice of a message: large enough that the overhead per slice is negligible, small
+// enough that malloc reuses the memory.
 constexpr int kPieceBytes = 1 << 20;
 
 constexpr std::uint32_t LengthTag(int field) {
@@ -31,12 +31,12 @@ std::uint64_t LengthFieldBytes(int field, std::uint64_t bytes) {
          CodedOutputStream::VarintSize64(bytes) + bytes;
 }
 
-// Adds those of the message in `input`, which ends where `input` does, to `fields`, as far as it is
-// a message: a parser comes no further. False where it is none, or has too many.
+// Adds the number of fields in `input` to `fields`, up to the first malformed field, where a parser
+// stops as well. Returns false for a malformed message or too many fields.
 bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& type, int& fields) {
   while (const std::uint32_t tag = input.ReadTag()) {
     const auto wire_type = WireFormatLite::GetTagWireType(tag);
-    // What a group holds is kept like any unknown field, and no version of the protocol has groups.
+    // A parser would keep the contents of a group. No version of the protocol has groups.
     fields = wire_type == WireFormatLite::WIRETYPE_START_GROUP ? kMaxFields + 1 : fields + 1;
     if (fields > kMaxFields) return false;
     const auto* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
@@ -44,7 +44,7 @@ bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& ty
         field->message_type() != nullptr) {
       int length = 0;
       if (!input.ReadVarintSizeAsInt(&length)) return false;
-      // Types of requests do not contain themselves, so this ends.
+      // The recursion ends, because no request type contains itself.
       const auto limit = input.PushLimit(length);
       if (!CountFields(input, *field->message_type(), fields)) return false;
       if (input.BytesUntilLimit() != 0) return false;
@@ -56,7 +56,7 @@ bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& ty
   return true;
 }
 
-// The last `sequence` of the ParticleFrame in `input`, which ends where `input` does.
+// The last `sequence` of the ParticleFrame in `input`.
 bool ReadSequence(CodedInputStream& input, google::protobuf::uint64& sequence, int& fields) {
   constexpr std::uint32_t kSequence = WireFormatLite::MakeTag(
       v1::ParticleFrame::kSequenceFieldNumber, WireFormatLite::WIRETYPE_VARINT);
@@ -70,7 +70,7 @@ bool ReadSequence(CodedInputStream& input, google::protobuf::uint64& sequence, i
   return input.BytesUntilLimit() == 0;
 }
 
-// As ReadSequence, of a ReconstructRequest.
+// ReadSequence for a ReconstructRequest.
 bool FindSequence(grpc::ByteBuffer& bytes, google::protobuf::uint64& sequence) {
   grpc::ProtoBufferReader reader(&bytes);
   if (!reader.status().ok()) return false;
@@ -87,13 +87,13 @@ bool FindSequence(grpc::ByteBuffer& bytes, google::protobuf::uint64& sequence) {
     } else if (!WireFormatLite::SkipField(&input, tag)) {
       return false;
     } else if (tag == LengthTag(v1::ReconstructRequest::kOpenFieldNumber)) {
-      sequence = 0;  // It takes the place of a frame before it.
+      sequence = 0;  // It replaces an earlier frame.
     }
   }
   return input.ConsumedEntireMessage();
 }
 
-// `frame` without its arrays.
+// The scalar fields of `frame`.
 Frame ScalarsOf(const Frame& frame) {
   Frame scalars{.positions = frame.positions, .components = frame.components, .time = frame.time};
   std::visit([](auto& view) { view = {}; }, scalars.positions);  // Of the same type.
@@ -106,8 +106,8 @@ RowArray RowsOf(std::span<const T> numbers) {
   return {.rows = bytes.size(), .row_bytes = 1, .in_place = bytes.data()};
 }
 
-// Gathered rows go straight into the pieces of memory that `out` is made of; one that two of them
-// share goes through `shared`.
+// Gathers rows directly into the slices of `out`. A row that crosses the end of a slice goes
+// through `shared`.
 void WriteRows(const RowArray& array, CodedOutputStream& out) {
   if (array.in_place != nullptr) {
     out.WriteRaw(array.in_place, static_cast<int>(array.bytes()));
@@ -132,7 +132,7 @@ void WriteRows(const RowArray& array, CodedOutputStream& out) {
   }
 }
 
-// Of a NamedScalar, what is inside of it.
+// The contents of a NamedScalar.
 std::uint64_t BytesOf(const AttributeRows& attribute) {
   std::uint64_t bytes = 0;
   if (!attribute.name.empty()) {

@@ -1,5 +1,5 @@
-// Messages as gRPC carries them: for calls that take bytes in place of messages, so that large
-// arrays are copied once and buffers are kept from message to message.
+// Serialised messages in gRPC's byte buffers. Calls exchange bytes instead of messages, so that
+// large arrays are copied once and buffers are reused.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -16,53 +16,52 @@
 
 namespace partiemc::wire {
 
-/// Of a request, with those of its messages and with unknown ones. No request that means something
-/// has nearly as many; each costs up to thirty times its bytes once it is parsed.
+/// Most fields of a request, nested and unknown ones included. Valid requests have far fewer. A
+/// parsed field can take thirty times its serialised size.
 inline constexpr int kMaxFields = 4096;
 
-/// Whether parsing `bytes` as a message of `type` takes about as much memory as they do: at most
-/// kMaxFields fields, as far as it is such a message, and no groups. Passes over the contents of
-/// strings.
+/// Whether `bytes` has at most kMaxFields fields and no groups, read as a message of `type` up to
+/// the first malformed field. Parsing such a message takes about as much memory as its bytes. Skips
+/// the contents of strings.
 bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& type);
 
-/// Of a message that is nothing but a oneof of the fields 1 to `last`: the number of the one that
-/// it holds, 0 where it holds none, nothing where `bytes` is no message or has more than kMaxFields
-/// fields. What is in the fields is not looked at.
+/// The number of the set field of a message that consists of a oneof with the fields 1 to `last`; 0
+/// if none is set. Empty if `bytes` is malformed or has more than kMaxFields fields. Does not check
+/// the contents of the field.
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
 
-/// The `sequence` of the ParticleFrame in `bytes`, a ReconstructRequest that holds one; nothing
-/// where they are none, or have more than kMaxFields fields. Passes over the frame's arrays.
+/// The `sequence` of the ParticleFrame in `bytes`, a ReconstructRequest. Empty if `bytes` is
+/// malformed or has more than kMaxFields fields. Skips the arrays.
 std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes);
 
-/// The `sequence` of the ParticleFrame in `bytes` as SequenceOf, also of a message that is damaged
-/// or has more than kMaxFields fields: then the last one before the damage and among these fields.
-/// 0 if there is none.
+/// SequenceOf for damaged messages and messages with more than kMaxFields fields: the last
+/// `sequence` before the damage and among the first kMaxFields fields; 0 if there is none.
 std::uint64_t ReadableSequence(grpc::ByteBuffer& bytes);
 
-/// Adds what `bytes` holds to `message`; strings that are there and empty keep their memory. False
-/// where `bytes` is no such message; `message` may then hold a part of it.
+/// Merges `bytes` into `message`. Empty strings of `message` keep their memory. Returns false if
+/// `bytes` is malformed; `message` then holds a part of it.
 bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message);
 
 /// Requires: a message of less than 2 GiB.
 grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message);
 
-/// The arrays of `frame` as they are.
+/// A view of the arrays of `frame`.
 FrameRows RowsOf(const Frame& frame);
 
-/// A ReconstructRequest that holds a frame, as EncodeFrame and ToBytes would make it, but without a
-/// message between the caller's arrays and the bytes.
+/// A ReconstructRequest with a frame. The same bytes as EncodeFrame and ToBytes, but copied
+/// directly from the caller's arrays.
 class FrameRequest {
  public:
   /// A view of `frame`. Requires: frame.components is 2 or 3.
   FrameRequest(const Frame& frame, std::uint64_t sequence)
       : FrameRequest(RowsOf(frame), sequence) {}
-  /// Likewise, of arrays that lie anywhere.
+  /// A view of arrays with any memory layout.
   FrameRequest(const FrameRows& frame, std::uint64_t sequence);
 
-  /// Of its ParticleFrame alone: what Limits.max_frame_bytes counts.
+  /// Size of the ParticleFrame, as counted by Limits.max_frame_bytes.
   std::uint64_t frame_bytes() const { return frame_bytes_; }
 
-  /// Copies each array once, from where it is to the memory that is sent.
+  /// Copies each array once, into the memory that gRPC sends.
   /// Requires: frame_bytes() < 2^31 - 16.
   grpc::ByteBuffer ToBytes() const;
 
@@ -72,7 +71,7 @@ class FrameRequest {
     RowArray rows;
   };
 
-  v1::ParticleFrame scalars_;  // All but the arrays.
+  v1::ParticleFrame scalars_;  // All fields except the arrays.
   std::array<Array, 4> arrays_;
   std::vector<AttributeRows> attributes_;
   std::uint64_t frame_bytes_ = 0;

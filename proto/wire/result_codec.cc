@@ -1,4 +1,4 @@
-// Results: rings, mesh and statistics, to the wire and back.
+// Encodes and decodes rings, mesh and statistics.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,15 +13,14 @@
 namespace partiemc::wire {
 namespace {
 
-// Relative coordinates may move a vertex by as many spacings: a hundredth of what the outline
-// itself is accurate to.
+// Largest error of relative coordinates, in spacings: a hundredth of the accuracy of the outline.
 constexpr double kMaxRelativeShift = 1e-4;
 
 struct Point {
   double x = 0, y = 0;
 };
 
-// The middle of the box around all points, where the largest relative coordinate is smallest.
+// The centre of the bounding box minimises the largest relative coordinate.
 Point MiddleOf(const Result& result) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Point low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};
@@ -47,7 +46,7 @@ absl::Status AssignRelative(std::span<const double> points, Point origin, double
     std::memcpy(bytes.data() + i * sizeof(float), &x, sizeof(float));
     std::memcpy(bytes.data() + (i + 1) * sizeof(float), &y, sizeof(float));
     const double shift = std::hypot(origin.x + x - points[i], origin.y + y - points[i + 1]);
-    // Written so that a shift that is not a number is refused too.
+    // This form of the comparison refuses NaN, too.
     if (shift <= limit) continue;
     return ViolationError(absl::StatusCode::kOutOfRange,
                           {std::string(kReasonResolution), absl::StrCat(field, "[", i / 2, "]"),
@@ -69,7 +68,7 @@ absl::Status EncodePoints(std::span<const double> points, const v1::Reconstructe
 
 void EncodeMeasures(const Rings& rings, v1::Rings& message) {
   auto& measures = *message.mutable_measures();
-  // Not Clear(): its elements are overwritten below and their memory is kept.
+  // Clear() would free the elements that are overwritten below.
   while (measures.size() > static_cast<int>(rings.measures.size())) measures.RemoveLast();
   while (measures.size() < static_cast<int>(rings.measures.size())) measures.Add();
   auto& identities = *message.mutable_identities();
@@ -91,7 +90,7 @@ void EncodeMeasures(const Rings& rings, v1::Rings& message) {
 
 using NamedAttributes = google::protobuf::RepeatedPtrField<v1::NamedAttribute>;
 
-// At the first `points` vertices.
+// Writes the attributes of the first `points` vertices.
 void EncodeAttributes(std::span<const AttributeValues> attributes, std::size_t points,
                       NamedAttributes& messages) {
   while (messages.size() > static_cast<int>(attributes.size())) messages.RemoveLast();
@@ -101,7 +100,7 @@ void EncodeAttributes(std::span<const AttributeValues> attributes, std::size_t p
     v1::NamedAttribute& to = messages[static_cast<int>(k)];
     to.set_name(from.name);
     to.set_components(static_cast<std::uint32_t>(from.components));
-    // Of an empty frame there are none.
+    // An empty frame has none.
     AssignBytes(
         std::span(from.values).first(std::min(from.values.size(), points * from.components)),
         *to.mutable_values());
@@ -131,20 +130,6 @@ absl::Status EncodeMesh(const Result& result, v1::ReconstructedFrame& message) {
   EncodeAttributes(result.attributes, result.mesh.PointCount(), *mesh.mutable_attributes());
   return EncodePoints(result.mesh.points, message, result.statistics.spacing, "mesh.points",
                       *mesh.mutable_points());
-}
-
-v1::Doubt ToWire(Doubt doubt) {
-  switch (doubt) {
-    case Doubt::kSpacingProvisional:
-      return v1::DOUBT_SPACING_PROVISIONAL;
-    case Doubt::kSpacingContradicted:
-      return v1::DOUBT_SPACING_CONTRADICTED;
-    case Doubt::kVolumesContradictSpacing:
-      return v1::DOUBT_VOLUMES_CONTRADICT_SPACING;
-    case Doubt::kPositionsCoarse:
-      return v1::DOUBT_POSITIONS_COARSE;
-  }
-  return v1::DOUBT_UNSPECIFIED;
 }
 
 void EncodeStatistics(const FrameStatistics& statistics, v1::FrameStatistics& message) {
@@ -214,7 +199,7 @@ absl::Status CheckOffsets(std::span<const std::uint32_t> offsets, std::size_t po
                                               " points that there are"));
   }
   for (std::size_t k = 0; k + 1 < offsets.size(); ++k) {
-    // Not a difference: it would wrap around.
+    // Compares instead of subtracting, which could wrap around.
     if (offsets[k + 1] < offsets[k] || offsets[k + 1] - offsets[k] < 3) {
       return Lost("rings.offsets", absl::StrCat("gives ring ", k, " fewer than 3 points"));
     }
@@ -234,7 +219,7 @@ absl::Status CheckNesting(std::span<const std::uint32_t> outer_of) {
   return absl::OkStatus();
 }
 
-// Every array has as many elements as there are rings or points.
+// Checks the number of elements of every array against the numbers of rings and points.
 absl::Status CheckRingCounts(const v1::Rings& message, std::size_t points) {
   if (message.offsets().size() % sizeof(std::uint32_t) != 0) {
     return Lost("rings.offsets", "is no array of uint32");
@@ -358,7 +343,7 @@ void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& stati
                 .perimeter = message.perimeter(),
                 .spacing = message.spacing(),
                 .cell_size = message.cell_size()};
-  // A doubt that a later server adds is not an error.
+  // A newer server may send doubts that are unknown here.
   for (const Doubt doubt : kAllDoubts) {
     if (std::count(message.doubts().begin(), message.doubts().end(), ToWire(doubt)) > 0) {
       statistics.doubts.Add(doubt);
@@ -370,7 +355,7 @@ void DecodeTimes(const v1::FrameStatistics& message, FrameTimes& times) {
   times = {};
   times.total_ms = message.milliseconds();
   for (const v1::StageTime& time : message.stages()) {
-    // A stage that a later server adds is not an error.
+    // A newer server may send stages that are unknown here.
     const auto name = std::find(kStageNames.begin(), kStageNames.end(), time.stage());
     if (name == kStageNames.end()) continue;
     times.stages_ms[static_cast<std::size_t>(name - kStageNames.begin())] = time.milliseconds();
@@ -396,7 +381,7 @@ absl::Status DecodeGeometry(const v1::ReconstructedFrame& message, Result& resul
   return absl::OkStatus();
 }
 
-// All of an outline but times and sections.
+// Decodes an outline, except for times and sections.
 absl::Status EncodeOutline(const Result& result, const Outputs& outputs,
                            v1::ReconstructedFrame& message) {
   EncodeStatistics(result.statistics, *message.mutable_statistics());
@@ -407,7 +392,7 @@ absl::Status EncodeOutline(const Result& result, const Outputs& outputs,
                                                          : v1::COORDINATE_FORMAT_FLOAT64);
   message.set_origin_x(origin.x);
   message.set_origin_y(origin.y);
-  // The messages of rings and mesh are overwritten, not cleared, so that their buffers stay.
+  // Overwrites the messages of rings and mesh, so that their buffers are reused.
   if (!outputs.rings) message.clear_rings();
   if (!outputs.mesh) message.clear_mesh();
   absl::Status status;
@@ -423,12 +408,26 @@ absl::Status DecodeOutline(const v1::ReconstructedFrame& message, Result& result
 
 }  // namespace
 
+v1::Doubt ToWire(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::kSpacingProvisional:
+      return v1::DOUBT_SPACING_PROVISIONAL;
+    case Doubt::kSpacingContradicted:
+      return v1::DOUBT_SPACING_CONTRADICTED;
+    case Doubt::kVolumesContradictSpacing:
+      return v1::DOUBT_VOLUMES_CONTRADICT_SPACING;
+    case Doubt::kPositionsCoarse:
+      return v1::DOUBT_POSITIONS_COARSE;
+  }
+  return v1::DOUBT_UNSPECIFIED;
+}
+
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message) {
   EncodeTimes(times, *message.mutable_statistics());
   absl::Status status = EncodeOutline(result, outputs, message);
   const int sections = static_cast<int>(result.sections.size());
-  // Those that are there keep their buffers.
+  // Existing elements keep their buffers.
   while (message.sections_size() > sections) message.mutable_sections()->RemoveLast();
   while (message.sections_size() < sections) message.add_sections();
   for (int k = 0; status.ok() && k < sections; ++k) {

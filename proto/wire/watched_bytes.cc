@@ -26,7 +26,7 @@ constexpr std::uint32_t VarintTag(int field) {
   return WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_VARINT);
 }
 
-// What `write` writes.
+// The bytes that `write` writes.
 template <typename Write>
 std::string Written(Write write) {
   std::string text;
@@ -38,7 +38,7 @@ std::string Written(Write write) {
   return text;
 }
 
-// A stretch of a message's bytes.
+// A range of bytes of a message.
 struct Span {
   std::size_t offset = 0, length = 0;
 };
@@ -64,8 +64,8 @@ std::optional<Span> FindIn(CodedInputStream& input, std::span<const int> path) {
   return found;
 }
 
-// What field `path` of the message in `bytes` holds: the first number is a field of the message,
-// the next one of the message in that field. Of several the last, as for a parser.
+// The contents of field `path` of the message in `bytes`: the first number is a field of the
+// message, the next one of the message in that field. Of several the last, as for a parser.
 std::optional<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
   grpc::ProtoBufferReader reader(&bytes);
   if (!reader.status().ok()) return std::nullopt;

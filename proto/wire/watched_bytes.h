@@ -1,5 +1,4 @@
-// A result as watchers get it: the bytes that were serialised for its producer, shared by all
-// messages that carry them.
+// A serialised result for watchers. All messages share the bytes of the producer's response.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -13,34 +12,33 @@
 
 namespace partiemc::wire {
 
-/// Immutable but for EchoParticles, and cheap to copy: slices are counted references.
+/// Immutable except for EchoParticles. Copies share reference-counted slices.
 class WatchedBytes {
  public:
-  /// The frame in `response`, which ToBytes made of a ReconstructResponse, all of it and nothing
-  /// else: what stands beside it, its checkpoint, is between the producer and the server. Shares
-  /// the memory of `response`.
-  /// Requires: a frame, without particles.
+  /// Takes the frame of `response`, without the checkpoint, which only the producer receives.
+  /// Shares the memory of `response`. Requires: `response` is ToBytes of a ReconstructResponse that
+  /// holds a frame without particles.
   explicit WatchedBytes(grpc::ByteBuffer& response);
 
-  /// A serialised ReconstructedFrame, which nobody has looked at.
+  /// Copies a serialised ReconstructedFrame, which may be malformed.
   explicit WatchedBytes(const std::string& frame) { AppendOwn(frame); }
 
-  /// Adds positions, ids, volumes and velocities of the frame in `request`, the bytes of a
-  /// ReconstructRequest that was parsed into `frame`, by sharing their memory.
+  /// Adds positions, ids, volumes and velocities of the frame in `request`. Shares the memory of
+  /// `request`. Requires: `frame` is the parsed frame of `request`.
   void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
 
-  /// Of the serialised ReconstructedFrame.
+  /// Size of the serialised ReconstructedFrame.
   std::size_t size() const { return size_; }
 
-  /// What keeping it keeps from being freed: pieces of memory that have other parts of an answer or
-  /// a request, too.
+  /// Bytes of memory that this object keeps alive, including other parts of a shared response or
+  /// request.
   std::size_t memory() const { return memory_; }
 
   /// The serialised ReconstructedFrame, copied.
   std::string ToString() const;
 
-  /// A serialised WatchStreamResponse with the frame and these fields of WatchedFrame. Copies
-  /// nothing but a few bytes of its own.
+  /// A serialised WatchStreamResponse with the frame and these fields of WatchedFrame. Shares the
+  /// memory of the frame.
   grpc::ByteBuffer ToResponse(std::uint64_t dropped, std::uint64_t oldest_sequence) const;
 
  private:
@@ -49,7 +47,7 @@ class WatchedBytes {
 
   std::vector<grpc::Slice> slices_;
   std::size_t size_ = 0, memory_ = 0;
-  const std::uint8_t* counted_ = nullptr;  // The piece of memory that was counted last.
+  const std::uint8_t* counted_ = nullptr;  // The slice that memory_ counted last.
 };
 
 }  // namespace partiemc::wire

@@ -242,6 +242,12 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   if (relay_ != nullptr) response.add_capabilities("relay");
   response.add_capabilities("watch");
   if (limits_.history_bytes > 0) response.add_capabilities("history");
+  for (const Doubt doubt : kAllDoubts) {
+    v1::DoubtText& text = *response.add_doubts();
+    text.set_doubt(wire::ToWire(doubt));
+    text.set_name(std::string(partiemc::Name(doubt)));
+    text.set_explanation(std::string(Explanation(doubt)));
+  }
   response.set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
   response.set_draining(registry_.draining());
   v1::ServerLoad& load = *response.mutable_load();

@@ -9,7 +9,7 @@
 namespace partiemc::server {
 namespace {
 
-// Of frames in answer to one fetch, so that no replica is flooded with a whole history at once.
+// Most bytes per fetch, so that a replica does not receive a whole history at once.
 constexpr std::size_t kMaxFetchedBytes = std::size_t{4} << 20;
 
 }  // namespace
@@ -28,7 +28,7 @@ void ExportedStream::Begin() {
   machine_->Start();
 }
 
-// It asks once, with credit for ever.
+// One request with unlimited credit.
 void ExportedStream::StartRead() {
   if (!opened_.exchange(true)) machine_->ReadDone({WatchRequest::Kind::kOpen, 0});
 }
@@ -86,7 +86,7 @@ void ExportedStream::End() {
 }
 
 bool ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
-  // The stream goes on, and whoever misses something fetches it.
+  // The stream continues. Replicas fetch the results that they miss.
   if (end.reason == kReasonFellBehind) return true;
   relay::v1::StreamEnd& told = *end_.mutable_stream_end();
   told.set_stream_id(id_);
@@ -145,7 +145,7 @@ void ExportedStream::Answer(const relay::v1::Fetch& fetch, const std::string& re
   relay::v1::FetchEnd& end = *message.mutable_fetch_end();
   end.set_stream_id(id_);
   end.set_fetch(fetch.fetch());
-  // What comes after that is published as it comes: to that this is a watcher already.
+  // Later results are published when they arrive.
   end.set_last_number(asks_for_frames ? broadcaster_->LastNumber() : last_published_);
   std::size_t bytes = 0;
   for (Published next = First(fetch); next.frame != nullptr && next.number <= end.last_number();

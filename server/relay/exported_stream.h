@@ -1,5 +1,5 @@
-// A stream of this replica that others watch: each result is published once for all of them, and
-// what one of them has missed it may fetch.
+// A stream of this replica that other replicas watch. Each result is published once for all of
+// them; a replica fetches the results that it has missed.
 #pragma once
 
 #include <atomic>
@@ -17,36 +17,36 @@
 
 namespace partiemc::server {
 
-/// To the stream it is one more watcher of all frames: the same bounds hold for it, and a bus that
-/// is slow or gone harms its producer as little. Everything public is for the relay's thread.
+/// A watcher of the stream in mode `every`, with the limits of a watcher. So a slow or disconnected
+/// bus does not delay the producer. Public functions: relay thread only.
 class ExportedStream final : public std::enable_shared_from_this<ExportedStream>,
                              private WatchTransport {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `port` lives until live() is false. Held by shared_ptr only.
+  /// Requires: `port` lives until live() is false; held by shared_ptr.
   ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster> broadcaster,
                  std::size_t max_bytes, RelayPort& port);
 
-  /// Publishes from now on what comes.
+  /// Starts to publish new results.
   void Begin();
-  /// Nobody wants it any more.
+  /// Stops publishing.
   void End();
-  /// Sends what could not be sent so far; what comes after it waits meanwhile as for any watcher.
+  /// Retries a failed send. Newer results wait as for a slow watcher.
   void Retry();
-  /// Between Begin and the end of the stream, or the last thing after End.
+  /// True from Begin until the stream has ended or End has completed.
   bool live() const { return live_; }
 
-  /// Another replica wants the results, until then.
+  /// Sets the time until which another replica has requested results.
   void WantedUntil(Clock::time_point until) { wanted_until_ = until; }
   Clock::time_point wanted_until() const { return wanted_until_; }
-  /// When its end was told, if it was: for who was away, it is told again to each that asks.
+  /// The time at which its end was published. The end is repeated for each later fetch.
   std::optional<Clock::time_point> ended_at() const { return ended_at_; }
-  /// Answers `fetch` of this replica.
+  /// Responds to `fetch` of `replica`.
   void Answer(const relay::v1::Fetch& fetch, const std::string& replica);
 
  private:
-  // Which fetch a result answers; 0: none.
+  // The fetch to which a result responds; 0: a new result.
   struct Answering {
     std::uint64_t fetch = 0;
     bool first = false;
@@ -72,13 +72,13 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   const std::shared_ptr<ResultBroadcaster> broadcaster_;
   RelayPort& port_;
   const std::shared_ptr<WatchStateMachine> machine_;
-  std::shared_ptr<ExportedStream> self_;  // While live: the machine calls it.
+  std::shared_ptr<ExportedStream> self_;  // Keeps this alive while live_: the machine calls it.
   std::atomic<bool> live_ = false, opened_ = false;
   Clock::time_point wanted_until_;
-  std::uint64_t last_published_ = 0;  // Its number.
+  std::uint64_t last_published_ = 0;  // Result number.
   std::function<bool()> unsent_;
   std::optional<Clock::time_point> ended_at_;
-  relay::v1::RelayMessage end_;  // From then on.
+  relay::v1::RelayMessage end_;  // Set with ended_at_.
 };
 
 }  // namespace partiemc::server

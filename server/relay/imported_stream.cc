@@ -13,11 +13,11 @@ namespace {
 
 using std::chrono::seconds;
 
-// How often the replica that has the stream hears that it is watched here.
+// Interval between fetches that keep the owner publishing.
 constexpr seconds kWantEvery(1);
-// A fetch that has had no answer for so long will have none.
+// Timeout of a fetch.
 constexpr seconds kFetchPatience(2);
-// For who has just lost his connection, or comes with others.
+// How long an import without watchers is kept, for watchers that reconnect.
 constexpr seconds kLinger(5);
 
 constexpr char kNoAnswer[] =
@@ -54,7 +54,7 @@ bool ImportedStream::Covers(std::optional<std::uint64_t> from_sequence,
                             Clock::time_point now) const {
   if (ended_) return false;
   if (!from_sequence || limits_.history == nullptr) return true;
-  // What it was begun for, and could not be held, would not be held a second time.
+  // A second import could not hold the requested history either.
   if (from_sequence_ && *from_sequence_ <= *from_sequence && now - began_ < kLinger) return true;
   const std::uint64_t here = broadcaster_->oldest_here();
   return ready_ &&
@@ -66,7 +66,7 @@ void ImportedStream::Await(Ready ready) {
   await_.push_back(std::move(ready));
 }
 
-// Each one has a number of its own, by which its answers are known.
+// Each fetch has its own number, which its responses repeat.
 void ImportedStream::Fetch(Clock::time_point now) {
   fetching_ = true;
   heard_ = wanted_ = now;
@@ -99,7 +99,7 @@ void ImportedStream::Came(relay::v1::Result& result, Clock::time_point now) {
     return DeliverWaiting(now);
   }
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
-  // Without room it is missing, and will be fetched.
+  // Without capacity the result counts as missing and is fetched later.
   if (waiting_bytes_ + bytes <= limits_.waiting_bytes &&
       waiting_.emplace(published.number, published).second) {
     waiting_bytes_ += bytes;
@@ -121,7 +121,7 @@ void ImportedStream::Came(const relay::v1::FetchEnd& end, Clock::time_point now)
   if (!fetching_ || end.fetch() != fetch_.fetch()) return;
   SetOldest(end.oldest_sequence());
   const std::uint64_t last = end.next_number() == 0 ? end.last_number() : end.next_number() - 1;
-  // Something of the answer was lost; where nothing of it came, nothing will.
+  // A part of the response was lost.
   if (next_number_ != 0 && next_number_ <= last && fetch_.number() != next_number_) {
     return FetchFrom(next_number_, now);
   }
@@ -130,7 +130,7 @@ void ImportedStream::Came(const relay::v1::FetchEnd& end, Clock::time_point now)
   FetchFrom(end.next_number(), now);
 }
 
-// What is missing up to there is not to be had.
+// Missing results up to `number` cannot be fetched any more.
 void ImportedStream::FetchEnded(std::uint64_t last_number, Clock::time_point now) {
   fetching_ = false;
   DeliverUpTo(last_number);
@@ -178,7 +178,7 @@ void ImportedStream::Came(const relay::v1::StreamEnd& end, Clock::time_point now
                 .message = end.message(),
                 .status = {},
                 .last_number = end.last_number()};
-  // It is not this server that goes away.
+  // This server does not drain.
   if (end.reason() == kReasonDraining) {
     told.reason = kReasonProducerLost;
     told.message = "the server that had the stream is going away";

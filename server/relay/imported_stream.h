@@ -1,4 +1,4 @@
-// A stream of another replica, as watchers of this one see it.
+// A stream of another replica for the watchers of this replica.
 #pragma once
 
 #include <chrono>
@@ -18,22 +18,22 @@
 
 namespace partiemc::server {
 
-/// For the relay's thread alone. Results keep the numbers that their replica gave them, so that a
-/// hole is seen: what is missing is fetched, and what cannot be had counts as dropped.
+/// Relay thread only. Results keep the numbers of their replica, so gaps are detected. Missing
+/// results are fetched; results that have left the history count as dropped.
 class ImportedStream {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Told once it can be joined, or why not.
+  /// Called once, when the stream can be joined or with the error.
   using Ready = std::function<void(const absl::Status& status)>;
 
   struct Limits {
     ResultBroadcaster::Limits broadcaster;
-    /// Of results that wait for others before them.
+    /// Most bytes of results that wait for earlier ones.
     std::size_t waiting_bytes = std::size_t{16} << 20;
-    HistoryRoom* history = nullptr;  ///< Lives longer; null: watchers cannot go back.
+    HistoryRoom* history = nullptr;  ///< Outlives this; null: no history for watchers.
   };
 
-  /// Fetches what is held from `from_sequence` on, or the newest result.
+  /// Fetches the history from `from_sequence`, or the newest result.
   ImportedStream(RemoteStream stream, std::optional<std::uint64_t> from_sequence,
                  WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port,
                  Clock::time_point now);
@@ -41,25 +41,26 @@ class ImportedStream {
   const RemoteStream& stream() const { return stream_; }
   const std::shared_ptr<ResultBroadcaster>& broadcaster() const { return broadcaster_; }
   bool ended() const { return ended_; }
-  /// Of no use to anybody any more.
+  /// Whether it has had no watcher for long enough to be deleted.
   bool IsIdle(Clock::time_point now) const;
 
-  /// Whether who wants to watch from there sees as much here as at the replica that has it.
+  /// Whether a watcher from `from_sequence` gets the same results here as at the owner.
   bool Covers(std::optional<std::uint64_t> from_sequence, Clock::time_point now) const;
   void Await(Ready ready);
 
   void Came(relay::v1::Result& result, Clock::time_point now);
   void Came(const relay::v1::FetchEnd& end, Clock::time_point now);
   void Came(const relay::v1::StreamEnd& end, Clock::time_point now);
-  /// What has come meanwhile may be missing, the end too: asks for it.
+  /// Fetches results and the end that may have been lost.
   void FetchAgain(Clock::time_point now);
-  /// Its replica answers no more. Ends as the replica has told if it has, else with `otherwise`.
+  /// The replica does not respond any more. Ends with the end that it reported, or with
+  /// `otherwise`.
   void Lost(const WatchEnd& otherwise, Clock::time_point now);
-  /// No more comes.
+  /// Ends the stream.
   void End(const WatchEnd& end);
-  /// Who waits to join is told this instead.
+  /// Fails all pending joins.
   void Refuse(const absl::Status& status) { TellWaiting(status); }
-  /// To be called every now and then.
+  /// Called periodically.
   void Tick(Clock::time_point now, bool connected);
 
  private:
@@ -81,12 +82,12 @@ class ImportedStream {
 
   bool ready_ = false, ended_ = false;
   std::vector<Ready> await_;
-  std::uint64_t next_number_ = 0;  // To be delivered; 0: not known yet.
+  std::uint64_t next_number_ = 0;  // Next number to deliver; 0: unknown.
   std::map<std::uint64_t, Published> waiting_;
   std::size_t waiting_bytes_ = 0;
-  relay::v1::Fetch fetch_;  // The last one.
+  relay::v1::Fetch fetch_;  // The latest fetch.
   bool fetching_ = false;
-  std::optional<relay::v1::StreamEnd> end_;  // To be told once all is delivered.
+  std::optional<relay::v1::StreamEnd> end_;  // Delivered after all results.
   Clock::time_point began_, heard_, wanted_, watched_;
 };
 

@@ -1,5 +1,5 @@
-// What carries messages between replicas: subjects, each with those who listen to it. Messages may
-// be lost; those of one sender that come keep their order.
+// A publish-subscribe bus between replicas. Messages can be lost; messages of one sender arrive in
+// order.
 #pragma once
 
 #include <functional>
@@ -9,13 +9,13 @@
 
 namespace partiemc::server {
 
-/// Safe from any thread.
+/// Thread-safe.
 class MessageBus {
  public:
   using Handler = std::function<void(std::string_view message)>;
 
-  /// Listens until it goes. Its handler, which therefore owns what it uses, may be called for a
-  /// moment longer.
+  /// Subscribed during its lifetime. The handler may still be called shortly afterwards, so it must
+  /// own everything that it uses.
   class Subscription {
    public:
     virtual ~Subscription() = default;
@@ -24,13 +24,12 @@ class MessageBus {
   virtual ~MessageBus() = default;
 
   virtual bool connected() const = 0;
-  /// May wait for a moment. False if the message is lost for certain.
+  /// May block briefly. Returns false if the message was certainly lost.
   virtual bool Publish(const std::string& subject, std::string_view message) = 0;
-  /// `handler` is called by a thread of the bus, and must not wait for long, nor end subscriptions.
-  /// While the bus is not connected nothing comes; it comes again afterwards. Null where there is
-  /// no memory.
+  /// Calls `handler` from a thread of the bus; it must not block for long or end subscriptions. The
+  /// subscription survives reconnections. Returns null if memory is exhausted.
   virtual std::unique_ptr<Subscription> Subscribe(const std::string& subject, Handler handler) = 0;
-  /// Waits until what was published is on its way, for a second at most.
+  /// Waits until published messages are sent, at most one second.
   virtual void Flush() = 0;
 };
 

@@ -16,13 +16,13 @@ namespace {
 
 constexpr std::int64_t kConnectTimeoutMs = 1000;
 constexpr std::int64_t kReconnectWaitMs = 100, kReconnectJitterMs = 50;
-// A server of NATS that takes nothing for so long is as good as gone.
+// Write timeout of the connection to NATS.
 constexpr std::int64_t kWriteDeadlineMs = 2000;
-// A cut cable is noticed after two of these.
+// Ping interval; two missing replies end the connection.
 constexpr std::int64_t kPingIntervalMs = 2000;
 constexpr int kMaxPingsOut = 2;
 constexpr std::int64_t kFlushMs = 1000;
-// Of one subscription, of what has come and was not handled yet; beyond it messages are lost.
+// Most pending bytes of a subscription. Beyond it messages are lost.
 constexpr int kPendingMessages = 65'536, kPendingBytes = 64 << 20;
 
 struct Deleter {
@@ -30,8 +30,8 @@ struct Deleter {
   void operator()(natsConnection* connection) const { natsConnection_Destroy(connection); }
 };
 
-// Its handler is called by the delivery thread of the library, which may still be at it when the
-// subscription ends: whoever comes last deletes it.
+// The library's delivery thread calls the handler and may still run it when the subscription ends.
+// The last user deletes it.
 class NatsSubscription final : public MessageBus::Subscription {
  public:
   explicit NatsSubscription(MessageBus::Handler handler)
@@ -77,7 +77,7 @@ class NatsBus final : public MessageBus {
   bool connected() const override {
     return natsConnection_Status(connection_.get()) == NATS_CONN_STATUS_CONNECTED;
   }
-  // What is published while there is no connection would come much later, all at once.
+  // Without a connection the library would send the messages much later, all at once.
   bool Publish(const std::string& subject, std::string_view message) override {
     return connected() && natsConnection_Publish(connection_.get(), subject.c_str(), message.data(),
                                                  static_cast<int>(message.size())) == NATS_OK;
@@ -116,12 +116,12 @@ natsStatus SetOptions(natsOptions* options, const std::string& url) {
   if (status == NATS_OK) status = natsOptions_SetWriteDeadline(options, kWriteDeadlineMs);
   if (status == NATS_OK) status = natsOptions_SetPingInterval(options, kPingIntervalMs);
   if (status == NATS_OK) status = natsOptions_SetMaxPingsOut(options, kMaxPingsOut);
-  // A frame is to be on its way at once, and not when the next one comes.
+  // Send every message at once instead of with the next one.
   if (status == NATS_OK) status = natsOptions_SetSendAsap(options, true);
   if (status == NATS_OK) status = natsOptions_SetNoEcho(options, true);
-  // One thread for all subscriptions: what one replica sends keeps its order across subjects.
+  // One thread for all subscriptions keeps the order of a replica's messages across subjects.
   if (status == NATS_OK) status = natsOptions_UseGlobalMessageDelivery(options, true);
-  // Errors are seen by their consequences; the library would print them.
+  // Keeps the library from printing errors.
   if (status == NATS_OK) {
     status = natsOptions_SetErrorHandler(
         options, [](natsConnection*, natsSubscription*, natsStatus, void*) {}, nullptr);
@@ -139,7 +139,7 @@ absl::StatusOr<std::unique_ptr<MessageBus>> ConnectToNats(const std::string& url
   natsConnection* connection = nullptr;
   if (status == NATS_OK) status = natsConnection_Connect(&connection, made);
   if (status != NATS_OK && status != NATS_NOT_YET_CONNECTED) {
-    // Not the URL itself: it may have a password.
+    // The URL may contain a password.
     return absl::InvalidArgumentError(
         absl::StrCat("--nats: ", natsStatus_GetText(status),
                      "; it must be nats://HOST:PORT or tls://HOST:PORT"));

@@ -1,4 +1,4 @@
-// The bus that replicas share: a server of NATS, or several of one cluster.
+// A MessageBus over NATS.
 #pragma once
 
 #include <memory>
@@ -9,9 +9,9 @@
 
 namespace partiemc::server {
 
-/// Connects in the background, and again whenever the connection is lost, for ever. `url` is
-/// nats://[USER:PASSWORD@|TOKEN@]HOST[:PORT] or tls://..., or several with commas between them.
-/// Errors: INVALID_ARGUMENT for what is no such URL.
+/// Connects in the background and reconnects without limit. `url` is
+/// nats://[USER:PASSWORD@|TOKEN@]HOST[:PORT] or tls://..., or several, separated by commas. Errors:
+/// INVALID_ARGUMENT for an invalid URL.
 absl::StatusOr<std::unique_ptr<MessageBus>> ConnectToNats(const std::string& url);
 
 }  // namespace partiemc::server

@@ -8,9 +8,9 @@
 namespace partiemc::server {
 namespace {
 
-// Replicas whose messages are being put together; others have to wait until those are through.
+// Most senders with incomplete messages.
 constexpr std::size_t kMaxSenders = 1024;
-// The largest messages that there is room for at a time.
+// Incomplete messages of the largest size that fit at a time.
 constexpr std::size_t kMaxMessages = 4;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Messages of any size in pieces that the bus takes.
+// Splits messages into pieces of the size that the bus accepts, and joins them.
 #pragma once
 
 #include <cstddef>
@@ -12,27 +12,27 @@
 
 namespace partiemc::server {
 
-/// NATS takes messages of up to a megabyte, unless it is told otherwise.
+/// Below the default limit of NATS, one megabyte.
 inline constexpr std::size_t kPieceBytes = std::size_t{512} << 10;
 
-/// Calls `send` with each partiemc.relay.v1.Piece of `message`, serialised, in their order, until
-/// it returns false. Whether it never did.
+/// Calls `send` with each serialised partiemc.relay.v1.Piece of `message`, in order, until it
+/// returns false. Returns whether all were sent.
 bool SendInPieces(const std::string& replica, std::uint64_t number, std::string_view message,
                   absl::FunctionRef<bool(std::string_view piece)> send);
 
-/// Puts the pieces of several senders together; those of one come in their order, one message after
-/// the other. A message of which a piece is missing is left out.
+/// Joins the pieces of several senders. The pieces of one sender arrive in order, one message after
+/// the other. Drops a message with a missing piece.
 class PieceJoiner {
  public:
-  /// A message of more than `max_bytes` is left out, and one for which those of others that are
-  /// not whole yet leave no room: all together have four times as much.
+  /// Drops a message of more than `max_bytes`, and a message that would raise the total of
+  /// incomplete messages above four times `max_bytes`.
   explicit PieceJoiner(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-  /// The message of which `piece`, a serialised Piece, is the last.
+  /// Adds a serialised Piece. Returns the message if it is complete.
   std::optional<std::string> Add(std::string_view piece);
-  /// Of this sender nothing more is expected.
+  /// Drops the incomplete message of this sender.
   void Forget(const std::string& replica);
-  /// Of messages that are not whole yet.
+  /// Bytes of incomplete messages.
   std::size_t held_bytes() const { return held_bytes_; }
 
  private:
@@ -42,11 +42,11 @@ class PieceJoiner {
     std::string bytes;
   };
 
-  // Its bytes, which nothing more is expected of.
+  // Removes a message and returns its bytes.
   std::string TakeOut(std::map<std::string, Begun>::iterator begun);
 
   const std::size_t max_bytes_;
-  std::map<std::string, Begun> begun_;  // By sender.
+  std::map<std::string, Begun> begun_;  // Key: sender.
   std::size_t held_bytes_ = 0;
 };
 

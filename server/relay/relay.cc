@@ -22,34 +22,33 @@ using std::chrono::seconds;
 
 constexpr milliseconds kTickEvery(50);
 constexpr seconds kAnnounceEvery(1);
-// Three announcements missed.
+// Three missing announcements.
 constexpr seconds kReplicaPatience(3);
-// For which all is taken for unchanged that cannot be heard.
+// How long the known state is kept while the bus is disconnected.
 constexpr seconds kBusPatience(30);
 constexpr seconds kExportLease(3);
-// A fetch is answered this often while results of this server's streams wait to be sent: an answer
-// has up to 4 MiB.
+// Interval of responses to fetches while results of this server's streams wait to be sent. A
+// response has up to 4 MiB.
 constexpr milliseconds kAnswerEvery(20);
-// For which those who were away can hear that a stream has ended.
+// How long the end of a stream is kept for replicas that were disconnected.
 constexpr seconds kEndKept(30);
-// A stream that its replica does not announce any more has ended: it is asked how, and has so long.
+// How long a stream that is not announced any more may take to report its end.
 constexpr seconds kLastWord(2);
-// For others to come, and to answer whoever has just come.
+// Time for other replicas to connect and announce.
 constexpr milliseconds kSettle(300);
-// For all others to say whether they have a stream that is looked for; and how often they are
-// asked.
+// Timeout of a search for a stream, and the interval of its requests.
 constexpr milliseconds kSearchPatience(1500), kAskEvery(100);
-// Until the bus is connected for the first time.
+// Time for the first connection to the bus.
 constexpr seconds kFirstConnection(2);
 constexpr milliseconds kDrainPatience(300);
-// Also if the bus blocks.
+// Longest drain, even if the bus blocks.
 constexpr seconds kLongestDrain(2);
-// Of news, which have results, and of fetches.
+// Queue sizes: for news, which contain results, and for fetches.
 constexpr std::array kQueueBytes = {std::size_t{64} << 20, std::size_t{4} << 20};
-// What announcements may have.
+// Limits of an announcement.
 constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
 
-// The rule that a name breaks while those of others are not known.
+// The rule of NO_SUCH_STREAM while the streams of other replicas are unknown.
 constexpr char kOnlyHere[] =
     "must be the name of an open stream of this server: NATS cannot be reached, so that those of "
     "other replicas cannot be watched here; try again";
@@ -59,7 +58,7 @@ std::string NewReplicaName() {
   return absl::StrCat(absl::Hex(random(), absl::kZeroPad8), absl::Hex(random(), absl::kZeroPad8));
 }
 
-// By the clock that replicas have in common.
+// Wall-clock time, comparable between replicas.
 std::int64_t UnixMs(std::chrono::steady_clock::time_point time) {
   const auto ago = std::chrono::steady_clock::now() - time;
   return std::chrono::floor<milliseconds>(
@@ -182,7 +181,7 @@ void Relay::Announce(Clock::time_point now, bool asks, bool leaving) {
                                : registry_.List(0, std::numeric_limits<std::size_t>::max());
   for (const StreamSummary& stream : streams) {
     const auto found = local_.find(stream.id);
-    if (found == local_.end()) continue;  // Will be told with the change.
+    if (found == local_.end()) continue;  // Announced with the next change.
     relay::v1::LiveStream& live = *announcement.add_streams();
     EncodeSummary(stream, now, *live.mutable_summary());
     live.set_lineage(stream.lineage);
@@ -206,8 +205,8 @@ void Relay::LookAtLocalStreams() {
   local_.swap(streams);
 }
 
-// A producer that came back elsewhere, by whichever way, has left the stream that it had here or
-// there; that one may not have noticed yet. Only its watchers are told, who find it again.
+// A producer that resumed its stream at another replica has abandoned the former stream, whose
+// replica may not have detected it yet. Ends its watches, so that the watchers find the new one.
 void Relay::EndTakenOver() {
   const WatchEnd taken_over{
       std::string(kReasonTakenOver), "another replica has the stream now", {}};
@@ -239,7 +238,7 @@ bool Relay::WasResumedElsewhere(std::string_view lineage, Clock::time_point open
 
 std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::size_t count,
                                                const Caller& caller) const {
-  std::map<std::string, std::int64_t> here;  // When it was opened, by lineage.
+  std::map<std::string, std::int64_t> here;  // Opening time by lineage.
   for (const StreamSummary& stream : registry_.List(0, std::numeric_limits<std::size_t>::max())) {
     here[stream.lineage] = UnixMs(stream.opened);
   }
@@ -253,11 +252,11 @@ std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::si
 void Relay::LookAtExports(Clock::time_point now) {
   for (auto it = exports_.begin(); it != exports_.end();) {
     ExportedStream& exported = *it->second;
-    // While nobody can be heard, nobody can say what he wants.
+    // While the bus is disconnected, no replica can request results.
     const bool may_be_wanted = !connected_ && now - disconnected_ < kBusPatience;
     const bool has_news = exported.ended_at() && now - *exported.ended_at() < kEndKept;
     const bool is_wanted = now < exported.wanted_until() || may_be_wanted || has_news;
-    // Others come back in the same moments: what waited is not to be gone before they listen.
+    // Other replicas reconnect at the same time: keep pending results until they have subscribed.
     if (connected_ && connected_since_ && now - *connected_since_ > kSettle) exported.Retry();
     if (!is_wanted && exported.live()) exported.End();
     if (is_wanted || exported.live()) {
@@ -397,7 +396,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
                  .name = name, .from_sequence = from_sequence, .done = std::move(done)}]() mutable {
         if (draining_since_) return search.done(DrainingError());
         const auto now = Clock::now();
-        // Whoever has just come does not know the others yet.
+        // A replica that has just connected does not know the others yet.
         const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
         search.began = now;
         search.settled = settled + kSettle;
@@ -414,7 +413,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
 
 bool Relay::TryFind(const Search& search, Clock::time_point now) {
   const auto remote = directory_.FindName(search.name);
-  // One that was resumed here is found here.
+  // A stream that was resumed here is local.
   const auto is_here = [&](const auto& item) {
     return item.second.lineage == remote->stream.lineage() &&
            item.second.opened_unix_ms > remote->stream.opened_unix_ms();
@@ -433,7 +432,7 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_
   if (begun != imports_.end()) {
     stream = begun->stream.get();
   } else {
-    // Listens first, so that nothing falls between what is fetched and what comes.
+    // Subscribes before it fetches, so that no result is missed in between.
     Import import;
     import.results = queue_->Listen(*bus_, SubjectOfResults(remote.id()), RelayQueue::kNews);
     import.stream = std::make_unique<ImportedStream>(
@@ -452,7 +451,7 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_
 }
 
 void Relay::LookAtSearches(Clock::time_point now) {
-  // Whoever is looked for may have come a moment ago.
+  // The stream may have been announced just now.
   if (!searches_.empty() && connected_ && now - asked_ > kAskEvery) {
     asked_ = now;
     Announce(now, true, false);
@@ -472,7 +471,7 @@ void Relay::LookAtSearches(Clock::time_point now) {
 void Relay::WillDrain() {
   Post([this] {
     will_drain_ = true;
-    announced_ = {};  // The next tick tells it.
+    announced_ = {};  // Announces at the next tick.
   });
 }
 
@@ -492,7 +491,7 @@ void Relay::GoOnDraining(Clock::time_point now) {
     return item.second->live();
   });
   if (has_more && now - *draining_since_ < kDrainPatience) {
-    // Streams that have not ended yet end with this server.
+    // Remaining streams end with this server.
     if (now - *draining_since_ > kDrainPatience / 2) {
       for (auto& [id, exported] : exports_) exported->End();
     }

@@ -1,5 +1,5 @@
-// What makes every replica able to show the streams of all of them: each announces those that it
-// has, and publishes the results of a stream while somebody watches it elsewhere.
+// Lets every replica serve watchers of all streams: each replica announces its streams and
+// publishes the results of a stream while another replica watches it.
 #pragma once
 
 #include <atomic>
@@ -31,23 +31,23 @@
 
 namespace partiemc::server {
 
-/// The public part is safe from any thread; all else is done by the relay's own. Messages of other
-/// replicas beyond what its queues hold are lost, and fetched again. The work of this server comes
-/// first, then messages, then one fetch at a time: a peer that floods delays neither results nor a
-/// drain for long.
+/// Public functions are thread-safe; the relay thread does everything else. Messages beyond the
+/// capacity of its queues are lost; the results in them are fetched again. Work of this server
+/// comes first, then messages, then one fetch at a time, so a flooding peer delays neither results
+/// nor a drain for long.
 class Relay final : private RelayPort {
  public:
   using Clock = std::chrono::steady_clock;
 
   struct Limits {
-    ResultBroadcaster::Limits broadcaster;  ///< Of streams of other replicas.
+    ResultBroadcaster::Limits broadcaster;  ///< For streams of other replicas.
     std::size_t watcher_bytes = std::size_t{16} << 20;
-    HistoryRoom* history = nullptr;  ///< Null: streams of others have none here.
-    std::size_t watches = 64;        ///< That look for their streams at the same time.
+    HistoryRoom* history = nullptr;  ///< Null: no history for streams of other replicas.
+    std::size_t watches = 64;        ///< Most concurrent searches for streams.
   };
 
-  /// All that is passed lives longer. `address`: under which clients find this server, told to the
-  /// other replicas; empty: they send nobody here.
+  /// Requires: all references outlive this. `address` is announced to the other replicas as the
+  /// address of this server for clients; empty: none.
   Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
         const Limits& limits, std::string address = {});
   ~Relay() override;
@@ -61,32 +61,32 @@ class Relay final : private RelayPort {
   };
   using FindDone = std::function<void(const absl::StatusOr<Found>& found)>;
 
-  /// Looks for the stream that another replica has by this name, to be watched from
-  /// `from_sequence` on, and calls `done` once, from within or from another thread.
-  /// Errors: NOT_FOUND (NO_SUCH_STREAM), within some seconds; UNAVAILABLE (DRAINING).
+  /// Searches the other replicas for the stream of this name, to watch it from `from_sequence`.
+  /// Calls `done` once, possibly from within or from another thread. Errors: NOT_FOUND
+  /// (NO_SUCH_STREAM), within some seconds; UNAVAILABLE (DRAINING).
   void Find(const std::string& name, std::optional<std::uint64_t> from_sequence, FindDone done);
   /// Whether another replica has opened the stream with this lineage later than `opened`.
   bool WasResumedElsewhere(std::string_view lineage, Clock::time_point opened) const;
-  /// Streams of other replicas, each once, but for those that were resumed here since: of those
-  /// whose names `caller` may use at most `count`, in the order of their ids, after `after`.
+  /// At most `count` streams of other replicas with ids above `after`, in the order of ids, that
+  /// `caller` may use. Without streams that were resumed here.
   std::vector<relay::v1::LiveStream> List(const std::string& after, std::size_t count,
                                           const Caller& caller) const;
   std::size_t replicas() const { return directory_.replicas(); }
   std::size_t remote_streams() const { return directory_.streams(); }
 
-  /// Addresses of other replicas that take streams, as far as they are told: some of them.
+  /// Some addresses of other replicas that accept streams.
   std::vector<std::string> Addresses() const { return directory_.Addresses(kMaxAddresses); }
 
-  /// From now on the others send no stream here. Drain comes next.
+  /// Announces that this replica accepts no more streams. Drain follows.
   void WillDrain();
-  /// Refuses searches for streams, and sends the last results and ends. Takes at most some 300 ms
-  /// beside what the bus takes, and two seconds with it.
+  /// Refuses pending searches, sends the last results and ends, and stops. Takes at most 300 ms
+  /// plus the time of the bus, two seconds in total.
   void Drain();
 
   bool connected() const { return connected_; }
   std::size_t exported_streams() const { return exported_count_; }
   std::size_t imported_streams() const { return imported_count_; }
-  /// Of other replicas, that came faster than they were handled, or could not be sent.
+  /// Number of messages lost because a queue was full or a send failed.
   std::uint64_t lost_messages() const {
     return unsent_ + dropped_fetches_ + queue_->lost_messages();
   }
@@ -98,12 +98,12 @@ class Relay final : private RelayPort {
     std::shared_ptr<ResultBroadcaster> broadcaster;
     std::string lineage;
     std::int64_t opened_unix_ms = 0;
-    bool was_told = false;  // That it was resumed elsewhere.
+    bool was_told = false;  // Its watchers know that it was resumed at another replica.
   };
   struct Import {
     std::unique_ptr<ImportedStream> stream;
     std::unique_ptr<MessageBus::Subscription> results;
-    std::optional<Clock::time_point> missing_since;  // In what its replica announces.
+    std::optional<Clock::time_point> missing_since;  // Since when its replica does not announce it.
   };
   struct Search {
     std::string name;
@@ -134,7 +134,7 @@ class Relay final : private RelayPort {
   void LookAtSearches(Clock::time_point now);
   void GoOnDraining(Clock::time_point now);
 
-  const std::string replica_;  // Tells this run of this server from all others.
+  const std::string replica_;  // Unique for this process.
   const std::string address_;
   const Limits limits_;
   StreamRegistry& registry_;
@@ -146,7 +146,7 @@ class Relay final : private RelayPort {
   std::atomic<std::size_t> exported_count_ = 0, imported_count_ = 0;
   std::atomic<std::uint64_t> unsent_ = 0, dropped_fetches_ = 0;
 
-  // Of the relay's thread:
+  // Owned by the relay thread:
   PieceJoiner joiner_, asked_joiner_{FetchQueue::kFetchBytes};
   FetchQueue fetches_;
   std::uint64_t sent_ = 0;
@@ -156,9 +156,9 @@ class Relay final : private RelayPort {
   std::vector<Import> imports_;
   std::vector<Search> searches_;
   std::uint64_t local_changes_ = 0;
-  bool told_away_ = false;  // That the bus is not connected.
-  bool changed_ = false;    // Streams came or went, here or elsewhere.
-  bool was_asked_ = false;  // To announce the streams.
+  bool told_away_ = false;  // The log has the loss of the connection.
+  bool changed_ = false;    // The set of streams has changed, here or at another replica.
+  bool was_asked_ = false;  // Another replica has requested an announcement.
   bool will_drain_ = false;
   const Clock::time_point began_ = Clock::now();
   Clock::time_point announced_, asked_, ticked_, answered_, disconnected_ = began_;

@@ -1,4 +1,4 @@
-// What the parts of the relay have in common: its thread, and the way out to other replicas.
+// The interface of the relay for its streams: run on its thread, send to other replicas.
 #pragma once
 
 #include <functional>
@@ -8,21 +8,19 @@
 
 namespace partiemc::server {
 
-/// Of one replica.
 class RelayPort {
  public:
   virtual ~RelayPort() = default;
 
-  /// Has `action` done by the relay's thread, in the order of the calls. From any thread; waits for
-  /// nothing.
+  /// Runs `action` on the relay thread, in the order of the calls. Thread-safe; does not block.
   virtual void Post(std::function<void()> action) = 0;
-  /// By the relay's thread alone. False if the message is lost for certain.
+  /// Relay thread only. Returns false if the message was certainly lost.
   virtual bool Send(const std::string& subject, relay::v1::RelayMessage& message) = 0;
 };
 
-/// All replicas listen to these announcements.
+/// Announcements to all replicas.
 inline constexpr char kReplicasSubject[] = "partiemc.replicas";
-/// Fetches for a replica, and what answers its own.
+/// Fetches to a replica, and responses to its fetches.
 inline std::string SubjectOfAsking(const std::string& replica) { return "partiemc.ask." + replica; }
 inline std::string SubjectOfAnswers(const std::string& replica) {
   return "partiemc.for." + replica;

@@ -1,4 +1,4 @@
-// Queues the work of the relay's thread: actions of this server, and messages of the bus.
+// The queue of the relay thread: posted actions and messages from the bus.
 #pragma once
 
 #include <array>
@@ -16,9 +16,9 @@
 
 namespace partiemc::server {
 
-/// Actions are taken all at once, and messages in small numbers, so that a flood on the bus delays
-/// no stream and no drain. Safe from any thread. Held by shared_ptr only: handlers of the bus may
-/// outlive the relay.
+/// Take returns all actions but only a few messages, so that a flood on the bus delays no stream
+/// and no drain. Thread-safe. Held by shared_ptr, because handlers of the bus may outlive the
+/// relay.
 class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
  public:
   /// Messages whose senders are bounded apart from each other.
@@ -36,19 +36,18 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
     std::array<std::deque<std::string>, kLanes> messages;
   };
 
-  /// Messages of a lane beyond its `max_bytes` are lost.
+  /// Drops messages of a lane while it holds its `max_bytes`.
   explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes) : max_bytes_(max_bytes) {}
 
   void Post(std::function<void()> action);
-  /// Queues the messages of `subject` from now on. Null as MessageBus::Subscribe says.
+  /// Queues the messages of `subject`. Returns null if memory is exhausted.
   std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject,
                                                    Lane lane);
 
-  /// Takes all actions and the next messages, in the order in which they came, into `work`, which
-  /// is empty. Waits at most `patience` for work. False once the queue has stopped and no action is
-  /// left.
+  /// Moves all actions and the next messages to `work`, in order; waits for the first item up to
+  /// `patience`. Returns false after Stop if no action is left. Requires: `work` is empty.
   bool Take(std::chrono::milliseconds patience, Work& work);
-  /// No more messages come in.
+  /// Drops all further messages.
   void Stop();
 
   std::uint64_t lost_messages() const;

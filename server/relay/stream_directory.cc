@@ -9,10 +9,10 @@
 namespace partiemc::server {
 namespace {
 
-// What bounds the memory that announcements of strangers could take.
+// Limits the memory of announcements.
 constexpr std::size_t kMaxReplicas = 1024;
 
-// Empty where clients are not to be sent there.
+// Empty for replicas that accept no streams.
 std::string AddressOf(const relay::v1::Announcement& announcement) {
   const auto address = ParseAddress(announcement.address());
   const bool can_be_reached = address.ok() && address->unix_path.empty() && address->port != 0;
@@ -110,7 +110,7 @@ bool StreamDirectory::Has(const std::string& replica, std::string_view stream_id
 std::vector<relay::v1::LiveStream> StreamDirectory::List(
     const std::string& after, std::size_t count,
     absl::FunctionRef<bool(const relay::v1::LiveStream&)> wants) const {
-  std::map<std::string, const relay::v1::LiveStream*> latest;  // By lineage.
+  std::map<std::string, const relay::v1::LiveStream*> latest;  // Key: lineage.
   const std::lock_guard lock(mutex_);
   for (const auto& [name, replica] : replicas_) {
     for (const auto& [id, stream] : replica.streams) {

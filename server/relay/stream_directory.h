@@ -1,4 +1,4 @@
-// The streams that other replicas have, as they announce them.
+// The announced streams of other replicas.
 #pragma once
 
 #include <chrono>
@@ -24,25 +24,26 @@ struct RemoteStream {
   const std::string& name() const { return stream.summary().stream_name(); }
 };
 
-/// Safe from any thread. A stream that was resumed at another replica, and that the former one has
-/// not given up yet, is there once: as the later one has it, by the clocks of both.
+/// Thread-safe. If two replicas announce one stream, because it was resumed and the former replica
+/// has not given it up yet, the directory lists the one that was opened later by the clocks of
+/// both.
 class StreamDirectory {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// All streams of a replica. Whether they are others than before.
+  /// Replaces the streams of a replica. Returns whether they have changed.
   bool Announced(const std::string& replica, const relay::v1::Announcement& announcement,
                  Clock::time_point now);
   void Left(const std::string& replica);
-  /// Whose last announcement is older than that has left; gives them.
+  /// Removes and returns the replicas without an announcement since `before`.
   std::vector<std::string> Expire(Clock::time_point before);
-  /// What was heard before counts as heard now: nothing could be heard meanwhile.
+  /// Treats all replicas as announced at `now`, after a disconnection of the bus.
   void Refresh(Clock::time_point now);
 
-  /// Of those that do not drain, each once: at most `count`.
+  /// At most `count` distinct addresses of replicas that do not drain.
   std::vector<std::string> Addresses(std::size_t count) const;
 
-  /// Whether every one that is known has announced its streams since then.
+  /// Whether every known replica has announced its streams since `since`.
   bool HaveAllAnnouncedSince(Clock::time_point since) const;
 
   /// The stream of that name that was opened last.
@@ -50,7 +51,7 @@ class StreamDirectory {
   /// The stream with this lineage that was opened last.
   std::optional<RemoteStream> FindLineage(std::string_view lineage) const;
   bool Has(const std::string& replica, std::string_view stream_id) const;
-  /// Those that `wants` wants, in the order of their ids: at most `count`, after `after`.
+  /// At most `count` streams that fulfil `wants`, with ids above `after`, in the order of ids.
   std::vector<relay::v1::LiveStream> List(
       const std::string& after, std::size_t count,
       absl::FunctionRef<bool(const relay::v1::LiveStream&)> wants) const;
@@ -59,9 +60,9 @@ class StreamDirectory {
 
  private:
   struct Replica {
-    std::map<std::string, relay::v1::LiveStream> streams;  // By their ids.
+    std::map<std::string, relay::v1::LiveStream> streams;  // Key: id.
     Clock::time_point heard, announced;
-    std::string address;  // Empty where none is to be told.
+    std::string address;  // Empty: none.
   };
 
   template <typename Matches>

@@ -1,4 +1,4 @@
-// What others are told of an open stream.
+// Encodes the summary of an open stream.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// A result as it is handed to watchers: bytes that all of them share.
+// A result for watchers, with bytes that all of them share.
 #pragma once
 
 #include <utility>

@@ -14,7 +14,7 @@
 namespace partiemc::server {
 namespace {
 
-// Each call is compared with all of them.
+// Each call is compared with all tokens.
 constexpr std::size_t kMaxTokens = 1000;
 
 absl::Status Wrong(std::size_t line, const std::string& rule) {

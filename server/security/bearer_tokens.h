@@ -1,4 +1,4 @@
-// The tokens that clients may identify themselves with, as a file lists them.
+// The bearer tokens of a token file.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace partiemc::server {
 
-/// Holds digests (SHA-256), so that no token stays in memory and comparing tells nothing by its
-/// time.
+/// Stores SHA-256 digests, so that no token stays in memory and the time of a comparison reveals
+/// nothing.
 class BearerTokens {
  public:
   using Digest = std::array<std::uint8_t, 32>;
@@ -23,16 +23,14 @@ class BearerTokens {
     std::shared_ptr<const CallerTerms> terms;
   };
 
-  /// `text` has a token a line, and after it, with blanks between them, the words of
-  /// ParseCallerTerms: without a name the client's is "token-LINE", without anything else it may
-  /// everything. Blank lines and lines that begin with '#' count for nothing. A token is 16 to 512
-  /// characters of [A-Za-z0-9-._~+/=].
-  /// Errors: INVALID_ARGUMENT, which tells line, word and rule and shows no word: one that is not
-  /// as said, a token twice, no token at all, more than 1,000.
+  /// Each line of `text` is a token (16 to 512 characters of [A-Za-z0-9-._~+/=]), followed by the
+  /// words of ParseCallerTerms, separated by blanks. The default name is "token-LINE", the default
+  /// terms permit everything. Empty lines and lines that begin with '#' are ignored. Errors:
+  /// INVALID_ARGUMENT with line, word number and rule, but without the word: an invalid word, a
+  /// repeated token, no token, more than 1,000 tokens.
   static absl::StatusOr<BearerTokens> Parse(std::string_view text);
 
-  /// The client that has this token; null if there is none. Takes as long for every token of the
-  /// same length: all are compared with, to their last byte.
+  /// The client of this token, or null. Compares all tokens in constant time.
   const Client* Find(std::string_view token) const { return Find(DigestOf(token)); }
 
   const std::vector<Client>& clients() const { return clients_; }

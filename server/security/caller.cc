@@ -39,7 +39,7 @@ std::uint32_t LimitOf(const CallerQuota& quota, CallerAccount::Kind kind) {
   return kNone;
 }
 
-// Whose it is, and when there is more again.
+// The rule of a quota: its owner, and when to retry.
 constexpr char kOfOneCaller[] =
     " of one caller, which is a token or, without tokens, an address; try again when a call of it "
     "has ended";

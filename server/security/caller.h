@@ -1,4 +1,4 @@
-// Who calls: what it may, and the account of what it holds of the server.
+// A caller: its permissions, and the account of the resources that it holds.
 #pragma once
 
 #include <array>
@@ -16,21 +16,21 @@
 
 namespace partiemc::server {
 
-/// The reasons for which a caller does not get what it asks for (proto/PROTOCOL.md).
+/// Reasons of refused requests (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonNotPermitted = "NOT_PERMITTED";
 inline constexpr std::string_view kReasonCallerCalls = "CALLER_CALLS";
 inline constexpr std::string_view kReasonCallerStreams = "CALLER_STREAMS";
 inline constexpr std::string_view kReasonCallerWatchers = "CALLER_WATCHERS";
 inline constexpr std::string_view kReasonCallerBytes = "CALLER_BYTES";
 
-/// What one caller holds of the server: one for each token, shared by all calls with it; without
-/// tokens one for each peer (PeerAccounts). Its address tells callers from each other wherever they
-/// take turns or share (ComputePool, FairShare). Safe from any thread.
+/// The resources that a caller holds. All calls with one token share an account; without tokens,
+/// all calls of one peer (PeerAccounts). ComputePool and FairShare identify callers by the address
+/// of this object. Thread-safe.
 class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
  public:
   enum class Kind { kCall, kStream, kWatcher };
 
-  /// One of what is counted, until it goes. It keeps the account alive.
+  /// A counted resource; released at destruction. Keeps the account alive.
   class Place {
    public:
     Place() = default;
@@ -49,17 +49,17 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
     Place(std::shared_ptr<CallerAccount> account, Kind kind)
         : account_(std::move(account)), kind_(kind) {}
 
-    std::shared_ptr<CallerAccount> account_;  // None: no place.
+    std::shared_ptr<CallerAccount> account_;  // Null: empty.
     Kind kind_ = Kind::kCall;
   };
 
   explicit CallerAccount(CallerQuota quota = {}) : quota_(quota) {}
 
-  /// Counts for what is taken from now on; what is held stays, even if it is more.
+  /// Applies to further resources. Held resources stay, even above the quota.
   void SetQuota(CallerQuota quota);
   CallerQuota quota() const;
 
-  /// Held by shared_ptr only.
+  /// Requires: this is held by shared_ptr.
   /// Errors: RESOURCE_EXHAUSTED (CALLER_CALLS, CALLER_STREAMS, CALLER_WATCHERS).
   absl::StatusOr<Place> Take(Kind kind);
   std::uint32_t held(Kind kind) const;
@@ -72,24 +72,23 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
   std::array<std::uint32_t, kKinds> held_{};
 };
 
-/// RESOURCE_EXHAUSTED (CALLER_BYTES) for a caller that wants so many more than its share.
+/// RESOURCE_EXHAUSTED (CALLER_BYTES) for a request of `bytes` beyond the caller's quota.
 absl::Status TooManyBytesOfCaller(std::uint64_t bytes);
 
-/// A caller as it was let in. What a call does it does with one of these, from its beginning on:
-/// the terms stay those of that moment, the account is the one in force.
+/// An admitted caller. A call uses the terms of its start, and the current account.
 class Caller {
  public:
-  /// May everything, with an account of its own.
+  /// A caller with all permissions and a new account.
   Caller();
   Caller(std::shared_ptr<const CallerTerms> terms, std::shared_ptr<CallerAccount> account)
       : terms_(std::move(terms)), account_(std::move(account)) {}
 
-  /// For the log; empty where no token is wanted.
+  /// For the log; empty without tokens.
   const std::string& name() const { return terms_->name; }
   const std::shared_ptr<CallerAccount>& account() const { return account_; }
   bool MayUse(std::string_view stream_name) const { return terms_->MayUse(stream_name); }
 
-  /// Errors of each: PERMISSION_DENIED (NOT_PERMITTED), which tells nothing of what there is.
+  /// Errors: PERMISSION_DENIED (NOT_PERMITTED), without information about existing streams.
   absl::Status CheckMayProduce() const;
   absl::Status CheckMayWatch() const;
   absl::Status CheckMayList() const;

@@ -15,7 +15,7 @@ namespace partiemc::server {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 64;
-// Each open stream is compared with all of them when streams are listed.
+// ListStreams compares each open stream with all patterns.
 constexpr std::size_t kMaxPatterns = 32;
 
 constexpr char kMayRule[] = "may= must have one or more of produce,watch,list, each once";
@@ -61,7 +61,7 @@ bool ReadNames(std::string_view text, CallerTerms& terms) {
          });
 }
 
-// Leaves in `text` what follows the number.
+// Removes the number from the front of `text`.
 template <typename Number>
 bool ReadNumber(std::string_view& text, std::optional<Number>& number) {
   const auto [end, error] =
@@ -87,7 +87,7 @@ bool ReadBytes(std::string_view text, std::optional<std::uint64_t>& bytes) {
   return true;
 }
 
-// The rule that `value` breaks; null if none.
+// The rule that `value` breaks, or null.
 const char* Read(std::string_view key, std::string_view value, CallerTerms& terms) {
   CallerQuota& quota = terms.quota;
   if (key == "may") return ReadMay(value, terms) ? nullptr : kMayRule;

@@ -16,7 +16,7 @@
 namespace partiemc::server {
 namespace {
 
-constexpr std::size_t kMaxKeys = 2;  // The one in use, and the one before or after it.
+constexpr std::size_t kMaxKeys = 2;  // The current key, and its predecessor or successor.
 
 using Signature = std::array<unsigned char, CheckpointKeys::kSignatureBytes>;
 
@@ -64,7 +64,7 @@ std::string CheckpointKeys::Sign(std::string_view bytes) const {
 bool CheckpointKeys::Verify(std::string_view bytes, std::string_view signature) const {
   if (signature.size() != kSignatureBytes) return false;
   bool verified = false;
-  for (const std::string& key : keys_) {  // All of them, whichever it is.
+  for (const std::string& key : keys_) {  // Constant time: always tries all keys.
     const Signature expected = SignatureOf(bytes, key);
     const bool same = CRYPTO_memcmp(expected.data(), signature.data(), kSignatureBytes) == 0;
     verified = verified || same;

@@ -1,5 +1,4 @@
-// The keys by which servers tell checkpoints of their own making from others: a file that replicas
-// share.
+// Keys that sign checkpoints, from a file that replicas share.
 #pragma once
 
 #include <cstddef>
@@ -13,29 +12,28 @@
 
 namespace partiemc::server {
 
-/// HMAC-SHA256. The first key signs; each of them verifies, so that a fleet changes its key without
-/// a refused checkpoint.
+/// HMAC-SHA256. The first key signs, all keys verify, so that replicas can replace a key without
+/// refusing checkpoints.
 class CheckpointKeys {
  public:
   static constexpr std::size_t kSignatureBytes = 32;
 
-  /// `text` has one or two lines with a key each; blank lines and lines that begin with '#' count
-  /// for nothing. A key is 16 to 512 characters of [A-Za-z0-9-._~+/=]; whoever has a signed
-  /// checkpoint can try keys at leisure, so it should be random.
-  /// Errors: INVALID_ARGUMENT, which names the line and the rule and never a key: something else,
-  /// a key twice, none, more than two.
+  /// `text` has one or two lines with one key each; empty lines and lines that begin with '#' are
+  /// ignored. A key has 16 to 512 characters of [A-Za-z0-9-._~+/=]. Keys must be random, because a
+  /// signed checkpoint permits offline guessing. Errors: INVALID_ARGUMENT with line and rule, but
+  /// without the key: an invalid or repeated key, no key, more than two keys.
   static absl::StatusOr<CheckpointKeys> Parse(std::string_view text);
 
-  /// kSignatureBytes.
+  /// Returns kSignatureBytes bytes.
   std::string Sign(std::string_view bytes) const;
-  /// Whether one of the keys has signed `bytes`. Takes as long whatever the signature is.
+  /// Whether one of the keys has signed `bytes`. Constant time for all signatures.
   bool Verify(std::string_view bytes, std::string_view signature) const;
 
  private:
   std::vector<std::string> keys_;  // At least one.
 };
 
-/// Those in force. Safe from any thread.
+/// The current keys. Thread-safe.
 class CurrentCheckpointKeys {
  public:
   void Set(CheckpointKeys keys);

@@ -10,8 +10,8 @@
 namespace partiemc::server {
 namespace {
 
-// Differs whenever a file was written, replaced (behind a symbolic link too, as Kubernetes does
-// it), removed, or given another owner or mode.
+// Changes if a file is written, replaced (also behind a symbolic link, as in Kubernetes), removed,
+// or gets another owner or mode.
 std::string StampOf(const std::vector<std::string>& files) {
   std::string stamp;
   for (const std::string& file : files) {
@@ -39,7 +39,7 @@ FileReloader::~FileReloader() {
 }
 
 absl::Status FileReloader::Add(std::string what, std::vector<std::string> files, Load load) {
-  // The stamp is taken first: what changes during the load is seen as a change.
+  // Takes the stamp before the load, so that a change during the load is detected.
   std::string stamp = StampOf(files);
   if (auto status = load(); !status.ok()) return status;
   watched_.push_back({std::move(what), std::move(files), std::move(load), std::move(stamp)});

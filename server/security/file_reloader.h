@@ -1,4 +1,4 @@
-// Files that may change while the server runs: certificates, keys, tokens.
+// Reloads files that may change while the server runs: certificates, keys, tokens.
 #pragma once
 
 #include <chrono>
@@ -13,8 +13,8 @@
 
 namespace partiemc::server {
 
-/// Looks at files from time to time and has them loaded again when one of them has changed. A load
-/// that fails is logged, once for each change, and leaves in force what was loaded before.
+/// Polls files and reloads them after a change. A failed load is logged, once per change, and
+/// leaves the previous content in force.
 class FileReloader {
  public:
   using Load = std::function<absl::Status()>;
@@ -24,12 +24,12 @@ class FileReloader {
   FileReloader(const FileReloader&) = delete;
   FileReloader& operator=(const FileReloader&) = delete;
 
-  /// Loads for the first time, and again whenever a file of `files` has changed. `what` names them
-  /// in the log. `load` is called by one thread at a time. Before Start only.
-  /// Errors: that of the first load; then nothing is watched.
+  /// Calls `load` now and after each change of `files`. `what` is the name of the files in the log.
+  /// `load` is called by one thread at a time. Requires: Start was not called. Errors: the error of
+  /// the first load; the files are then not watched.
   absl::Status Add(std::string what, std::vector<std::string> files, Load load);
 
-  /// Begins to look, every `interval`. Without anything added no thread is started.
+  /// Starts to poll every `interval`. Starts no thread without files.
   void Start(std::chrono::milliseconds interval);
 
  private:
@@ -37,13 +37,13 @@ class FileReloader {
     std::string what;
     std::vector<std::string> files;
     Load load;
-    std::string stamp;  // Of the files as they were when they were loaded, or failed to be.
+    std::string stamp;  // Stamp of the files at the last load.
   };
 
   void Run(std::chrono::milliseconds interval);
   static void Look(Watched& watched);
 
-  std::vector<Watched> watched_;  // After Start of the thread alone.
+  std::vector<Watched> watched_;  // Owned by the thread after Start.
   std::mutex mutex_;
   std::condition_variable stop_asked_;
   bool stopping_ = false;  // Guarded by mutex_.

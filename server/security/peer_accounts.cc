@@ -16,10 +16,10 @@ struct PeerAccounts::Known {
 
 namespace {
 
-// The network of 2^64 addresses that one host is given, or the address itself where it is none of
-// IPv6 proper: "[2001:db8::1]" gives "2001:db8::".
+// The /64 network of an IPv6 address, "[2001:db8::1]" -> "2001:db8::"; other addresses are
+// unchanged.
 std::string NetworkOf(std::string_view host) {
-  // gRPC writes brackets, and the sign before a zone, as in a URI.
+  // gRPC writes brackets and zones as in a URI.
   for (const std::string_view before : {"[", "%5B"}) {
     if (host.starts_with(before)) host.remove_prefix(before.size());
   }
@@ -51,7 +51,7 @@ std::shared_ptr<CallerAccount> PeerAccounts::Of(std::string_view peer) {
   const std::lock_guard lock(known_->mutex);
   std::weak_ptr<CallerAccount>& known = known_->accounts[key];
   if (auto account = known.lock()) return account;
-  // The last who holds it forgets it, unless the peer has come again since.
+  // The last holder removes the account, unless the peer has a new one.
   const auto forget = [all = known_, key = std::move(key)](CallerAccount* account) {
     delete account;
     const std::lock_guard forgetting(all->mutex);

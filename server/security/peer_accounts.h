@@ -1,4 +1,4 @@
-// The accounts of callers without a token: one for each peer.
+// The accounts of callers without a token, one per peer.
 #pragma once
 
 #include <cstddef>
@@ -10,21 +10,20 @@
 
 namespace partiemc::server {
 
-/// "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Of IPv6 the first 64 bits, as one host may have all
-/// addresses that begin with them: "ipv6:[2001:db8::1]:51234" -> "ipv6:2001:db8::". All who come
-/// over a Unix socket are "unix".
+/// "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Of IPv6 addresses only the first 64
+/// bits, because one host can use all addresses with this prefix: "ipv6:[2001:db8::1]:51234" ->
+/// "ipv6:2001:db8::". All peers of Unix sockets are "unix".
 std::string HostOfPeer(std::string_view peer);
 
-/// Safe from any thread.
+/// Thread-safe.
 class PeerAccounts {
  public:
   explicit PeerAccounts(CallerQuota quota) : quota_(quota) {}
 
-  /// That of the peer without its port. It is the same one for as long as anybody holds it, and
-  /// forgotten after that.
+  /// The account of a peer, ignoring its port. It exists while a caller holds it.
   std::shared_ptr<CallerAccount> Of(std::string_view peer);
 
-  /// Accounts that are held by somebody.
+  /// Number of held accounts.
   std::size_t size() const;
 
  private:
@@ -32,7 +31,7 @@ class PeerAccounts {
 
   const CallerQuota quota_;
   const std::shared_ptr<Known> known_ =
-      MakeKnown();  // Of the accounts too, which may outlive this.
+      MakeKnown();  // Shared with the accounts, which may outlive this.
 
   static std::shared_ptr<Known> MakeKnown();
 };

@@ -1,4 +1,4 @@
-// What a secret in a file may look like: a bearer token's or a key's.
+// The format of secrets in files: bearer tokens and keys.
 #pragma once
 
 #include <cstddef>
@@ -6,13 +6,13 @@
 
 namespace partiemc::server {
 
-/// A shorter one can be guessed; a longer one is none.
+/// Shorter secrets can be guessed.
 inline constexpr std::size_t kMinSecretBytes = 16;
 inline constexpr std::size_t kMaxSecretBytes = 512;
 
 inline constexpr char kSecretRule[] = "of 16 to 512 characters of [A-Za-z0-9-._~+/=]";
 
-/// Whether it is as kSecretRule says, which is what `authorization: Bearer` takes (RFC 6750, 2.1).
+/// Whether `text` conforms to kSecretRule, the syntax of `authorization: Bearer` (RFC 6750, 2.1).
 bool IsSecret(std::string_view text);
 
 }  // namespace partiemc::server

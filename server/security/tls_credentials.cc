@@ -9,9 +9,9 @@
 namespace partiemc::server {
 namespace {
 
-// gRPC asks for the identity at every handshake (grpc_ssl_server_certificate_config_callback). Its
-// own watcher of files, FileWatcherCertificateProvider, would put a key in force that does not
-// belong to the certificate, and then refuse every client.
+// gRPC requests the identity at every handshake (grpc_ssl_server_certificate_config_callback).
+// gRPC's FileWatcherCertificateProvider would accept a key that does not match the certificate, and
+// then refuse every client.
 class TlsCredentials final : public grpc::ServerCredentials {
  public:
   explicit TlsCredentials(const CurrentTlsIdentity& current) : current_(current) {
@@ -24,7 +24,7 @@ class TlsCredentials final : public grpc::ServerCredentials {
   }
   ~TlsCredentials() override { grpc_server_credentials_release(credentials_); }
 
-  // Tokens are checked where their refusal can carry a reason (server/rpc/service.cc).
+  // server/rpc/service.cc checks tokens, because its refusals can carry a reason.
   void SetAuthMetadataProcessor(const std::shared_ptr<grpc::AuthMetadataProcessor>&) override {}
 
  private:
@@ -32,7 +32,7 @@ class TlsCredentials final : public grpc::ServerCredentials {
     return grpc_server_add_http2_port(server, address.c_str(), credentials_);
   }
 
-  // Called under a lock of gRPC's, at every handshake.
+  // gRPC calls this at every handshake, with a lock held.
   static grpc_ssl_certificate_config_reload_status Fetch(
       void* self, grpc_ssl_server_certificate_config** config) {
     auto& credentials = *static_cast<TlsCredentials*>(self);
@@ -40,7 +40,7 @@ class TlsCredentials final : public grpc::ServerCredentials {
     if (version.number == credentials.fetched_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
     const TlsIdentity& identity = *version.identity;
     const grpc_ssl_pem_key_cert_pair pair{identity.key.c_str(), identity.certificate.c_str()};
-    // gRPC wants some authority even where no client is asked for a certificate of it.
+    // gRPC requires an authority even if no client certificate is required.
     const std::string& authority =
         identity.client_ca.empty() ? identity.certificate : identity.client_ca;
     *config = grpc_ssl_server_certificate_config_create(authority.c_str(), &pair, 1);
@@ -50,7 +50,7 @@ class TlsCredentials final : public grpc::ServerCredentials {
 
   const CurrentTlsIdentity& current_;
   grpc_server_credentials* credentials_ = nullptr;
-  std::uint64_t fetched_ = 0;  // The version that gRPC has.
+  std::uint64_t fetched_ = 0;  // The version that gRPC uses.
 };
 
 }  // namespace

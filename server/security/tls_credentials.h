@@ -1,4 +1,4 @@
-// TLS for gRPC's server, with an identity that may change while it runs.
+// TLS credentials for gRPC's server, with an identity that can change at run time.
 #pragma once
 
 #include <grpcpp/security/server_credentials.h>
@@ -9,10 +9,9 @@
 
 namespace partiemc::server {
 
-/// Credentials that give every new connection the identity in force; connections that are open keep
-/// the one that they began with. With a client authority a client without a certificate of it is
-/// refused. `current` has an identity by now; it and the credentials are kept until the server has
-/// stopped.
+/// New connections use the current identity; open connections keep theirs. With a client authority,
+/// clients need a certificate signed by it. Requires: `current` has an identity and outlives the
+/// server.
 std::shared_ptr<grpc::ServerCredentials> MakeTlsCredentials(const CurrentTlsIdentity& current);
 
 }  // namespace partiemc::server

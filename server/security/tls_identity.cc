@@ -28,7 +28,7 @@ using Certificate = std::unique_ptr<X509, Free<X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 using File = std::unique_ptr<std::FILE, Free<std::fclose>>;
 
-// Far above any chain of certificates and any list of tokens.
+// Far above the size of certificate chains and token lists.
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 
 absl::Status Wrong(const std::string& flag, const std::string& path, const std::string& what) {
@@ -39,10 +39,10 @@ Bio Reading(const std::string& text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
 }
 
-// A key with a passphrase is an error, where OpenSSL itself would ask the terminal for it.
+// Refuses keys with a passphrase; OpenSSL would prompt on the terminal.
 int NoPassphrase(char*, int, int, void*) { return -1; }
 
-// The first certificate of a PEM file.
+// Parses the first certificate of a PEM file.
 absl::StatusOr<Certificate> ParseCertificate(const std::string& flag, const std::string& path,
                                              const std::string& text) {
   const Bio bio = Reading(text);

@@ -1,4 +1,4 @@
-// The certificate, key and client authority of a server, read from files and checked.
+// Reads and checks the certificate, key and client authority of a server.
 #pragma once
 
 #include <chrono>
@@ -14,27 +14,27 @@
 namespace partiemc::server {
 
 struct TlsFiles {
-  std::string certificate;  ///< PEM: the server's own first, then those between it and its root.
+  std::string certificate;  ///< PEM: the certificate of the server, then the intermediate ones.
   std::string key;          ///< PEM, without a passphrase.
-  /// PEM: authorities, one of which must have signed a client's certificate. Empty: clients need
-  /// none.
+  /// PEM: authorities that may sign client certificates. Empty: clients need no certificate.
   std::string client_ca;
 
-  /// Those that are given.
+  /// The non-empty paths.
   std::vector<std::string> All() const;
 };
 
-/// What the files hold, as PEM.
+/// The contents of the files, as PEM.
 struct TlsIdentity {
   std::string certificate, key, client_ca;
-  std::chrono::system_clock::time_point not_after;  ///< Of the server's own certificate.
+  std::chrono::system_clock::time_point
+      not_after;  ///< End of validity of the server's certificate.
 };
 
-/// The identity in force. Safe from any thread.
+/// The current identity. Thread-safe.
 class CurrentTlsIdentity {
  public:
   struct Version {
-    std::uint64_t number = 0;  ///< One more for each change; 0: none yet.
+    std::uint64_t number = 0;  ///< Counts changes; 0: none yet.
     std::shared_ptr<const TlsIdentity> identity;
   };
 
@@ -53,15 +53,13 @@ class CurrentTlsIdentity {
   Version version_;
 };
 
-/// Reads the files and checks that they fit: a certificate, the key that belongs to it, and at
-/// least one authority where they are asked for. One that has expired is no error: clients refuse
-/// it, and a server that runs on can be given a new one.
-/// Errors: INVALID_ARGUMENT, a line that names the flag, the file, and what is wrong with it; never
-/// what is in it.
+/// Reads the files and checks that certificate and key match and that client_ca has an authority.
+/// An expired certificate is accepted: clients refuse it, and the operator can replace it at run
+/// time. Errors: INVALID_ARGUMENT with flag, file and problem, but without the content.
 absl::StatusOr<TlsIdentity> ReadTlsIdentity(const TlsFiles& files);
 
-/// A whole file of secrets or certificates.
-/// Errors: INVALID_ARGUMENT, names `flag` and `path`: cannot be read, or is above 1 MiB.
+/// Reads a file of secrets or certificates.
+/// Errors: INVALID_ARGUMENT with `flag` and `path`: unreadable, or above 1 MiB.
 absl::StatusOr<std::string> ReadSmallFile(const std::string& flag, const std::string& path);
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// Who is told what became of each frame.
+// Receives the outcome of each frame.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@ class StageClock;
 
 namespace server {
 
-/// Called by the threads that compute, so quick and safe from any of them.
+/// Called by compute threads: implementations are fast and thread-safe.
 class FrameObserver {
  public:
   virtual ~FrameObserver() = default;
 
   virtual void FrameReconstructed(std::uint64_t particles, const StageClock& clock) = 0;
-  /// `reason` is one of those in proto/PROTOCOL.md.
+  /// `reason` is listed in proto/PROTOCOL.md.
   virtual void FrameRefused(std::string_view reason) = 0;
 };
 

@@ -17,13 +17,13 @@ namespace {
 constexpr std::chrono::milliseconds kLastPatience(500);
 constexpr std::chrono::seconds kTick(1);
 
-// Gives the bytes that could not be written.
+// Returns the number of bytes that were not written.
 std::string_view WriteAll(int file, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(file, bytes.data(), bytes.size());
     if (written >= 0) {
       bytes.remove_prefix(static_cast<std::size_t>(written));
-    } else if (errno == EAGAIN) {  // Somebody who shares the file has made it non-blocking.
+    } else if (errno == EAGAIN) {  // Another process has made the shared file non-blocking.
       pollfd ready{.fd = file, .events = POLLOUT, .revents = 0};
       poll(&ready, 1, /*timeout=*/-1);
     } else if (errno != EINTR) {
@@ -41,9 +41,9 @@ struct LogWriter::State {
   const Options options;
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
-  std::string waiting;  // Guarded by the mutex, as is the next.
+  std::string waiting;  // Guarded by the mutex, like the next member.
   bool stop = false, ended = false;
-  std::atomic<bool> behind = false;  // Something waits or is being written.
+  std::atomic<bool> behind = false;  // Lines are buffered or being written.
   std::atomic<std::uint64_t> dropped = 0;
 };
 
@@ -94,7 +94,7 @@ void LogWriter::Run(const std::shared_ptr<State>& state) {
   auto next_tick = std::chrono::steady_clock::now() + kTick;
   std::string lines;
   std::unique_lock lock(state->mutex);
-  while (!state->stop) {  // What could be written in time has been.
+  while (!state->stop) {
     state->changed.wait_until(lock, next_tick,
                               [&] { return state->stop || !state->waiting.empty(); });
     lines.swap(state->waiting);

@@ -1,5 +1,4 @@
-// The log on its way out: lines are handed over without waiting, and a thread of their own writes
-// them.
+// Writes log lines on a separate thread, so that callers never wait.
 #pragma once
 
 #include <unistd.h>
@@ -18,9 +17,10 @@ class LogWriter {
  public:
   struct Options {
     int file = STDERR_FILENO;
-    /// Bytes of lines that wait to be written; as many again may be being written.
+    /// Capacity of the buffer in bytes; another buffer of this size may be written at the same
+    /// time.
     std::size_t capacity = std::size_t{1} << 20;
-    /// Called by the thread about once a second.
+    /// Called by the writer thread about once per second.
     std::function<void()> every_second = {};
   };
 
@@ -29,18 +29,18 @@ class LogWriter {
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
 
-  /// Never waits for the file. A line for which there is no room is dropped and counted, as are
-  /// those that the file refuses (a pipe whose reader has gone). Safe from any thread.
+  /// Never waits for the file. Drops and counts a line if the buffer is full or the file fails (a
+  /// closed pipe). Thread-safe.
   void Write(std::string_view line);
 
-  /// Whether everything has been written before `patience` is over.
+  /// Waits up to `patience` until everything is written. Returns whether it is.
   bool Flush(std::chrono::milliseconds patience) const;
 
-  /// The same for a signal handler: it takes no lock.
+  /// Flush for a signal handler, without a lock.
   void FlushInSignal(std::chrono::milliseconds patience) const;
 
-  /// Flush with half a second's patience, and the end of the thread: it calls `every_second` no
-  /// more, and lines that come from now on are dropped. One that a full pipe holds is left behind.
+  /// Flushes for half a second and ends the thread. Later lines are dropped. A thread that blocks
+  /// on a full pipe is abandoned.
   void Stop();
 
   std::uint64_t dropped() const;
@@ -49,7 +49,7 @@ class LogWriter {
   struct State;
   static void Run(const std::shared_ptr<State>& state);
 
-  const std::shared_ptr<State> state_;  // The thread's too, as it may be left behind.
+  const std::shared_ptr<State> state_;  // Shared with the thread, which may be abandoned.
   std::thread thread_;
 };
 

@@ -23,7 +23,7 @@
 namespace partiemc::server {
 namespace {
 
-// Begins the payload of a line whose fields are JSON already; nothing else can begin with it.
+// First character of a payload whose fields are JSON; no other payload begins with it.
 constexpr char kFieldsFollow = '\x1e';
 
 constexpr std::uint32_t kRefusalsPerSecond = 20;
@@ -31,10 +31,10 @@ constexpr std::chrono::milliseconds kPatienceOnAbort(500);
 
 std::atomic<LogFormat> log_format = LogFormat::kText;
 RateLimit refusals(kRefusalsPerSecond);
-// Since SetUpLogging. It is never taken away: threads that are left behind at the end of the
-// process may log until the last moment.
+// Set by SetUpLogging and never destroyed, because abandoned threads may log until the process
+// ends.
 std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
-// Likewise, as spdlog's own goes at the end of main.
+// Never destroyed; spdlog's own logger is destroyed at the end of main.
 std::shared_ptr<spdlog::logger>& logger =
     *new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
 
@@ -52,7 +52,7 @@ std::string ToText(const LogField& field, bool json) {
   return fmt::format("{:.3f}", std::get<double>(field.value));
 }
 
-// One JSON object a line: {"time":"2024-05-01T12:00:00.000Z","level":"info","message":"..."}.
+// One JSON object per line: {"time":"2024-05-01T12:00:00.000Z","level":"info","message":"..."}.
 class JsonFormatter final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
@@ -79,8 +79,8 @@ class JsonFormatter final : public spdlog::formatter {
   }
 };
 
-// Errors are about gRPC's own insides; what went wrong for a user is told in our own words. What it
-// says below that level is for its developers, and may show what travels.
+// gRPC's errors concern its internals; the server logs errors for users itself. gRPC's messages
+// below level error may contain transferred data.
 void LogFromGrpc(gpr_log_func_args* message) {
   if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
   LogEvent(spdlog::level::debug, "grpc", {{"says", std::string(message->message)}});
@@ -101,7 +101,7 @@ class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
   const std::shared_ptr<LogWriter> to_;
 };
 
-// Lines about lines that are missing.
+// Lines about missing lines.
 void TellLosses() {
   if (const auto count = refusals.TakeHeldBack(); count > 0) {
     LogEvent(spdlog::level::warn, "more refusals", {{"count", count}});
@@ -115,7 +115,7 @@ void TellLosses() {
 
 void OnAbort(int signal) {
   if (writer) writer->FlushInSignal(kPatienceOnAbort);
-  raise(signal);  // By default again (SA_RESETHAND).
+  raise(signal);  // SA_RESETHAND has restored the default action.
 }
 
 }  // namespace
@@ -162,7 +162,7 @@ void SetUpLogging(const std::string& level, LogFormat format) {
   });
   static_cast<void>(registered);
   gpr_set_log_function(&LogFromGrpc);
-  // Protobuf would tell standard error of every message that is none, as often as somebody likes.
+  // Protobuf would print a line on standard error for every malformed message.
   google::protobuf::SetLogHandler(nullptr);
 }
 

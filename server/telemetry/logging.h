@@ -1,5 +1,5 @@
-// The log: one line per event of the server or of a stream, to standard error. Nobody waits for it:
-// a thread of its own writes (LogWriter).
+// The log: one line per event of the server or of a stream, on standard error. LogWriter writes it
+// on its own thread.
 #pragma once
 
 #include <spdlog/common.h>
@@ -19,48 +19,45 @@ namespace partiemc::server {
 
 enum class LogFormat { kText, kJson };
 
-/// Sets up spdlog's default logger, and has gRPC's own errors go there at level debug, nothing else
-/// of what it says. `level` is one of trace, debug, info, warn, error, off. Called before gRPC
-/// starts.
+/// Sets up spdlog's default logger, and sends gRPC's own errors there at level debug. `level` is
+/// trace, debug, info, warn, error or off. Requires: gRPC has not started.
 void SetUpLogging(const std::string& level, LogFormat format);
 
-/// Takes GRPC_TRACE out of the environment, and tells in the log that it did. gRPC's traces print
-/// what travels, bearer and stream tokens among it, in words and in bytes, so that no choice of
-/// them would be safe. After SetUpLogging, before gRPC starts.
+/// Removes GRPC_TRACE from the environment and logs this. Every trace of gRPC could print bearer or
+/// stream tokens. Requires: SetUpLogging was called, gRPC has not started.
 void RefuseTraces();
 
-/// When the process aborts (an assertion, std::terminate), what was logged before is written first.
+/// Flushes the log if the process aborts (an assertion, std::terminate).
 void FlushLogOnAbort();
 
-/// Tells what was left out, and waits until all is written, for `patience` at most.
+/// Logs the number of dropped lines and waits up to `patience` until everything is written.
 void FlushLog(std::chrono::milliseconds patience = std::chrono::milliseconds(500));
 
-/// Since the start: lines without room because standard error was too slow, and refusals above the
-/// rate of LogRefusal.
+/// Totals since the start: lines dropped because standard error was too slow, and refusals above
+/// the rate of LogRefusal.
 struct LogLosses {
   std::uint64_t dropped_lines = 0;
   std::uint64_t refusals_held_back = 0;
 };
 LogLosses LossesOfLog();
 
-/// What is known about an event, beside its name.
+/// A field of an event.
 struct LogField {
   std::string_view name;
   std::variant<std::string, std::uint64_t, double> value;
 };
 
-/// One line for something that has happened to the server, a stream or a caller. As text:
-/// `stream opened id=7 name="two words"`; as JSON the fields stand beside the message:
-/// {"time":...,"level":"info","message":"stream opened","id":7,"name":"two words"}. Values may come
-/// from clients: what would break a line, or what a terminal would obey, is escaped.
+/// Logs one event of the server, a stream or a caller. As text: `stream opened id=7 name="two
+/// words"`; as JSON: {"time":...,"level":"info","message":"stream opened","id":7,"name":"two
+/// words"}. Values may come from clients: line breaks and control characters are escaped.
 void LogEvent(spdlog::level::level_enum level, std::string_view event,
               std::initializer_list<LogField> fields);
 
-/// A caller that was not let in, or what it asked for was not: who, and why. Twenty lines a second
-/// at most, so that a flood of refusals is none of lines; then one tells how many more there were.
+/// Logs a refused caller or request with its reason. Writes at most twenty lines per second, then
+/// one line with the number of further refusals.
 void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status);
 
-/// What gives a line its format, for a sink of one's own.
+/// The formatter of log lines, for other sinks.
 std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format);
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// What the running server counts, as Prometheus reads it.
+// The metrics of the server, for Prometheus.
 #pragma once
 
 #include <prometheus/collectable.h>
@@ -20,9 +20,9 @@
 
 namespace partiemc::server {
 
-/// Counters and histograms are kept as things happen, at some hundred nanoseconds a frame; gauges,
-/// and counters of others, are asked for when somebody reads. No label has a value that a client
-/// could choose, so that the number of series is bounded. Safe from any thread.
+/// Events update counters and histograms, for some hundred nanoseconds per frame. A reading calls
+/// the functions of gauges and of external counters. No label has a value that a client can choose,
+/// so the number of series is bounded. Thread-safe.
 class Metrics final : public prometheus::Collectable, public FrameObserver {
  public:
   Metrics();
@@ -30,15 +30,15 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
   void FrameReconstructed(std::uint64_t particles, const StageClock& clock) override;
   void FrameRefused(std::string_view reason) override;
 
-  /// A gauge whose value is asked for at each reading. Before anybody reads.
+  /// Adds a gauge; each reading calls the function. Requires: no reading has begun.
   void AddGauge(std::string name, std::string help, std::function<double()> value);
-  /// The same for what only grows.
+  /// Adds a counter; each reading calls the function.
   void AddCounter(std::string name, std::string help, std::function<double()> value);
 
-  /// For counters of other parts.
+  /// Registry for the counters of other components.
   prometheus::Registry& registry() { return registry_; }
 
-  /// Everything, the process's memory, processor time and file descriptors included.
+  /// All metrics, including memory, processor time and file descriptors of the process.
   std::vector<prometheus::MetricFamily> Collect() const override;
 
  private:

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kKnockInterval(5);
 
-// Connects and hangs up.
+// Connects and disconnects.
 void Knock(const Address& address) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
@@ -44,7 +44,7 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
         absl::StrCat("--metrics ", address.ToString(), ": must be HOST:PORT or [IPV6]:PORT"));
   }
   try {
-    // Prometheus reads every few seconds; whoever connects and says nothing gives up its thread.
+    // Prometheus reads every few seconds. A connection without a request must not occupy a thread.
     const std::vector<std::string> options = {
         "listening_ports", address.ToString(), "num_threads", "2", "request_timeout_ms", "5000"};
     auto exposer = std::make_unique<prometheus::Exposer>(options);
@@ -63,8 +63,8 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
 MetricsEndpoint::MetricsEndpoint(Address address, std::unique_ptr<prometheus::Exposer> exposer)
     : address_(std::move(address)), exposer_(std::move(exposer)) {}
 
-// The web server looks whether it should stop when somebody connects, and otherwise every two
-// seconds.
+// The web server checks its stop flag at each connection and every two seconds. A connection makes
+// it stop at once.
 MetricsEndpoint::~MetricsEndpoint() {
   std::atomic<bool> stopped = false;
   std::thread stop([this, &stopped] {

@@ -14,15 +14,15 @@ class Exposer;
 
 namespace partiemc::server {
 
-/// GET /metrics answers with all of them. Runs in two threads of its own until it is destroyed.
+/// GET /metrics returns all metrics. Uses two threads until it is destroyed.
 class MetricsEndpoint {
  public:
-  /// Errors: INVALID_ARGUMENT for a Unix socket, UNAVAILABLE where it cannot listen.
+  /// Errors: INVALID_ARGUMENT for a Unix socket, UNAVAILABLE if it cannot listen.
   static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Listen(
       const Address& address, const std::shared_ptr<Metrics>& metrics);
   ~MetricsEndpoint();
 
-  /// With the port that it got.
+  /// The address with its actual port.
   const Address& address() const { return address_; }
 
  private:

@@ -42,7 +42,7 @@ std::vector<prometheus::MetricFamily> ProcessFamilies() {
   cpu.metric.emplace_back().counter.value = CpuSeconds();
   families.push_back(std::move(cpu));
 
-  // In pages: all, resident.
+  // In pages: total, resident.
   std::ifstream memory("/proc/self/statm");
   double all = 0, resident = 0;
   if (memory >> all >> resident) {
@@ -55,7 +55,7 @@ std::vector<prometheus::MetricFamily> ProcessFamilies() {
   const std::filesystem::directory_iterator open("/proc/self/fd", error),
       threads("/proc/self/task", error);
   if (!error) {
-    // The listing itself is one of them.
+    // One of them is the listing itself.
     families.push_back(GaugeFamily("process_open_fds", "Open file descriptors.",
                                    static_cast<double>(std::distance(begin(open), end(open)) - 1)));
     families.push_back(

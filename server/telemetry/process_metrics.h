@@ -1,4 +1,4 @@
-// What the system tells about this process, under the names that Prometheus's libraries share.
+// Metrics of this process from /proc, with the usual names of Prometheus's libraries.
 #pragma once
 
 #include <prometheus/metric_family.h>
@@ -8,10 +8,10 @@
 
 namespace partiemc::server {
 
-/// Memory, processor time, threads and file descriptors; those that /proc does not tell are absent.
+/// Memory, processor time, threads and file descriptors; without those that /proc lacks.
 std::vector<prometheus::MetricFamily> ProcessFamilies();
 
-/// A family of one gauge without labels.
+/// A metric family with one gauge, without labels.
 prometheus::MetricFamily GaugeFamily(const std::string& name, const std::string& help,
                                      double value);
 

@@ -8,7 +8,7 @@
 namespace partiemc::server {
 namespace {
 
-// How often this thread has given up its processor to wait for something.
+// Number of voluntary context switches of this thread.
 long Sleeps() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);
@@ -50,7 +50,7 @@ std::vector<Published> ResultBroadcaster::HandOver() {
   if (!history_) return frames;
   frames.reserve(history_->size());
   for (std::size_t k = 0; k < history_->size(); ++k) frames.push_back(history_->at(k));
-  if (watchers_.empty()) history_.reset();  // Else they may still have to read it.
+  if (watchers_.empty()) history_.reset();  // Watchers may still read it.
   return frames;
 }
 
@@ -61,9 +61,9 @@ bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::ui
     return true;
   }
   mailbox_.Put(std::move(published));
-  // Otherwise whoever has the lock has come to watch, or the next frame takes this one along.
+  // If the lock is taken, its holder or the next frame collects this one.
   if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) Collect();
-  // Who has joined meanwhile may have found the mailbox empty.
+  // A watcher that joined in between may have found the mailbox empty.
   return watcher_count_ != 0;
 }
 
@@ -90,7 +90,7 @@ ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMach
   Joined joined;
   {
     const std::lock_guard lock(mutex_);
-    // From here on all that is published is offered.
+    // All results published from here on are offered.
     ++watcher_count_;
     watchers_.push_back(std::move(watcher));
     Collect();
@@ -110,7 +110,7 @@ ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMach
 }
 
 void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
-  std::shared_ptr<WatchStateMachine> left;  // Given up without the lock, and so are the frames.
+  std::shared_ptr<WatchStateMachine> left;  // Released after the lock, like the frames.
   std::vector<Published> news;
   Published newest;
   const std::lock_guard lock(mutex_);
@@ -127,7 +127,7 @@ void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
 
 Published ResultBroadcaster::Held(std::uint64_t number) {
   const std::lock_guard lock(mutex_);
-  if (number > collected_) Collect();  // The dispatcher may not have come to it yet.
+  if (number > collected_) Collect();  // The dispatcher may not have collected it yet.
   const Published* const held = history_ ? history_->FromNumber(number) : nullptr;
   return held != nullptr ? *held : Published();
 }
@@ -190,7 +190,7 @@ void ResultBroadcaster::Serve() {
   if (end) DropHistoryOf(watchers);
 }
 
-// The stream is over: unless one of them still reads the history, nobody ever will.
+// Drops the history of an ended stream unless a watcher still reads it.
 void ResultBroadcaster::DropHistoryOf(
     const std::vector<std::shared_ptr<WatchStateMachine>>& watchers) {
   if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {

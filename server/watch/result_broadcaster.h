@@ -1,4 +1,4 @@
-// The fan-out of one stream: its producer's results go in, its watchers get them.
+// Delivers the results of one stream to its watchers.
 #pragma once
 
 #include <atomic>
@@ -16,77 +16,74 @@
 
 namespace partiemc::server {
 
-/// Publish comes from one thread at a time; it and Announce never wait, whatever watchers do.
-/// Everything else comes from any thread. Held by shared_ptr only.
+/// Publish and Announce never wait for watchers. Publish is called by one thread at a time; all
+/// other functions are thread-safe. Held by shared_ptr.
 class ResultBroadcaster final : public Dispatched {
  public:
   struct Limits {
-    /// Of frames that the dispatcher has not come to yet.
+    /// Most bytes of frames that the dispatcher has not processed.
     std::size_t mailbox_bytes = std::size_t{16} << 20;
-    /// The newest frame is kept for a watcher that comes later, although nobody watches, if it is
-    /// no larger; whether there is a history or not.
+    /// Without watchers and history, the newest frame is kept for later watchers up to this size.
     std::size_t kept_bytes = std::size_t{1} << 20;
   };
 
-  /// `dispatcher` lives longer.
+  /// Requires: `dispatcher` outlives this.
   ResultBroadcaster(WatchDispatcher& dispatcher, const Limits& limits);
 
-  /// From now on keeps frames that watchers can go back to, as far as `room`, which lives longer,
-  /// lets it. Where the stream goes on from `former`, the frames before `next_sequence` that are
-  /// held there are the first; those after it will be made again. To be called before Publish and
-  /// Join, once.
+  /// Starts a history within the limits of `room`. If the stream resumes from `former`, the history
+  /// takes its frames before `next_sequence`; later ones are computed again. Requires: one call,
+  /// before Publish and Join; `room` outlives this.
   void BeginHistory(HistoryRoom& room, ResultBroadcaster* former, std::uint64_t next_sequence);
-  /// Others have come: their histories want a share of the room. Waits for nothing.
+  /// Shrinks the history after other histories have started. Does not block.
   void ShareRoom() { dispatcher_.Wake(*this); }
 
-  /// A result of the stream, the answer of the frame with this sequence number, which is larger
-  /// than that of the one before. Wait-free: a lock is taken only if nobody has it. True if
-  /// somebody watches: then Announce is to follow.
+  /// Publishes the result of the frame `sequence`. Wait-free: takes a lock only if it is free.
+  /// Returns whether there are watchers; then the caller must call Announce. Requires: `sequence`
+  /// increases.
   [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence);
-  /// The same of a result that another server has numbered, and announced at once; numbers rise,
-  /// and those left out never come.
+  /// Publishes and announces a result with the number of another server. Requires: numbers
+  /// increase; skipped numbers never follow.
   void PublishNumbered(Published published);
-  /// The results before those that are held here can be asked for from this sequence number on, of
-  /// the server that made them. 0: none can.
+  /// Sets the oldest sequence number in the history of the server that owns the stream. 0: none.
   void SetOldestElsewhere(std::uint64_t sequence) { oldest_elsewhere_ = sequence; }
-  /// Has watchers served with what was published. From any thread; wakes the dispatcher's, without
-  /// waiting for it. Apart from Publish, so that a producer's own answer is on its way before the
-  /// dispatcher writes to watchers: their writes take the same locks of gRPC.
+  /// Wakes the dispatcher to deliver published results. Does not block; thread-safe. Separate from
+  /// Publish, so that the producer's response is sent before the writes to watchers, which take the
+  /// same locks of gRPC.
   void Announce();
-  /// The stream has ended. Watchers get what was published, then this.
+  /// Ends the stream. Watchers receive the published results, then `end`.
   void End(WatchEnd end);
 
-  /// Where a watcher begins.
+  /// The start of a watch.
   struct Joined {
     HeldFrames held;
-    Published first;                ///< If there is one, to be shown at once.
-    std::uint64_t next_held = 0;    ///< Else from this frame on, by Held; 0: from what comes now.
-    std::uint64_t last_number = 0;  ///< Of what had been published by then.
+    Published first;  ///< The newest result, to deliver at once; may be empty.
+    std::uint64_t next_held =
+        0;  ///< Otherwise the first number to read with Held; 0: live results only.
+    std::uint64_t last_number = 0;  ///< Number of the last published result.
   };
-  /// From the frame of sequence number `from` on, or from the oldest that is held; without it, from
-  /// the newest on. What is published after this call is offered, none of it is left out.
+  /// Adds a watcher that starts at sequence number `from` or the oldest frame after it; without
+  /// `from` at the newest frame. All results published after this call are offered to it.
   Joined Join(std::shared_ptr<WatchStateMachine> watcher, std::optional<std::uint64_t> from);
   void Leave(const WatchStateMachine& watcher);
 
-  /// The first frame of at least this number in the history, offered or not; none: all are older.
+  /// The first frame of the history with at least this number; empty if all are older.
   Published Held(std::uint64_t number);
-  /// Likewise of at least this sequence number.
+  /// The first frame of the history with at least this sequence number; empty if all are older.
   Published HeldFrom(std::uint64_t sequence);
-  /// The newest one, if it is held.
+  /// The newest frame, if it is kept.
   Published Newest();
   /// The number of the last result.
   std::uint64_t LastNumber();
-  /// The oldest sequence number that can be asked for; 0: none.
+  /// The oldest sequence number that watchers can request; 0: none.
   std::uint64_t oldest_sequence() const {
     const std::uint64_t elsewhere = oldest_elsewhere_, here = oldest_sequence_;
     return elsewhere != 0 && (here == 0 || elsewhere < here) ? elsewhere : here;
   }
-  /// The oldest one that is held here; 0: none.
+  /// The oldest sequence number in the history of this server; 0: none.
   std::uint64_t oldest_here() const { return oldest_sequence_; }
 
   std::uint32_t watcher_count() const { return watcher_count_; }
-  /// How often the producer's thread had to sleep to publish or to announce, as the system counts
-  /// it.
+  /// Number of voluntary context switches of the producer's thread in Publish and Announce.
   std::uint64_t producer_waits() const { return producer_waits_; }
 
  private:
@@ -102,17 +99,17 @@ class ResultBroadcaster final : public Dispatched {
   WatchDispatcher& dispatcher_;
   const Limits limits_;
   ResultMailbox mailbox_;
-  std::uint64_t published_ = 0;  // Of the producer's thread.
+  std::uint64_t published_ = 0;  // Owned by the producer's thread.
   std::atomic<std::uint64_t> producer_waits_ = 0;
   std::atomic<std::uint32_t> watcher_count_ = 0;
   std::atomic<std::uint64_t> oldest_sequence_ = 0, oldest_elsewhere_ = 0;
 
   std::mutex mutex_;  // Guards everything below. Publish never waits for it.
   std::vector<std::shared_ptr<WatchStateMachine>> watchers_;
-  std::uint64_t collected_ = 0;  // The number of the last frame that was taken from the mailbox.
-  std::vector<Published> news_;  // Of those, what has not been offered yet.
+  std::uint64_t collected_ = 0;  // Number of the last frame taken from the mailbox.
+  std::vector<Published> news_;  // Frames taken from the mailbox and not offered yet.
   std::optional<ResultHistory> history_;
-  Published newest_;  // If it is in the history, or small, or somebody watches.
+  Published newest_;  // Kept if it is in the history, small, or watched.
   std::optional<WatchEnd> end_;
 };
 

@@ -31,11 +31,11 @@ ResultHistory::~ResultHistory() {
 
 void ResultHistory::Add(const Published& published) {
   const std::uint64_t bytes = BytesOf(published);
-  // After a hole nothing before it may stay.
+  // The frames must be consecutive.
   while (size_ > 0 && at(size_ - 1).number + 1 != published.number) DropOldest();
   DropUntilFits(bytes);
   bool has_room = bytes <= room_.share();
-  // Others may hold more than their share until they hear that it has become smaller.
+  // Other histories may exceed their new limit until they shrink.
   while (has_room && !room_.TryTake(bytes)) {
     has_room = size_ > 0;
     if (has_room) DropOldest();
@@ -76,7 +76,8 @@ const Published* ResultHistory::FromNumber(std::uint64_t number) const {
 }
 
 const Published* ResultHistory::FromSequence(std::uint64_t sequence) const {
-  std::size_t older = 0, end = size_;  // Those before `older` are; those from `end` on are not.
+  std::size_t older = 0,
+              end = size_;  // Binary search: frames before `older` are older, from `end` on not.
   while (older < end) {
     const std::size_t middle = older + (end - older) / 2;
     if (at(middle).sequence < sequence) {

@@ -1,5 +1,5 @@
-// The results of a stream that its watchers can go back to: as many of the newest as there is room
-// for. They are the frames that watchers get anyway; nothing of them is copied.
+// The newest results of a stream, for watchers that start in the past. Shares the frames of the
+// watchers without copies.
 #pragma once
 
 #include <algorithm>
@@ -12,27 +12,26 @@
 
 namespace partiemc::server {
 
-/// Sequence numbers of what a stream holds for its watchers.
+/// Sequence numbers of a history.
 struct HeldFrames {
   bool any = false;
-  std::uint64_t oldest = 0, newest = 0;  ///< 0 if there are none.
+  std::uint64_t oldest = 0, newest = 0;  ///< 0 without frames.
 };
 
-/// What the histories of all streams may hold together, in equal shares. Takes no lock; safe from
-/// any thread.
+/// The memory limit of all histories, divided equally. Lock-free and thread-safe.
 class HistoryRoom {
  public:
-  /// No history has more than `bytes_of_one`, all together have no more than `bytes_of_all`.
+  /// `bytes_of_one` limits each history, `bytes_of_all` their total.
   HistoryRoom(std::uint64_t bytes_of_one, std::uint64_t bytes_of_all)
       : bytes_of_one_(bytes_of_one), bytes_of_all_(bytes_of_all) {}
 
-  /// What each history may hold, with as many as there are now.
+  /// The current limit of each history.
   std::uint64_t share() const {
     return std::min(bytes_of_one_, bytes_of_all_ / std::max<std::uint64_t>(1, histories_));
   }
-  /// Whether one more history makes the share of each smaller.
+  /// Whether another history reduces the limit of each.
   bool is_scarce() const { return share() < bytes_of_one_; }
-  /// By all.
+  /// Bytes of all histories.
   std::uint64_t held() const { return held_; }
 
  private:
@@ -45,30 +44,30 @@ class HistoryRoom {
   std::atomic<std::uint64_t> histories_ = 0, held_ = 0;
 };
 
-/// Frames without a hole: a frame that there is no room for ends what came before it. Not
-/// thread-safe. Allocates nothing once it has been full.
+/// Consecutive frames: adding a frame beyond the limit clears the history. Not thread-safe.
+/// Allocates nothing once it has been full.
 class ResultHistory {
  public:
-  /// `room` lives longer.
+  /// Requires: `room` outlives this.
   explicit ResultHistory(HistoryRoom& room);
   ~ResultHistory();
   ResultHistory(const ResultHistory&) = delete;
   ResultHistory& operator=(const ResultHistory&) = delete;
 
-  /// The newest frame. Drops the oldest ones until it fits, or all with it where it does not.
+  /// Adds the newest frame. Drops the oldest frames until it fits; if it never fits, drops all
+  /// frames.
   void Add(const Published& published);
-  /// Drops the oldest ones beyond the share, which has become smaller.
+  /// Drops the oldest frames after the limit has become smaller.
   void Shrink() { DropUntilFits(0); }
 
   bool empty() const { return size_ == 0; }
   std::size_t size() const { return size_; }
-  /// With what each frame costs beside its bytes.
+  /// Bytes including the overhead of each frame.
   std::uint64_t bytes() const { return bytes_; }
-  /// 0 is the oldest.
+  /// The k-th frame; 0 is the oldest.
   const Published& at(std::size_t k) const { return ring_[(first_ + k) % ring_.size()]; }
 
-  /// The first frame of at least this number, or of at least this sequence number; null if all are
-  /// older.
+  /// The first frame with at least this result number or sequence number; null if all are older.
   const Published* FromNumber(std::uint64_t number) const;
   const Published* FromSequence(std::uint64_t sequence) const;
 

@@ -7,8 +7,8 @@ namespace partiemc::server {
 void ResultMailbox::Put(Published published) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   auto* const post = new Post{std::move(published), nullptr, bytes};
-  // Taken back first, so that nobody else is at them while they are linked. Nothing can come
-  // between the two exchanges: there is one who puts.
+  // Takes the list back before linking, so that no other thread accesses it. No post can be added
+  // between the two exchanges, because only one thread puts.
   Post* const older = posts_.exchange(nullptr);
   if (older != nullptr) {
     if (older->bytes + bytes <= max_bytes_) {
@@ -22,7 +22,7 @@ void ResultMailbox::Put(Published published) {
 }
 
 void ResultMailbox::Take(absl::FunctionRef<void(Published)> taker) {
-  Post* oldest = nullptr;  // The list turned round: each leads to the newer one.
+  Post* oldest = nullptr;  // The reversed list: each post points to the newer one.
   for (Post* post = posts_.exchange(nullptr); post != nullptr;) {
     Post* const older = std::exchange(post->older, oldest);
     oldest = std::exchange(post, older);

@@ -1,5 +1,5 @@
-// Where a stream's results pass from the worker that made them to whoever shows them to watchers.
-// The worker's side never waits: it exchanges a pointer.
+// Passes results from the compute thread to the thread that delivers them. The compute thread never
+// waits: it exchanges a pointer.
 #pragma once
 
 #include <atomic>
@@ -11,35 +11,34 @@
 
 namespace partiemc::server {
 
-/// A result as its transport made it for watchers: immutable, one for all of them.
+/// A result in the form of its transport. Immutable, shared by all watchers.
 class WatchFrame {
  public:
   explicit WatchFrame(std::size_t bytes) : WatchFrame(bytes, bytes) {}
   WatchFrame(std::size_t bytes, std::size_t memory) : bytes_(bytes), memory_(memory) {}
   virtual ~WatchFrame() = default;
 
-  /// Of the message.
+  /// Size of the message.
   std::size_t bytes() const { return bytes_; }
-  /// That is kept by whoever keeps the frame: with what its answer has beside it, a checkpoint say.
+  /// Bytes of memory that the frame keeps alive, including other parts of its response.
   std::size_t memory() const { return memory_; }
 
  private:
   const std::size_t bytes_, memory_;
 };
 
-/// A result of a stream and its number: 1 for the first, then one more each. Refused frames use up
-/// sequence numbers, but none of these.
+/// A result of a stream with its number, which counts results from 1. Refused frames have sequence
+/// numbers, but no result numbers.
 struct Published {
   std::shared_ptr<const WatchFrame> frame;
   std::uint64_t number = 0;
-  std::uint64_t sequence = 0;  ///< Of the producer's frame.
+  std::uint64_t sequence = 0;  ///< Sequence number of the producer's frame.
 };
 
-/// What a published frame costs beside its bytes, roughly: so many small ones count as what they
-/// are.
+/// Approximate overhead of a published frame, counted in addition to its bytes.
 inline constexpr std::size_t kPublishedBytes = 512;
 
-/// Put comes from one thread at a time, Take from any thread.
+/// Put: one thread at a time. Take: any thread.
 class ResultMailbox {
  public:
   /// Holds at most `max_bytes`, or one frame.
@@ -48,24 +47,24 @@ class ResultMailbox {
   ResultMailbox(const ResultMailbox&) = delete;
   ResultMailbox& operator=(const ResultMailbox&) = delete;
 
-  /// Wait-free: two exchanges, whatever the other side does. What has not been taken yet stays
-  /// before it, unless that would be too much.
+  /// Wait-free: two atomic exchanges. Keeps earlier frames that were not taken, unless they exceed
+  /// `max_bytes` together.
   void Put(Published published);
 
-  /// Hands over what has come since, the oldest first. Allocates nothing.
+  /// Passes the pending frames to `taker`, oldest first. Allocates nothing.
   void Take(absl::FunctionRef<void(Published)> taker);
 
  private:
   struct Post {
     Published published;
     Post* older = nullptr;
-    std::size_t bytes = 0;  // With all older ones.
+    std::size_t bytes = 0;  // Including all older posts.
   };
 
   static void Delete(Post* newest);
 
   const std::size_t max_bytes_;
-  std::atomic<Post*> posts_ = nullptr;  // The newest one; owned.
+  std::atomic<Post*> posts_ = nullptr;  // The newest post; owned.
 };
 
 }  // namespace partiemc::server

@@ -27,7 +27,7 @@ WatchDispatcher::~WatchDispatcher() {
 }
 
 void WatchDispatcher::Wake(Dispatched& dispatched) {
-  if (dispatched.waiting_.exchange(true)) return;  // Whoever set it puts it into the list.
+  if (dispatched.waiting_.exchange(true)) return;  // The caller that set it adds it to the list.
   dispatched.self_ = dispatched.shared_from_this();
   Dispatched* head = waiting_.load();
   do {
@@ -56,7 +56,7 @@ void WatchDispatcher::Run() {
     for (Dispatched* dispatched = TakeWaiting(); dispatched != nullptr;) {
       Dispatched* const next = dispatched->next_;
       const std::shared_ptr<Dispatched> held = std::move(dispatched->self_);
-      // Before serving: what comes from here on wakes again.
+      // Cleared before Serve, so that later events wake it again.
       dispatched->waiting_.exchange(false);
       if (!stopping_) held->Serve();
       dispatched = next;
@@ -64,7 +64,7 @@ void WatchDispatcher::Run() {
   }
 }
 
-// In the order in which they came.
+// Returns the list in the order of arrival.
 Dispatched* WatchDispatcher::TakeWaiting() {
   Dispatched* reversed = nullptr;
   for (Dispatched* newest = waiting_.exchange(nullptr); newest != nullptr;) {

@@ -1,5 +1,5 @@
-// The thread that carries results from the mailboxes of all streams to their watchers, so that no
-// worker does.
+// The thread that delivers the results of all streams to their watchers, on behalf of the compute
+// threads.
 #pragma once
 
 #include <semaphore.h>
@@ -10,44 +10,43 @@
 
 namespace partiemc::server {
 
-/// Something that the dispatcher serves. May be asked to while it is being served.
+/// An object that the dispatcher serves. Wake may be called during Serve.
 class Dispatched : public std::enable_shared_from_this<Dispatched> {
  public:
   virtual ~Dispatched() = default;
 
  protected:
-  /// Called by the dispatcher's thread alone.
+  /// Called by the dispatcher's thread.
   virtual void Serve() = 0;
 
  private:
   friend class WatchDispatcher;
 
-  std::atomic<bool> waiting_ = false;  // In the dispatcher's list.
-  Dispatched* next_ = nullptr;         // In it.
-  std::shared_ptr<Dispatched> self_;   // While in it.
+  std::atomic<bool> waiting_ = false;  // Whether it is in the dispatcher's list.
+  Dispatched* next_ = nullptr;         // Link of the list.
+  std::shared_ptr<Dispatched> self_;   // Keeps this alive while it is in the list.
 };
 
 class WatchDispatcher {
  public:
   WatchDispatcher();
-  /// Joins. What still waits is not served.
+  /// Joins the thread without serving the remaining objects.
   ~WatchDispatcher();
   WatchDispatcher(const WatchDispatcher&) = delete;
   WatchDispatcher& operator=(const WatchDispatcher&) = delete;
 
-  /// Has `dispatched` served once more after this call began. Takes no lock and never waits; from
-  /// any thread.
+  /// Schedules one more Serve of `dispatched` after this call. Wait-free and thread-safe.
   void Wake(Dispatched& dispatched);
-  /// Returns when all that was woken before has been served.
+  /// Waits until all objects woken before this call have been served.
   void Flush();
 
  private:
   void Run();
   Dispatched* TakeWaiting();
 
-  std::atomic<Dispatched*> waiting_ = nullptr;  // The last one that came.
+  std::atomic<Dispatched*> waiting_ = nullptr;  // Head of the list: the newest object.
   std::atomic<bool> stopping_ = false;
-  sem_t wakes_;  // Posted when the list stops being empty. Never blocks whoever posts.
+  sem_t wakes_;  // Posted when the list becomes non-empty. Posting never blocks.
   std::thread thread_;
 };
 

@@ -1,4 +1,4 @@
-// How watches end, and in which words their watchers are told.
+// The reasons and messages with which watches end.
 #pragma once
 
 #include <cstddef>
@@ -10,30 +10,30 @@
 
 namespace partiemc::server {
 
-/// The reasons for which a watch ends, beside those of StreamStateMachine (proto/PROTOCOL.md).
+/// Reasons of ended watches, in addition to the reasons of streams (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonFellBehind = "FELL_BEHIND";
 inline constexpr std::string_view kReasonWatchedBytes = "WATCHED_BYTES";
 inline constexpr std::string_view kReasonFinished = "FINISHED";
 inline constexpr std::string_view kReasonProducerLost = "PRODUCER_LOST";
 inline constexpr std::string_view kReasonCreditUsed = "CREDIT_USED";
 
-/// Why a watch ends, told to its watcher.
+/// Why a watch ends, for its watcher.
 struct WatchEnd {
   std::string reason;
-  std::string message;  ///< For a person.
-  absl::Status status;  ///< Of the call.
-  /// The number of the stream's last result, where watchers may not have been offered it.
+  std::string message;  ///< For people.
+  absl::Status status;  ///< Status of the call.
+  /// Number of the stream's last result, which may not have been offered to watchers.
   std::uint64_t last_number = 0;
 
-  /// For the watchers of a stream that ended with `status`.
+  /// The end of a stream with `status`.
   static WatchEnd OfStream(const absl::Status& status);
-  /// Says the same as the error that ends the call.
+  /// The end with the reason and message of `status`.
   static WatchEnd With(absl::Status status);
-  /// Of one in mode `every` that does not take what waits for it, frames of so many bytes.
+  /// The end of a watch in mode `every` whose pending frames exceed `max_bytes`.
   static WatchEnd FellBehind(std::size_t frames, std::size_t bytes, std::size_t max_bytes);
-  /// Likewise where they are not in the stream's history any more.
+  /// The end of a watch whose next frames have left the history.
   static WatchEnd NoLongerHeld(std::uint64_t frames);
-  /// Of a frame that no watcher may hold.
+  /// The end of a watch whose next frame exceeds `max_bytes`.
   static WatchEnd TooLarge(std::size_t bytes, std::size_t max_bytes);
 };
 

@@ -43,7 +43,7 @@ void WatchRegistry::Leave(const WatchStateMachine& watcher) {
   const std::lock_guard lock(mutex_);
   placed_.erase(&watcher);
   watchers_.erase(&watcher);
-  // With the lock held: whoever waits for the last one may take the registry away after that.
+  // Notifies with the lock held: the waiting thread may delete the registry afterwards.
   left_.notify_all();
 }
 
@@ -61,7 +61,7 @@ std::uint64_t WatchRegistry::held_bytes() const {
 std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Without the lock: one that ends may leave at once.
+  // Without the lock, because a watch may call Leave at once.
   for (const auto& watcher : All()) {
     look_again = std::min(look_again, watcher->EndIfSilent(limit, now));
   }
@@ -75,7 +75,7 @@ std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
   return all;
 }
 
-// Machines are told without the lock: one that drains may leave at once.
+// Calls machines without the lock, because a watch may call Leave at once.
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
   {
     const std::lock_guard lock(mutex_);

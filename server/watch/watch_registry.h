@@ -1,4 +1,4 @@
-// The watchers of this server: how many may come in, and how all are sent home.
+// The watchers of this server: their limit and their drain.
 #pragma once
 
 #include <chrono>
@@ -18,35 +18,36 @@ namespace partiemc::server {
 
 inline constexpr std::string_view kReasonTooManyWatchers = "TOO_MANY_WATCHERS";
 
-/// Safe from any thread.
+/// Thread-safe.
 class WatchRegistry {
  public:
   explicit WatchRegistry(std::uint32_t max_watchers) : max_watchers_(max_watchers) {}
 
-  /// A watcher comes in, before it has said what it wants to watch: those are counted elsewhere
-  /// (OpeningCalls). Errors, with a Violation: UNAVAILABLE (DRAINING).
+  /// Registers a watcher before its first request; OpeningCalls counts those. Errors, with a
+  /// Violation: UNAVAILABLE (DRAINING).
   absl::Status Enter(std::shared_ptr<WatchStateMachine> watcher);
-  /// It has said so, and gets a place. Errors, each with a Violation: RESOURCE_EXHAUSTED
-  /// (TOO_MANY_WATCHERS, CALLER_WATCHERS).
+  /// Takes a slot for a watcher after its first request. Errors, with a Violation:
+  /// RESOURCE_EXHAUSTED (TOO_MANY_WATCHERS, CALLER_WATCHERS).
   absl::Status Open(const WatchStateMachine& watcher, const Caller& caller = {});
-  /// Its last word is about to be sent: its place is free.
+  /// Frees the slot of a watcher whose end is about to be sent.
   void Close(const WatchStateMachine& watcher);
-  /// Its last word has been sent.
+  /// Removes a watcher whose end has been sent.
   void Leave(const WatchStateMachine& watcher);
 
-  /// Of those that have a place.
+  /// Number of watchers with a slot.
   std::size_t count() const;
-  /// Of results that watchers have not taken yet, counted for each although they share them.
+  /// Bytes of pending results, counted per watcher although watchers share them.
   std::uint64_t held_bytes() const;
 
-  /// Ends those that have not said for `limit` what they want to watch. Gives the time before which
-  /// none of those that are here now will have.
+  /// Ends watchers without a first request for `limit`. Returns the earliest time at which another
+  /// one can reach the limit.
   std::chrono::steady_clock::time_point EndSilent(std::chrono::milliseconds limit,
                                                   std::chrono::steady_clock::time_point now);
 
-  /// Lets nobody in any more and ends every watch. Those that cannot be told by `patience` are cut.
+  /// Refuses new watchers and ends every watch. Cuts watches that do not accept their end by
+  /// `patience`.
   void Drain(std::chrono::steady_clock::time_point patience);
-  /// Whether all have left before the deadline.
+  /// Waits until all watchers have left. Returns false at the deadline.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
 
  private:

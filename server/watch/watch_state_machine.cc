@@ -14,7 +14,7 @@ absl::Status WatcherGone() { return absl::CancelledError("the watcher went away"
 
 }  // namespace
 
-// Lets something happen to the state and does what follows from it.
+// Applies an event to the state under the lock, then performs the resulting actions without it.
 template <typename Event>
 void WatchStateMachine::On(Event event) {
   Actions actions;
@@ -61,8 +61,8 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
   }
 }
 
-// The watcher joins before it is told that it is in, so that it misses nothing that is published
-// after that. Nothing is written, and nothing ends, until then.
+// Joins before `opened` is written, so that the watcher misses no result published afterwards.
+// Nothing is written and nothing ends before that.
 void WatchStateMachine::Opened(const absl::StatusOr<WatchTerms>& terms) {
   On([&] {
     opening_ = false;
@@ -100,7 +100,7 @@ void WatchStateMachine::ReadEnded() {
 }
 
 void WatchStateMachine::WriteDone(bool ok) {
-  Published written;  // Its memory is given back without the lock.
+  Published written;  // Freed without the lock.
   On([&] {
     writing_ = false;
     if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
@@ -118,7 +118,7 @@ void WatchStateMachine::Offer(std::span<const Published> frames) {
     for (const Published& published : frames) {
       if (phase_ != Phase::kWatching) return;
       if (published.number <= offered_) continue;
-      // A frame that the history has no room for comes here alone, in its turn.
+      // A frame that does not fit into the history is only offered.
       if (published.number == next_held_ && !IsHeld(next_held_)) CatchUp();
       if (next_held_ == 0) {
         Take(published);
@@ -155,7 +155,7 @@ bool WatchStateMachine::IsHeld(std::uint64_t number) const {
   return broadcaster_->Held(number).number == number;
 }
 
-// Instead of holding it, and what waits before it, where the history has all of it.
+// Drops the pending frames if the history has all of them, to read them there later.
 bool WatchStateMachine::LeaveToHistory(const Published& published) {
   const std::uint64_t first = pending_.empty() ? published.number : pending_.front().number;
   if (!IsHeld(first)) return false;
@@ -165,12 +165,12 @@ bool WatchStateMachine::LeaveToHistory(const Published& published) {
   return true;
 }
 
-// With credit, the next frame of the history is then pending.
+// Makes the next frame of the history pending if there is credit.
 void WatchStateMachine::TakeHeld() {
   Published held = broadcaster_->Held(next_held_);
   if (held.number != next_held_) {
-    if (next_held_ > offered_) return CatchUp();  // It is about to be offered.
-    // Before its first frame a watcher has missed nothing: it begins with what is left.
+    if (next_held_ > offered_) return CatchUp();  // It will be offered.
+    // Before its first frame a watcher starts with the oldest remaining frame.
     if (mode_ == WatchMode::kEvery && counts_.frames > 0) {
       return End(WatchEnd::NoLongerHeld(offered_ + 1 - next_held_));
     }
@@ -187,7 +187,7 @@ void WatchStateMachine::TakeHeld() {
   pending_.push_back(std::move(held));
 }
 
-// All before the next one has been taken out of the history: that one will be offered.
+// The watcher has read the whole history; the next frame will be offered.
 void WatchStateMachine::CatchUp() {
   offered_ = std::max(offered_, next_held_ - 1);
   next_held_ = 0;
@@ -290,16 +290,16 @@ void WatchStateMachine::DropPending() {
   CatchUp();
 }
 
-// What is held is given up: there is no time to wait for credit, or no sense in it.
+// Drops pending frames instead of waiting for credit.
 void WatchStateMachine::End(WatchEnd end) {
-  if (phase_ == Phase::kEnding && !owes_ended_) return;  // Another end has been told.
+  if (phase_ == Phase::kEnding && !owes_ended_) return;  // Another end has been sent.
   phase_ = Phase::kEnding;
   end_ = std::move(end);
   owes_ended_ = true;
   DropPending();
 }
 
-// Before the watch was open: the status says it all.
+// Ends a watch that is not open yet by its status alone.
 void WatchStateMachine::Refuse(absl::Status status) {
   if (phase_ != Phase::kOpening) return;
   phase_ = Phase::kEnding;

@@ -89,6 +89,28 @@ TEST(Attributes, ReproducesLinearFieldAtEveryVertex) {
   }
 }
 
+TEST(Attributes, KeepTheirNamesWithoutVertices) {
+  const Cloud cloud(0.3);
+  const auto reconstructor = Reconstructor::Create({.spacing = 1});
+  State state;
+  Workspace workspace;
+  Result result;
+  const std::vector<Attribute> attributes = {{"pressure", 1, cloud.linear}};
+  ASSERT_TRUE(reconstructor
+                  ->Reconstruct({.positions = cloud.positions, .attributes = attributes}, state,
+                                workspace, result)
+                  .ok());
+  const std::vector<Attribute> others = {{"stress", 2, {}}};
+  ASSERT_TRUE(reconstructor
+                  ->Reconstruct({.positions = std::span<const float>(), .attributes = others},
+                                state, workspace, result)
+                  .ok());
+  ASSERT_EQ(result.attributes.size(), 1u);
+  EXPECT_EQ(result.attributes[0].name, "stress");
+  EXPECT_EQ(result.attributes[0].components, 2);
+  EXPECT_THAT(result.attributes[0].values, testing::IsEmpty());
+}
+
 TEST(Attributes, ChangeNothingElse) {
   const Cloud cloud(0.3);
   const std::vector<Attribute> attributes = {{"pressure", 1, cloud.linear}};

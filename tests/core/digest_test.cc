@@ -67,8 +67,8 @@ TEST(Digest, OfTheExampleOfTheProtocolIsTheOneThatStandsThere) {
   };
   expect_told("rings_digest    0x%016llx\n", DigestRings(rings));
   expect_told("mesh_digest     0x%016llx\n", DigestMesh(mesh));
-  expect_told("the one number 0: 0x%016llx and", DigestRings(Rings{}));
-  expect_told("for the empty mesh, 0x%016llx.", DigestMesh(Mesh{}));
+  expect_told("`rings_digest` is 0x%016llx;", DigestRings(Rings{}));
+  expect_told("`mesh_digest` of an empty mesh is 0x%016llx.", DigestMesh(Mesh{}));
 }
 
 TEST(Digest, TellsEveryChangeOfGeometryApart) {

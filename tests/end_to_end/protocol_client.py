@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A client of partiemc.v1, written from proto/PROTOCOL.md ("A whole client, in words") and the .proto
+"""A client of partiemc.v1, written from proto/PROTOCOL.md ("Write a client") and the .proto
 alone, and a test of both: streams the bundled dam break to a server of its own, loses its call in
 the middle, resumes, and computes every digest itself.
 

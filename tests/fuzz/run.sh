@@ -22,7 +22,7 @@ readonly round_seconds=30
 # stay small: what they break is rarely a matter of size, and small ones are fast. Those that are kept
 # are as many and as large as a repository bears.
 readonly large_bytes=1048576 small_bytes=2048 kept_bytes=400 kept_files=60
-readonly small_targets=' checkpoint expressions frames state watch_requests '
+readonly small_targets=' checkpoint expressions frames relay_peers sections state watch_requests '
 
 seconds=60
 executions=0

@@ -25,7 +25,9 @@ Attack AttackNpz;
 Attack AttackPacked;          // gzip, zstd and deflate, and what reads lines from them.
 Attack AttackRecording;       // A .pemc file, as it is or with its blocks packed as they should be.
 Attack AttackRelayMessages;   // What a replica hears of the stream of another one.
+Attack AttackRelayPeers;      // What several replicas send to one, through its queues.
 Attack AttackResultMessage;   // A server's answer, as the client decodes it.
+Attack AttackSections;        // Frames with attributes, and streams with sections.
 Attack AttackState;           // A serialised State, its checksum put right, and a frame after it.
 Attack AttackStreamRequests;  // A producer's messages, one after the other into the same buffers.
 Attack AttackTextTable;

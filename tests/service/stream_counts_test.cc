@@ -181,6 +181,16 @@ void OpenAndCancel(const std::shared_ptr<grpc::Channel>& channel, std::mt19937& 
   client.Finish();
 }
 
+TEST_F(StreamCosts, InfoExplainsEveryDoubt) {
+  const v1::GetServerInfoResponse info = Info();
+  ASSERT_EQ(info.doubts_size(), v1::Doubt_MAX);
+  for (const v1::DoubtText& doubt : info.doubts()) {
+    EXPECT_NE(doubt.doubt(), v1::DOUBT_UNSPECIFIED);
+    EXPECT_FALSE(doubt.name().empty());
+    EXPECT_FALSE(doubt.explanation().empty());
+  }
+}
+
 TEST_F(StreamCosts, OpenedAndClosedStreamsLeaveNothing) {
   Repeat(1000, OpenAndClose);
   const double before = SettledMib();

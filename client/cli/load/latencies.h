@@ -1,4 +1,4 @@
-// Times of answers: what they are like, and whether they have settled.
+// Percentiles of response times, and whether they have settled.
 #pragma once
 
 #include <cstddef>
@@ -8,16 +8,16 @@
 
 namespace partiemc::client {
 
-/// In milliseconds, by nearest rank: p50 is the least time that half of the answers did not exceed.
+/// In milliseconds, by nearest rank.
 struct Percentiles {
   std::size_t count = 0;
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
-/// All 0 of none. Sorts `times`.
+/// All 0 if `times` is empty. Sorts `times`.
 Percentiles PercentilesOf(std::vector<double>& times);
 
-/// Whether two windows of equal length tell the same: their medians and their 99th percentiles
-/// differ by at most 5 %, or .2 ms. Of windows without answers, no.
+/// Whether medians and 99th percentiles of two windows of equal length differ by at most 5 % or
+/// .2 ms. False if a window is empty.
 bool HaveSettled(const Percentiles& before, const Percentiles& after);
 
 /// Collects times from many threads.
@@ -27,7 +27,7 @@ class Latencies {
     const std::lock_guard lock(mutex_);
     times_.push_back(milliseconds);
   }
-  /// What has come since the last call.
+  /// The times added since the last call.
   std::vector<double> Take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(times_, {});

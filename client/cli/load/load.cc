@@ -34,9 +34,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Compared with each other, until they tell the same.
+// Length of a window. The run ends once consecutive windows agree (HaveSettled).
 constexpr std::chrono::seconds kWindow(2);
-// More than are ever in flight.
+// Larger than any number of frames in flight.
 constexpr std::size_t kRemembered = 4096;
 
 double Milliseconds(Clock::duration time) {
@@ -54,7 +54,7 @@ double CpuSecondsOf(std::thread& thread) {
   return pthread_getcpuclockid(thread.native_handle(), &clock) == 0 ? SecondsOf(clock) : 0;
 }
 
-// What all threads share.
+// State that all threads share.
 struct Shared {
   const LoadFlags& flags;
   std::vector<std::vector<float>> frames;
@@ -85,6 +85,7 @@ class LoadedStream {
 
   absl::Status Open() {
     StreamOptions options{.name = name_, .credentials = shared_.flags.server.credentials};
+    options.reconnect.give_up_after = kShortPatience;
     options.parameters.spacing = 1;
     auto stream = Stream::Open(shared_.flags.server.address, options);
     if (!stream.ok()) return stream.status();
@@ -93,7 +94,7 @@ class LoadedStream {
   }
 
   void Start(Clock::time_point start) {
-    // Streams are out of step, as simulators are.
+    // Streams start at different times within a period, as independent simulators do.
     start_ = start + PeriodTimes(static_cast<double>(number_) / shared_.flags.streams);
     sender_ = std::thread([this] { Send(); });
     receiver_ = std::thread([this] { Receive(); });
@@ -104,10 +105,10 @@ class LoadedStream {
     receiver_.join();
   }
 
-  // Of its two threads, which do most of what gRPC does for them, too.
+  // Processor time of the two threads, which includes most of gRPC's work.
   double CpuSeconds() { return CpuSecondsOf(sender_) + CpuSecondsOf(receiver_); }
 
-  // When the producer had the answer to a frame; nothing while it has not.
+  // Arrival time of the response to a frame; empty before.
   std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
     const auto at = answered_at_[sequence % kRemembered].load();
     if (at == Clock::duration::rep{0}) return std::nullopt;
@@ -155,7 +156,7 @@ class LoadedStream {
       const Clock::time_point due{Clock::duration(due_[event.sequence % kRemembered].load())};
       shared_.answers.Add(Milliseconds(now - due));
       ++shared_.answered;
-      // Late: the next one was due before.
+      // Late: the response came after the next frame was due.
       if (shared_.flags.rate > 0 && now > due + PeriodTimes(1)) ++shared_.late;
     }
   }
@@ -169,7 +170,7 @@ class LoadedStream {
   std::thread sender_, receiver_;
 };
 
-// Receives what a stream shows, from when it has frames until it ends.
+// Watches a stream until it ends.
 void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& server) {
   const auto watcher =
       Watcher::Open(server, stream.name(), {.credentials = shared.flags.server.credentials});
@@ -184,7 +185,7 @@ void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& 
     if (*got == Received::kEnd) return;
     if (*got != Received::kEvent) continue;
     const auto now = Clock::now();
-    // A watcher may have it first.
+    // The watcher may receive the result before the producer.
     const auto answered = stream.AnsweredAt(frame.sequence);
     shared.watches.Add(answered ? std::max(Milliseconds(now - *answered), 0.0) : 0.0);
   }
@@ -204,18 +205,18 @@ double MemoryMb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-// What is told in the end: of all windows but the first, in which buffers grow.
+// Results of all windows except the first, in which buffers grow.
 struct Figures {
   double seconds = 0;
   bool settled = false;
   Percentiles answers, watches;
   std::uint64_t frames = 0, late = 0, refused = 0;
-  double client_cpu_ms = 0, producer_cpu_ms = 0;  // A frame.
+  double client_cpu_ms = 0, producer_cpu_ms = 0;  // Per frame.
   double client_memory_mb = 0;
   std::optional<double> server_cpu_ms, server_memory_mb;
 };
 
-// Waits for answers until percentiles have settled, time is over, or somebody ends it.
+// Collects response times until the percentiles have settled, the time is up, or a signal arrives.
 absl::StatusOr<Figures> Measure(Shared& shared,
                                 const std::vector<std::unique_ptr<LoadedStream>>& streams) {
   const LoadFlags& flags = shared.flags;
@@ -335,47 +336,47 @@ std::string JsonOf(const LoadFlags& flags, const Figures& figures) {
 }  // namespace
 
 CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
-  CLI::App* verb = app.add_subcommand("load", "Measure what a server bears");
+  CLI::App* verb = app.add_subcommand("load", "Measure the capacity of a server");
   AddServerFlags(*verb, flags.server, "Server");
-  verb->add_option("--streams", flags.streams, "Streams at once")
+  verb->add_option("--streams", flags.streams, "Number of concurrent streams")
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str()
       ->type_name("N");
-  verb->add_option("--particles", flags.particles, "Particles of each frame")
+  verb->add_option("--particles", flags.particles, "Number of particles per frame")
       ->check(CLI::Range(1, 10'000'000))
       ->capture_default_str()
       ->type_name("N");
-  verb->add_option("--rate", flags.rate,
-                   "Frames a second of each stream; 0: the next one as soon as there is room")
+  verb->add_option("--rate", flags.rate, "Frames per second and stream; 0: as fast as possible")
       ->check(CLI::Range(0.0, 100'000.0))
       ->capture_default_str()
       ->type_name("FPS");
-  verb->add_option("--watchers", flags.watchers, "Watchers, spread over the streams")
+  verb->add_option("--watchers", flags.watchers, "Number of watchers, distributed over the streams")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str()
       ->type_name("N");
   verb->add_option(
           "--watch-servers", flags.watch_servers,
-          "Watchers ask these in turns: other replicas of --server, which share its streams")
+          "Servers of the watchers, used in turn: replicas that share the streams of --server")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("ADDRESS,...");
-  verb->add_flag("--no-ids", flags.no_ids, "Particles have no ids");
-  verb->add_option("--seconds", flags.seconds,
-                   "At most so long; it ends before, once the median and the 99th percentile of "
-                   "two seconds are those of the two before")
+  verb->add_flag("--no-ids", flags.no_ids, "Send no ids");
+  verb->add_option(
+          "--seconds", flags.seconds,
+          "Longest duration, in seconds. The run ends earlier once median and 99th percentile "
+          "of two consecutive windows of two seconds agree")
       ->check(CLI::Range(4.0, 1e6))
       ->capture_default_str()
       ->type_name("S");
   verb->add_option("--metrics", flags.metrics,
-                   "The server's --metrics: tells its processor time and memory, too")
+                   "Address of the server's --metrics, to report its processor time and memory")
       ->type_name("HOST:PORT");
-  verb->add_flag("--json", flags.json, "Print an object instead of a table");
-  verb->add_flag("--quiet", flags.quiet, "Say nothing while it runs");
+  verb->add_flag("--json", flags.json, "Print one JSON object instead of a table");
+  verb->add_flag("--quiet", flags.quiet, "No progress");
   verb->footer(
-      "An answer's time counts from when its frame was due, so that a server that falls behind\n"
-      "shows it; a watcher's from when the producer had the answer. Exit code 0: nothing failed\n"
-      "or was refused.\n"
+      "A response time counts from the moment at which the frame was due, so a server that falls\n"
+      "behind has growing times. A watcher's time counts from the arrival of the producer's\n"
+      "response. Exit code 0: nothing failed and no frame was refused.\n"
       "Examples:\n"
       "  partiemc-server --metrics 127.0.0.1:9464 &\n"
       "  partiemc load --streams 8 --metrics 127.0.0.1:9464\n"

@@ -1,4 +1,4 @@
-// `partiemc load`: what a server bears.
+// `partiemc load`: measures the capacity of a server.
 #pragma once
 
 #include <string>
@@ -15,10 +15,10 @@ namespace partiemc::client {
 struct LoadFlags {
   ServerFlags server;
   int streams = 4;
-  int particles = 10'000;  ///< Of each frame.
-  double rate = 30;        ///< Frames a second of each stream; 0: as fast as they are answered.
-  int watchers = 0;        ///< Of all streams together.
-  std::vector<std::string> watch_servers;  ///< That they ask in turns; empty: `server`.
+  int particles = 10'000;  ///< Per frame.
+  double rate = 30;        ///< Frames per second and stream; 0: as fast as possible.
+  int watchers = 0;        ///< In total.
+  std::vector<std::string> watch_servers;  ///< Servers of the watchers, in turn; empty: `server`.
   bool no_ids = false;
   double seconds = 60;
   std::string metrics;
@@ -26,7 +26,7 @@ struct LoadFlags {
   bool quiet = false;
 };
 
-/// Adds the verb to `app`; its flags go to `flags`, which must outlive the parsing.
+/// Adds the verb to `app`. Requires: `flags` outlives the parsing.
 CLI::App* AddLoad(CLI::App& app, LoadFlags& flags);
 
 int Load(const LoadFlags& flags);

@@ -8,8 +8,8 @@
 
 namespace partiemc::client {
 
-/// A disc of particles on a lattice of spacing 1, whose centre moves on a circle, by a spacing from
-/// frame to frame: x0, y0, x1, y1, ... of each frame of one turn. Requires: particles > 0.
+/// Frames of a disc of particles on a lattice of spacing 1: x0, y0, x1, y1, ... The centre of the
+/// disc moves on a circle by one spacing per frame. Requires: particles > 0.
 inline std::vector<std::vector<float>> LoadFrames(int particles) {
   constexpr int kFrames = 16;
   constexpr double kOrbit = kFrames / (2 * std::numbers::pi);

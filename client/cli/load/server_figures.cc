@@ -12,7 +12,7 @@
 namespace partiemc::client {
 namespace {
 
-// The number behind a name at the beginning of a line.
+// The number that follows a name at the beginning of a line.
 std::optional<double> ValueOf(std::string_view text, std::string_view name) {
   const std::string begin = Concat("\n", name, " ");
   const auto at = text.find(begin);
@@ -23,7 +23,7 @@ std::optional<double> ValueOf(std::string_view text, std::string_view name) {
   return end != rest.c_str() ? std::optional(value) : std::nullopt;
 }
 
-// A connection with five seconds for each step; -1 if there is none.
+// Connects with a timeout of five seconds per step. Returns the descriptor, or -1.
 int Connect(const std::string& host, const std::string& port) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;

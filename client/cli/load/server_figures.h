@@ -1,4 +1,4 @@
-// What a server tells of itself to Prometheus.
+// Reads processor time and memory of a server from its metrics.
 #pragma once
 
 #include <optional>
@@ -14,11 +14,11 @@ struct ServerFigures {
   double memory_bytes = 0;
 };
 
-/// Of the text that Prometheus reads; nothing where it lacks one of them.
+/// Parses the text format of Prometheus. Empty if a figure is missing.
 std::optional<ServerFigures> FiguresIn(std::string_view text);
 
-/// Asks http://HOST:PORT/metrics. Errors: INVALID_ARGUMENT for another form of address,
-/// UNAVAILABLE where nobody answers, DATA_LOSS for an answer without the figures.
+/// Requests http://HOST:PORT/metrics. Errors: INVALID_ARGUMENT for another form of address,
+/// UNAVAILABLE without a response, DATA_LOSS for a response without the figures.
 absl::StatusOr<ServerFigures> AskFigures(const std::string& address);
 
 }  // namespace partiemc::client

@@ -1,4 +1,4 @@
-// A queue between two threads that holds a few elements and no more: back-pressure.
+// A bounded queue between two threads. A full queue blocks the producer (back pressure).
 #pragma once
 
 #include <condition_variable>
@@ -15,7 +15,7 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  /// Waits for room. False, and `value` is dropped, once the queue is closed.
+  /// Waits for capacity. Returns false and drops `value` if the queue is closed.
   bool Push(T value) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return closed_ || values_.size() < capacity_; });
@@ -25,7 +25,7 @@ class BoundedQueue {
     return true;
   }
 
-  /// Waits for a value. Nothing once the queue is closed and empty.
+  /// Waits for a value. Empty if the queue is closed and has no more values.
   std::optional<T> Pop() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return closed_ || !values_.empty(); });
@@ -36,7 +36,7 @@ class BoundedQueue {
     return value;
   }
 
-  /// No more values; those inside are still delivered.
+  /// Rejects further values. Queued values are still delivered.
   void Close() {
     const std::scoped_lock lock(mutex_);
     closed_ = true;

@@ -101,7 +101,7 @@ void FrameFeeder::SendAll() {
       return;
     }
   }
-  // An error ends the stream, and is told by Receive.
+  // An error ends the stream; Receive reports it.
   (latest ? latest->Finish() : stream_.FinishSending()).IgnoreError();
 }
 
@@ -119,11 +119,11 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
               .components = recorded.components,
               .volumes = recorded.volumes,
               .ids = recorded.ids};
-  // Without a time, velocities tell nothing of the way from frame to frame.
+  // Velocities are useless without times: the distance between two frames is unknown.
   if (recorded.time) frame.velocities = recorded.velocities;
   ViewAttributes(recorded);
   frame.attributes = attributes_;
-  if (recorded.float32) {  // Half of the bytes, and nothing is lost.
+  if (recorded.float32) {  // Half of the bytes, without loss.
     as_float32_.assign(recorded.positions.size(), 0);
     for (std::size_t k = 0; k < as_float32_.size(); ++k) {
       as_float32_[k] = static_cast<float>(recorded.positions[k]);
@@ -133,7 +133,7 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
   return frame;
 }
 
-// Those that are asked for, as far as they are there: the stream tells which one is not.
+// Views the requested attributes that exist. The stream reports a missing one.
 void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
   attributes_.clear();
   for (const std::string& name : attribute_names_) {
@@ -150,7 +150,7 @@ bool FrameFeeder::SendOne(FramePointer owned) {
   const RecordedFrame& recorded = *owned;
   const Frame frame = View(recorded);
   {
-    // Before it is sent: its answer may be there before Send returns.
+    // Before Send, because the response may arrive before Send returns.
     const std::scoped_lock lock(mutex_);
     unanswered_.push_back(std::move(owned));
   }
@@ -166,14 +166,14 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
   const Frame frame = View(recorded);
   const double time = TimeOf(recorded);
   {
-    // Before it is offered: it may be sent, and answered, before Offer returns.
+    // Before Offer, because the response may arrive before Offer returns.
     const std::scoped_lock lock(mutex_);
     offered_.push_back(std::move(owned));
   }
   return sender.Offer(frame, time).ok();
 }
 
-// Frames are sent and skipped in the order in which they were offered.
+// The sender sends and skips frames in the order of Offer.
 OfferHooks FrameFeeder::Hooks() {
   return {.sending =
               [this](std::uint64_t) {

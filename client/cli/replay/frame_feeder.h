@@ -1,11 +1,10 @@
-// The sending half of a replay: input -> two frames read ahead -> stream.
+// The sending half of a replay: input -> read-ahead queue of two frames -> stream.
 //
 //   reader thread    Sequence::Next -> queue of two
-//   sender thread    queue -> pace -> FrameStream::Send, or LatestSender::Offer -> frames that wait
-//                    for their answers
-//   caller           TakeAnswered for each answer, in order; Recycle when the frame is done with
+//   sender thread    queue -> pace -> FrameStream::Send or LatestSender::Offer -> unanswered frames
+//   caller           TakeAnswered for each response, in order; Recycle after use
 //
-// Memory: the queue, the window of the stream and one frame in each hand.
+// Memory: the queue, the window of the stream, and one frame per thread.
 #pragma once
 
 #include <condition_variable>
@@ -27,39 +26,39 @@
 
 namespace partiemc::client {
 
-/// What happens to frames that come faster than the stream takes them.
+/// What to do with frames while the stream is busy.
 enum class SendPolicy {
-  kBlock,   ///< They wait; none is lost.
-  kLatest,  ///< The newest one is sent, as a simulator does that never waits; others are skipped.
+  kBlock,   ///< Wait; no frame is lost.
+  kLatest,  ///< Send the newest frame, skip and count the others.
 };
 
 class FrameFeeder {
  public:
-  /// A frame that was refused before it was sent, hence without an answer.
+  /// A frame that the library refused to send. It has no response.
   struct Refused {
     std::string source;
     std::string message;
   };
 
-  /// Starts at once. `input` and `stream` must outlive it. Absent rate: as fast as it goes. Of what
-  /// particles carry besides, `attributes` are sent along.
+  /// Starts both threads. Requires: `input` and `stream` outlive it. Without a rate it sends as
+  /// fast as possible. `attributes` names the attributes to send.
   FrameFeeder(Sequence& input, FrameStream& stream, std::optional<double> frames_per_second,
               SendPolicy policy, std::vector<std::string> attributes);
-  /// Stops as Stop does.
+  /// Calls Stop and Join.
   ~FrameFeeder();
 
-  /// The frame that the answer just received belongs to. Requires: called once for each result or
-  /// refusal, in their order.
+  /// The frame of the response received last. Requires: one call for each result or refusal, in
+  /// order.
   std::unique_ptr<RecordedFrame> TakeAnswered();
   void Recycle(std::unique_ptr<RecordedFrame> frame);
   std::vector<Refused> TakeRefused();
-  /// Frames that were not sent because newer ones came.
+  /// Number of frames that newer ones replaced before they were sent.
   std::uint64_t skipped_count() const;
 
   /// Cancels the stream and reads no further.
   void Stop();
-  /// Waits for both threads. To be called when the stream has ended, or after Stop.
-  /// Errors: that of the input.
+  /// Waits for both threads. Requires: the stream has ended, or Stop was called.
+  /// Errors: the error of the input.
   absl::Status Join();
 
  private:
@@ -81,15 +80,15 @@ class FrameFeeder {
   const SendPolicy policy_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   BoundedQueue<FramePointer> read_ahead_{2};
-  absl::Status input_status_;  // Of the reader thread until it is joined.
+  absl::Status input_status_;  // Owned by the reader thread until Join.
   const std::vector<std::string> attribute_names_;
-  std::vector<float> as_float32_;      // Of the sender thread alone.
+  std::vector<float> as_float32_;      // Owned by the sender thread.
   std::vector<Attribute> attributes_;  // Likewise.
 
   mutable std::mutex mutex_;
   std::condition_variable stopped_;
   bool stop_ = false;
-  std::deque<FramePointer> offered_;  // And neither being sent nor skipped.
+  std::deque<FramePointer> offered_;  // Neither sent nor skipped yet.
   std::deque<FramePointer> unanswered_;
   std::uint64_t skipped_ = 0;
   std::vector<FramePointer> free_;

@@ -1,4 +1,4 @@
-// An input that begins anew when it ends.
+// An input that starts over at its end.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +14,11 @@
 
 namespace partiemc::client {
 
-/// The frames of `input` again and again, as they are recorded: times go back with each round, so
-/// that no velocity counts from its last frame to its first. Ends when the input cannot be read any
-/// more, or has become empty.
+/// Repeats the frames of `input` with their recorded times. Times decrease at each new round, so
+/// the stream uses no velocity across it. Ends if the input cannot be read again or is empty.
 class LoopedInput final : public Sequence {
  public:
-  /// `first`: what OpenInput made of the other two.
+  /// `first` is OpenInput(input, options).
   LoopedInput(InputSource first, std::string input, SequenceOptions options)
       : frames_(std::move(first.frames)), input_(std::move(input)), options_(std::move(options)) {}
 

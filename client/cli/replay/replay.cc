@@ -24,13 +24,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How soon Ctrl-C is seen while no answer comes.
+// Poll interval for Ctrl-C while waiting for a response.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
-// A name that a server takes: 128 bytes at most, nothing that a terminal would obey.
+// The name of the input as a label: at most 128 bytes, printable.
 std::string InputLabel(const std::string& input) {
   std::string label = Printable(BaseName(input)).substr(0, 128);
-  while (!IsPrintable(label)) label.pop_back();  // A character that was cut.
+  while (!IsPrintable(label)) label.pop_back();  // The cut may split a character.
   return label;
 }
 
@@ -44,27 +44,36 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
     if (!stream.ok()) return stream.status();
     return *std::move(stream);
   }
-  const auto deadline = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(flags.deadline_seconds));
+  const std::chrono::milliseconds patience = flags.policy == "latest" ? kShortPatience : kPatience;
   const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
-  auto stream =
-      Stream::Open(servers.front(), {.name = flags.name,
-                                     .parameters = parameters,
-                                     .outputs = {.mesh = parameters.fill != Fill::kNone,
-                                                 .normals = normals,
-                                                 .echo_particles = flags.echo_particles,
-                                                 .attributes = flags.sequence.attributes},
-                                     .labels = {{"input", InputLabel(flags.input)}},
-                                     .credentials = flags.server.credentials,
-                                     .deadline = deadline,
-                                     .fallback_addresses = {servers.begin() + 1, servers.end()},
-                                     .checkpoint_interval = flags.checkpoint_interval,
-                                     .reconnect = {.announce = true}});
+  auto stream = Stream::Open(
+      servers.front(),
+      {.name = flags.name,
+       .parameters = parameters,
+       .outputs = {.mesh = parameters.fill != Fill::kNone,
+                   .normals = normals,
+                   .echo_particles = flags.echo_particles,
+                   .attributes = flags.sequence.attributes},
+       .labels = {{"input", InputLabel(flags.input)}},
+       .credentials = flags.server.credentials,
+       .deadline = ToMilliseconds(flags.deadline_seconds),
+       .fallback_addresses = {servers.begin() + 1, servers.end()},
+       .checkpoint_interval = flags.checkpoint_interval,
+       .reconnect = {.give_up_after = flags.give_up_after_seconds
+                                          ? ToMilliseconds(*flags.give_up_after_seconds)
+                                          : patience,
+                     .announce = true}});
   if (!stream.ok()) return stream.status();
   return *std::move(stream);
 }
 
-// The receiving half of a replay: answers -> check -> outputs, until the stream ends.
+// How a replay ended.
+struct ReplayEnd {
+  ExitCode code = kGood;
+  std::string error = {};  // Empty for kGood and kInterrupted.
+};
+
+// The receiving half of a replay: responses -> check -> outputs, until the stream ends.
 class Receiver {
  public:
   Receiver(const ReplayFlags& flags, FrameStream& stream, FrameFeeder& feeder,
@@ -76,25 +85,20 @@ class Receiver {
         progress_(progress),
         sections_in_plane_(SectionsInPlane(stream.info().parameters)) {}
 
-  /// kGood when every frame was answered, else the code of what ended the replay, which is told
-  /// unless it was Ctrl-C.
-  ExitCode Run() {
+  /// kGood if every frame has a response.
+  ReplayEnd Run() {
     while (!Interrupted()) {
       const auto received = stream_.Receive(event_, kPollInterval);
       for (const auto& refused : feeder_.TakeRefused()) Refuse(refused.source, refused.message);
-      if (!received.ok()) {
-        progress_.Note("partiemc: " + OneLine(received.status()));
-        return kServer;
+      if (!received.ok()) return {kServer, OneLine(received.status())};
+      if (*received == Received::kEnd) return {};
+      if (*received == Received::kNothingYet) {
+        if (const auto lost = stream_.reconnecting()) progress_.Wait(WaitingText(*lost));
+        continue;
       }
-      if (*received == Received::kEnd) return kGood;
-      if (*received == Received::kNothingYet) continue;
-      const absl::Status status = Take();
-      if (!status.ok()) {
-        progress_.Note("partiemc: " + OneLine(status));
-        return kFailed;
-      }
+      if (const absl::Status status = Take(); !status.ok()) return {kFailed, OneLine(status)};
     }
-    return kInterrupted;
+    return {kInterrupted};
   }
 
   std::uint64_t answered() const { return answered_; }
@@ -103,7 +107,7 @@ class Receiver {
  private:
   absl::Status Take() {
     if (event_.kind == Event::Kind::kNotice) {
-      progress_.Note("partiemc: the server says: " + OneLine(event_.message));
+      progress_.Note("partiemc: notice of the server: " + OneLine(event_.message));
       return absl::OkStatus();
     }
     if (event_.kind == Event::Kind::kReconnected) {
@@ -116,7 +120,7 @@ class Receiver {
       Refuse(frame->source, event_.message);
     } else {
       if (flags_.check) Check(frame->source);
-      // A loop has no end: its numbers are not kept.
+      // A loop has no outputs.
       if (!flags_.loop) {
         status = outputs_.Write({.index = frame->index,
                                  .time = event_.time,
@@ -142,7 +146,7 @@ class Receiver {
       valid.Update(Validate(section, fill));
     }
     if (valid.ok()) return;
-    // A placement without guarantees breaks them in almost every frame: one example is enough.
+    // A placement without guarantees breaks them in almost every frame; report it once.
     const std::uint64_t told = KeepsGuarantees(*FindPlacement(flags_.placement)) ? 10 : 1;
     if (++failed_checks_ > told) return;
     progress_.Note(Concat("partiemc: ", source, ": --check: ", OneLine(valid)));
@@ -163,7 +167,7 @@ class Receiver {
   std::uint64_t answered_ = 0, failed_checks_ = 0;
 };
 
-// Why not every frame came through; empty where all did.
+// Why the replay ended early; empty for a complete one.
 std::string WhyEarly(ExitCode ended, const absl::Status& input_status) {
   if (ended == kInterrupted) return "interrupted";
   if (ended == kServer) return "the server was lost, or ended the stream";
@@ -171,7 +175,7 @@ std::string WhyEarly(ExitCode ended, const absl::Status& input_status) {
   return input_status.ok() ? "" : "the input could not be read further";
 }
 
-// Prints what is worth a word once all frames are through, and decides how the program ends.
+// Prints warnings and failures of a complete replay. Returns the exit code.
 ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& parameters,
                   const ReplayOutputs& outputs, std::uint64_t failed_checks) {
   const Summary& summary = outputs.summary();
@@ -179,10 +183,11 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
   for (const std::string& warning : summary.Warnings()) Complain(kGood, warning);
   if (summary.refused_count() > 0 && !flags.keep_going) {
     Complain(kInput, Concat(Plural(summary.refused_count(), "frame"),
-                            " refused, as told above; --keep-going takes that as good"));
+                            " refused, see above; --keep-going exits with 0 nevertheless"));
     code = kInput;
   }
   if (failed_checks > 0) {
+    // Count and report, but do not fail: the placement guarantees nothing.
     const bool expected = !KeepsGuarantees(parameters.placement);
     Complain(kFailed, Concat("--check: ", Plural(failed_checks, "frame"), " of ",
                              summary.frame_count(), " broke a guarantee",
@@ -198,7 +203,7 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
 int Replay(const ReplayFlags& flags) {
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
-  // Some recordings know the spacing that a slice wants.
+  // The recording may hold the spacing that a slice requires.
   const auto without_input = ParametersOf(flags, 1.0);
   if (!without_input.ok()) return Complain(kUsage, without_input.status());
 
@@ -212,7 +217,7 @@ int Replay(const ReplayFlags& flags) {
   if (flags.loop) {
     input->frames = std::make_unique<LoopedInput>(*std::move(input), flags.input, flags.sequence);
   }
-  CatchInterrupts();  // Before there are temporary files to take away.
+  CatchInterrupts();  // Before the first temporary file exists.
   auto outputs = ReplayOutputs::Create(flags, *parameters);
   if (!outputs.ok()) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
@@ -220,7 +225,7 @@ int Replay(const ReplayFlags& flags) {
   }
   const auto stream = OpenStream(flags, *parameters, outputs->WantsNormals());
   if (!stream.ok()) {
-    // This verb can do without a server.
+    // This verb works without a server, too.
     const std::string why = OneLine(stream.status());
     if (!why.starts_with("no server")) return ComplainOfServer(stream.status());
     return Complain(kServer, why + ", or use --local");
@@ -235,8 +240,8 @@ int Replay(const ReplayFlags& flags) {
                      flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock,
                      flags.sequence.attributes);
   Receiver receiver(flags, **stream, feeder, *outputs, progress);
-  const ExitCode ended = receiver.Run();
-  if (ended != kGood) feeder.Stop();
+  const ReplayEnd ended = receiver.Run();
+  if (ended.code != kGood) feeder.Stop();
   const absl::Status input_status = feeder.Join();
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   progress.Finish();
@@ -245,10 +250,10 @@ int Replay(const ReplayFlags& flags) {
     for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
     if (feeder.skipped_count() > 0) {
       Complain(kGood, Concat(Plural(feeder.skipped_count(), "frame"),
-                             " skipped, because newer ones came (--policy latest)"));
+                             " skipped because newer ones arrived (--policy latest)"));
     }
   }
-  const std::string early = WhyEarly(ended, input_status);
+  const std::string early = WhyEarly(ended.code, input_status);
   if (!early.empty()) outputs->EndEarly(early);
   const Summary& summary = outputs->summary();
   absl::Status finished;
@@ -256,15 +261,15 @@ int Replay(const ReplayFlags& flags) {
     finished = outputs->Finish(seconds);
     if (!flags.quiet && finished.ok()) std::fputs(summary.Table(seconds).c_str(), stdout);
   } else if (early.empty()) {
-    return Complain(kInput, Concat(flags.input, ": has no frame to replay; look at --frames"));
+    return Complain(kInput, Concat(flags.input, ": has no frame to replay; check --frames"));
   }
-  // What failed before says why what is left of it cannot be finished.
-  if (!finished.ok() && ended != kFailed) Complain(kFailed, finished);
-  if (ended == kInterrupted) {
+  // After kFailed the outputs cannot be completed, for the same reason.
+  if (!finished.ok() && ended.code != kFailed) Complain(kFailed, finished);
+  if (ended.code == kInterrupted) {
     return Complain(kInterrupted,
                     Concat("interrupted after ", Plural(receiver.answered(), "frame")));
   }
-  if (ended != kGood) return ended;
+  if (ended.code != kGood) return Complain(ended.code, ended.error);
   if (!input_status.ok()) return Complain(kInput, input_status);
   if (!finished.ok()) return kFailed;
   return Conclude(flags, *parameters, *outputs, receiver.failed_checks());

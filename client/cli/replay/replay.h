@@ -1,4 +1,4 @@
-// `partiemc replay`: a recorded sequence through a server, or through the core in this process.
+// `partiemc replay`: sends a recorded sequence to a server, or reconstructs it in this process.
 #pragma once
 
 #include "client/cli/replay_flags.h"

@@ -1,4 +1,4 @@
-// Everything that a replay leaves behind: frames, statistics, report, and the numbers of its table.
+// The outputs of a replay: files, statistics, report and summary.
 #pragma once
 
 #include <optional>
@@ -18,8 +18,8 @@ namespace partiemc::client {
 
 class ReplayOutputs {
  public:
-  /// Opens every output, so that a place that cannot be written is known before the work.
-  /// Errors: INVALID_ARGUMENT for a wrong format or extension, those of AtomicFile.
+  /// Opens every output, so that an unwritable path is reported before the work begins.
+  /// Errors: INVALID_ARGUMENT for a wrong format or extension; the errors of AtomicFile.
   static absl::StatusOr<ReplayOutputs> Create(const ReplayFlags& flags,
                                               const ReconstructionParameters& parameters);
 
@@ -28,10 +28,10 @@ class ReplayOutputs {
 
   absl::Status Write(const FrameRecord& frame);
   void AddRefused() { frames_.AddRefused(); }
-  /// Report and table tell that not all frames came through, and why.
+  /// Report and table state that frames are missing, and why.
   void EndEarly(std::string why) { frames_.EndEarly(std::move(why)); }
 
-  /// Completes statistics and report, which do not exist before, each even if the other fails.
+  /// Writes statistics and report, each even if the other fails. Neither exists before.
   absl::Status Finish(double wall_seconds);
 
   const Summary& summary() const { return frames_.summary(); }

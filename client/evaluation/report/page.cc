@@ -11,11 +11,6 @@
 #include "client/output/html.h"
 #include "client/output/text.h"
 
-namespace partiemc::client::page {
-extern const std::string_view
-    kReportCss;  // The look of the replay's report, which this one shares.
-}
-
 namespace partiemc::evaluation {
 namespace page {
 extern const std::string_view kEvaluationCss;
@@ -297,10 +292,9 @@ std::string EvaluationHtml(const Evaluation& evaluation) {
       "<meta name=\"color-scheme\" content=\"light dark\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
       "style-src 'unsafe-inline'\">\n<title>Evaluation: ",
-      EscapeHtml(evaluation.set), " &middot; PartiEMC</title>\n<style>\n", client::page::kReportCss,
-      page::kEvaluationCss, "</style>\n</head>\n<body>\n<header><h1>",
-      "Evaluation: ", EscapeHtml(evaluation.set), "</h1><p>", EscapeHtml(Subtitle(evaluation)),
-      "</p></header>\n<main>\n");
+      EscapeHtml(evaluation.set), " &middot; PartiEMC</title>\n<style>\n", page::kEvaluationCss,
+      "</style>\n</head>\n<body>\n<header><h1>", "Evaluation: ", EscapeHtml(evaluation.set),
+      "</h1><p>", EscapeHtml(Subtitle(evaluation)), "</p></header>\n<main>\n");
   out += Section("What of the paper reproduces",
                  "Computed from the runs on this page, for the paper&#39;s placement "
                  "(farthest-particle) and for our default (virtual-plane).",

@@ -47,6 +47,16 @@ absl::Status CannotOpen(const std::string& path, int error) {
 
 }  // namespace
 
+bool ExpandsTooMuch(std::uint64_t unpacked, std::uint64_t packed, double max_expansion) {
+  return unpacked > kFreeExpansionBytes &&
+         static_cast<double>(unpacked) > max_expansion * static_cast<double>(packed);
+}
+
+std::string ExpansionRule(double max_expansion) {
+  return Concat("unpacks to more than 64 MiB and ", max_expansion,
+                " times its size; give a larger --max-expansion if it is meant to");
+}
+
 absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path) {
   struct stat found = {};
   if (stat(path.c_str(), &found) != 0) return CannotOpen(path, errno);
@@ -58,17 +68,18 @@ absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path) {
   return std::make_unique<FileSource>(path, file);
 }
 
-absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string& path) {
+absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string& path,
+                                                               double max_expansion) {
   auto file = OpenFile(path);
   if (!file.ok()) return file.status();
   char magic[4] = {};
   const auto count = (*file)->Read(magic, sizeof(magic));
   if (!count.ok()) return count.status();
   const Packing packing = RecognisePacking(std::string_view(magic, *count));
-  // Opened again rather than rewound: a ByteSource only goes forward.
+  // A ByteSource cannot be rewound, so the file is opened again.
   file = OpenFile(path);
   if (!file.ok()) return file.status();
-  auto unpacked = Unpack(packing, path, *std::move(file));
+  auto unpacked = Unpack(packing, path, *std::move(file), max_expansion);
   if (!unpacked.ok()) return unpacked.status();
   return std::unique_ptr<InputStream>(
       new InputStream(path, *std::move(unpacked), packing != Packing::kNone));
@@ -137,7 +148,7 @@ absl::Status ReadUpTo(ByteSource& source, std::size_t size, std::vector<char>& b
   bytes.clear();
   while (bytes.size() < size) {
     const std::size_t old_size = bytes.size();
-    // Doubling: what is allocated stays within twice of what has arrived.
+    // Doubling keeps the allocation within twice the bytes that have arrived.
     const std::size_t step = std::min(size - old_size, std::max(kBlockBytes, old_size));
     bytes.resize(old_size + step);
     const auto count = source.Read(bytes.data() + old_size, step);

@@ -1,7 +1,8 @@
-// Bytes of a file, unpacked on the way, without trust in what the file says about itself.
+// Reads and decompresses files. Declared sizes are not trusted.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -12,15 +13,24 @@
 
 namespace partiemc::client::input {
 
-/// A frame with more particles than this is refused, whatever memory there is (1.1 GB of
-/// positions).
+/// Largest number of particles of a frame (1.1 GB of positions).
 inline constexpr std::size_t kMaxParticles = std::size_t{1} << 26;
 
-/// Bytes in order, once.
+/// Largest ratio of unpacked to packed bytes of a file, beyond kFreeExpansionBytes. Particle dumps
+/// pack to a third of their size, or to a hundredth if nothing moves.
+inline constexpr double kMaxExpansion = 1000;
+inline constexpr std::uint64_t kFreeExpansionBytes = std::uint64_t{64} << 20;
+
+/// Whether `unpacked` bytes are more than `packed` bytes are allowed to become.
+bool ExpandsTooMuch(std::uint64_t unpacked, std::uint64_t packed, double max_expansion);
+/// The broken rule and the remedy, for an error message.
+std::string ExpansionRule(double max_expansion);
+
+/// A stream of bytes that is read once, in order.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
-  /// Reads 1 to `size` bytes; 0 at the end. `size` must not be 0.
+  /// Reads 1 to `size` bytes; 0 at the end. Requires: size > 0.
   virtual absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) = 0;
 };
 
@@ -28,33 +38,36 @@ class ByteSource {
 absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path);
 
 /// A file of text or binary data, plain, gzip or zstd (recognised by its first bytes, not its
-/// name). Reads ahead by blocks of 256 KiB. If the file is damaged, what comes before is delivered
+/// name). Reads ahead by blocks of 256 KiB. The bytes before a damaged place are delivered
 /// first.
 class InputStream final : public ByteSource {
  public:
-  static absl::StatusOr<std::unique_ptr<InputStream>> Open(const std::string& path);
+  /// Errors: also kResourceExhausted for a file that expands too much, when it is read so far.
+  static absl::StatusOr<std::unique_ptr<InputStream>> Open(const std::string& path,
+                                                           double max_expansion = kMaxExpansion);
 
   absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override;
 
-  /// The next `size` bytes or what there is of them, without taking them. `size` <= 64 KiB.
+  /// The next `size` bytes, fewer at the end, without consuming them. Requires: size <= 64 KiB.
   absl::StatusOr<std::string_view> Peek(std::size_t size);
 
-  /// The next line without "\n" or "\r\n", valid until the next call; false at the end. A UTF-8
-  /// byte order mark at the beginning of the file is no part of the first line. A line over 1 MiB
-  /// is an error.
+  /// The next line without "\n" or "\r\n", valid until the next call. Returns false at the end.
+  /// Skips a UTF-8 byte order mark at the beginning of the file. A line over 1 MiB is an error.
   absl::StatusOr<bool> ReadLine(std::string_view& line);
 
   const std::string& path() const { return path_; }
   bool compressed() const { return compressed_; }
-  std::size_t line_number() const { return line_number_; }  ///< Of the line read last, 1-based.
+  std::size_t line_number() const {
+    return line_number_;
+  }  ///< Number of the last line read, from 1.
 
-  /// "PATH:LINE: message" with the line read last.
+  /// "PATH:LINE: message" with the last line read.
   absl::Status ErrorAtLine(absl::StatusCode code, std::string_view message) const;
 
  private:
   InputStream(std::string path, std::unique_ptr<ByteSource> source, bool compressed);
 
-  // Appends a block to the buffer. False at the end, or at an error, which is kept in `failure_`.
+  // Appends a block to the buffer. Returns false at the end or after an error (`failure_`).
   bool Fill();
   std::string_view Buffered() const { return std::string_view(buffer_).substr(position_); }
 
@@ -68,7 +81,7 @@ class InputStream final : public ByteSource {
   std::size_t line_number_ = 0;
 };
 
-/// Reads up to `size` bytes into `bytes`, which grows with what arrives. Fewer at the end.
+/// Reads `size` bytes, fewer at the end. `bytes` grows with the bytes that arrive.
 absl::Status ReadUpTo(ByteSource& source, std::size_t size, std::vector<char>& bytes);
 
 }  // namespace partiemc::client::input

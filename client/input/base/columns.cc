@@ -16,7 +16,7 @@ namespace {
 using Names = std::vector<std::string>;
 using Axes = std::array<std::optional<std::size_t>, 3>;
 
-// "Pos.x [m]" -> "posx": what is left of a name when people's habits are taken away.
+// Normalises a name: "Pos.x [m]" -> "posx".
 std::string Canonical(std::string_view name) {
   const std::size_t unit = name.find_first_of("[(");
   if (unit != std::string_view::npos && unit > 0) name = name.substr(0, unit);
@@ -29,7 +29,7 @@ std::string Canonical(std::string_view name) {
   return canonical;
 }
 
-// Spellings of one axis of a vector: each of `stems` with the axis before or behind it.
+// The names of one axis of a vector: each of `stems` with the axis before or after it.
 std::vector<std::string> Spellings(std::initializer_list<std::string_view> stems,
                                    std::size_t axis) {
   const std::string letter(1, "xyz"[axis]);
@@ -56,7 +56,7 @@ std::ptrdiff_t CountFound(const Axes& axes) {
   return std::count_if(axes.begin(), axes.end(), [](const auto& axis) { return axis.has_value(); });
 }
 
-// Families of position columns in the order of preference.
+// Families of position columns, in order of preference.
 enum class Family { kPlain, kVector, kUnwrapped, kScaled, kScaledUnwrapped };
 
 constexpr Family kFamilies[] = {Family::kPlain, Family::kVector, Family::kUnwrapped,
@@ -98,7 +98,7 @@ Axes FindVelocities(const Names& canonical) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     axes[axis] = FindFirst(canonical, Spellings({"v", "vel", "velocity", "velocities"}, axis));
   }
-  // PySPH's own names, only together: a single "u" or "v" is anything.
+  // PySPH's names, only if both are present: a single "u" or "v" can mean anything.
   const auto u = FindFirst(canonical, {"u"});
   const auto v = FindFirst(canonical, {"v"});
   if (CountFound(axes) == 0 && u && v) axes = {u, v, FindFirst(canonical, {"w"})};
@@ -111,7 +111,7 @@ std::string List(const Names& names) {
   return Concat(absl::StrJoin(shown, ","), names.size() > kShown ? ",..." : "");
 }
 
-// A column that the caller names: as written, in another case or spelling, or by its number from 1.
+// Finds a requested column: by its exact name, by another spelling, or by its number from 1.
 std::optional<std::size_t> FindAsked(const Names& names, const Names& canonical,
                                      const std::string& asked) {
   if (const auto exact = FindFirst(names, {asked})) return exact;
@@ -121,8 +121,8 @@ std::optional<std::size_t> FindAsked(const Names& names, const Names& canonical,
   return FindFirst(canonical, {Canonical(asked)});
 }
 
-// Positions in the columns that the caller lists. Where the names tell axes in rising order (x and
-// z), these are the axes, so that velocities of the same axes fit; else the first is x.
+// Positions from the listed columns. If the names contain axes in rising order (x and z), these are
+// the axes, so that velocities have the same ones; otherwise the first column is x.
 absl::Status PlanAskedPositions(const Names& names, const Names& canonical,
                                 const ColumnRequest& request, ColumnPlan& plan) {
   const Names& asked = request.columns;
@@ -184,7 +184,7 @@ absl::Status PlanConditions(const Names& names, const Names& canonical,
   return absl::OkStatus();
 }
 
-// The columns of "NAME:0", "NAME:1" and perhaps "NAME:2", also as NAME_x and so on.
+// The columns "NAME:0", "NAME:1" and optionally "NAME:2", or NAME_x, NAME_y, NAME_z.
 std::vector<std::size_t> FindComponents(const Names& names, const Names& canonical,
                                         const std::string& asked) {
   const std::string stem = Canonical(asked);
@@ -201,7 +201,7 @@ std::vector<std::size_t> FindComponents(const Names& names, const Names& canonic
 absl::Status PlanAttributes(const Names& names, const Names& canonical,
                             const ColumnRequest& request, ColumnPlan& plan) {
   for (const std::string& asked : request.attributes) {
-    // The rows keep velocities by their axes, which the plane of the particles chooses from.
+    // Rows store velocities by axis; the projection selects the axes of the plane.
     if (asked == kVelocityAttribute && CountFound(plan.velocities) >= 2) continue;
     std::vector<std::size_t> columns = FindComponents(names, canonical, asked);
     if (const auto column = FindAsked(names, canonical, asked); column && columns.empty()) {

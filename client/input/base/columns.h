@@ -1,7 +1,7 @@
-// What the columns of a table mean, by their names and by the caller's word.
+// Assigns meanings to the columns of a table, by their names or by options.
 //
-// Every format is a table to this file: an array of two or three components counts as columns
-// "name:0", "name:1", "name:2".
+// All formats are treated as tables: an array of two or three components has the columns "name:0",
+// "name:1", "name:2".
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/input/base/byte_source.h"
 
 namespace partiemc::client::input {
 
@@ -26,24 +27,25 @@ struct Condition {
   bool Holds(double cell) const { return number.has_value() && cell == *number; }
 };
 
-/// What the caller says about columns.
+/// The options about columns.
 struct ColumnRequest {
   std::vector<Condition> conditions;
-  std::vector<std::string> attributes;  ///< SequenceOptions::attributes.
-  std::vector<std::string> columns;     ///< SequenceOptions::columns, split; empty: by names.
+  std::vector<std::string> attributes;   ///< SequenceOptions::attributes.
+  std::vector<std::string> columns;      ///< SequenceOptions::columns, split; empty: by names.
+  double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
 };
 
 /// kInvalidArgument if an expression is not "COLUMN=VALUE" or an entry of `columns` is empty.
 absl::StatusOr<ColumnRequest> ParseColumnRequest(const std::vector<std::string>& select,
                                                  std::string_view columns);
 
-/// The columns of one of ColumnRequest::attributes: a column each component, 1 to 3.
+/// The columns of an attribute, one per component, 1 to 3.
 struct AttributeColumns {
   std::string name;
   std::vector<std::size_t> columns;
 };
 
-/// Which column is what. Axes are x, y, z in the input's own terms.
+/// The meaning of each column. Axes are the x, y, z of the input.
 struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> positions;  ///< Two or three are set.
   std::array<std::optional<std::size_t>, 3> velocities;
@@ -55,17 +57,16 @@ struct ColumnPlan {
   bool scaled = false;  ///< Positions are LAMMPS's xs ys zs: fractions of the box.
 };
 
-/// A plan for a table that names its columns. Recognised, in any case of letters, with any of
-/// " _.:-" between the parts, and with a unit in brackets behind: x, Pos.x, Points:0, Position_X,
-/// xu, xs, vx, Vel:0, velocity_x, id, idp, particle_id, volume, vol, area and the like. An
-/// attribute is a column of its name, or an array of two or three, NAME:0, NAME:1, NAME_x and the
-/// like; the velocities are "velocity", whatever their columns are called. Errors:
-/// kFailedPrecondition if there are no positions or a column that is asked for is missing.
+/// Makes a plan for a table with column names. Recognises x, Pos.x, Points:0, Position_X, xu, xs,
+/// vx, Vel:0, velocity_x, id, idp, particle_id, volume, vol, area and similar names, in upper or
+/// lower case, with any of " _.:-" between the parts and an optional unit in brackets. An attribute
+/// is a column with its name, or an array NAME:0, NAME:1 or NAME_x, NAME_y; "velocity" means the
+/// velocities. Errors: kFailedPrecondition without positions or without a requested column.
 absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& names,
                                             const ColumnRequest& request);
 
-/// A plan for a table of `count` columns without names: two are x y, three are x y z, others need
-/// request.columns.
+/// Makes a plan for a table of `count` columns without names: two are x y, three are x y z; other
+/// tables need request.columns.
 absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnRequest& request);
 
 /// Whether PlanNamedColumns would find positions by names alone.

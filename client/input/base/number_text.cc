@@ -8,7 +8,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// std::from_chars leaves both ends of the range to the caller. `text` is a well-formed number.
+// std::from_chars does not convert numbers out of range. Requires: `text` is a well-formed number.
 double OutOfRange(std::string_view text) {
   const bool negative = text.front() == '-';
   const std::size_t exponent = text.find_first_of("eE");
@@ -50,7 +50,8 @@ std::optional<std::uint64_t> ParseId(std::string_view text) {
 }
 
 std::optional<std::uint64_t> IdOfNumber(double number) {
-  constexpr double kWholeBelow = 9007199254740992.0;  // 2^53: above, neighbours are not 1 apart.
+  constexpr double kWholeBelow =
+      9007199254740992.0;  // 2^53: above, not all integers are representable.
   if (!(number >= 0 && number < kWholeBelow) || std::trunc(number) != number) return std::nullopt;
   return static_cast<std::uint64_t>(number);
 }

@@ -1,4 +1,4 @@
-// Numbers as files spell them, independent of the locale.
+// Parses numbers in files, independent of the locale.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace partiemc::client::input {
 
-/// A decimal number: "1", "+.5", "-1.25e-3", "nan", "inf". The whole of `text` must be one. What is
-/// beyond double becomes infinity, what is below it zero, as strtod has it.
+/// A decimal number: "1", "+.5", "-1.25e-3", "nan", "inf". All of `text` must be the number.
+/// Overflow gives infinity, underflow zero, like strtod.
 std::optional<double> ParseNumber(std::string_view text);
 
 /// A count or an index: digits only, below 2^64.
@@ -17,7 +17,7 @@ std::optional<std::uint64_t> ParseCount(std::string_view text);
 /// An identity: a count, or a number that is whole and below 2^53 ("3.000e+00" of NumPy's savetxt).
 std::optional<std::uint64_t> ParseId(std::string_view text);
 
-/// The same for a number that was read already.
+/// ParseId of a parsed number.
 std::optional<std::uint64_t> IdOfNumber(double number);
 
 }  // namespace partiemc::client::input

@@ -1,4 +1,4 @@
-// A quantity that particles of a recording carry.
+// An attribute of the particles of a recording.
 #pragma once
 
 #include <string>

@@ -10,7 +10,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// Cells in messages are cut: a file may hold anything.
+// Messages quote at most this much of a cell.
 constexpr std::size_t kShownCellBytes = 40;
 
 absl::StatusOr<double> NumberOf(std::string_view cell) {
@@ -56,7 +56,7 @@ auto Visit(const ArrayColumn& column, std::size_t row, Visitor visitor) {
   return visitor(Load<double>(at, column.swapped));
 }
 
-// The rows for which all conditions hold.
+// The rows that fulfil all conditions.
 absl::StatusOr<std::vector<std::size_t>> SelectedRows(std::span<const ArrayColumn> columns,
                                                       std::size_t row_count, const ColumnPlan& plan,
                                                       const ColumnRequest& request) {

@@ -1,4 +1,4 @@
-// Particles as a format yields them: every axis that the input has, before the plane is known.
+// Particles as read from a file, with all axes of the input, before the projection into a plane.
 #pragma once
 
 #include <array>
@@ -17,30 +17,30 @@
 namespace partiemc::client::input {
 
 struct ParticleRows {
-  std::array<std::vector<double>, 3> positions;  ///< By axis; axes not in the plan stay empty.
+  std::array<std::vector<double>, 3> positions;  ///< By axis; axes outside the plan are empty.
   std::array<std::vector<float>, 3> velocities;
   std::vector<std::uint64_t> ids;
   std::vector<double> volumes;
-  std::vector<ParticleAttribute> attributes;  ///< Those of the plan, in its order.
+  std::vector<ParticleAttribute> attributes;  ///< In the order of the plan.
   std::array<bool, 3> has_position = {};
   std::array<bool, 3> has_velocity = {};
-  bool has_ids = false;  ///< Falls to false at the first id that is no id.
+  bool has_ids = false;  ///< Becomes false at the first invalid id.
   bool has_volumes = false;
   bool float32 = false;
   std::optional<double> time;
   std::string source;
   std::size_t count = 0;
 
-  /// Empties the arrays, keeps their memory, and notes which of them `plan` will fill.
+  /// Clears the arrays, keeps their memory, and records which of them `plan` fills.
   void Begin(const ColumnPlan& plan);
 };
 
-/// Adds one row of a text table if the conditions hold. Requires rows.Begin(plan) before.
-/// Errors, without a place: kDataLoss if cells are missing or are no numbers.
+/// Adds one row of a text table if the conditions hold. Requires: rows.Begin(plan).
+/// Errors, without a place: kDataLoss if cells are missing or not numbers.
 absl::Status AppendTextRow(std::span<const std::string_view> cells, const ColumnPlan& plan,
                            const ColumnRequest& request, ParticleRows& rows);
 
-/// What an element of a binary array is.
+/// The type of an element of a binary array.
 enum class ElementType {
   kFloat32,
   kFloat64,
@@ -67,9 +67,9 @@ struct ArrayColumn {
   std::optional<std::uint64_t> Id(std::size_t row) const;
 };
 
-/// Adds `row_count` rows of a binary table, those for which the conditions hold. Every column that
-/// the plan names must be there with `row_count` elements. Requires rows.Begin(plan) before.
-/// Errors: kFailedPrecondition if a condition compares with text.
+/// Adds the rows of a binary table that fulfil the conditions. Requires: rows.Begin(plan); every
+/// column of the plan has `row_count` elements. Errors: kFailedPrecondition if a condition compares
+/// with text.
 absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t row_count,
                              const ColumnPlan& plan, const ColumnRequest& request,
                              ParticleRows& rows);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t";
 
-// A table has a few dozen columns; a line of binary rubbish has many more.
+// Most columns of a table. A line of binary data has many more.
 constexpr std::size_t kMaxColumns = 4096;
 
 std::string_view Trim(std::string_view cell) {
@@ -28,8 +28,8 @@ bool AllNumbers(const std::vector<std::string_view>& cells) {
 
 bool IsComment(std::string_view line) { return line.front() == '#' || line.front() == '%'; }
 
-// Where the cell that begins at `begin` ends: at the separator outside quotes, or at the line's
-// end.
+// The end of the cell that starts at `begin`: the next separator outside quotes, or the end of the
+// line.
 std::size_t CellEnd(std::string_view line, std::size_t begin, char separator) {
   std::size_t open = line.find_first_not_of(kBlanks, begin);
   if (open == std::string_view::npos || line[open] != '"') {

@@ -1,4 +1,4 @@
-// Lines of a text table: dialect, header, cells.
+// Reads text tables: dialect, header, rows.
 #pragma once
 
 #include <string>
@@ -10,13 +10,13 @@
 
 namespace partiemc::client::input {
 
-/// Splits `line` at blanks; consecutive ones count as one. Views into `line`.
+/// Splits `line` at runs of blanks. `cells` are views into `line`.
 void SplitAtBlanks(std::string_view line, std::vector<std::string_view>& cells);
 
-/// A table in text: comma, semicolon, tab or blanks between cells; cells may be in quotes. Empty
-/// lines and lines that begin with # or % are passed over. The first other line is a header unless
-/// all of its cells are numbers; without one, the last comment before it is taken for the header if
-/// it has as many words as there are columns and is no row of numbers (NumPy's savetxt).
+/// A text table with comma, semicolon, tab or blanks between cells; cells may be quoted. Skips
+/// empty lines and lines that begin with # or %. The first other line is a header unless all of its
+/// cells are numbers. Without such a header, the last comment before the first row is the header,
+/// if it has one word per column and is not a row of numbers (NumPy's savetxt).
 class TextTable {
  public:
   /// Reads up to the first row. `stream` must outlive the table. kDataLoss if there is no line.
@@ -26,8 +26,8 @@ class TextTable {
   const std::vector<std::string>& names() const { return names_; }
   std::size_t column_count() const { return column_count_; }
 
-  /// The next row, valid until the next call; false at the end. A separator after the last cell is
-  /// no cell. A row may have more or fewer cells than there are columns.
+  /// Reads the next row, valid until the next call. Returns false at the end. Ignores a separator
+  /// after the last cell. A row may have more or fewer cells than there are columns.
   absl::StatusOr<bool> ReadRow(std::vector<std::string_view>& cells);
 
  private:
@@ -42,8 +42,8 @@ class TextTable {
   char separator_ = ' ';
   std::vector<std::string> names_;
   std::size_t column_count_ = 0;
-  std::string comment_;    // The last one before the first row.
-  std::string first_row_;  // Read ahead where there is no header.
+  std::string comment_;    // Last comment before the first row.
+  std::string first_row_;  // Read ahead in a table without a header.
   bool first_row_waits_ = false;
 };
 

@@ -25,6 +25,43 @@ absl::Status Truncated(const std::string& name, std::string_view packing) {
   return absl::DataLossError(Concat(name, ": the ", packing, " data is truncated"));
 }
 
+// Counts the bytes that pass.
+class CountedSource final : public ByteSource {
+ public:
+  CountedSource(std::unique_ptr<ByteSource> source, std::uint64_t& count)
+      : source_(std::move(source)), count_(count) {}
+
+  absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override {
+    const auto count = source_->Read(bytes, size);
+    count_ += count.value_or(0);
+    return count;
+  }
+
+ private:
+  std::unique_ptr<ByteSource> source_;
+  std::uint64_t& count_;
+};
+
+// An unpacked source with a bound on its expansion.
+class BoundedSource final : public ByteSource {
+ public:
+  BoundedSource(Packing packing, const std::string& name, std::unique_ptr<ByteSource> packed,
+                double max_expansion);
+
+  absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override {
+    const auto count = unpacked_->Read(bytes, size);
+    unpacked_bytes_ += count.value_or(0);
+    if (!ExpandsTooMuch(unpacked_bytes_, packed_bytes_, max_expansion_)) return count;
+    return absl::ResourceExhaustedError(Concat(name_, ": ", ExpansionRule(max_expansion_)));
+  }
+
+ private:
+  const std::string name_;
+  const double max_expansion_;
+  std::uint64_t packed_bytes_ = 0, unpacked_bytes_ = 0;
+  std::unique_ptr<ByteSource> unpacked_;
+};
+
 class InflateSource final : public ByteSource {
  public:
   InflateSource(std::string name, std::unique_ptr<ByteSource> packed, bool gzip)
@@ -55,18 +92,26 @@ class InflateSource final : public ByteSource {
         stream_.avail_in = static_cast<uInt>(*count);
       }
       if (absl::Status status = Step(); !status.ok()) return status;
-      // A full output may hide bytes that zlib still holds.
+      // zlib may hold more bytes if the output is full.
       flushing_ = stream_.avail_out == 0 && !between_members_ && !finished_;
     }
     return wanted - stream_.avail_out;
   }
 
  private:
+  // Raw deflate is a part of a file and ends with it.
+  absl::Status CheckEnd() {
+    char surplus = 0;
+    const auto count = stream_.avail_in > 0 ? std::size_t{1} : packed_->Read(&surplus, 1);
+    if (!count.ok()) return count.status();
+    return *count == 0 ? absl::OkStatus() : Damaged(name_, Packing(), "bytes follow its end");
+  }
+
   std::string_view Packing() const { return gzip_ ? "gzip" : "deflate"; }
 
   absl::Status Step() {
     if (between_members_) {
-      // Padding after the last member (tar and tapes write zeros) is no member.
+      // Zeros after the last member are padding (tar, tapes).
       if (members_ > 0 && *stream_.next_in == 0) {
         stream_.avail_in = 0;
         finished_ = true;
@@ -79,7 +124,7 @@ class InflateSource final : public ByteSource {
       ++members_;
       if (!gzip_) {
         finished_ = true;
-        return absl::OkStatus();
+        return CheckEnd();
       }
       between_members_ = true;
       inflateReset(&stream_);
@@ -124,7 +169,7 @@ class ZstdSource final : public ByteSource {
       const std::size_t rest = ZSTD_decompressStream(stream_.get(), &output, &input_);
       if (ZSTD_isError(rest) != 0) return Damaged(name_, "zstd", ZSTD_getErrorName(rest));
       between_frames_ = rest == 0;
-      // A full output may hide bytes that the decoder still holds.
+      // The decoder may hold more bytes if the output is full.
       flushing_ = rest != 0 && output.pos == output.size;
     }
     return output.pos;
@@ -144,6 +189,17 @@ class ZstdSource final : public ByteSource {
   bool flushing_ = false;
 };
 
+BoundedSource::BoundedSource(Packing packing, const std::string& name,
+                             std::unique_ptr<ByteSource> packed, double max_expansion)
+    : name_(name), max_expansion_(max_expansion) {
+  auto counted = std::make_unique<CountedSource>(std::move(packed), packed_bytes_);
+  if (packing == Packing::kGzip) {
+    unpacked_ = std::make_unique<InflateSource>(name, std::move(counted), true);
+  } else {
+    unpacked_ = std::make_unique<ZstdSource>(name, std::move(counted));
+  }
+}
+
 }  // namespace
 
 Packing RecognisePacking(std::string_view first_bytes) {
@@ -153,15 +209,16 @@ Packing RecognisePacking(std::string_view first_bytes) {
 }
 
 absl::StatusOr<std::unique_ptr<ByteSource>> Unpack(Packing packing, const std::string& name,
-                                                   std::unique_ptr<ByteSource> packed) {
+                                                   std::unique_ptr<ByteSource> packed,
+                                                   double max_expansion) {
   switch (packing) {
     case Packing::kNone:
       return packed;
-    case Packing::kGzip:
     case Packing::kDeflate:
-      return std::make_unique<InflateSource>(name, std::move(packed), packing == Packing::kGzip);
+      return std::make_unique<InflateSource>(name, std::move(packed), false);
+    case Packing::kGzip:
     case Packing::kZstd:
-      return std::make_unique<ZstdSource>(name, std::move(packed));
+      return std::make_unique<BoundedSource>(packing, name, std::move(packed), max_expansion);
   }
   return absl::InternalError("no such packing");
 }

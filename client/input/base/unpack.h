@@ -1,4 +1,4 @@
-// gzip, zstd and raw deflate as byte sources.
+// Decompresses gzip, zstd and raw deflate.
 #pragma once
 
 #include <memory>
@@ -16,8 +16,10 @@ enum class Packing { kNone, kGzip, kZstd, kDeflate };
 Packing RecognisePacking(std::string_view first_bytes);
 
 /// `packed` unpacked. Several gzip members or zstd frames follow each other as one; an end in the
-/// middle of one is kDataLoss. `name` is for messages.
+/// middle of one is kDataLoss. `name` is for messages. kResourceExhausted where gzip or zstd
+/// expands too much; deflate makes at most 1,032 bytes of one.
 absl::StatusOr<std::unique_ptr<ByteSource>> Unpack(Packing packing, const std::string& name,
-                                                   std::unique_ptr<ByteSource> packed);
+                                                   std::unique_ptr<ByteSource> packed,
+                                                   double max_expansion = kMaxExpansion);
 
 }  // namespace partiemc::client::input

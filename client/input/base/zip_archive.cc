@@ -36,7 +36,7 @@ std::uint64_t LittleEndian(std::string_view bytes, std::size_t at, std::size_t s
   return value;
 }
 
-// A part of a file.
+// A byte range of a file.
 class FilePart final : public ByteSource {
  public:
   FilePart(const std::string& path, std::uint64_t offset, std::uint64_t size)
@@ -67,7 +67,7 @@ class CheckedEntry final : public ByteSource {
       : name_(std::move(name)), source_(std::move(source)), left_(entry.bytes), crc_(entry.crc) {}
 
   absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override {
-    if (left_ == 0) return std::size_t{0};
+    if (left_ == 0) return CheckEnd();
     const std::size_t wanted =
         static_cast<std::size_t>(std::min<std::uint64_t>({size, left_, std::uint64_t{1} << 30}));
     const auto count = source_->Read(bytes, wanted);
@@ -76,13 +76,25 @@ class CheckedEntry final : public ByteSource {
     seen_crc_ = static_cast<std::uint32_t>(
         crc32(seen_crc_, reinterpret_cast<const Bytef*>(bytes), static_cast<uInt>(*count)));
     left_ -= *count;
-    if (left_ == 0 && seen_crc_ != crc_) {
-      return absl::DataLossError(Concat(name_, ": the checksum is wrong; the file is damaged"));
-    }
+    if (left_ == 0 && seen_crc_ != crc_) return WrongChecksum();
     return count;
   }
 
  private:
+  absl::Status WrongChecksum() const {
+    return absl::DataLossError(Concat(name_, ": the checksum is wrong; the file is damaged"));
+  }
+
+  // 0, or the error of an entry that goes on behind its size.
+  absl::StatusOr<std::size_t> CheckEnd() {
+    if (seen_crc_ != crc_) return WrongChecksum();  // Of an empty one.
+    char surplus = 0;
+    const auto count = source_->Read(&surplus, 1);
+    if (!count.ok() || *count == 0) return count;
+    return absl::DataLossError(
+        Concat(name_, ": is larger than the directory says; the file is damaged"));
+  }
+
   std::string name_;
   std::unique_ptr<ByteSource> source_;
   std::uint64_t left_;
@@ -132,6 +144,7 @@ absl::StatusOr<std::vector<ZipEntry>> ParseDirectory(const std::string& path,
     entries.push_back(std::move(entry));
     directory.remove_prefix(kCentralHeaderBytes + name_bytes + more_bytes);
   }
+  if (!directory.empty()) return Damaged(path, "the directory is longer than its entries");
   return entries;
 }
 
@@ -154,6 +167,9 @@ absl::StatusOr<ZipArchive> ZipArchive::Open(const std::string& path) {
   const std::size_t count = LittleEndian(*tail, end + 10, 2);
   const std::uint64_t bytes = LittleEndian(*tail, end + 12, 4);
   const std::uint64_t offset = LittleEndian(*tail, end + 16, 4);
+  if (end + kEndBytes + LittleEndian(*tail, end + 20, 2) != tail->size()) {
+    return Damaged(path, "has bytes behind its directory");
+  }
   if (offset + bytes > archive.file_bytes_)
     return Damaged(path, "the directory is out of the file");
   const auto directory = ReadPart(path, offset, static_cast<std::size_t>(bytes));

@@ -1,4 +1,4 @@
-// Zip files as numpy.savez writes them: entries stored or deflated, below 4 GiB.
+// Reads zip files of numpy.savez: stored or deflated entries below 4 GiB.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,24 @@ namespace partiemc::client::input {
 
 struct ZipEntry {
   std::string name;
-  std::uint64_t offset = 0;  ///< Of the local header.
+  std::uint64_t offset = 0;  ///< Offset of the local header.
   std::uint64_t packed_bytes = 0;
   std::uint64_t bytes = 0;
   std::uint32_t crc = 0;
   std::uint16_t method = 0;  ///< 0 stored, 8 deflated; others cannot be opened.
 };
 
-/// The directory of an archive. Not trusted: every offset and size is checked against the file.
+/// The directory of an archive. Every offset and size is checked against the file.
 class ZipArchive {
  public:
-  /// kDataLoss if the file is no zip archive, is truncated or has over 65,535 entries.
+  /// kDataLoss if the file is not a zip archive, is truncated, has over 65,535 entries or bytes
+  /// behind its directory.
   static absl::StatusOr<ZipArchive> Open(const std::string& path);
 
   const std::vector<ZipEntry>& entries() const { return entries_; }
 
-  /// The bytes of an entry. At the end the checksum is verified: kDataLoss if it is another.
+  /// The bytes of an entry. At the end the checksum and the size are verified: kDataLoss if they
+  /// differ.
   /// kUnimplemented for other methods and encrypted entries.
   absl::StatusOr<std::unique_ptr<ByteSource>> OpenEntry(const ZipEntry& entry) const;
 

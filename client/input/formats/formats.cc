@@ -1,4 +1,4 @@
-// The table of formats. A new format is an entry here, its OpenReader in a file of its own.
+// The table of formats. To add a format, add a row here and its OpenReader in a new file.
 #include "client/input/formats/formats.h"
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kHeadBytes = 4096;
 
-// What recognition sees of a file. The extension is in lower case, without the dot, and that of the
-// packing (.gz, .zst) is taken off first.
+// The properties of a file that recognition uses. The extension is in lower case, without the dot
+// and without the extension of the compression (.gz, .zst).
 struct FileHead {
   std::string name;
   std::string extension;
@@ -41,7 +41,7 @@ bool IsXyz(const FileHead& head) {
   return head.extension == "xyz" || head.Line(1).starts_with("Atoms. Timestep:");
 }
 
-// A command that every LAMMPS script has begins a line.
+// Whether a line begins with a command that every LAMMPS script contains.
 bool IsLammpsScript(const FileHead& head) {
   if (!head.text) return false;
   constexpr std::string_view kCommands[] = {"\nunits ", "\natom_style ", "\npair_style ",
@@ -73,14 +73,14 @@ bool IsPickle(const FileHead& head) {
   return head.extension == "pkl" || head.extension == "pickle" || head.Begins("\x80\x04\x95");
 }
 
-// A format that is read, or one that is not, with what to do instead.
+// A supported format, or an unsupported one with a remedy.
 struct Entry {
   bool (*matches)(const FileHead&);
   Format format;
   std::string_view refusal;
 };
 
-// The first entry that matches decides: marks in the content, then what names tell, then any text.
+// The first match decides: signatures in the content, then names, then any text.
 constexpr Entry kEntries[] = {
     {[](const FileHead& head) { return head.Begins("\x93NUMPY"); }, {"NPY", OpenNpy, true}, ""},
     {[](const FileHead& head) { return head.Begins("PK\x03\x04") || head.Begins("PK\x05\x06"); },
@@ -132,7 +132,7 @@ constexpr Entry kEntries[] = {
     {[](const FileHead& head) { return head.text; }, {"CSV", OpenTextTable, true}, ""},
 };
 
-// Text has no control characters; the head may end within a UTF-8 sequence.
+// Text has no control characters. The head may end inside a UTF-8 sequence.
 bool IsText(std::string_view bytes) {
   return std::all_of(bytes.begin(), bytes.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);

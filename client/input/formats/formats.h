@@ -1,4 +1,4 @@
-// Which format a file has, by its content first and its name second.
+// Recognises the format of a file, by its content and then by its name.
 #pragma once
 
 #include <memory>
@@ -16,8 +16,8 @@ struct Format {
   bool one_frame_per_file;
 };
 
-/// Looks at the name and the first bytes of a file. Errors: kUnimplemented, with a word on what the
-/// file is and what to do, for formats that are not read; kDataLoss for an empty file; those of
+/// Recognises a format by the first bytes and the name of a file. Errors: kUnimplemented for an
+/// unsupported format, with its name and a remedy; kDataLoss for an empty file; the errors of
 /// OpenFile.
 absl::StatusOr<const Format*> RecogniseFormat(const std::string& path);
 

@@ -1,4 +1,4 @@
-// What a file format has to offer: frames of one file, one after another.
+// The interface of a file format: reads the frames of one file in order.
 #pragma once
 
 #include <memory>
@@ -15,13 +15,13 @@ class FrameReader {
  public:
   virtual ~FrameReader() = default;
 
-  /// Reads the next frame of the file into `rows`, or passes over it if `rows` is null; false at
-  /// the end. Sets rows->source, and rows->time where the file tells one. After an error the reader
-  /// is not used any more. Errors name the file, and the line where there is one.
+  /// Reads the next frame into `rows`, or skips it if `rows` is null. Returns false at the end.
+  /// Sets rows->source, and rows->time if the file has a time. Errors state the file and, for text,
+  /// the line. The reader must not be used after an error.
   virtual absl::StatusOr<bool> Next(ParticleRows* rows) = 0;
 };
 
-/// Of a file that is one frame.
+/// Reader of a format with one frame per file.
 class OneFrameReader : public FrameReader {
  public:
   absl::StatusOr<bool> Next(ParticleRows* rows) final {

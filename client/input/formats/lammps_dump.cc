@@ -21,8 +21,8 @@ struct Box {
   std::array<Vector3, 3> edges = {};
 };
 
-// Lower and upper bounds, and for a triclinic box the tilts xy xz yz. The bounds of a triclinic box
-// are those of its bounding box, which the tilts widen.
+// Lower and upper bounds and, for a triclinic box, the tilts xy xz yz. The bounds of a triclinic
+// box belong to its bounding box, which is wider than the box.
 Box BoxOfBounds(const std::array<std::vector<double>, 3>& lines) {
   Vector3 low = {lines[0][0], lines[1][0], lines[2][0]};
   Vector3 high = {lines[0][1], lines[1][1], lines[2][1]};
@@ -45,7 +45,7 @@ Box BoxOfBounds(const std::array<std::vector<double>, 3>& lines) {
   return box;
 }
 
-// "ITEM: BOX BOUNDS abc origin": each line an edge and a coordinate of the origin.
+// "ITEM: BOX BOUNDS abc origin": each line has an edge and a coordinate of the origin.
 Box BoxOfEdges(const std::array<std::vector<double>, 3>& lines) {
   Box box;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -109,7 +109,7 @@ class LammpsDumpReader final : public FrameReader {
     }
   }
 
-  // Reads the line of the value that follows an ITEM line, as one cell.
+  // Reads the value line after an ITEM line as one cell.
   absl::Status ReadValue(std::string_view name, std::string& value) {
     std::string_view line;
     const auto found = ReadContentLine(line);
@@ -163,7 +163,7 @@ class LammpsDumpReader final : public FrameReader {
     return absl::OkStatus();
   }
 
-  // A plan is made when the columns change, which is rare.
+  // Makes a new plan only if the columns have changed.
   absl::Status PlanColumns(const std::string& columns) {
     if (plan_ && columns == planned_columns_) return absl::OkStatus();
     std::vector<std::string_view> names;
@@ -186,7 +186,7 @@ class LammpsDumpReader final : public FrameReader {
 
   absl::StatusOr<bool> ReadAtoms(const std::string& columns, ParticleRows* rows) {
     if (!head_.atoms) return Error("ITEM: ATOMS comes before the number of atoms");
-    // Asked before the columns are judged, of which the end of the file may have cut off some.
+    // Check for the end of the file first: it may have cut off some columns.
     const auto next = stream_->Peek(1);
     if (!next.ok()) return next.status();
     if (next->empty() && *head_.atoms > 0) return EndsAfter(0);
@@ -214,7 +214,7 @@ class LammpsDumpReader final : public FrameReader {
     return true;
   }
 
-  // Fractions of the box become coordinates. An axis that the dump leaves out counts as 0.
+  // Converts fractions of the box to coordinates. An axis that the dump lacks counts as 0.
   absl::Status Unscale(ParticleRows& rows) const {
     if (!head_.box) return Error("scaled positions (xs ys) without BOX BOUNDS");
     const Box& box = *head_.box;
@@ -248,7 +248,7 @@ class LammpsDumpReader final : public FrameReader {
 
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenLammpsDump(const std::string& path,
                                                             const ColumnRequest& request) {
-  auto stream = InputStream::Open(path);
+  auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   return std::make_unique<LammpsDumpReader>(*std::move(stream), request);
 }

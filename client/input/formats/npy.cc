@@ -19,7 +19,7 @@ absl::Status Damaged(const std::string& name, std::string_view what) {
   return absl::DataLossError(Concat(name, ": ", what));
 }
 
-// The text after "'key':" in the header, which is a Python literal of three known keys.
+// The text after "'key':" in the header, a Python dict with three known keys.
 std::optional<std::string_view> ValueOf(std::string_view header, std::string_view key) {
   const std::size_t at = header.find(Concat("'", key, "'"));
   if (at == std::string_view::npos) return std::nullopt;
@@ -79,7 +79,7 @@ absl::Status ParseShape(std::string_view value, const std::string& name, NpyHead
     if (*extent > kMaxElementBytes / bytes) {
       return Damaged(name, "the array is over 4 GiB");
     }
-    // An empty array keeps the product meaningful for the extents that follow.
+    // Keeps the product valid for the extents that follow an extent of 0.
     bytes *= std::max<std::size_t>(*extent, 1);
     header.shape.push_back(*extent);
   }
@@ -108,7 +108,7 @@ absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& n
   if (!std::string_view(bytes.data(), 8).starts_with("\x93NUMPY")) {
     return Damaged(name, "is no NPY array");
   }
-  // Version 1 has a length of two bytes, the later ones four; little-endian.
+  // The length has two bytes in version 1 and four in later versions, little-endian.
   const std::size_t length_bytes = bytes[6] == 1 ? 2 : 4;
   if (absl::Status status = ReadExactly(source, length_bytes, name, bytes); !status.ok()) {
     return status;
@@ -133,7 +133,13 @@ absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& n
 
 absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const std::string& name,
                              std::vector<char>& bytes) {
-  return ReadExactly(source, header.element_count() * ElementBytes(header.type), name, bytes);
+  const std::size_t size = header.element_count() * ElementBytes(header.type);
+  if (absl::Status status = ReadExactly(source, size, name, bytes); !status.ok()) return status;
+  char surplus = 0;
+  const auto count = source.Read(&surplus, 1);
+  if (!count.ok()) return count.status();
+  if (*count == 0) return absl::OkStatus();
+  return Damaged(name, Concat("has bytes behind the ", size, " of the array; save one array"));
 }
 
 std::vector<ArrayColumn> NpyColumns(const NpyHeader& header, const std::vector<char>& bytes) {
@@ -145,7 +151,7 @@ std::vector<ArrayColumn> NpyColumns(const NpyHeader& header, const std::vector<c
     columns[k].type = header.type;
     columns[k].swapped = header.swapped;
     columns[k].stride = element * (header.column_major ? 1 : count);
-    if (bytes.empty()) continue;  // No rows: there is nothing to point at.
+    if (bytes.empty()) continue;  // No rows.
     columns[k].data = bytes.data() + k * element * (header.column_major ? rows : 1);
   }
   return columns;

@@ -1,4 +1,4 @@
-// Arrays as numpy.save writes them.
+// Reads arrays of numpy.save.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace partiemc::client::input {
 
-/// What the header of an array says. Its elements are numbers.
+/// The header of an array of numbers.
 struct NpyHeader {
   ElementType type = ElementType::kFloat64;
   bool swapped = false;       ///< Byte order other than this machine's.
@@ -21,12 +21,12 @@ struct NpyHeader {
   std::size_t element_count() const;  ///< Does not overflow: ReadNpyHeader has checked.
 };
 
-/// Reads the header. `name` is for messages. Errors: kDataLoss if it is none; kUnimplemented if the
-/// elements are not plain numbers (Python objects, structures, complex, half precision); sizes over
-/// 4 GiB are kDataLoss.
+/// Reads the header. `name` is for messages. Errors: kDataLoss for an invalid header or a size
+/// over 4 GiB; kUnimplemented for elements that are not plain numbers (Python objects, structures,
+/// complex, half precision).
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);
 
-/// Reads the elements that follow the header. kDataLoss if there are fewer than it says.
+/// Reads the elements that follow the header. kDataLoss if `source` holds fewer or more bytes.
 absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const std::string& name,
                              std::vector<char>& bytes);
 

@@ -9,7 +9,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// A row per particle has a few columns; more is a transposed array.
+// A row has a few columns. More columns indicate a transposed array.
 constexpr std::size_t kMaxColumns = 4096;
 
 class NpyReader final : public OneFrameReader {
@@ -45,7 +45,7 @@ class NpyReader final : public OneFrameReader {
 
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenNpy(const std::string& path,
                                                      const ColumnRequest& request) {
-  auto stream = InputStream::Open(path);
+  auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   auto header = ReadNpyHeader(**stream, path);
   if (!header.ok()) return header.status();

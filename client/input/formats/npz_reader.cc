@@ -10,7 +10,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// An array (N, K) with more components is no property of particles.
+// An array (N, K) with more components is not a particle attribute.
 constexpr std::size_t kMaxComponents = 16;
 
 struct NamedArray {
@@ -24,7 +24,7 @@ struct NamedArray {
 struct NpzTable {
   std::vector<NamedArray> arrays;
   std::vector<std::string> column_names;
-  absl::Status not_plain;  // Why the first array that is not read is not read; OK if all are.
+  absl::Status not_plain;  // Error of the first unreadable array; OK without one.
   std::optional<NamedArray> time;
 };
 
@@ -58,7 +58,7 @@ absl::StatusOr<NpzTable> ReadTable(const ZipArchive& archive, const std::string&
   return table;
 }
 
-// "--columns pos" names an array: its components are meant.
+// "--columns pos" with the name of an array selects its components.
 ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& table) {
   if (request.columns.size() != 1) return request;
   ColumnRequest expanded = request;
@@ -70,7 +70,7 @@ ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& t
   return expanded;
 }
 
-// Optional columns of arrays that have other rows than the positions belong to something else.
+// Ignores optional arrays whose number of rows differs from that of the positions.
 void DropForeignColumns(const NpzTable& table, ColumnPlan& plan) {
   std::vector<std::size_t> rows;
   for (const NamedArray& array : table.arrays) {
@@ -149,7 +149,7 @@ class NpzReader final : public OneFrameReader {
     if (!source.ok()) return source.status();
     const auto header = ReadNpyHeader(**source, name);
     if (!header.ok()) return header.status();
-    // The header read first, with which the columns were planned, also if the file has changed.
+    // Uses the header of the plan, even if the file has changed since.
     return ReadNpyElements(**source, array.header, name, bytes);
   }
 

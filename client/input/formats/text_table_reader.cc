@@ -1,4 +1,4 @@
-// One frame per file: CSV and its relatives.
+// One frame per file: CSV and similar tables.
 #include <utility>
 
 #include "client/input/base/text.h"
@@ -41,7 +41,7 @@ class TextTableReader final : public OneFrameReader {
 
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenTextTable(const std::string& path,
                                                            const ColumnRequest& request) {
-  auto stream = InputStream::Open(path);
+  auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   auto table = TextTable::Open(**stream);
   if (!table.ok()) return table.status();

@@ -1,4 +1,4 @@
-// Stands in for vtk_reader.cc where VTK was not found.
+// Replaces vtk_reader.cc in builds without VTK.
 #include "client/input/base/text.h"
 #include "client/input/formats/frame_reader.h"
 

@@ -15,10 +15,10 @@
 namespace partiemc::client::input {
 namespace {
 
-// The least bytes of a number in a file, with its separator.
+// Smallest size of a number in a file, with its separator.
 constexpr std::int64_t kLeastBytes = 2;
 
-// Lists of cells, of which each is a count of its points and their indices.
+// Keywords of cell lists: each cell is a count of points and their indices.
 bool IsCells(std::string_view keyword) {
   return keyword == "vertices" || keyword == "lines" || keyword == "polygons" ||
          keyword == "triangle_strips" || keyword == "cells";
@@ -54,7 +54,7 @@ class ParticlesReader final : public vtkDataReader {
     return LowerCase(word_);
   }
 
-  // A count of numbers that the file can hold.
+  // Reads a count and checks it against the size of the file.
   bool ReadCount(std::int64_t& count) {
     long long value = 0;
     if (vtkDataReader::Read(&value) && value >= 0 && value <= most_numbers_) {
@@ -65,7 +65,7 @@ class ParticlesReader final : public vtkDataReader {
     return false;
   }
 
-  // False at the end, and after an error.
+  // Returns false at the end and after an error.
   bool ReadSection(vtkPolyData& particles) {
     const std::string keyword(Keyword());
     std::int64_t count = 0;
@@ -98,8 +98,8 @@ class ParticlesReader final : public vtkDataReader {
     return count == 0 || ReadCellsLegacy(count, skipped.data());
   }
 
-  // Until 4.2: numbers of cells and of integers, then the integers. From 5.0 on: numbers of offsets
-  // and of indices, then both as arrays of a named type.
+  // Up to version 4.2: the numbers of cells and of integers, then the integers. From 5.0: the
+  // numbers of offsets and of indices, then both as typed arrays.
   bool SkipCells() {
     std::int64_t first = 0, second = 0;
     if (!ReadCount(first) || !ReadCount(second)) return false;
@@ -116,7 +116,7 @@ class ParticlesReader final : public vtkDataReader {
     return vtkSmartPointer<vtkAbstractArray>::Take(ReadArray(type.c_str(), count, 1)) != nullptr;
   }
 
-  // Up to an empty line.
+  // Skips to an empty line.
   bool SkipMetaData() {
     char line[256];
     while (ReadLine(line)) {

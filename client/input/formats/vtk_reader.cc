@@ -1,5 +1,5 @@
-// One frame per file: legacy VTK (vtk_legacy.h), VTP and VTU through VTK. No other files see VTK's
-// headers.
+// One frame per file: legacy VTK (vtk_legacy.h), VTP and VTU through VTK. Only this file and
+// vtk_legacy include VTK's headers.
 #include <vtkAlgorithm.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -32,22 +32,22 @@
 namespace partiemc::client::input {
 namespace {
 
-// Arrays with more components are no property that we read.
+// Arrays with more components are ignored.
 constexpr int kMaxComponents = 16;
 
-// The part of a file that is searched for declared counts: its head with all of the XML of usual
-// files, or the POINTS line of a legacy file.
+// Size of the head that is searched for declared counts: the XML of usual files, or the POINTS line
+// of a legacy file.
 constexpr std::size_t kHeadBytes = 65536;
 
-// The least bytes that a point can take: three digits with separators, or three coordinates of four
-// bytes that zlib packs at its best ratio of about 1:1000.
+// Smallest size of a point: three digits with separators, or three coordinates of four bytes
+// compressed with zlib's best ratio of about 1:1000.
 constexpr double kLeastBytesPerPlainPoint = 6;
 constexpr double kLeastBytesPerPackedPoint = 0.01;
 
-// The largest count that is told as it stands.
+// The largest count that messages print.
 constexpr double kMostDeclared = 1e18;
 
-// Keeps the first error instead of printing it.
+// Stores the first error instead of printing it.
 class MessageCatcher final : public vtkOutputWindow {
  public:
   static MessageCatcher* New();
@@ -72,8 +72,8 @@ class MessageCatcher final : public vtkOutputWindow {
   bool has_error() const { return !error_.empty(); }
 
  private:
-  // The legacy reader calls it a warning when a file ends within its data ("Error reading ascii
-  // data"). Other warnings, of newer file versions and the like, do no harm.
+  // The legacy reader reports a truncated file as a warning ("Error reading ascii data"). Other
+  // warnings, for example about newer file versions, are harmless.
   void TakeWarning(std::string_view text) {
     if (error_.empty() && Contains(text, "Error reading")) error_ = text;
   }
@@ -83,8 +83,7 @@ class MessageCatcher final : public vtkOutputWindow {
 
 vtkStandardNewMacro(MessageCatcher)
 
-// VTK's messages go through one object of the process, and through a log that writes to stderr.
-// While this lives, they go to `catcher` alone.
+// Redirects VTK's messages, which are global to the process, to `catcher` during its lifetime.
 class CatchMessages {
  public:
   CatchMessages()
@@ -256,7 +255,7 @@ class VtkReader final : public OneFrameReader {
     if (points->GetPoints() != nullptr && points->GetNumberOfPoints() > 0) {
       table = TableOf(*points);
     } else {
-      // Frames without particles leave out what they have no data for.
+      // Files omit empty arrays of frames without particles.
       table.names = {"Points:0", "Points:1", "Points:2"};
       for (const Condition& condition : request_.conditions) {
         table.names.push_back(condition.column);
@@ -290,7 +289,7 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenVtk(const std::string& path,
     return absl::InvalidArgumentError(Concat(
         path, ": --columns does not apply to VTK files, which know where their positions are"));
   }
-  const auto stream = InputStream::Open(path);
+  const auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   const auto head = (*stream)->Peek(kHeadBytes);
   if (!head.ok()) return head.status();

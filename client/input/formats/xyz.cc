@@ -47,7 +47,7 @@ class XyzReader final : public FrameReader {
                                 Concat("frame ", frame_, ": ", message));
   }
 
-  // Reads the count and the comment; false at the end of the file.
+  // Reads the count and the comment. Returns false at the end of the file.
   absl::StatusOr<bool> ReadHead(std::uint64_t& count) {
     std::string_view line;
     do {
@@ -86,7 +86,7 @@ class XyzReader final : public FrameReader {
 
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenXyz(const std::string& path,
                                                      const ColumnRequest& request) {
-  auto stream = InputStream::Open(path);
+  auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
   auto plan = PlanNamedColumns({"type", "x", "y", "z"}, request);
   if (!plan.ok()) {

@@ -71,8 +71,10 @@ def connect(address=None, *, latest=False, **options):
     tls, ca_file, cert_file, key_file, token, token_file: as the command line has them; those of the
         environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...) unless given.
     fallback_addresses: servers to go on with. checkpoint_interval, max_held_bytes,
-        connect_timeout, deadline, give_up_after, send_timeout (seconds): as in client/include/
+        connect_timeout, deadline, send_timeout (seconds): as in client/include/
         partiemc/client/stream.h.
+    give_up_after: seconds after which a lost connection ends the stream; 300, with latest 30. 0:
+        at once.
     part, parts: of a simulator of many processes, each of which connects with the same `name`: its
         number from 0 on, and how many there are. Every one sends its particles of each frame, also
         none; part 0 gets the results, the others None for each frame. The frame is that of all
@@ -95,7 +97,8 @@ def watch(address, name, **options):
     from_sequence: go back in the stream: begin with the frame of this number, 0 with the oldest that
         the server still holds, and follow from there; none is left out before the newest is reached.
     tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
-        deadline, give_up_after: as of connect. Raises Error.
+        deadline: as of connect. give_up_after: seconds for which a lost stream is looked for; 30.
+        Raises Error.
 
     Iteration ends with the stream. Each Result tells in `dropped` how many did not come.
     """

@@ -5,7 +5,7 @@ import {
 } from '../src/draw/colours';
 import { rampColour, rampStops, rampTexels, rangeOf } from '../src/draw/ramp';
 
-/** Relative luminance, and its ratio of two colours, as WCAG 2 defines them. */
+/** Relative luminance and contrast ratio, as in WCAG 2. */
 function luminance(colour: Rgb): number {
   const [red, green, blue] = colour.map((part) =>
     part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
@@ -20,7 +20,7 @@ function contrast(one: Rgb, other: Rgb): number {
 for (const dark of [false, true]) {
   const name = dark ? 'dark' : 'light';
 
-  test(`Lines stand out from the ground (${name})`, () => {
+  test(`lines contrast with the background (${name})`, () => {
     const { background, outline, hole, accent, normal, missing } = theme(dark);
     for (const colour of [outline, hole, accent, normal, missing]) {
       assert.ok(contrast(colour, background) >= 3, hex(colour));
@@ -34,20 +34,20 @@ for (const dark of [false, true]) {
     }
   });
 
-  test(`Both ends of an attribute stand out, and its lightness grows evenly (${name})`, () => {
+  test(`attribute colours contrast, in even lightness steps (${name})`, () => {
     const shares = Array.from({ length: 33 }, (_, k) => k / 32);
     for (const share of shares) {
       const ratio = contrast(rampColour(share, dark), theme(dark).background);
       assert.ok(ratio >= 3, `${share}: ${ratio}`);
     }
-    // The cube root of luminance is close to the lightness that eyes see.
+    // The cube root of luminance is close to perceived lightness.
     const light = shares.map((share) => Math.cbrt(luminance(rampColour(share, dark))));
     const steps = light.slice(1).map((one, k) => one - light[k]);
     assert.ok(Math.min(...steps) > 0.3 * Math.max(...steps), steps.join(' '));
   });
 }
 
-test('Identities that follow each other differ in colour, and one keeps its own', () => {
+test('successive identities differ in colour', () => {
   const distance = (one: Rgb, other: Rgb): number =>
     Math.hypot(...one.map((part, k) => part - other[k]));
   for (let identity = 1; identity < 500; ++identity) {
@@ -61,18 +61,18 @@ test('Identities that follow each other differ in colour, and one keeps its own'
   assert.notDeepEqual(identityColour(77, 3, true), identityColour(77, 4, true));
 });
 
-test('What is not tracked is grey', () => {
+test('an untracked ring is grey', () => {
   assert.deepEqual(identityColour(0, 0, true), theme(true).missing);
   assert.notDeepEqual(identityColour(0, 1, true), theme(true).missing);
 });
 
-test('A colour survives being written as text and as a number', () => {
+test('a colour converts to text and number and back', () => {
   assert.equal(hex(rgb('#0b4f86')), '#0b4f86');
   assert.equal(packed(rgb('#0b4f86')), 0xff864f0b);
   assert.equal(hex(unpacked(packed(rgb('#fa0180')))), '#fa0180');
 });
 
-test('The stops of a legend are the ends and what lies between them', () => {
+test('legend stops cover the range', () => {
   const stops = rampStops(true);
   assert.equal(stops[0], hex(rampColour(0, true)));
   assert.equal(stops[stops.length - 1], hex(rampColour(1, true)));
@@ -80,7 +80,7 @@ test('The stops of a legend are the ends and what lies between them', () => {
   assert.equal(hex([texels[0] / 255, texels[1] / 255, texels[2] / 255]), stops[0]);
 });
 
-test('A range leaves out what is not finite', () => {
+test('a range ignores NaN and infinity', () => {
   assert.deepEqual(rangeOf(Float32Array.of(3, NaN, -1, Infinity, 2)), { min: -1, max: 3 });
   assert.equal(rangeOf(Float32Array.of(NaN)), null);
 });

@@ -1,12 +1,12 @@
 import { bytesOf } from '../src/protocol/arrays';
 import { type Frame, type Mesh, NO_RING } from '../src/protocol/frame';
 
-/** Frames to draw: outlines of a level set on a grid, filled as the server fills them. */
+/** Frames to draw: outlines of a level set on a grid, with a mesh like the server's. */
 
 /** Negative inside. */
 export type LevelSet = (x: number, y: number) => number;
 
-/** A body with a round hole, drops beside it, one of them a drop in the hole. */
+/** A body with a round hole, and drops: some outside, one in the hole. */
 export function blobs(phase: number): LevelSet {
   const drops = [
     { x: 13.2, y: 8.2, r: 1.3 }, { x: 15.4, y: 5.6, r: 0.55 }, { x: 14.6, y: 3.1, r: 0.9 },
@@ -30,7 +30,7 @@ export interface FrameOptions {
   width?: number;
   height?: number;
   cell?: number;
-  /** Whole cells become rectangles of a row; else two triangles each. */
+  /** Merges whole cells of a row to rectangles. Otherwise each has two triangles. */
   merge?: boolean;
   sequence?: bigint;
   origin?: [number, number];
@@ -49,8 +49,8 @@ export function makeFrame(options: FrameOptions = {}): Frame {
   }
   const inside = (node: number): boolean => values[node] < 0;
 
-  // Segments of marching squares, the inside on the left: from the edge where one enters a cell to
-  // the edge where one leaves it. An edge is named by its lower node, times 2, plus 1 if upright.
+  // Segments of marching squares, with the inside on the left, from one edge of a cell to another. The
+  // number of an edge is its lower node, times 2, plus 1 if vertical.
   const following = new Map<number, number>();
   const corners = (node: number): number[] => [node, node + 1, node + stride + 1, node + stride];
   const edgesOf = (node: number): number[] =>
@@ -63,9 +63,9 @@ export function makeFrame(options: FrameOptions = {}): Frame {
       const edges = edgesOf(node);
       let cut = false;
       for (let k = 0; k < 4; ++k) {
-        if (!signs[k] || signs[(k + 1) % 4]) continue; // The inside ends on edge k.
+        if (!signs[k] || signs[(k + 1) % 4]) continue;  // The inside ends on edge k.
         let back = k;
-        while (signs[back]) back = (back + 3) % 4; // The edge on which it began.
+        while (signs[back]) back = (back + 3) % 4;  // Its first edge.
         following.set(edges[k], edges[back]);
         cut = true;
       }
@@ -74,7 +74,7 @@ export function makeFrame(options: FrameOptions = {}): Frame {
   }
 
   const points: number[] = [];
-  const pointOf = new Map<number, number>(); // By edge; nodes as -1 - node.
+  const pointOf = new Map<number, number>();  // By edge; nodes as -1 - node.
   const place = (key: number): number => {
     const known = pointOf.get(key);
     if (known !== undefined) return known;
@@ -131,12 +131,13 @@ export function makeFrame(options: FrameOptions = {}): Frame {
   return frameOf(options, points, offsets, ringPoints, triangles, classes, level, cell);
 }
 
-/** A mesh whose bytes are those of its arrays. */
+/** A mesh of arrays. */
 export function meshOf(
   points: Float32Array, triangles: Uint32Array, classes: Uint8Array,
+  attributes: ReadonlyMap<string, Float32Array> = new Map(),
 ): Mesh {
   const bytes = { points: bytesOf(points), triangles: bytesOf(triangles) };
-  return { points, triangles, classes, bytes };
+  return { points, triangles, classes, bytes, attribute: (name) => attributes.get(name) };
 }
 
 function frameOf(
@@ -165,7 +166,7 @@ function frameOf(
   const outers = [...area.keys()].filter((ring) => area[ring] > 0);
   const outerOf = Uint32Array.from(area, (one, ring) => {
     if (one > 0) return NO_RING;
-    // Here every hole is in the largest body.
+    // Every hole lies in the largest body.
     const larger = (most: number, outer: number): number =>
       area[outer] > area[most] ? outer : most;
     return outers.reduce(larger, outers[0] ?? ring);
@@ -183,8 +184,6 @@ function frameOf(
   return {
     sequence: options.sequence ?? 1n,
     time: 0,
-    bytes: 0,
-    receivedAt: 0,
     origin: options.origin ?? [0, 0],
     rings: {
       points: Float32Array.from(points.slice(0, ringPoints)),
@@ -198,13 +197,14 @@ function frameOf(
       normals,
       attributes: new Map([['speed', speed]]),
     },
+    isolines: null,
     mesh: meshOf(
       Float32Array.from(points), Uint32Array.from(triangles), Uint8Array.from(classes)),
     particles: Float32Array.from(particles),
     statistics: {
       particles: particles.length / 2, triangles: classes.length, trianglesGrid: classes.length,
-      area: sum(area), perimeter: sum(perimeter), spacing, cellSize: cell, milliseconds: 0,
-      stages: [], doubts: [],
+      area: sum(area), perimeter: sum(perimeter), spacing, milliseconds: 0, droppedHoles: 0,
+      droppedComponents: 0, droppedSpray: 0, selfIntersections: 0, foldedTriangles: 0, doubts: [],
     },
     ringsDigest: 0n,
     meshDigest: 0n,

@@ -12,7 +12,7 @@ class FakeScene implements Navigable {
   }
 }
 
-/** What `attachNavigation` uses of a canvas, without a browser. */
+/** The part of a canvas that `attachNavigation` uses. */
 class FakeCanvas extends EventTarget {
   style = { touchAction: '' };
   setPointerCapture(): void {}
@@ -38,7 +38,7 @@ function attached(): { canvas: FakeCanvas; scene: FakeScene; changes: () => numb
   return { canvas, scene, changes: () => count, detach };
 }
 
-test('A notch of the wheel magnifies the same in pixels, lines and pinches, back undoes it', () => {
+test('the wheel zooms alike in pixels, lines and pinches', () => {
   const wheel = (deltaY: number, deltaMode = 0, ctrlKey = false): number =>
     wheelFactor({ deltaY, deltaMode, ctrlKey });
   assert.ok(wheel(-100) > 1.1 && wheel(-100) < 1.5);
@@ -48,7 +48,7 @@ test('A notch of the wheel magnifies the same in pixels, lines and pinches, back
   assert.ok(wheel(-1e9) < 3, 'a broken wheel does not lose the view');
 });
 
-test('The wheel magnifies about the cursor and keeps the page from scrolling', () => {
+test('the wheel zooms about the cursor without scrolling', () => {
   const { canvas, scene, changes } = attached();
   const under = toWorld(scene.view, scene.size, 120, 333);
   const event = canvas.send('wheel',
@@ -59,7 +59,7 @@ test('The wheel magnifies about the cursor and keeps the page from scrolling', (
   assert.equal(changes(), 1);
 });
 
-test('A drag carries along what the pointer holds', () => {
+test('a drag pans by its distance', () => {
   const { canvas, scene } = attached();
   const held = toWorld(scene.view, scene.size, 50, 60);
   canvas.pointer('pointerdown', 1, 50, 60);
@@ -72,7 +72,7 @@ test('A drag carries along what the pointer holds', () => {
   assert.deepEqual(toCss(scene.view, scene.size, ...held), at, 'released');
 });
 
-test('Two fingers magnify by how far they part, and hold what is between them', () => {
+test('two fingers zoom about their centre', () => {
   const { canvas, scene } = attached();
   const between = toWorld(scene.view, scene.size, 200, 100);
   canvas.pointer('pointerdown', 1, 150, 100);
@@ -84,7 +84,7 @@ test('Two fingers magnify by how far they part, and hold what is between them', 
   assert.ok(Math.hypot(x - 200, y - 100) < 1e-9);
 });
 
-test('A click after a drag is kept from others, a click on the spot is not', () => {
+test('a drag does not click', () => {
   const { canvas } = attached();
   let clicks = 0;
   canvas.addEventListener('click', () => ++clicks);
@@ -100,7 +100,7 @@ test('A click after a drag is kept from others, a click on the spot is not', () 
   assert.equal(clicks, 1);
 });
 
-test('Keys move, magnify about the middle and fit; others are left to the page', () => {
+test('keys pan, zoom and fit; others are ignored', () => {
   const scene = new FakeScene();
   assert.ok(applyKey(scene, 'ArrowRight', false) && scene.view.x > 0);
   const slow = scene.view.x;
@@ -114,14 +114,14 @@ test('Keys move, magnify about the middle and fit; others are left to the page',
   assert.equal(applyKey(scene, 'Tab', false), false);
 });
 
-test('Shortcuts of the browser are left alone', () => {
+test('browser shortcuts are ignored', () => {
   const { canvas, scene } = attached();
   const event = canvas.send('keydown', { key: '+', ctrlKey: true });
   assert.equal(scene.view.scale, 10);
   assert.equal(event.defaultPrevented, false);
 });
 
-test('What was taken away does nothing any more', () => {
+test('a detached navigation is inactive', () => {
   const { canvas, scene, changes, detach } = attached();
   detach();
   canvas.send('keydown', { key: '+' });

@@ -4,7 +4,7 @@ import { RingIndex } from '../src/draw/pick';
 import { NO_RING, type Rings } from '../src/protocol/frame';
 import { makeFrame } from './draw_frames';
 
-/** Rings of given corners; `outerOf` is NO_RING for outer rings. */
+/** Rings from their corners; `outerOf` is NO_RING for outer rings. */
 function ringsOf(corners: number[][], outerOf: number[]): Rings {
   const offsets = [0];
   for (const ring of corners) offsets.push(offsets[offsets.length - 1] + ring.length / 2);
@@ -36,7 +36,7 @@ const NESTED = ringsOf([
   [4, 4, 6, 4, 6, 6, 4, 6],
 ], [NO_RING, 0, NO_RING]);
 
-/** All segments, by the definition. */
+/** Brute-force search over all segments. */
 function bruteForce(rings: Rings, x: number, y: number): number | null {
   let inner: number | null = null;
   for (let ring = 0; ring < rings.outerOf.length; ++ring) {
@@ -55,7 +55,7 @@ function bruteForce(rings: Rings, x: number, y: number): number | null {
   return inner !== null && rings.outerOf[inner] === NO_RING ? inner : null;
 }
 
-test('A place belongs to the innermost outer ring, and in a hole to none', () => {
+test('a position belongs to the innermost outer ring', () => {
   const index = new RingIndex(NESTED);
   assert.equal(index.ringAt(1, 5, 0), 0);
   assert.equal(index.ringAt(3, 5, 0), null);
@@ -64,7 +64,7 @@ test('A place belongs to the innermost outer ring, and in a hole to none', () =>
   assert.equal(index.ringAt(5, -1e9, 0), null);
 });
 
-test('Near a line its ring is meant, a hole too', () => {
+test('a position near a line picks its ring', () => {
   const index = new RingIndex(NESTED);
   assert.equal(index.ringAt(2.2, 5, 0.5), 1);
   assert.equal(index.ringAt(1.8, 5, 0.5), 1);
@@ -73,7 +73,7 @@ test('Near a line its ring is meant, a hole too', () => {
   assert.equal(index.ringAt(5, 6.1, 0.5), 2);
 });
 
-test('All places of a frame get what a look at every segment gives', () => {
+test('the index agrees with a search of every segment', () => {
   const { rings } = makeFrame({ cell: 0.2 });
   const index = new RingIndex(rings);
   let found = 0;
@@ -88,7 +88,7 @@ test('All places of a frame get what a look at every segment gives', () => {
   assert.ok(found > 800 && found < 3600, `${found}`);
 });
 
-test('No rings, points on one line and single points are no ring around anything', () => {
+test('degenerate rings contain nothing', () => {
   assert.equal(new RingIndex(ringsOf([], [])).ringAt(0, 0, 1), null);
   const flat = new RingIndex(ringsOf([[0, 1, 5, 1, 9, 1]], [NO_RING]));
   assert.equal(flat.ringAt(5, 1.5, 0.1), null);
@@ -98,7 +98,7 @@ test('No rings, points on one line and single points are no ring around anything
   assert.equal(point.ringAt(4, 3, 0.1), null);
 });
 
-test('Segments as tall as the whole do not fill the memory', () => {
+test('tall segments do not exhaust the memory', () => {
   const comb: number[] = [];
   for (let k = 0; k < 20000; ++k) comb.push(k, k % 2 === 0 ? 0 : 1000);
   comb.push(20000, -1, -1, -1);

@@ -4,7 +4,7 @@ import { pieceTints } from '../src/draw/pieces';
 import { RingIndex } from '../src/draw/pick';
 import { makeFrame, meshOf } from './draw_frames';
 
-test('Every triangle gets the colour of the outer ring that it lies in', () => {
+test('every triangle gets the colour of its outer ring', () => {
   for (const merge of [true, false]) {
     const { mesh, rings } = makeFrame({ cell: 0.2, merge });
     assert.ok(mesh);
@@ -17,7 +17,7 @@ test('Every triangle gets the colour of the outer ring that it lies in', () => {
       const x = (points[2 * a] + points[2 * b] + points[2 * c]) / 3;
       const y = (points[2 * a + 1] + points[2 * b + 1] + points[2 * c + 1]) / 3;
       const ring = index.ringAt(x, y, 0);
-      if (ring === null) continue; // Of no area, on the line.
+      if (ring === null) continue;  // On the line.
       seen.add(ring);
       for (const corner of [a, b, c]) assert.equal(tints[corner], 1000 + ring);
     }
@@ -25,11 +25,11 @@ test('Every triangle gets the colour of the outer ring that it lies in', () => {
   }
 });
 
-test('A piece that shares no point with an outline is found by its place', () => {
+test('a piece without ring vertices is found by position', () => {
   const { mesh, rings } = makeFrame({ cell: 0.5 });
   assert.ok(mesh);
   const count = mesh.points.length / 2;
-  // A triangle of its own within the largest body.
+  // A separate triangle inside the largest body.
   const points = Float32Array.from([...mesh.points, 9, 5, 9.2, 5, 9, 5.2]);
   const triangles = Uint32Array.from([...mesh.triangles, count, count + 1, count + 2]);
   const tints = pieceTints(

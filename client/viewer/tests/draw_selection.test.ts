@@ -31,7 +31,7 @@ test('A ring stays selected as long as it keeps its identity', () => {
   assert.deepEqual(selected(selection, frame(9, [[7, [7]]])), [7n]);
 });
 
-test('After a split all parts are selected, and so are their parts', () => {
+test('after a split all parts are selected', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, frame(1, [[7, []], [1, []]]));
@@ -39,7 +39,7 @@ test('After a split all parts are selected, and so are their parts', () => {
   assert.deepEqual(selected(selection, frame(3, [[9, [8]], [8, [8]], [7, [7]]])), [9n, 8n, 7n]);
 });
 
-test('After a merge the ring that swallowed it is selected', () => {
+test('after a merge the merged ring is selected', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, frame(1, [[7, []], [1, []]]));
@@ -47,7 +47,7 @@ test('After a merge the ring that swallowed it is selected', () => {
   assert.deepEqual(selected(selection, frame(3, [[1, [1]]])), [1n]);
 });
 
-test('Back before a merge the other ring is not selected', () => {
+test('before a merge the other ring is not selected', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, frame(4, [[7, []], [1, []]]));
@@ -56,7 +56,7 @@ test('Back before a merge the other ring is not selected', () => {
   assert.deepEqual(selected(selection, frame(5, [[1, [1, 7]]])), [1n]);
 });
 
-test('Over a gap parents are those of a frame that was not seen, and tell nothing', () => {
+test('parents are ignored after a gap', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, frame(1, [[7, []], [8, []]]));
@@ -85,7 +85,7 @@ function squares(sequence: number, ones: [number, number, number, number][],
   };
 }
 
-test('A merge that was not seen is told by place', () => {
+test('a missed merge is found by position', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, squares(1, [[7, 0, 0, 2], [1, 3, 0, 9]]));
@@ -94,7 +94,7 @@ test('A merge that was not seen is told by place', () => {
   assert.deepEqual(selected(selection, squares(90, [[1, -1, -1, 13]])), [1n]);
 });
 
-test('A split that was not seen is told by place; what is new elsewhere is not selected', () => {
+test('a missed split is found by position', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, squares(1, [[7, 0, 0, 10], [1, 30, 0, 9]]));
@@ -102,14 +102,14 @@ test('A split that was not seen is told by place; what is new elsewhere is not s
   assert.deepEqual(selected(selection, split), [7n, 8n]);
 });
 
-test('Many frames later place tells nothing', () => {
+test('position is ignored after many frames', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, squares(1, [[7, 0, 0, 2], [1, 3, 0, 9]]));
   assert.deepEqual(selected(selection, squares(60, [[1, -1, -1, 13]])), []);
 });
 
-test('What is not tracked is never selected by its identity', () => {
+test('an untracked ring is never selected', () => {
   const selection = new Selection();
   selection.start(0n);
   assert.deepEqual(selected(selection, frame(1, [[0, []]])), []);
@@ -119,7 +119,7 @@ test('What is not tracked is never selected by its identity', () => {
   assert.deepEqual(selected(selection, frame(3, [[0, []], [0, []]])), []);
 });
 
-test('A new selection forgets the one before', () => {
+test('a new selection replaces the old one', () => {
   const selection = new Selection();
   selection.start(7n);
   selected(selection, frame(1, [[7, []], [1, []]]));

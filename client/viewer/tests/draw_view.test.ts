@@ -9,17 +9,17 @@ function near(actual: readonly number[], expected: readonly number[], tolerance 
   actual.forEach((one, k) => assert.ok(Math.abs(one - expected[k]) <= tolerance, `${actual}`));
 }
 
-test('The middle of the canvas is the place of the view, and y goes up in the world', () => {
+test('the view is the canvas centre, and world y points up', () => {
   near(toWorld(VIEW, SIZE, 400, 250), [12.5, -3]);
   near(toWorld(VIEW, SIZE, 440, 210), [13.5, -2]);
 });
 
-test('From the world to CSS pixels and back leads to the same place', () => {
+test('world and CSS coordinates convert both ways', () => {
   const [cssX, cssY] = toCss(VIEW, SIZE, 17.25, 4.125);
   near(toWorld(VIEW, SIZE, cssX, cssY), [17.25, 4.125]);
 });
 
-test('Magnifying keeps what is under the cursor where it is', () => {
+test('a zoom keeps the position under the cursor', () => {
   let view = VIEW;
   const under = toWorld(view, SIZE, 113, 402);
   for (const factor of [1.2, 3, 0.1, 40, 1e-3]) {
@@ -29,7 +29,7 @@ test('Magnifying keeps what is under the cursor where it is', () => {
   near([view.scale], [40 * 1.2 * 3 * 0.1 * 40 * 1e-3], 1e-9);
 });
 
-test('Magnification ends before single precision does', () => {
+test('zoom stays within single precision', () => {
   let view = VIEW;
   for (let k = 0; k < 400; ++k) view = zoomAt(view, SIZE, 1, 1, 10);
   assert.equal(view.scale, 1e30);
@@ -37,25 +37,25 @@ test('Magnification ends before single precision does', () => {
   assert.equal(view.scale, 1e-30);
 });
 
-test('Moving by pixels moves what is seen by as many', () => {
+test('a pan by pixels moves the content by pixels', () => {
   const before = toCss(VIEW, SIZE, 1, 2);
   near(toCss(panBy(VIEW, 30, -7), SIZE, 1, 2), [before[0] + 30, before[1] - 7]);
 });
 
-test('What is fitted lies within the canvas, in its middle, and touches the margin', () => {
+test('fitted bounds are centred and touch the margin', () => {
   const view = fitBounds({ left: -1, right: 9, bottom: 100, top: 101 }, SIZE);
   const [left, bottom] = toCss(view, SIZE, -1, 100);
   const [right, top] = toCss(view, SIZE, 9, 101);
   near([left, SIZE.width - right, top], [48, 48, SIZE.height - bottom], 1e-6);
 });
 
-test('A single place, and a canvas without size, have a view too', () => {
+test('a single point and an empty canvas have a view', () => {
   assert.equal(fitBounds({ left: 2, right: 2, bottom: 3, top: 3 }, SIZE).scale, 1);
   const box = { left: 0, right: 1, bottom: 0, top: 1 };
   assert.equal(fitBounds(box, { width: 0, height: 0 }).scale, 1);
 });
 
-test('Bounds are in world coordinates and leave out what is not finite', () => {
+test('bounds are world coordinates of finite points', () => {
   const points = Float32Array.of(1, 2, NaN, 9, 3, -4, Infinity, 0);
   assert.deepEqual(boundsOf(points, [1000, 10]), { left: 1001, bottom: 6, right: 1003, top: 12 });
   assert.equal(boundsOf(new Float32Array(0), [0, 0]), null);

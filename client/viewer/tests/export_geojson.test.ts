@@ -24,7 +24,7 @@ function signedArea(ring: [number, number][]): number {
 
 const FRAME = makeFrame({ sequence: 12n, origin: [1e6, -2e6] });
 
-test('Each outer ring is a polygon with its holes, closed, holes the other way round', () => {
+test('each outer ring is a closed polygon with its holes', () => {
   const { type, frame, features } = JSON.parse(geojson(FRAME)) as Collection;
   assert.equal(type, 'FeatureCollection');
   assert.equal(frame, 12);
@@ -41,14 +41,14 @@ test('Each outer ring is a polygon with its holes, closed, holes the other way r
   }
 });
 
-test('Coordinates are of the world, in double precision', () => {
+test('coordinates are float64 world coordinates', () => {
   const { features } = JSON.parse(geojson(FRAME)) as Collection;
   const first = features[0].geometry.coordinates[0][0];
   assert.deepEqual(first, [1e6 + FRAME.rings.points[0], -2e6 + FRAME.rings.points[1]]);
   assert.notEqual(first[0], Math.fround(first[0]));
 });
 
-test('Area and perimeter are of the polygon with its holes', () => {
+test('area and perimeter include the holes', () => {
   const { features } = JSON.parse(geojson(FRAME)) as Collection;
   for (const { properties, geometry } of features) {
     const area = geometry.coordinates.reduce((sum, ring) => sum + signedArea(ring), 0);
@@ -56,7 +56,7 @@ test('Area and perimeter are of the polygon with its holes', () => {
   }
 });
 
-test('Identities keep their 64 bits, and a time that is not finite is null', () => {
+test('identities keep 64 bits; a time of NaN is null', () => {
   const large = 2n ** 64n - 1n;
   const rings = {
     ...FRAME.rings,
@@ -68,7 +68,7 @@ test('Identities keep their 64 bits, and a time that is not finite is null', () 
   assert.equal((JSON.parse(text) as Collection).time, null);
 });
 
-test('An empty frame is a collection of nothing', () => {
+test('an empty frame is an empty collection', () => {
   const rings = {
     ...FRAME.rings,
     points: new Float32Array(0),

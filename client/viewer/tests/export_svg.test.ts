@@ -20,7 +20,7 @@ function count(text: string, pattern: RegExp): number {
   return text.match(pattern)?.length ?? 0;
 }
 
-test('Nothing but the ground is drawn of a look that shows nothing', () => {
+test('an empty look draws only the background', () => {
   const text = draw({});
   assert.match(text, /^<svg [^>]*width="850" height="550" viewBox="0 0 850 550">/);
   assert.equal(count(text, /<path/g), 0);
@@ -28,7 +28,7 @@ test('Nothing but the ground is drawn of a look that shows nothing', () => {
   assert.ok(draw({ dark: true }).includes(hex(theme(true).background)));
 });
 
-test('The outline has all points of all rings, each where the screen has it', () => {
+test('the outline has every vertex at its screen position', () => {
   const text = draw({ outline: true, lineWidth: 3 });
   assert.equal(count(text, /[ML][\d.-]+ [\d.-]+/g), FRAME.rings.points.length / 2);
   assert.equal(count(text, /Z/g), FRAME.rings.outerOf.length);
@@ -38,7 +38,7 @@ test('The outline has all points of all rings, each where the screen has it', ()
   assert.ok(text.includes(`M${x} ${y}L`));
 });
 
-test('What is out of sight is left out', () => {
+test('parts outside the picture are left out', () => {
   const drop = { x: 14.6, y: 3.1, scale: 250 };
   assert.equal(count(draw({ outline: true }, FRAME, drop), /Z/g), 1);
   const away = { x: 1e6, y: 0, scale: 50 };
@@ -46,7 +46,7 @@ test('What is out of sight is left out', () => {
   assert.equal(count(draw(all, FRAME, away), /<path/g), 0);
 });
 
-test('Merged triangles are one figure on top of the inside', () => {
+test('merged triangles are one path on top of the inside', () => {
   const text = draw({ fill: true });
   const { band, interior } = theme(false);
   assert.ok(text.indexOf(hex(band)) < text.indexOf(hex(interior)));
@@ -55,13 +55,13 @@ test('Merged triangles are one figure on top of the inside', () => {
   assert.equal(count(text, /Z/g), FRAME.rings.outerOf.length + merged);
 });
 
-test('Rings are filled without a mesh, too', () => {
+test('rings are filled without a mesh', () => {
   const text = draw({ fill: true, edges: true }, { ...FRAME, mesh: null });
   assert.equal(count(text, /<path/g), 1);
   assert.match(text, /fill-rule="evenodd"/);
 });
 
-test('Every edge is drawn once', () => {
+test('every edge is drawn once', () => {
   const edges = new Set<string>();
   const { triangles } = FRAME.mesh ?? { triangles: new Uint32Array(0) };
   for (let k = 0; k < triangles.length; ++k) {
@@ -71,7 +71,7 @@ test('Every edge is drawn once', () => {
   assert.equal(count(draw({ edges: true }), /M/g), edges.size);
 });
 
-test('Particles are dots, normals are lines out of the vertices', () => {
+test('particles are dots, normals are lines', () => {
   assert.equal(count(draw({ particles: true }), /h0/g), (FRAME.particles?.length ?? 0) / 2);
   assert.equal(count(draw({ normals: true }), /l/g) > 0, true);
   const zoomed = { ...VIEW, scale: 5 };
@@ -79,7 +79,7 @@ test('Particles are dots, normals are lines out of the vertices', () => {
     count(draw({ normals: true }), /M/g), 'every n-th where they are too close');
 });
 
-test('Each identity has its colours', () => {
+test('each identity has its colour', () => {
   const text = draw({ outline: true, fill: true, colour: 'identity' });
   const strokes = new Set([...text.matchAll(/stroke="(#\w+)"/g)].map(([, colour]) => colour));
   assert.equal(strokes.size, FRAME.rings.outerOf.length);
@@ -87,7 +87,7 @@ test('Each identity has its colours', () => {
   assert.equal(fills.size, 2 * 6, 'band and interior of six outer rings');
 });
 
-test('An attribute colours the outline along its range, and what is no number is grey', () => {
+test('an attribute colours the outline; NaN is grey', () => {
   const stops = rampStops(false);
   const values = Float32Array.from(FRAME.rings.points, (one) => one).filter((_, k) => k % 2 === 0);
   const rings = { ...FRAME.rings, attributes: new Map([['x', values]]) };
@@ -102,6 +102,6 @@ test('An attribute colours the outline along its range, and what is no number is
     .includes(`stroke="${hex(theme(false).missing)}"`));
 });
 
-test('An attribute that the frame lacks leaves the outline plain', () => {
+test('a missing attribute leaves the outline plain', () => {
   assert.ok(draw({ outline: true, colour: 'nowhere' }).includes(hex(theme(false).outline)));
 });

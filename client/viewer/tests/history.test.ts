@@ -2,14 +2,14 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { History, type Entry } from '../src/stream/history';
 
-const ENTRY = 600;  // What an entry takes beside its message.
+const ENTRY = 600;  // Size of an entry without its message.
 
 function entry(sequence: number, bytes = 400): Entry {
   return {
     sequence, time: sequence / 10, receivedAt: 0, bytes,
     summary: { area: 0, rings: 0, triangles: 0, trianglesGrid: 0, milliseconds: 0, stages: [],
                received: 0, drawn: 0, dropped: 0, latency: NaN },
-    parse: () => { throw new Error('not parsed here'); },
+    frame: () => { throw new Error('unused'); },
   };
 }
 
@@ -17,14 +17,14 @@ function sequences(history: History): number[] {
   return Array.from({ length: history.size }, (_, k) => history.entry(k).sequence);
 }
 
-test('the oldest frames give way to new ones, and bytes stay below the limit', () => {
+test('the oldest frames are evicted at the byte limit', () => {
   const history = new History(5 * (400 + ENTRY));
   for (let k = 1; k <= 20; ++k) assert.ok(history.insert(entry(k), Infinity));
   assert.deepEqual(sequences(history), [16, 17, 18, 19, 20]);
   assert.ok(history.bytes <= 5 * (400 + ENTRY));
 });
 
-test('frames from the place on that somebody looks at are kept, and new ones refused', () => {
+test("frames from the player's position on are kept", () => {
   const history = new History(5 * (400 + ENTRY));
   for (let k = 1; k <= 5; ++k) history.insert(entry(k), Infinity);
   assert.ok(history.insert(entry(6), 2), 'frame 1 lies before the place');
@@ -32,20 +32,20 @@ test('frames from the place on that somebody looks at are kept, and new ones ref
   assert.deepEqual(sequences(history), [2, 3, 4, 5, 6]);
 });
 
-test('frames that come late take their place in the order, once', () => {
+test('late frames are inserted in order, once', () => {
   const history = new History(1 << 20);
   for (const k of [10, 11, 5, 6, 7, 6, 12]) assert.ok(history.insert(entry(k), Infinity));
   assert.deepEqual(sequences(history), [5, 6, 7, 10, 11, 12]);
 });
 
-test('frames that come late do not push out newer ones', () => {
+test('late frames do not evict newer ones', () => {
   const history = new History(3 * (400 + ENTRY));
   for (const k of [10, 11, 12]) history.insert(entry(k), Infinity);
   assert.ok(!history.insert(entry(9), Infinity));
   assert.deepEqual(sequences(history), [10, 11, 12]);
 });
 
-test('a place between frames is that of the frame before', () => {
+test('a position between frames is the previous frame', () => {
   const history = new History(1 << 20);
   for (const k of [3, 5, 9]) history.insert(entry(k), Infinity);
   assert.equal(history.atOrBefore(8)?.sequence, 5);

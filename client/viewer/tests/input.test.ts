@@ -17,24 +17,24 @@ import type { Particles } from '../src/protocol/particles';
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const recording = new URL('../../../recordings/dam_break.pemc', import.meta.url);
 
-test('names are ordered as people number them', () => {
+test('names are in natural order', () => {
   const names = ['f10.csv', 'f2.csv', 'f1.csv', 'a/f3.csv', 'f02.csv'];
   assert.deepEqual(names.sort(naturalOrder), ['a/f3.csv', 'f1.csv', 'f02.csv', 'f2.csv', 'f10.csv']);
 });
 
-test('tables are read with commas, semicolons, blanks, quotes and comments', () => {
+test('tables may use any separator, quotes and comments', () => {
   assert.deepEqual(parseTable('x,y\n1,2\n\n3,4\n', 'a').rows, [['1', '2'], ['3', '4']]);
   assert.deepEqual(parseTable('"Pos x";"y"\r\n1;2\r\n', 'a').names, ['Pos x', 'y']);
   assert.deepEqual(parseTable('# x y\n1 2\n3 4', 'a').names, ['x', 'y']);
   assert.deepEqual(parseTable('1 2\n3 4', 'a'), { names: [], columnCount: 2, rows: [['1', '2'], ['3', '4']] });
 });
 
-test('a row that is too short is refused with its line', () => {
+test('a short row is refused with its line number', () => {
   assert.throws(() => parseTable('x,y\n1,2\n3\n', 'cut.csv'), /cut\.csv, line 3/);
   assert.throws(() => parseTable('', 'empty.csv'), InputError);
 });
 
-test('columns are found by the names that people give them', () => {
+test('columns are found by common names', () => {
   const plan = planNamedColumns(['idp', 'Pos.x [m]', 'Pos.z [m]', 'Vel.x', 'Vel.z', 'Rhop']);
   assert.deepEqual(plan.positions, [1, null, 2]);
   assert.deepEqual(plan.velocities, [3, null, 4]);
@@ -46,7 +46,7 @@ test('columns are found by the names that people give them', () => {
 
 const file = (name: string, text: string) => new File([text], name);
 
-test('a folder of CSV files is a frame each, with times beside them', async () => {
+test('a CSV folder is one frame per file', async () => {
   const source = await openDropped([
     file('f10.csv', 'x,y,vx,vy,p\n1,2,3,4,5\n'), file('times.csv', 'frame,t\n0,0.5\n1,0.75\n'),
     file('f9.csv', 'x,y,vx,vy,p\n0,0,0,0,1\n1,0,0,0,2\n'),
@@ -61,25 +61,25 @@ test('a folder of CSV files is a frame each, with times beside them', async () =
   assert.deepEqual([...arrayOf(Float32Array, second.velocities ?? new Uint8Array())], [3, 4]);
 });
 
-test('without times frames have their number as time, and velocities mean nothing', async () => {
+test('frames without times have their number as time', async () => {
   const source = await openDropped([file('a.csv', 'x,y,vx,vy\n1,2,3,4\n')]);
   const frame = await source.frame(0);
   assert.deepEqual([frame.time, frame.velocities], [0, undefined]);
 });
 
-test('a plane is found among three axes, and 3D is refused', async () => {
+test('a plane is found among three axes; 3D is refused', async () => {
   const flat = await openDropped([file('a.csv', 'x,y,z\n0,7,1\n2,7,3\n')]);
   assert.deepEqual(doubles((await flat.frame(0)).positions), [0, 1, 2, 3]);
-  await assert.rejects(openDropped([file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n')]), /slice it first/);
+  await assert.rejects(openDropped([file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n')]), /Extract a slice/);
 });
 
-test('ids that come twice are left out, words where numbers are due are refused', async () => {
+test('duplicate ids are dropped, text in numbers is refused', async () => {
   const twice = await openDropped([file('a.csv', 'id,x,y\n1,0,0\n1,1,0\n')]);
   assert.equal((await twice.frame(0)).ids, undefined);
-  await assert.rejects(openDropped([file('a.csv', 'x,y\n0,zero\n')]), /row 1: 'zero' is no number/);
+  await assert.rejects(openDropped([file('a.csv', 'x,y\n0,zero\n')]), /row 1: 'zero' is not a number/);
 });
 
-test('times are told by columns or by a single one', () => {
+test('times are columns or a single column', () => {
   assert.deepEqual([...parseTimes('t\n1\n2\n', 'times.csv')], [[0, 1], [1, 2]]);
   assert.deepEqual([...parseTimes('frame,time\n3,1.5\n', 'times.csv')], [[3, 1.5]]);
   assert.throws(() => parseTimes('a,b\n1,2\n', 'times.csv'), InputError);
@@ -88,19 +88,19 @@ test('times are told by columns or by a single one', () => {
 const DUMP = ['ITEM: TIMESTEP', '0', 'ITEM: NUMBER OF ATOMS', '2', 'ITEM: BOX BOUNDS pp pp pp',
   '0 10', '0 20', '-1 1', 'ITEM: ATOMS id type xs ys', '1 1 0.5 0.5', '2 1 0.1 0.2', ''].join('\n');
 
-test('a LAMMPS dump is cut into frames, and scaled positions get their box', async () => {
+test('a LAMMPS dump is split and unscaled', async () => {
   const source = await LammpsSource.open(new Blob([DUMP + DUMP.replace('0.5 0.5', '0.25 0.5')]), 'd.lammpstrj');
   assert.equal(source.count, 2);
   assert.deepEqual(doubles((await source.frame(0)).positions), [5, 10, 1, 4]);
   assert.deepEqual(doubles((await source.frame(1)).positions), [2.5, 10, 1, 4]);
 });
 
-test('a dump that was cut off is refused with its frame', () => {
+test('a truncated dump is refused with its frame', () => {
   assert.throws(() => parseLammpsFrame(DUMP.slice(0, -20), 4, 'd'), /d, frame 5 has|cells|no number/);
   assert.throws(() => parseLammpsFrame('ITEM: TIMESTEP\n1\n', 0, 'd'), /no atoms/);
 });
 
-test('the bundled recording gives its frames in any order', async () => {
+test('a recording reads frames in any order', async () => {
   const source = RecordingSource.open(new Uint8Array(readFileSync(recording)), 'dam_break.pemc');
   assert.equal(source.count, 75);
   assert.equal(source.spacing, 0.0303);
@@ -112,15 +112,15 @@ test('the bundled recording gives its frames in any order', async () => {
   assert.deepEqual((await source.frame(74)).positions, last.positions);
 });
 
-test('a recording that was cut off has the frames of its whole blocks; a damaged one is refused', async () => {
+test('a truncated recording keeps its whole blocks', async () => {
   const bytes = new Uint8Array(readFileSync(recording));
   const cut = RecordingSource.open(bytes.slice(0, bytes.length / 2), 'cut.pemc');
   assert.ok(cut.count > 20 && cut.count < 60, `${cut.count}`);
   assert.ok((await cut.frame(cut.count - 1)).positions.length > 0);
-  assert.throws(() => RecordingSource.open(bytes.slice(100), 'x'), /no recording/);
+  assert.throws(() => RecordingSource.open(bytes.slice(100), 'x'), /not a recording/);
 });
 
-test('what cannot be read is told with what can', async () => {
+test('unreadable files are refused with the readable kinds', async () => {
   await assert.rejects(openDropped([file('a.vtp', '<VTKFile>')]), /a\.vtp cannot be read here.*convert/);
   await assert.rejects(openDropped([]), InputError);
 });
@@ -134,7 +134,7 @@ function cloud(count: number, ids?: bigint[]): Particles {
   };
 }
 
-test('a share of the particles is about so many, and all of their arrays', () => {
+test('a share selects rows of all arrays', () => {
   for (const percent of [80, 50, 30]) {
     const chosen = shareOf(cloud(10_000), percent);
     const count = chosen.positions.length / 8;
@@ -147,7 +147,7 @@ test('a share of the particles is about so many, and all of their arrays', () =>
   assert.equal(shareOf(all, 100), all);
 });
 
-test('the same particles are chosen in whatever order they come', () => {
+test('a share does not depend on the order of particles', () => {
   const ids = Array.from({ length: 1000 }, (_, i) => BigInt(i) * 7919n);
   const chosen = (order: bigint[]) =>
     new Set(arrayOf(BigUint64Array, shareOf(cloud(1000, order), 50).ids ?? new Uint8Array()));

@@ -3,9 +3,9 @@ import test from 'node:test';
 import { Player, type Range } from '../src/stream/player';
 import { PlayoutClock } from '../src/stream/playout_clock';
 
-test('frames that come in bursts are shown evenly', () => {
+test('bursts of frames are drawn evenly', () => {
   const clock = new PlayoutClock(100);
-  // Fifty frames a second, delivered five at a time.
+  // Fifty frames per second, in bursts of five.
   const shown: number[] = [];
   let sequence = 0;
   for (let now = 0; now < 4000; now += 10) {
@@ -20,14 +20,14 @@ test('frames that come in bursts are shown evenly', () => {
   assert.ok(Math.abs(perSecond - 50) < 3, `${perSecond} frames a second`);
 });
 
-test('what is shown lies behind what comes by the latency, and never before it', () => {
+test('drawing follows arrivals at the latency', () => {
   const clock = new PlayoutClock(100);
   for (let k = 0; k <= 100; ++k) clock.arrived(k, 10 * k);
   assert.ok(Math.abs((clock.position(1000) ?? NaN) - 90) < 0.5);
   assert.equal(clock.position(5000), 100, 'the newest is the last that there is');
 });
 
-test('after a pause of the stream the pace is found anew', () => {
+test('the clock adapts after a pause', () => {
   const clock = new PlayoutClock(100);
   for (let k = 0; k < 50; ++k) clock.arrived(k, 20 * k);
   for (let k = 50; k < 100; ++k) clock.arrived(k, 10_000 + 10 * k);
@@ -38,7 +38,7 @@ function player(range: Range | null, live = true): Player {
   return new Player({ range: () => range, rate: () => 10, livePosition: () => range?.last ?? null }, live);
 }
 
-test('pause stands still, play goes on from there, follow goes to the newest', () => {
+test('pause, play and follow move the position', () => {
   const range = { first: 1, last: 100 };
   const it = player(range);
   assert.equal(it.tick(0), 100);
@@ -51,7 +51,7 @@ test('pause stands still, play goes on from there, follow goes to the newest', (
   assert.equal(it.tick(2100), 200);
 });
 
-test('a pause where frames are missing stands at the one that is seen', () => {
+test('a pause in a gap stays at the visible frame', () => {
   const it = player({ first: 0, last: 30 });
   it.tick(0);
   it.pause(22);
@@ -59,7 +59,7 @@ test('a pause where frames are missing stands at the one that is seen', () => {
   assert.deepEqual([it.mode, it.sequence], ['paused', 22]);
 });
 
-test('play at double speed catches up and follows then', () => {
+test('double speed catches up, then follows', () => {
   const it = player({ first: 1, last: 100 });
   it.tick(0);
   it.seek(90);
@@ -70,7 +70,7 @@ test('play at double speed catches up and follows then', () => {
   assert.equal(it.mode, 'live');
 });
 
-test('files end at their last frame, or begin anew', () => {
+test('files stop at their last frame or loop', () => {
   const it = player({ first: 1, last: 20 }, false);
   it.tick(0);
   it.tick(5000);
@@ -83,7 +83,7 @@ test('files end at their last frame, or begin anew', () => {
   assert.deepEqual([it.mode, it.sequence], ['playing', 1]);
 });
 
-test('seek keeps to what there is', () => {
+test('seek stays within the range', () => {
   const it = player({ first: 5, last: 20 });
   it.seek(1);
   assert.equal(it.sequence, 5);
@@ -92,7 +92,7 @@ test('seek keeps to what there is', () => {
   assert.equal(it.mode, 'paused');
 });
 
-test('a place whose frames are gone moves on to the oldest that there is', () => {
+test('an evicted position moves to the oldest frame', () => {
   const range = { first: 1, last: 50 };
   const it = player(range);
   it.seek(3);

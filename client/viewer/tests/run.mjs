@@ -1,22 +1,27 @@
-// Runs the unit tests: every tests/*.test.ts, bundled, by node's own runner.
+// Runs the unit tests: bundles every tests/*.test.ts for node's test runner.
 //   node tests/run.mjs [NAME...]
+// Fails if the committed report differs from its sources.
 import { spawnSync } from 'node:child_process';
-import { existsSync, readdirSync, rmSync } from 'node:fs';
+import { existsSync, readdirSync, readFileSync, rmSync } from 'node:fs';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
+import { buildReport } from '../build.mjs';
 
 const here = path.dirname(fileURLToPath(import.meta.url));
 const viewer = path.dirname(here);
 const out = path.join(viewer, 'build/tests');
-const wanted = process.argv.slice(2);
+const names = process.argv.slice(2);
 
 if (!existsSync(path.join(viewer, 'build/generated'))) {
-  throw new Error('build the page first: client/viewer/build.sh makes the messages');
+  throw new Error('build the page first: client/viewer/build.sh generates the messages');
+}
+if (await buildReport() !== readFileSync(path.join(viewer, '../output/report_page.html'), 'utf8')) {
+  throw new Error('client/output/report_page.html is out of date: run client/viewer/build.sh --report');
 }
 rmSync(out, { recursive: true, force: true });
 const tests = readdirSync(here).filter((name) => name.endsWith('.test.ts'))
-  .filter((name) => wanted.length === 0 || wanted.some((part) => name.includes(part)));
+  .filter((name) => names.length === 0 || names.some((part) => name.includes(part)));
 await build({
   entryPoints: tests.map((name) => path.join(here, name)),
   outdir: out,

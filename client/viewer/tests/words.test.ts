@@ -6,7 +6,7 @@ import { digestText } from '../src/protocol/digest';
 import { Backoff } from '../src/stream/backoff';
 import { Credit, FIRST_CREDITS } from '../src/stream/credit';
 import { AS_STREAMED, isAsStreamed, parametersOf, parseSettings, settingsText } from '../src/stream/settings';
-import { inWords, mayTryAgain, parseStatus } from '../src/stream/status';
+import { describe, mayRetry, parseStatus } from '../src/stream/status';
 import { addressText, parseAddress } from '../src/ui/address';
 import { count, number } from '../src/ui/format';
 
@@ -32,14 +32,14 @@ test('an address holds streams, frame, view, settings and look', () => {
   assert.deepEqual(back.panes.slice(0, 2), address.panes.slice(0, 2));
 });
 
-test('an address that says nothing, or nonsense, shows nothing', () => {
+test('an invalid address shows nothing', () => {
   for (const hash of ['', '#', '#frame=x&view=1,2', '#beside=~fill:grid']) {
     const address = parseAddress(hash);
     assert.deepEqual([address.panes, address.frame, address.view], [[], null, null]);
   }
 });
 
-test('another placement gets a reference radius of its own, the same one keeps it', () => {
+test('another placement gets its own reference radius', () => {
   const base = create(ReconstructionParametersSchema, {
     placement: Placement.VIRTUAL_PLANE, kernelRadius: 3, referenceRadius: 0.7, cellSize: 1, clean: true,
   });
@@ -51,35 +51,35 @@ test('another placement gets a reference radius of its own, the same one keeps i
   assert.equal(parametersOf({ ...AS_STREAMED, surfaceOffset: 0.5 }, base, null).surfaceOffset, undefined);
 });
 
-test('statuses are told in words with what to do', () => {
+test('a status becomes a sentence with a remedy', () => {
   const status = parseStatus('{"code": 5, "reason": "NO_SUCH_STREAM", "message": "stream_name: dam; no open stream has it"}');
   assert.ok(status);
-  assert.match(inWords(status), /^stream_name: dam; no open stream has it\. .*waits for it\.$/);
-  assert.ok(mayTryAgain(status));
+  assert.match(describe(status), /^stream_name: dam; no open stream has it\.$/);
+  assert.ok(mayRetry(status));
   assert.equal(parseStatus('<html>'), null);
   assert.equal(parseStatus('{}'), null);
-  assert.ok(!mayTryAgain({ code: 16, reason: 'TOKEN_UNKNOWN', message: '' }));
+  assert.ok(!mayRetry({ code: 16, reason: 'TOKEN_UNKNOWN', message: '' }));
 });
 
-test('pauses between tries grow to their longest and begin anew after a success', () => {
+test('pauses grow to a limit and reset after a success', () => {
   const backoff = new Backoff(200, 1000);
   assert.deepEqual([1, 2, 3, 4].map(() => backoff.take()), [200, 400, 800, 1000]);
   backoff.reset();
   assert.equal(backoff.take(), 200);
 });
 
-/** Frames under way after `frames` of this size, as the server sees them. */
-function underWay(bytes: number, frames: number): number {
+/** Frames in flight after `frames` of this size, from the server's view. */
+function inFlight(bytes: number, frames: number): number {
   const credit = new Credit();
   let allowed = FIRST_CREDITS;
   for (let k = 0; k < frames; ++k) allowed += credit.taken(bytes) - 1;
   return allowed;
 }
 
-test('small frames get more credit, large ones less', () => {
-  assert.equal(underWay(1000, 100), 64);
-  assert.equal(underWay(1 << 20, 100), 8);
-  assert.equal(underWay(50 << 20, 100), 4);
+test('small frames get more credit than large ones', () => {
+  assert.equal(inFlight(1000, 100), 64);
+  assert.equal(inFlight(1 << 20, 100), 8);
+  assert.equal(inFlight(50 << 20, 100), 4);
 });
 
 test('numbers are short and digests have sixteen digits', () => {

@@ -1,4 +1,4 @@
-// The threads that Reconstruct may compute with.
+// Limits the threads that Reconstruct uses.
 #pragma once
 
 #include "absl/functional/function_ref.h"
@@ -7,19 +7,19 @@ namespace partiemc {
 
 class TaskArena;
 
-/// Places for threads that compute, oneTBB's task arena: what runs in it, with its parallel parts,
-/// has these places together. Reconstruct outside of any has one for each processor.
+/// A oneTBB task arena. Everything that runs in it shares its threads. Outside any arena,
+/// Reconstruct uses one thread per processor.
 class Arena {
  public:
-  /// 0 `threads`: one for each processor.
+  /// `threads` = 0: one per processor.
   explicit Arena(unsigned threads);
-  /// Requires: no call of Execute is under way.
+  /// Requires: no Execute call is running.
   ~Arena();
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
 
-  /// Runs `body`, and returns when it is done or throws what it throws. It may run in another
-  /// thread, where the arena has no place for this one. Safe to call from several threads at once.
+  /// Runs `body` in the arena and waits for it; rethrows its exception. If no slot is free for the
+  /// calling thread, `body` runs on another thread. Thread-safe.
   void Execute(absl::FunctionRef<void()> body);
 
  private:

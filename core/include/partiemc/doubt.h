@@ -1,5 +1,5 @@
-// What speaks against an answer that is no error: something in the input contradicts itself, and
-// only the caller knows which part of it is right.
+// Doubts: suspicious but legal input, reported with a result. The contradicting values cannot all
+// be right; the caller decides which one is wrong.
 #pragma once
 
 #include <array>
@@ -10,15 +10,14 @@
 namespace partiemc {
 
 enum class Doubt : std::uint8_t {
-  /// No spacing was given, and particles have not agreed on one yet: lengths are a guess of this
-  /// frame alone, nothing is remembered of it, and rings are not tracked.
+  /// No spacing is given and the particles do not agree on one yet. Lengths are estimates for this
+  /// frame only, nothing is kept for the next frame, and rings have no identities.
   kSpacingProvisional,
-  /// The particles of this frame agree on a spacing more than twice, or less than half, the one in
-  /// use.
+  /// The particles of this frame have a spacing more than twice, or less than half, the one in use.
   kSpacingContradicted,
-  /// More than half of the volumes are above twice, or below half, the square of the spacing.
+  /// More than half of the volumes are above twice, or below half, the squared spacing.
   kVolumesContradictSpacing,
-  /// Positions came as float32, whose steps at these coordinates are above 1/16 of the spacing.
+  /// Positions are float32, with steps above 1/16 of the spacing at these coordinates.
   kPositionsCoarse,
 };
 
@@ -29,7 +28,7 @@ inline constexpr std::array kAllDoubts = {Doubt::kSpacingProvisional, Doubt::kSp
 /// "spacing-provisional", "spacing-contradicted", ...
 std::string_view Name(Doubt doubt);
 
-/// What it means for the caller, and what helps: for a person, one line.
+/// One line for the user: the meaning and the remedy.
 std::string_view Explanation(Doubt doubt);
 
 /// A set of doubts.

@@ -28,7 +28,7 @@ enum class Fill : std::uint8_t {
   kNone,        ///< No mesh.
   kGrid,        ///< Two triangles for each interior cell: the paper's "before".
   kGreedy,      ///< Interior cells merged into rectangles: the paper's "after".
-  kConforming,  ///< As few triangles as greedy, without T-junctions.
+  kConforming,  ///< Few triangles, like greedy, but without T-junctions.
   kPolygon,     ///< The rings triangulated, without interior vertices.
 };
 
@@ -46,16 +46,16 @@ struct SlicePlane {
   /// A point of the plane, in world units. Results have their coordinates (0, 0) there.
   std::array<double, 3> origin{};
   /// Normal of the plane, of any length except 0. It decides the axes of results:
-  ///   along z: x and y; along -y: x and z; along x: y and z;
-  ///   otherwise: the first axis is the projection of x onto the plane, or of y if the normal is
-  ///   closer to the x axis than to y and z; the second completes a right-handed system with the
-  ///   normal.
+  ///   along z: x and y; along -y: x and z; along x: y and z.
+  /// For any other normal, the first axis is the projection of x onto the plane, or of y if the
+  /// normal is closer to the x axis than to y and z. The second axis completes a right-handed
+  /// system with the normal.
   std::array<double, 3> normal{0, 0, 1};
 
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
-/// One more outline of the same particles. All other parameters are those of the stream.
+/// One more outline of the same particles, with the other parameters of the stream.
 struct Section {
   /// Absent: the slice of the stream. Requires a slice there.
   std::optional<SlicePlane> slice = std::nullopt;
@@ -93,7 +93,7 @@ struct ReconstructionParameters {
   /// paper; 0.5 matches the volume.
   double surface_offset = 0.0;
 
-  /// Orient cell normals by those of the frame before (Eq. 11); otherwise by the outline alone.
+  /// Orient cell normals by the normals of the frame before (Eq. 11), not by the outline alone.
   bool normal_memory = true;
 
   /// Close holes smaller than 2 h^2 and drop components without particles. Absent: on for
@@ -125,8 +125,8 @@ struct ReconstructionParameters {
 
   static constexpr std::size_t kMaxSections = 16;
 
-  /// More outlines of each frame (Result::sections), at most 16. Each costs as much as a frame of
-  /// its own, except for the checks of the input.
+  /// More outlines of each frame (Result::sections), at most 16. Each costs another frame without
+  /// the checks of the input.
   std::vector<Section> sections = {};
 
   friend bool operator==(const ReconstructionParameters&,

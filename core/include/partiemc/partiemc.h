@@ -1,4 +1,4 @@
-// PartiEMC: temporally stable isolines and light meshes from particles, frame by frame.
+// PartiEMC: temporally stable outlines and light meshes from particles, frame by frame.
 //
 //   auto reconstructor = partiemc::Reconstructor::Create({.spacing = 0.01});
 //   partiemc::State state;          // one per stream
@@ -8,7 +8,7 @@
 //   if (auto status = reconstructor->Reconstruct(frame, state, workspace, result); !status.ok())
 //   ...
 //
-// core/METHOD.md tells the method; ARCHITECTURE.md tells where each stage lives.
+// core/METHOD.md describes the method, ARCHITECTURE.md the code.
 #pragma once
 
 #include "partiemc/arena.h"

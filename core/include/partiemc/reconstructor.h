@@ -1,4 +1,4 @@
-// The whole method: a frame of particles and a state in, rings, mesh and the next state out.
+// Turns frames of particles into outlines and meshes.
 #pragma once
 
 #include <atomic>
@@ -16,11 +16,11 @@
 
 namespace partiemc {
 
-/// Changes whenever the same frames and parameters would give other digests than before.
+/// Raised whenever the same frames and parameters give other digests.
 inline constexpr std::uint32_t kMethodVersion = 10;
 
-/// Buffers that are kept warm from frame to frame. Belongs to a worker, not to a stream: any
-/// workspace serves any reconstructor, and its history never changes a result.
+/// Reusable buffers, one set for each thread that calls Reconstruct. Any workspace serves any
+/// reconstructor; its history never changes a result.
 class Workspace {
  public:
   Workspace();
@@ -35,49 +35,48 @@ class Workspace {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// Says how much memory a frame may use.
+/// Admits the memory of a frame.
 class MemoryGuard {
  public:
   virtual ~MemoryGuard() = default;
 
-  /// Whether the workspace and the result may grow to `bytes` in all, for one frame. Called by the
-  /// thread that called Reconstruct, twice for each outline of a frame, each time before anything
-  /// of it is allocated: with what its tiles need at least, then with all that it needs.
+  /// Returns whether workspace and result may grow to `bytes` in total. Called on the thread of
+  /// Reconstruct twice per outline, before the memory is allocated: first with a lower bound from
+  /// the tiles, then with the full estimate.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 
-/// How somebody else follows a frame on its way, and stops it. Each may be left out; all outlive
-/// the call.
+/// Observes, admits and cancels one frame. Each member is optional and must outlive the call.
 struct FrameControl {
   StageObserver* observer = nullptr;
   MemoryGuard* memory = nullptr;
-  /// Set by any thread, and then left: the frame ends as soon as somebody sees it, which is between
-  /// two tiles, rings or particles.
+  /// Any thread may set it, once. Tasks check it between tiles, rings and particles.
   const std::atomic<bool>* cancelled = nullptr;
 };
 
 struct VirtualPlaneVariant;  // core/internal/research.h
 
-/// Knows the order of the stages; holds no state of a stream. Safe to share between threads.
+/// Runs the stages of one stream's method. Immutable; may be shared between threads.
 class Reconstructor {
  public:
-  /// Errors: INVALID_ARGUMENT, see Validate of either.
+  /// Errors: INVALID_ARGUMENT (Validate of the parameters and of the limits).
   static absl::StatusOr<Reconstructor> Create(const ReconstructionParameters& parameters,
                                               const FrameLimits& limits = {});
 
-  /// Reconstructs one frame. Runs its parallel parts in the Arena of the caller; the result has the
-  /// same bits for any number of threads.
-  /// Errors: INVALID_ARGUMENT (a coordinate that is not finite, a wrong count, an id twice,
-  /// particles outside one plane), RESOURCE_EXHAUSTED (more particles or tiles than the limits
-  /// allow in an outline, or more memory than `control.memory` does), OUT_OF_RANGE (float32 too
-  /// coarse for the spacing), each with a Violation; CANCELLED, by `control.cancelled`. `state` is
-  /// then as it was and `result` is empty. So they are when memory runs out (std::bad_alloc); then,
-  /// and after CANCELLED, `workspace` is as good as new. Cost: linear in particles and tiles; n log
-  /// n in the points of the rings.
+  /// Reconstructs one frame and updates `state`. Runs its parallel parts in the caller's Arena; the
+  /// result does not depend on the number of threads. Cost: linear in particles and tiles, n log n
+  /// in the points of the rings.
+  /// Errors with a Violation:
+  ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, particles
+  ///   outside one plane. RESOURCE_EXHAUSTED: too many particles or tiles, or `control.memory`
+  ///   refused the memory. OUT_OF_RANGE: float32 too coarse for the spacing.
+  /// Errors without one: CANCELLED by `control.cancelled`; INTERNAL, a bug.
+  /// On an error or exception (std::bad_alloc) `state` is unchanged and `result` is empty. After
+  /// CANCELLED or an exception `workspace` is empty, too.
   absl::Status Reconstruct(const Frame& frame, State& state, Workspace& workspace, Result& result,
                            const FrameControl& control = {}) const;
 
-  /// The parameters as resolved.
+  /// The resolved parameters (Resolve).
   const ReconstructionParameters& parameters() const { return parameters_; }
 
  private:

@@ -1,4 +1,4 @@
-// What a frame becomes: rings, mesh and statistics.
+// The result of a frame: rings, mesh and statistics.
 #pragma once
 
 #include <cstddef>
@@ -17,31 +17,31 @@ inline constexpr std::uint32_t kNoRing = 0xffffffff;
 struct RingMeasures {
   double area = 0;       ///< World units squared; positive for outer rings, negative for holes.
   double perimeter = 0;  ///< World units.
-  double centroid_x = 0, centroid_y = 0;  ///< Of the area that the ring encloses, world units.
-  std::uint64_t particle_count = 0;       ///< Particles of the ring's component; 0 for holes.
-  /// The same for a ring and the one that continues it in the next frame, different for any two
-  /// rings of a frame, and never given twice in a stream (core/IDENTITIES.md).
+  double centroid_x = 0, centroid_y = 0;  ///< Centroid of the enclosed area, world units.
+  std::uint64_t particle_count = 0;       ///< Particles of the component; 0 for holes.
+  /// Kept by the ring that continues this one in the next frame. Distinct within a frame, never
+  /// reused in a stream (core/IDENTITIES.md).
   std::uint64_t identity = 0;  ///< 0: not tracked.
 
   friend bool operator==(const RingMeasures&, const RingMeasures&) = default;
 };
 
-/// Closed polylines. Guarantees, if KeepsGuarantees(placement) (core/METHOD.md, "Guarantees"):
-///   R1 every ring has at least 3 points, all finite, none repeated; its end is not stored twice;
+/// Closed polylines. Guarantees if KeepsGuarantees(placement) (core/METHOD.md, "Guarantees"):
+///   R1 every ring has at least 3 points, all finite, none repeated; the first is not stored again;
 ///   R2 rings are simple and do not touch each other;
-///   R3 the inside lies on the left: outer rings counter-clockwise, holes clockwise;
-///   R4 each hole lies inside the outer ring that `outer_of` names.
+///   R3 the inside is on the left: outer rings counter-clockwise, holes clockwise;
+///   R4 each hole lies inside the outer ring that `outer_of` gives.
 struct Rings {
   std::vector<double> points;                ///< x0, y0, x1, y1, ... in world units.
   std::vector<std::uint32_t> offsets = {0};  ///< Ring k has points [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;       ///< Per ring: its outer ring, or kNoRing.
   std::vector<RingMeasures> measures;        ///< Per ring.
   std::vector<float> normals;                ///< Per point: outward unit normal, interleaved.
-  /// Identities, in the frame before, of the rings that ring k continues, ascending, are
-  /// [parent_offsets[k], parent_offsets[k + 1]): none for a new ring, several after a merge; after
-  /// a split, several rings name the same one.
+  /// Identities, in the frame before, of the rings that ring k continues, ascending:
+  /// [parent_offsets[k], parent_offsets[k + 1]). None for a new ring, several after a merge. After
+  /// a split, several rings have the same parent.
   std::vector<std::uint64_t> parents;
-  std::vector<std::uint32_t> parent_offsets = {0};  ///< As `offsets`; {0} where nothing is tracked.
+  std::vector<std::uint32_t> parent_offsets = {0};  ///< Like `offsets`; {0} without identities.
 
   std::size_t RingCount() const { return outer_of.size(); }
   std::size_t PointCount() const { return points.size() / 2; }
@@ -60,10 +60,10 @@ struct Rings {
 
 enum class TriangleClass : std::uint8_t {
   kBoundary,  ///< In the band between the rings and the interior cells.
-  kInterior,  ///< A piece of an interior cell, or of several merged ones.
+  kInterior,  ///< Part of one interior cell or of several merged ones.
 };
 
-/// Triangles that cover the inside of the rings. Guarantees, if KeepsGuarantees(placement):
+/// Triangles that cover the inside of the rings. Guarantees if KeepsGuarantees(placement):
 ///   M1 every triangle is counter-clockwise, none is folded or degenerate;
 ///   M2 triangles do not overlap and together cover exactly the inside of the rings;
 ///   M3 its first points are the points of the rings, bit for bit, in their order;
@@ -82,29 +82,29 @@ struct Mesh {
 struct FrameStatistics {
   std::uint64_t particles = 0;
   std::uint64_t tiles = 0;               ///< Tiles of 32 x 32 nodes that were allocated.
-  std::uint64_t active_cells = 0;        ///< Cells that the isoline runs through.
+  std::uint64_t active_cells = 0;        ///< Cells that the outline crosses.
   std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
-  std::uint64_t dropped_spray = 0;       ///< Components below a size that the caller set.
+  std::uint64_t dropped_spray = 0;       ///< Components below the size that parameters set.
   std::uint64_t triangles = 0;           ///< Triangles of the mesh.
-  std::uint64_t triangles_grid = 0;      ///< What `grid` would have made of the same rings.
+  std::uint64_t triangles_grid = 0;      ///< Triangles that `grid` would make of the same rings.
   std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.
   std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
   double area = 0;       ///< Sum over rings of their signed areas, world units squared.
   double perimeter = 0;  ///< Sum over rings, world units.
-  double spacing = 0;    ///< Spacing used in this frame, world units; 0: there was none.
-  double cell_size = 0;  ///< That of the lattice, world units; of the stream unless provisional.
-  Doubts doubts;         ///< What speaks against this answer.
+  double spacing = 0;    ///< Used in this frame, world units; 0: none.
+  double cell_size = 0;  ///< Lattice spacing, world units; the stream's unless provisional.
+  Doubts doubts;         ///< Reasons to distrust the result.
 
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-/// An attribute of the frame (Frame::attributes), interpolated.
+/// An attribute of the frame (Frame::attributes) at the vertices.
 struct AttributeValues {
   std::string name;
   int components = 1;
-  /// At the points of the rings, and then at those of the mesh that are none of the rings: in the
-  /// order of Mesh::points where there is one. `components` each, interleaved.
+  /// Interleaved, `components` per vertex: first the points of the rings, then the other points of
+  /// the mesh in the order of Mesh::points.
   std::vector<float> values;
 
   friend bool operator==(const AttributeValues&, const AttributeValues&) = default;
@@ -115,28 +115,27 @@ struct Result {
   Mesh mesh;                                ///< Empty for Fill::kNone.
   std::vector<AttributeValues> attributes;  ///< In the order of the frame's.
   FrameStatistics statistics;
-  /// The other outlines of the frame, one for each of ReconstructionParameters::sections: each as
-  /// if it were the only one.
+  /// The results of ReconstructionParameters::sections, each as if it were the only outline.
   std::vector<Result> sections;
 
-  /// Keeps `attributes` and `sections`, each without its contents.
+  /// Empties everything. The elements of `attributes` and `sections` remain, without contents.
   void Clear();
   friend bool operator==(const Result&, const Result&) = default;
 };
 
-/// 64-bit digests of the canonical little-endian form of the geometry: equal digests mean equal
-/// bits (proto/PROTOCOL.md gives the definition, so that any client can compute them).
+/// 64-bit digests of the geometry: equal digests mean equal bits. proto/PROTOCOL.md defines them,
+/// so that any client can compute them.
 std::uint64_t DigestRings(const Rings& rings);
 std::uint64_t DigestMesh(const Mesh& mesh);
 
-/// Both of one outline, whatever was left out of its result since.
+/// The digests of one outline.
 struct OutlineDigests {
   std::uint64_t rings = 0, mesh = 0;
 
   friend bool operator==(const OutlineDigests&, const OutlineDigests&) = default;
 };
 
-/// Of each of a result's sections.
+/// The digests of each section of a result.
 std::vector<OutlineDigests> DigestSections(const Result& result);
 
 }  // namespace partiemc

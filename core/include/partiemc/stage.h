@@ -1,4 +1,4 @@
-// The nine stages, under the names that they carry everywhere.
+// The nine stages of a frame and their names, which are the same in code, metrics and messages.
 #pragma once
 
 #include <array>
@@ -10,13 +10,13 @@ namespace partiemc {
 enum class Stage : std::uint8_t {
   kBins,        ///< Particles sorted into tiles of the lattice.
   kField,       ///< Level set at every node of every tile (paper, Eq. 1-5).
-  kCrossings,   ///< Active cells and the segments through them (marching squares' topology).
-  kRings,       ///< Segments joined to closed rings, nested, cleaned.
+  kCrossings,   ///< Cells on the outline and the segments through them (marching squares).
+  kRings,       ///< Segments joined to closed rings; nesting, cleaning.
   kNormals,     ///< Stabilised cell normals (paper, Eq. 9-11).
   kVertices,    ///< Vertices placed (paper, sections 3.4-3.5).
-  kIdentities,  ///< Rings related to those of the frame before (core/IDENTITIES.md).
+  kIdentities,  ///< Rings related to the frame before (core/IDENTITIES.md).
   kMesh,        ///< Inside filled with triangles (paper, sections 3.7-3.8).
-  kAttributes,  ///< What particles carry, interpolated at the vertices; only where there is any.
+  kAttributes,  ///< Attributes interpolated to the vertices, if the frame has any.
 };
 
 inline constexpr std::size_t kStageCount = 9;
@@ -28,7 +28,7 @@ constexpr std::string_view Name(Stage stage) {
   return kStageNames[static_cast<std::size_t>(stage)];
 }
 
-/// Told when a stage begins and ends, on the calling thread. The core has no clock of its own.
+/// Receives the begin and end of each stage, on the thread of Reconstruct. The core has no clock.
 class StageObserver {
  public:
   virtual ~StageObserver() = default;

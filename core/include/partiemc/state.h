@@ -1,4 +1,4 @@
-// What one frame leaves for the next.
+// The state of a stream: everything that one frame leaves for the next.
 #pragma once
 
 #include <cstddef>
@@ -25,14 +25,15 @@ struct CellNormal {
 struct KnownRing {
   std::uint64_t identity = 0;
   bool is_hole = false;
-  std::uint32_t outer = kNoRing;  ///< Of a hole: index of its outer ring, where that is known.
-  double velocity_x = 0, velocity_y = 0;  ///< Mean of its particles, world units per time; 0: none.
+  std::uint32_t outer = kNoRing;  ///< Index of a hole's outer ring, if known.
+  double velocity_x = 0,
+         velocity_y = 0;  ///< Mean of its particles, world units per time; 0: unknown.
 
   friend bool operator==(const KnownRing&, const KnownRing&) = default;
 };
 
-/// Neighbouring nodes of one row of the lattice, `first` to `last`, that lay inside of an outer
-/// ring of the last frame, or in the void of a hole next to its ring.
+/// A run of lattice nodes in one row, `first` to `last`. It lay inside an outer ring of the last
+/// frame, or in the void of a hole, close to its ring.
 struct NodeRun {
   std::int32_t row = 0, first = 0, last = 0;  ///< In cells from the origin.
   std::uint32_t ring = 0;                     ///< Index in RingHistory::rings.
@@ -40,10 +41,10 @@ struct NodeRun {
   friend bool operator==(const NodeRun&, const NodeRun&) = default;
 };
 
-/// At most this many particles of an outer ring are remembered.
+/// Limit of the samples per outer ring.
 inline constexpr std::uint32_t kMaxSamples = 16;
 
-/// A particle of the last frame, by a hash of its id that no other id has, and where it was.
+/// A particle of the last frame: a hash of its id, which no other sample has, and its position.
 struct ParticleSample {
   std::uint64_t hash = 0;
   std::int32_t column = 0, row = 0;  ///< The nearest node, in cells from the origin.
@@ -52,51 +53,52 @@ struct ParticleSample {
   friend bool operator==(const ParticleSample&, const ParticleSample&) = default;
 };
 
-/// What is needed to tell which ring of the next frame continues which ring of this one. Its size
-/// follows the length of the outline: a run has two ends on it, a ring has a bounded number of
-/// samples.
+/// Data to find the rings of the next frame that continue rings of this one. Its size is
+/// proportional to the length of the outline: two ends of a run lie on it, and samples per ring are
+/// limited.
 struct RingHistory {
-  std::uint64_t identities_given = 0;   ///< They are 1 to this number; none is given twice.
-  std::optional<double> time;           ///< Of the last frame; finite.
-  std::vector<KnownRing> rings;         ///< By identity.
-  std::vector<NodeRun> runs;            ///< By row, then column; disjoint. Each ring has one.
-  std::vector<ParticleSample> samples;  ///< By hash. Of a ring those of the least hashes.
+  std::uint64_t identities_given = 0;  ///< The largest identity so far; none is reused.
+  std::optional<double> time;          ///< Time of the last frame, finite.
+  std::vector<KnownRing> rings;        ///< By identity.
+  std::vector<NodeRun> runs;  ///< By row, then column; disjoint. Each ring has at least one.
+  std::vector<ParticleSample>
+      samples;  ///< By hash. Each ring has its particles with the lowest hashes.
 
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
 
-/// Everything that a stream remembers between frames, and nothing else. A default-constructed
-/// State is that of a stream that has seen no frame. Reconstruction is a pure function of frame
-/// and state, so that a stream goes on from a restored State bit for bit as if it had never
-/// stopped.
+/// The complete state of a stream; default-constructed: no frame yet. Reconstruction is a pure
+/// function of frame and state, so a stream that resumes from a restored State gives the same bits
+/// as without interruption.
 struct State {
-  /// Lattice spacing in world units: set by a given spacing, or by the first frame whose particles
-  /// agree on one; never changed afterwards. Frames before that one leave nothing behind.
+  /// Lattice spacing in world units, from the given spacing or the first frame whose particles
+  /// agree on one. It never changes. Frames before leave no state.
   std::optional<double> cell_size;
   /// Spacing in use, world units.
   std::optional<double> spacing;
-  /// How far the last frame's outline was moved to match its area, in spacings (core/METHOD.md,
-  /// "The default placement", step 4).
+  /// Offset of the last outline that matched its area, in spacings (core/METHOD.md, "The default
+  /// placement", step 4).
   std::optional<double> area_offset;
-  /// Normals of the last frame's active cells, ordered by row, then column. At most one per cell.
+  /// Normals of the active cells of the last frame by row, then column; at most one per cell.
   std::vector<CellNormal> normals;
   RingHistory history;
-  /// The same of each section (ReconstructionParameters::sections).
+  /// The states of the sections (ReconstructionParameters::sections).
   std::vector<State> sections;
 
   friend bool operator==(const State&, const State&) = default;
 };
 
-/// Bytes with a version and a checksum; the same on every machine. Size: 88 bytes, 16 per normal,
-/// 32 per ring, 16 per run and 20 per sample; with sections 24 bytes, and 8 and the state of each.
+/// Writes a state with version and checksum; same bytes on every machine. Size: 88 bytes, 16 per
+/// normal, 32 per ring, 16 per run, 20 per sample; with sections 24 bytes more, and 8 plus its size
+/// for each state.
 std::string Serialize(const State& state);
 
-/// The number of them, without writing any.
+/// The size of Serialize(state), without writing it.
 std::size_t SerializedBytes(const State& state);
 
-/// The state that Serialize wrote. Errors: INVALID_ARGUMENT (reason CORRUPT_STATE) for anything
-/// else, other versions included; bytes are untrusted, every count is checked against their number
-/// before it is believed.
+/// Reads the bytes of Serialize. The bytes may come from an untrusted client: every count is
+/// checked against the number of bytes before memory is allocated.
+/// Errors: INVALID_ARGUMENT (reason CORRUPT_STATE) for any other bytes and other versions.
 absl::StatusOr<State> ParseState(std::string_view bytes);
 
 }  // namespace partiemc

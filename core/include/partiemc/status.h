@@ -1,4 +1,4 @@
-// What is wrong with an input, in a form that a person can read and a program can act on.
+// Errors about an input, for people and programs.
 #pragma once
 
 #include <optional>
@@ -13,14 +13,14 @@ namespace partiemc {
 struct Violation {
   std::string reason;  ///< Stable, upper case, for programs: "NOT_FINITE", "BYTE_COUNT", ...
   std::string field;   ///< Path of the field: "positions[17].x", "parameters.kernel_radius".
-  std::string value;   ///< The value as found: "nan", "12 bytes".
-  std::string rule;    ///< What is asked: "must be finite".
+  std::string value;   ///< The actual value: "nan", "12 bytes".
+  std::string rule;    ///< The requirement: "must be finite".
 
   friend bool operator==(const Violation&, const Violation&) = default;
 };
 
-/// The reasons that the core gives. They are part of the public contract (proto/PROTOCOL.md):
-/// a reason is never renamed and never given a second meaning.
+/// The reasons of the core. They are part of the public contract (proto/PROTOCOL.md): a reason is
+/// never renamed or reused with another meaning.
 inline constexpr std::string_view kReasonOutOfRange = "OUT_OF_RANGE";
 inline constexpr std::string_view kReasonNotFinite = "NOT_FINITE";
 inline constexpr std::string_view kReasonCount = "COUNT";
@@ -33,14 +33,14 @@ inline constexpr std::string_view kReasonNotPlanar = "NOT_PLANAR";
 inline constexpr std::string_view kReasonResolution = "RESOLUTION";
 inline constexpr std::string_view kReasonCorruptState = "CORRUPT_STATE";
 
-/// A status of the given code whose message reads "field: value; rule" and which carries
-/// `violation` as a payload, so that no shell has to parse the message.
+/// Makes a status with the message "field: value; rule" and `violation` as payload, so that no
+/// caller has to parse the message.
 absl::Status ViolationError(absl::StatusCode code, Violation violation);
 
-/// The violation that `status` carries, if it was made by ViolationError.
+/// The violation of a status of ViolationError; absent for any other status.
 std::optional<Violation> FindViolation(const absl::Status& status);
 
-/// `value` in the shortest form that reads back the same: "0.1", "nan", "-inf".
+/// Formats a number in the shortest form that reads back the same: "0.1", "nan", "-inf".
 std::string ShortestNumber(double value);
 
 }  // namespace partiemc

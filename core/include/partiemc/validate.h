@@ -1,4 +1,4 @@
-// Every guarantee of a result, checked.
+// Checks the guarantees of a result, for tests and `--check`.
 #pragma once
 
 #include <cstddef>
@@ -9,18 +9,18 @@
 
 namespace partiemc {
 
-/// Checks guarantees R1-R4 and M1-M3 of result.h with exact arithmetic; M2 by areas, equal to
-/// 1e-9 relative, and by sides: those of the triangles cancel but for the segments of the rings,
-/// which together with M1 and R2 leaves no room for a gap or an overlap.
-/// Errors: INTERNAL, naming the guarantee, the ring or triangle, and what was found.
-/// Cost: n log n in the points. Made for tests and for `--check`, not for the hot path.
+/// Checks R1-R4 and M1-M3 of result.h with exact arithmetic. M2 is checked by areas (1e-9 relative)
+/// and by sides: the sides of the triangles cancel except for the segments of the rings. With M1
+/// and R2 this excludes gaps and overlaps.
+/// Errors: INTERNAL with the guarantee, the ring or triangle, and the values. Cost: n log n in the
+/// points.
 absl::Status Validate(const Result& result);
 
-/// The same for a result that is known to be filled by `fill`, and M4 where that promises it:
-/// exactly two triangles share each side, or one triangle and a segment of a ring.
+/// As above, and M4 if `fill` guarantees it: each side has exactly two triangles, or one triangle
+/// and one segment of a ring.
 absl::Status Validate(const Result& result, Fill fill);
 
-/// The number of vertices that lie inside a side of a triangle or ring: 0 where M4 is promised.
+/// Counts the vertices inside a side of a triangle or ring; 0 if M4 holds.
 /// Requires: Validate(result).ok(). Cost: n log n in the points.
 std::size_t CountTJunctions(const Result& result);
 

@@ -1,15 +1,15 @@
-// Bits of a row of nodes or cells; an index that is none.
+// Bit counts of rows of nodes or cells, and the invalid index.
 #pragma once
 
 #include <cstdint>
 
 namespace partiemc {
 
-/// Marks the index of nothing.
+/// The invalid index.
 inline constexpr std::uint32_t kNoIndex = 0xffffffff;
 
-/// How many bits are set. Unlike std::popcount, inline on processors that are not known to have an
-/// instruction for it: the library's call costs more than the sum.
+/// Counts the set bits. Inline also on processors without an instruction for it, unlike
+/// std::popcount, whose library call costs more than this sum.
 constexpr int CountBits(std::uint32_t bits) {
   bits -= bits >> 1 & 0x55555555u;
   bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);

@@ -1,4 +1,4 @@
-// Boxes along the axes.
+// Axis-aligned boxes.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace partiemc {
 
-/// A box around points; around none at first.
+/// The bounding box of the added points; empty at first.
 struct Box {
   double left = std::numeric_limits<double>::infinity(), bottom = left, right = -left, top = -left;
 
@@ -21,8 +21,8 @@ struct Box {
   double Extent() const { return std::max(right - left, top - bottom); }
 };
 
-/// Whether two boxes, borders included, have a point in common. Without a branch, which would be
-/// unpredictable for boxes that are near each other.
+/// Whether two closed boxes intersect. Branch-free: for nearby boxes the branches would be
+/// unpredictable.
 inline bool BoxesTouch(const Box& a, const Box& b) {
   return static_cast<bool>(
       static_cast<int>(a.right >= b.left) & static_cast<int>(b.right >= a.left) &

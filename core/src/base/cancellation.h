@@ -1,16 +1,15 @@
-// How a frame is stopped on its way: whoever works on it looks at the caller's flag now and then
-// and leaves by an exception, which Reconstruct catches.
+// Cancels a frame: its tasks check the caller's flag and throw; Reconstruct catches.
 #pragma once
 
 #include <atomic>
 
 namespace partiemc {
 
-/// Thrown where a frame has been cancelled. Comes out of Reconstruct as CANCELLED.
+/// Thrown by the tasks of a cancelled frame. Reconstruct returns CANCELLED.
 struct Cancelled {};
 
-/// What this thread works for may be cancelled by this flag, as long as the scope lives; by none
-/// where it is null. Tasks have the flag of the thread that made them (parallel.h).
+/// Sets the cancellation flag of this thread for the scope; null: none. Tasks inherit the flag of
+/// the thread that created them (parallel.h).
 class CancellationScope {
  public:
   explicit CancellationScope(const std::atomic<bool>* flag) : outer_(current_) { current_ = flag; }
@@ -18,7 +17,7 @@ class CancellationScope {
   CancellationScope(const CancellationScope&) = delete;
   CancellationScope& operator=(const CancellationScope&) = delete;
 
-  /// That of the calling thread, or null.
+  /// The flag of the calling thread, or null.
   static const std::atomic<bool>* Current() { return current_; }
 
  private:
@@ -26,14 +25,14 @@ class CancellationScope {
   const std::atomic<bool>* const outer_;
 };
 
-/// The flag carries nothing but itself, and is never taken back: whoever sees it late, stops late.
+/// Relaxed: the flag guards no other data and is never reset, so a late read only delays the end.
 inline void ThrowIfCancelled(const std::atomic<bool>* flag) {
   if (flag != nullptr && flag->load(std::memory_order_relaxed)) [[unlikely]] {
     throw Cancelled();
   }
 }
 
-/// For loops that no task divides, where a million steps may come in a row.
+/// For sequential loops with up to a million steps.
 inline void ThrowIfCancelled() { ThrowIfCancelled(CancellationScope::Current()); }
 
 }  // namespace partiemc

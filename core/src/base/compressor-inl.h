@@ -1,5 +1,5 @@
-// Moves the chosen lanes of a vector to its front. Compiled once for each target, hence the guard
-// that each of them turns.
+// Moves the selected lanes of a vector to its front. Compiled once for each instruction set, so the
+// include guard toggles.
 #ifndef PARTIEMC_COMPRESSOR_ONCE
 #define PARTIEMC_COMPRESSOR_ONCE
 
@@ -9,7 +9,7 @@
 
 namespace partiemc {
 
-// By mask of eight lanes: the chosen ones, then any. Its lower half is right for four lanes, too.
+// By mask of eight lanes: the selected lanes first. Its lower half also serves four lanes.
 inline constexpr auto kChosenLanes = [] {
   std::array<std::array<std::uint8_t, 8>, 256> chosen{};
   for (unsigned mask = 0; mask < chosen.size(); ++mask) {
@@ -40,8 +40,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Moves the lanes of a mask to the front, of vectors of up to sixteen lanes of 32 bits. In a
-// register: some processors are slow at compressing into memory.
+// Moves the lanes of a mask to the front, for vectors of up to sixteen 32-bit lanes. It works in
+// registers, as some processors compress slowly into memory.
 class Compressor {
  public:
   using Bits = hn::CappedTag<std::int32_t, 16>;
@@ -57,7 +57,7 @@ class Compressor {
  private:
   hn::Mask<Bits> mask_;
 #else
-  // One look-up for all that is compressed by a mask.
+  // The lane indices are looked up once per mask.
   HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) {
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(Bits(), mask, bits);

@@ -1,5 +1,5 @@
-// The 64-bit digests of proto/PROTOCOL.md: FNV-1a taken a 64-bit word at a time, with a shift that
-// carries high bits down. Not cryptographic: it tells equal bits from different ones.
+// The 64-bit digests of proto/PROTOCOL.md: FNV-1a over 64-bit words, with a shift that mixes high
+// bits down. Not cryptographic.
 #include <bit>
 #include <cstdint>
 #include <span>
@@ -15,7 +15,7 @@ class Digest {
     hash_ = (hash_ ^ word) * 0x00000100000001b3u;
     hash_ ^= hash_ >> 32;
   }
-  // An array is its number of elements, then each of them as one word.
+  // An array contributes its size, then each element as one word.
   void Add(std::span<const double> values) {
     Add(values.size());
     for (const double value : values) Add(std::bit_cast<std::uint64_t>(value));

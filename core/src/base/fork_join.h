@@ -1,6 +1,5 @@
-// What ThreadSanitizer has to be told about tasks: oneTBB as Debian builds it is not instrumented,
-// so that the sanitizer cannot see how work goes from thread to thread and back. Without the
-// sanitizer there is nothing of this left in the code.
+// Annotates tasks for ThreadSanitizer, which cannot see how oneTBB hands work from thread to
+// thread: Debian's oneTBB is not instrumented. Compiles to nothing without the sanitizer.
 #pragma once
 
 #if defined(__SANITIZE_THREAD__)
@@ -16,15 +15,15 @@
 
 namespace partiemc {
 
-/// A fork into tasks, from its construction, and their join, at its destruction.
+/// A fork into tasks at its construction, and their join at its destruction.
 ///
-///      thread:  construction -----------------------------> destruction
-///                   |   \                                     ^   ^
-///      task:        |    `--> Task(), work, ~Task() ---------'    |
-///      task:        `-------> Task(), work, ~Task() --------------'
+///        thread:  construction -----------------------------> destruction
+///                     |   \                                     ^   ^
+///        task:        |    `--> Task(), work, ~Task() ---------'    |
+///        task:        `-------> Task(), work, ~Task() --------------'
 ///
-/// The arrows are all that the sanitizer is told. None leads from one task to another, so that
-/// a race between two of them is still one.
+/// The arrows are the only annotated order. None leads from task to task, so the sanitizer still
+/// reports races between tasks.
 class ForkJoin {
  public:
   ForkJoin() { Release(&fork_); }
@@ -32,7 +31,7 @@ class ForkJoin {
   ForkJoin(const ForkJoin&) = delete;
   ForkJoin& operator=(const ForkJoin&) = delete;
 
-  /// The scope of one task, in the thread that runs it.
+  /// The scope of one task, on the thread that runs it.
   class Task {
    public:
     explicit Task(ForkJoin& fork_join) : fork_join_(fork_join) { Acquire(&fork_join_.fork_); }
@@ -53,7 +52,7 @@ class ForkJoin {
   static void Release(char*) {}
 #endif
 
-  char fork_, join_;  // Only their addresses count.
+  char fork_, join_;  // Only their addresses matter.
 };
 
 }  // namespace partiemc

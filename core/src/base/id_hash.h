@@ -1,4 +1,4 @@
-// Particles by their ids: hashes, and how those of the last frame are found again.
+// Hashes of particle ids, and an index of hashes.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace partiemc {
 
-/// A permutation of the 64-bit numbers that leaves no pattern of them: the finaliser of SplitMix64
-/// (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
+/// A permutation of the 64-bit numbers that removes patterns: the finaliser of SplitMix64 (Steele,
+/// Lea, Flood: Fast splittable pseudorandom number generators, 2014).
 inline std::uint64_t HashOf(std::uint64_t id) {
   id += 0x9e3779b97f4a7c15u;
   id = (id ^ (id >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -19,12 +19,13 @@ inline std::uint64_t HashOf(std::uint64_t id) {
   return id ^ (id >> 31);
 }
 
-/// Finds things by their `hash`: by its leading bits, of which there are about as many values as
-/// things, then by halving.
+/// Finds things by their member `hash`: a bucket by the leading bits, with about one thing per
+/// bucket, then a binary search.
 template <typename Thing>
 class HashIndex {
  public:
-  /// `things` by hash, each another one; `bucket` is working memory. Both outlive the index.
+  /// Requires: `things` are sorted by hash and distinct. `bucket` is scratch. Both must outlive the
+  /// index.
   HashIndex(std::span<const Thing> things, std::vector<std::uint32_t>& bucket)
       : things_(things),
         bucket_(bucket),
@@ -34,7 +35,7 @@ class HashIndex {
     std::partial_sum(bucket_.begin(), bucket_.end(), bucket_.begin());
   }
 
-  /// The thing with this hash, or null.
+  /// Returns the thing with this hash, or null.
   const Thing* Find(std::uint64_t hash) const {
     const Thing* const first = things_.data() + bucket_[hash >> shift_];
     const Thing* const last = things_.data() + bucket_[(hash >> shift_) + 1];

@@ -1,7 +1,7 @@
-// Parts of a stage in parallel, in the arena of the caller (partiemc/arena.h): the only place where
-// tasks are made. All return when everything is done; an exception of a body comes out of the call.
-// Work whose caller has cancelled it (cancellation.h) ends that way, too, before the next index or
-// range.
+// Runs the parts of a stage in parallel, in the caller's arena (partiemc/arena.h). Only this file
+// creates tasks. Each function returns when all work is done, and rethrows an exception of a body.
+// If the caller is cancelled (cancellation.h), the functions throw Cancelled before the next index
+// or range.
 #pragma once
 
 #include <algorithm>
@@ -17,12 +17,12 @@ namespace partiemc {
 
 class TaskArena;
 
-// What oneTBB runs, without types: parallel.cc alone is compiled against oneTBB's templates, and
-// without ThreadSanitizer, which would take their hand-overs for races. What tasks do themselves is
-// in the templates below and instrumented like everything else.
+// Type-erased tasks: parallel.cc alone is compiled against oneTBB's templates, and without
+// ThreadSanitizer, which would report its hand-overs as races. The task bodies are in the templates
+// below and are instrumented.
 namespace erased {
 
-// Requires of all of them: `body` and `fork_join` live as long as the action.
+// Requires: `body` and `fork_join` outlive the action.
 struct Action {
   void (*run)(ForkJoin& fork_join, const void* body);
   ForkJoin& fork_join;
@@ -52,8 +52,8 @@ RangeAction RangeActionOf(ForkJoin& fork_join, const Body& body) {
   return {run, fork_join, &body};
 }
 
-// Both throw Cancelled where the task that they are called by has been given up, as another one of
-// its group threw: oneTBB leaves out parts of what such a task begins, and tells nobody.
+// Both throw Cancelled if the calling task was cancelled because another task of its group threw.
+// oneTBB then skips work without reporting it.
 void Invoke(const Action& a, const Action& b);
 void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action);
 
@@ -65,11 +65,11 @@ void Execute(TaskArena& arena, const Action& action);
 
 }  // namespace erased
 
-/// For how many threads the caller's Arena has places.
+/// Number of threads of the caller's arena.
 inline std::size_t ThreadCount() { return erased::ThreadCount(); }
 
-/// Calls body(first, last) for ranges that together are [0, count), each of at least half of
-/// `grain` where there are so many.
+/// Calls body(first, last) for ranges that partition [0, count). Ranges have at least grain / 2
+/// elements, if `count` allows.
 template <std::invocable<std::size_t, std::size_t> Body>
 void ParallelForRanges(std::size_t count, std::size_t grain, const Body& body) {
   const std::atomic<bool>* const flag = CancellationScope::Current();
@@ -94,7 +94,7 @@ void ParallelFor(Index count, const Body& body) {
   });
 }
 
-/// Calls a() and b().
+/// Calls a() and b() in parallel.
 template <std::invocable A, std::invocable B>
 void ParallelInvoke(const A& a, const B& b) {
   const std::atomic<bool>* const flag = CancellationScope::Current();
@@ -111,8 +111,8 @@ void ParallelInvoke(const A& a, const B& b) {
   erased::Invoke(erased::ActionOf(fork_join, first), erased::ActionOf(fork_join, second));
 }
 
-/// Sorts by `less`. Splits as quicksort does, but at most `splits` times in a row, so that no order
-/// of the values makes it slow; equal ones come in any order.
+/// Sorts by `less`; not stable. Quicksort with at most `splits` nested partitions, then std::sort,
+/// so no input order makes it slow.
 template <typename T, typename Less>
 void ParallelSort(std::span<T> values, const Less& less, int splits = 6) {
   constexpr std::size_t kSortedAtOnce = 1 << 11;

@@ -1,4 +1,4 @@
-// A point of the plane, in whatever unit the caller works in.
+// A point of the plane, in any unit.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +12,14 @@ struct Point {
   friend bool operator==(const Point&, const Point&) = default;
 };
 
-/// The order in which sweeps meet points: by y, points of equal y by x. It is the order along a
-/// direction that leans from the y axis towards x by less than any angle in the input, so that no
-/// two distinct points are met at once.
+/// The order in which a sweep visits points: by y, then by x. This equals the order along a
+/// direction tilted from y towards x by less than any angle in the input, so the sweep never visits
+/// two distinct points at once.
 constexpr bool SweepsBefore(const Point& a, const Point& b) {
   return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
-/// Of interleaved points.
+/// The point at `index` of interleaved coordinates.
 inline Point PointAt(std::span<const double> points, std::size_t index) {
   return {points[2 * index], points[2 * index + 1]};
 }

@@ -7,7 +7,7 @@
 namespace partiemc {
 namespace {
 
-/// An unevaluated sum: the rounded result of an operation and what rounding took from it.
+/// The rounded result of an operation and its rounding error.
 struct Rounded {
   double value, error;
 };
@@ -45,8 +45,8 @@ Rounded TwoProduct(double a, double b) {
 
 int Sign(double value) { return (value > 0) - (value < 0); }
 
-/// An exact sum of doubles: components that do not overlap, ordered by magnitude, zeros among them
-/// (Shewchuk, section 2.2). The sign is that of the last component that is not zero.
+/// An exact sum of doubles: non-overlapping components in order of magnitude (Shewchuk, section
+/// 2.2). Its sign is the sign of the last component.
 class Expansion {
  public:
   /// Grow-Expansion (Shewchuk, Theorem 10).
@@ -71,7 +71,7 @@ class Expansion {
   int Sign() const { return size_ == 0 ? 0 : partiemc::Sign(components_[size_ - 1]); }
 
  private:
-  static constexpr std::size_t kProducts = 6;  // Of a determinant of three points.
+  static constexpr std::size_t kProducts = 6;  // In the determinant of three points.
 
   std::array<double, 2 * kProducts> components_;
   std::size_t size_ = 0;
@@ -90,8 +90,8 @@ int OrientationExact(const Point& a, const Point& b, const Point& c) {
   const Rounded bcx = TwoSum(b.x, -c.x);
   const Rounded bcy = TwoSum(b.y, -c.y);
   if (acx.error == 0 && acy.error == 0 && bcx.error == 0 && bcy.error == 0) {
-    // Differences without rounding, as on any lattice: two exact products are compared. Rounding
-    // is monotonic, so the rounded values decide unless they are equal.
+    // The differences are exact, as on any lattice: compare two exact products. Rounding is
+    // monotonic, so the rounded values decide unless they are equal.
     const Rounded left = TwoProduct(acx.value, bcy.value);
     const Rounded right = TwoProduct(acy.value, bcx.value);
     if (left.value != right.value) return left.value > right.value ? 1 : -1;
@@ -114,7 +114,7 @@ bool SegmentsTouch(const Point& a, const Point& b, const Point& c, const Point& 
   if (c_side * d_side > 0) return false;
   const int a_side = Orientation(c, d, a);
   const int b_side = Orientation(c, d, b);
-  // All four zero: on one line, where overlapping boxes are overlapping segments.
+  // All four zero: on one line. Overlapping boxes then mean overlapping segments.
   return a_side * b_side <= 0;
 }
 

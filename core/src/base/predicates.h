@@ -1,13 +1,13 @@
-// Geometric predicates that are never wrong: a floating-point filter answers almost every call,
-// exact expansion arithmetic the rest.
+// Exact geometric predicates: a floating-point filter decides almost every call, exact expansion
+// arithmetic the rest.
 //
 // Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 // Predicates", Discrete & Computational Geometry 18 (1997).
 //
 // Domain: coordinates that are zero or of a magnitude in [kMinMagnitude, kMaxMagnitude]. There no
-// product of two coordinates overflows and no bit of it is subnormal, so that every error-free step
-// is free of errors. Outside of it a sign may be wrong, but nothing worse happens.
-// Needs round-to-nearest and no contraction of a * b + c (-ffp-contract=off).
+// product of two coordinates overflows or loses subnormal bits, so every error-free transformation
+// is exact. Outside the domain a sign may be wrong, without other harm.
+// Requires round-to-nearest and no contraction of a * b + c (-ffp-contract=off).
 #pragma once
 
 #include "base/point.h"
@@ -20,19 +20,19 @@ inline constexpr double kMinMagnitude = 1e-120;
 /// Six products of two coordinates, and a coordinate times 2^27 + 1, stay below 2^1023.
 inline constexpr double kMaxMagnitude = 1e150;
 
-/// Whether `coordinate` lies in the domain of the predicates. False for NaN and infinities.
+/// Whether `coordinate` is in the domain. False for NaN and infinities.
 constexpr bool InPredicateDomain(double coordinate) {
   const double magnitude = coordinate < 0 ? -coordinate : coordinate;
   return magnitude == 0 || (magnitude >= kMinMagnitude && magnitude <= kMaxMagnitude);
 }
 
-/// Orientation without the filter, for calls that it could not answer.
+/// Orientation without the filter, for the calls that it cannot decide.
 int OrientationExact(const Point& a, const Point& b, const Point& c);
 
-/// +1 if a, b, c turn counter-clockwise (c lies left of the line from a to b), -1 if clockwise,
-/// 0 if they are collinear or two of them coincide. Exact in the domain above.
-/// Cost: about 3 ns when the filter answers, 10 ns for points of a lattice that are exactly
-/// collinear, below 1 us always.
+/// Returns +1 if a, b, c turn counter-clockwise (c is left of the line from a to b), -1 if
+/// clockwise, 0 if they are collinear or two coincide. Exact in the domain above.
+/// Cost: about 3 ns if the filter decides, 10 ns for exactly collinear lattice points, always below
+/// 1 us.
 inline int Orientation(const Point& a, const Point& b, const Point& c) {
   // Shewchuk's bound on the error of `determinant` relative to `magnitude`: (3 + 16 eps) eps with
   // eps = 2^-53.
@@ -46,13 +46,13 @@ inline int Orientation(const Point& a, const Point& b, const Point& c) {
   const double bound = kErrorBound * magnitude;
   if (determinant > bound) return 1;
   if (-determinant > bound) return -1;
-  // A difference or product is only rounded to zero when it is zero.
+  // A difference or product rounds to zero only if it is zero.
   if (magnitude == 0) return 0;
   return OrientationExact(a, b, c);
 }
 
-/// Whether the closed segments ab and cd have a point in common. Exact in the domain above.
-/// Segments of length zero are points.
+/// Whether the closed segments ab and cd intersect. Exact in the domain above. A segment of length
+/// zero is a point.
 bool SegmentsTouch(const Point& a, const Point& b, const Point& c, const Point& d);
 
 }  // namespace partiemc

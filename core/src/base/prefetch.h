@@ -1,4 +1,4 @@
-// Memory asked for before it is needed.
+// Prefetches memory.
 #pragma once
 
 #include <hwy/cache_control.h>
@@ -8,10 +8,8 @@
 
 namespace partiemc {
 
-/// Asks the memory for values that are soon read or written: they come while something else is
-/// done. Worth it for arrays that have left the near caches since they were last used, even where
-/// they are gone through in their order: not every machine asks for what comes next by itself,
-/// virtual ones least of all.
+/// Prefetches the cache lines of `values`. Useful for arrays that have left the near caches, even
+/// for sequential access: not every machine prefetches by itself, virtual ones least of all.
 template <typename T>
 void PrefetchLines(std::span<const T> values) {
   constexpr std::size_t kLine = 64;

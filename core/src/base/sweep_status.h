@@ -1,5 +1,5 @@
-// The status of a sweep: the intervals that its line meets, from left to right. A sequence of
-// identifiers in which one finds, inserts and erases in about the square root of its length.
+// The status structure of a plane sweep: the intervals on the sweep line, from left to right. A
+// sequence of identifiers; find, insert and erase cost about the square root of its length.
 #pragma once
 
 #include <algorithm>
@@ -10,11 +10,11 @@
 
 namespace partiemc {
 
-/// A directory of short blocks. Sorted by its user: the class only ever asks a predicate.
-/// Allocates nothing once it has been as long before. Not safe to share between threads.
+/// A directory of short blocks. The caller keeps it sorted; the class only calls predicates. Does
+/// not allocate up to the greatest length so far. Not thread-safe.
 class SweepStatus {
  public:
-  /// Names an element or, past the last one, the end. Valid until the next change.
+  /// A position of an element, or the end. Valid until the next change.
   struct Cursor {
     std::size_t block = 0, slot = 0;
   };
@@ -33,9 +33,9 @@ class SweepStatus {
   /// Requires: cursor is not the end.
   Cursor Next(Cursor cursor) const { return Normalized({cursor.block, cursor.slot + 1}); }
 
-  /// The first element for which `is_before` is false, or the end.
-  /// Requires: `is_before` is true for a prefix of the sequence only. (Otherwise some element for
-  /// which it is false, or the end.)
+  /// Returns the first element for which `is_before` is false, or the end. Requires: `is_before` is
+  /// true for a prefix of the sequence only; otherwise the result is any element for which it is
+  /// false, or the end.
   template <typename Predicate>
   Cursor FindFirstNot(const Predicate& is_before) const {
     const auto block =
@@ -45,14 +45,14 @@ class SweepStatus {
         });
     if (block == directory_.end()) return {directory_.size(), 0};
     const Block& found = blocks_[*block];
-    // The last element is known to be the answer if none before it is.
+    // If no earlier element matches, the last one does.
     const auto slot =
         std::partition_point(found.ids.begin(), found.ids.begin() + (found.size - 1), is_before);
     return {static_cast<std::size_t>(block - directory_.begin()),
             static_cast<std::size_t>(slot - found.ids.begin())};
   }
 
-  /// Inserts before `cursor`; returns the cursor of the element that it named.
+  /// Inserts before `cursor`; returns the new cursor of the element at `cursor`.
   Cursor Insert(Cursor cursor, std::uint32_t id) {
     if (directory_.empty()) directory_.push_back(NewBlock());
     if (IsEnd(cursor)) cursor = {directory_.size() - 1, BlockOf(directory_.size() - 1).size};
@@ -65,8 +65,7 @@ class SweepStatus {
     return Normalized({cursor.block, cursor.slot + 1});
   }
 
-  /// Erases the element at `cursor`; returns the cursor of the one that followed it.
-  /// Requires: cursor is not the end.
+  /// Erases the element at `cursor`; returns the cursor of its successor. Requires: not the end.
   Cursor Erase(Cursor cursor) {
     Block& block = BlockOf(cursor.block);
     const auto place = block.ids.begin() + static_cast<std::ptrdiff_t>(cursor.slot);
@@ -78,8 +77,8 @@ class SweepStatus {
   }
 
  private:
-  // A block fills four cache lines; the directory of a hundred thousand intervals then has a few
-  // thousand entries, and both are moved about equally fast.
+  // A block fills four cache lines. The directory of a hundred thousand intervals has a few
+  // thousand entries, so inserting costs about the same in block and directory.
   static constexpr std::uint32_t kBlockSize = 63;
 
   struct Block {

@@ -21,20 +21,19 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// How far beyond its kernel a particle needs tiles, in cells: an inside node is within reach of a
-// particle, the rest of an active cell within one cell of it, and any node of a small hole within
-// the radius of a disc of the hole's area of its ring.
+// Margin of tiles around a particle beyond its kernel, in cells. An inside node is within the
+// kernel of a particle. The other corners of its active cells are within one cell of it. The nodes
+// of a small hole are within the radius of a disk with the hole's area of its ring.
 double TileMargin(const Scale& scale) {
   return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
 }
 
-// Particles whose coordinates are looked at together: what is known of them stays in the nearest
-// cache.
+// Particles per block: their data stay in the nearest cache.
 constexpr std::size_t kBlockParticles = 256;
 
-// The homes met last, by the low bits of their coordinates: a body of up to 256 x 256 tiles finds
-// all of its homes here, and thousands of scattered tiles most of theirs, without a probe of the
-// directory that would have to be guessed. Homes whose index is too large are not remembered.
+// A direct-mapped cache of tile indices by the low bits of tile coordinates. A body of up to 256 x
+// 256 tiles finds all its tiles here, scattered tiles most of theirs, without an unpredictable
+// probe of the directory. Indices that do not fit are not cached.
 class RecentHomes {
  public:
   explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNone); }
@@ -56,8 +55,8 @@ class RecentHomes {
   std::array<std::uint16_t, 1 << (kColumnBits + kRowBits)> index_;
 };
 
-// First pass over a stretch: finds home tiles and counts. Returns false if a particle is too far
-// from the origin, or if there are more than `max_tiles`.
+// First pass over a stretch: finds the home tile of each particle and counts. Returns false if a
+// particle is too far from the origin, or if there are more than `max_tiles` tiles.
 template <typename Reader>
 bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double units_per_world,
                std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {
@@ -72,7 +71,7 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
                    scratch.positions.data() + 2 * start)) {
       return false;
     }
-    // They come while homes are looked up, which needs no memory that is far away.
+    // The next block arrives while homes are looked up, which needs no distant memory.
     reader.Prefetch(start + count, std::min(kBlockParticles, last - start - count));
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t home = recent.Find({tiles[2 * k + 1], tiles[2 * k]});
@@ -84,8 +83,8 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
   return true;
 }
 
-// Joins the homes of all stretches in `tiles`, sorted, and tells the stretches where theirs are.
-// Returns false if they are more than `max_tiles`.
+// Collects the homes of all stretches in `tiles`, sorted, and sets BinStretch::tiles. Returns false
+// if there are more than `max_tiles`.
 bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles) {
   for (BinStretch& stretch : scratch.stretches) {
     stretch.tiles.clear();
@@ -96,7 +95,7 @@ bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles)
   }
   scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
   tiles.Sort();
-  // One look-up for each home, not for each of each stretch.
+  // One look-up per tile, not per stretch and tile.
   scratch.next.clear();
   for (const TileCoordinate& home : scratch.homes) scratch.next.push_back(tiles.Find(home));
   for (BinStretch& stretch : scratch.stretches) {
@@ -106,8 +105,8 @@ bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles)
   return true;
 }
 
-// Turns the counts of all stretches into the places of their first particles: a tile's list has the
-// particles of the first stretch, then those of the second. Returns how many particles there are.
+// Turns the counts of all stretches into the indices of their first particles: in each tile's list
+// the particles of the first stretch, then of the second. Returns the number of particles.
 std::uint32_t PlaceParticles(BinScratch& scratch) {
   scratch.next.assign(scratch.homes.size(), 0);
   for (const BinStretch& stretch : scratch.stretches) {
@@ -133,8 +132,8 @@ std::uint32_t PlaceParticles(BinScratch& scratch) {
   return total;
 }
 
-// A particle asks for the line behind its own: its list goes on there after hundreds or thousands
-// of others, in which even memory far away has answered.
+// Prefetch distance in the list of a tile: the line after the particle's own. The list continues
+// there only after hundreds of particles of other tiles.
 constexpr std::size_t kNextLine = 64 / sizeof(BinnedParticle) + 1;
 
 // Second pass over a stretch: writes its particles.
@@ -161,7 +160,7 @@ void FillTiles(std::size_t first, std::size_t last, std::span<const float> volum
   }
 }
 
-// Whether the eight neighbours of a tile are in the directory.
+// Whether all eight neighbours of a tile exist.
 bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
@@ -171,7 +170,7 @@ bool IsSurrounded(const TileDirectory& tiles, TileCoordinate tile) {
   return true;
 }
 
-// Adds the tiles around those that hold particles, and seals the directory. Returns false if they
+// Adds the tiles around the tiles with particles, and seals the directory. Returns false if there
 // are more than `max_tiles`.
 bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   BinScratch& scratch = bins.scratch;
@@ -179,7 +178,7 @@ bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   const TileHalo reached(reach);
   scratch.reached.resize(homes);
   ParallelFor(homes, [&](std::uint32_t k) {
-    // In the middle of a body nothing is to be added, whatever its particles reach.
+    // Inside a body no tile is missing.
     scratch.reached[k] = 0;
     if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) return;
     const std::uint32_t end =
@@ -196,8 +195,8 @@ bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   return true;
 }
 
-// The first particle of each tile of the sealed directory, those without particles included, and
-// the tiles of the stretches' homes.
+// Sets the first particle of each tile, and maps the homes of the stretches to tiles of the sealed
+// directory.
 void SetOffsets(ParticleBins& bins) {
   BinScratch& scratch = bins.scratch;
   const auto particles = static_cast<std::uint32_t>(bins.particles.size());
@@ -214,7 +213,7 @@ void SetOffsets(ParticleBins& bins) {
   }
 }
 
-// Why tiles were not found: the first particle too far away, else too many tiles.
+// The reason why tiles were not found: the first particle too far away, else too many tiles.
 absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::size_t max_tiles) {
   const double units_per_world = UnitsPerWorld(scale);
   const Axes axes = AxesOf(frame, plane);
@@ -223,7 +222,7 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
     for (const auto& [axis, value] :
          {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
       if (IsNearOrigin(value * units_per_world)) continue;
-      // Particles of a slab have other places in the frame, and other axes.
+      // Particles of a slab have other indices and axes in the caller's frame.
       return InvalidFrame(kReasonOutOfRange,
                           scale.is_slice ? "positions" : CoordinateField("positions", k, axis),
                           ShortestNumber(value),
@@ -239,9 +238,9 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
                     ShortestNumber(scale.spacing * scale.cell_size), " right?")});
 }
 
-// A stretch has at least so many particles, and there are at most so many of them: enough for the
-// tasks to balance, few enough that counts by stretch and tile stay below the particles. Each meets
-// most homes anew, so that one thread has one.
+// Smallest stretch and largest number of stretches: enough for the tasks to balance, few enough
+// that counts by stretch and tile are fewer than the particles. Each stretch looks up most tiles
+// again, so a single thread has one stretch.
 constexpr std::size_t kMinStretch = 1 << 15;
 constexpr std::size_t kMaxStretches = 16;
 constexpr std::size_t kStretchesPerThread = 4;

@@ -1,4 +1,4 @@
-// Stage 1 of 9: particles -> tiles.
+// Stage 1 of 9: sorts the particles of a frame into tiles.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace partiemc {
 
-/// Holes of the level set of up to this many particles' area lie on existing tiles throughout.
+/// Holes up to the area of this many particles lie completely on existing tiles.
 inline constexpr double kHoleMarginParticles = 6;
 
 /// A particle in the list of its tile.
@@ -24,60 +24,56 @@ struct BinnedParticle {
   std::uint32_t source;  ///< Index of the particle in the frame.
 };
 
-/// Whether a particle lies in one of these cells of its tile.
+/// Whether a particle lies in one of the marked cells of its tile.
 inline bool LiesIn(const BinnedParticle& particle, const BitRows& cells) {
   return (cells[static_cast<int>(particle.y)] >> static_cast<int>(particle.x) & 1) != 0;
 }
 
-/// A stretch of successive particles: sorted by one task.
+/// Consecutive particles that one task sorts.
 struct BinStretch {
-  std::size_t first = 0, last = 0;  ///< Its particles are [first, last).
-  TileDirectory homes;  ///< The tiles in which its particles lie, in the order in which they came.
-  std::vector<std::uint32_t> tiles;   ///< By home: its place among those of all stretches; in the
-                                      ///< end its tile.
-  std::vector<std::uint32_t> places;  ///< By home: how many, then where the next one goes.
+  std::size_t first = 0, last = 0;    ///< Its particles are [first, last).
+  TileDirectory homes;                ///< The tiles of its particles, by first occurrence.
+  std::vector<std::uint32_t> tiles;   ///< By home: index in BinScratch::homes; finally the tile.
+  std::vector<std::uint32_t> places;  ///< By home: the count, then the next index.
 };
 
 /// Warm buffers of BinParticles.
 struct BinScratch {
-  std::vector<BinStretch> all_stretches;  ///< Of frames so far: a small one leaves them warm.
-  std::span<BinStretch> stretches;        ///< The first of them: those of this frame.
-  std::vector<std::uint32_t> home;        ///< By particle: its home in its stretch.
-  std::vector<float> positions;           ///< By particle: x and y in its home.
-  std::vector<TileCoordinate> homes;      ///< Tiles that hold particles, sorted.
-  std::vector<std::uint32_t> offsets;     ///< By these: their first particle.
-  std::vector<std::uint32_t> next;        ///< By these: where the next stretch goes on.
-  std::vector<std::uint32_t> reached;     ///< By these: tiles that must exist (AddReachedTiles).
+  std::vector<BinStretch> all_stretches;  ///< Kept for later, larger frames.
+  std::span<BinStretch> stretches;        ///< The first of them, in use for this frame.
+  std::vector<std::uint32_t> home;        ///< By particle: index in BinStretch::homes.
+  std::vector<float> positions;           ///< By particle: x and y in its tile.
+  std::vector<TileCoordinate> homes;      ///< Tiles with particles, sorted.
+  std::vector<std::uint32_t> offsets;     ///< By home: its first particle.
+  std::vector<std::uint32_t> next;        ///< By home: index for the next stretch.
+  std::vector<std::uint32_t> reached;     ///< By home: tiles that must exist.
 };
 
-/// Particles sorted by tile, each in the list of the tile that it lies in. Tiles exist farther out:
-/// wherever a kernel reaches a node or a cell, and so far beyond that no isoline meets the end of
-/// the lattice, and no small hole leaves it.
+/// Particles by tile. Tiles also exist where a kernel reaches a node or a cell, and so far around
+/// that no outline meets the end of the lattice and no small hole leaves it.
 ///
-/// Positions are relative to the tile's first node, in cells, rounded to multiples of 2^-17: every
-/// one is an exact float in its own tile and in each that its kernel reaches.
+/// Positions are relative to the first node of the tile, in cells, rounded to multiples of 2^-17.
+/// They are exact floats in their own tile and in each tile that their kernel reaches.
 struct ParticleBins {
   TileDirectory tiles;
   std::vector<std::uint32_t> offsets;     ///< Tile t has particles [offsets[t], offsets[t + 1]).
   std::vector<BinnedParticle> particles;  ///< Tile after tile.
-  std::vector<float> weight;              ///< By particle: w of the field; empty if all are equal.
-  std::vector<float> height;  ///< By particle of a slice: cells above its plane; else empty.
+  std::vector<float> weight;              ///< By particle: w; empty if all are equal.
+  std::vector<float> height;              ///< By particle of a slice: height in cells; else empty.
   BinScratch scratch;
 
   std::uint32_t CountOf(std::size_t tile) const { return offsets[tile + 1] - offsets[tile]; }
   void Clear();
 };
 
-/// Sorts the particles of a checked frame.
-/// Errors: INVALID_ARGUMENT (a particle too many cells from the origin), RESOURCE_EXHAUSTED (more
-/// tiles than allowed), each with a Violation.
-/// Deterministic: particles of a tile stand in the order of the frame. In parallel over stretches
-/// of the frame: count, prefix sum, fill. Cost: linear.
+/// Sorts the particles of a checked frame by tile, in the order of the frame within a tile.
+/// Parallel over stretches of the frame: count, prefix sum, fill. Deterministic. Cost: linear.
+/// Errors with a Violation: INVALID_ARGUMENT (a particle more than 2^30 cells from the origin),
+/// RESOURCE_EXHAUSTED (more tiles than allowed).
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
                           const FrameLimits& limits, ParticleBins& bins);
 
-/// Tells bins, which hold the particles of a slab, their heights: by particle of that frame, in
-/// world units.
+/// Sets the heights of the particles of a slab. `heights`: by particle of the slab, in world units.
 void SetHeights(std::span<const double> heights, const Scale& scale, ParticleBins& bins);
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-// Sets of cells in a tile and around it, as bits: which particles a step has to look at.
+// Sets of cells in and around a tile as bits. Stages use them to select the particles they need.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace partiemc {
 inline constexpr int kMaskMargin = kTileSize / 2;
 using CellMask = std::array<std::uint64_t, kTileSize + 2 * kMaskMargin>;
 
-/// Of a tile in its own Neighbourhood.
+/// Index of a tile in its own Neighbourhood.
 inline constexpr int kOwnPlace = 4;
 
 inline bool IsEmpty(const BitRows& rows) {
@@ -23,14 +23,14 @@ inline bool IsEmpty(const BitRows& rows) {
   return any == 0;
 }
 
-/// The cells of a mask that lie in the tile's neighbour at `place` (Neighbourhood), or in the tile
-/// itself.
+/// The cells of a mask in the tile's neighbour at index `place` of the Neighbourhood, or in the
+/// tile itself.
 inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
   const int dx = place % 3 - 1;
   const int dy = place / 3 - 1;
   const int first = dy < 0 ? kTileSize - kMaskMargin : 0;
   const int end = dy > 0 ? kMaskMargin : kTileSize;
-  // Before the tile its margin are the upper columns of its neighbour.
+  // The margin before the tile holds the upper columns of the neighbour.
   const int up = dx < 0 ? kTileSize - kMaskMargin : 0;
   const int down = dx < 0 ? 0 : dx > 0 ? kTileSize + kMaskMargin : kMaskMargin;
   BitRows cells{};
@@ -41,15 +41,16 @@ inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
   return cells;
 }
 
-/// The bits of a tile alone.
+/// A mask with the cells of one tile.
 inline CellMask MaskOf(const BitRows& rows) {
   CellMask mask{};
   for (int j = 0; j < kTileSize; ++j) mask[j + kMaskMargin] = std::uint64_t{rows[j]} << kMaskMargin;
   return mask;
 }
 
-/// The bits of a tile, and of its neighbours those in rows up to `margin` beyond its sides.
-/// rows_of(index) are the rows of an existing tile. Requires: 0 <= margin <= kMaskMargin.
+/// A mask with the cells of a tile, and its neighbours' cells in rows up to `margin` from its
+/// sides. rows_of(index) returns the rows of an existing tile. Requires: 0 <= margin <=
+/// kMaskMargin.
 template <typename RowsOf>
 CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int margin,
                      RowsOf rows_of) {
@@ -72,10 +73,10 @@ CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int mar
 }
 
 /// Adds the cells (i + di, j + dj), -before <= di, dj <= after, of every cell (i, j) of the mask.
-/// Of cells beyond the margin nothing is known, so that those that they would add miss. Requires: 0
-/// <= before, after <= kMaskMargin.
+/// Cells beyond the margin are unknown and add nothing. Requires: 0 <= before, after <=
+/// kMaskMargin.
 inline void Widen(CellMask& mask, int before, int after) {
-  // No row is read after it took another one in.
+  // Each row is read before it is changed.
   for (int step = 0; step < before; ++step) {
     for (std::uint64_t& row : mask) row |= row >> 1;
     for (std::size_t row = 0; row + 1 < mask.size(); ++row) mask[row] |= mask[row + 1];

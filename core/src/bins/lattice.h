@@ -1,8 +1,8 @@
-// The lattice: world-anchored, sparse, in tiles of 32 x 32 nodes.
+// The lattice: fixed in world coordinates, sparse, in tiles of 32 x 32 nodes.
 //
-// Node (i, j) lies at (i, j) * cell_size in world coordinates. Tile (x, y) owns the nodes
-// [32 x, 32 x + 32) x [32 y, 32 y + 32) and the cells whose lower left node it owns. A row of a
-// tile is a 32-bit word in which bit i stands for node or cell i of that row.
+// Node (i, j) lies at (i, j) * cell_size in world coordinates. Tile (x, y) owns the nodes [32 x, 32
+// x + 32) x [32 y, 32 y + 32) and the cells whose lower left node it owns. A row of a tile is a
+// 32-bit word: bit i is node or cell i of that row.
 #pragma once
 
 #include <array>
@@ -26,24 +26,23 @@ struct TileCoordinate {
   friend auto operator<=>(const TileCoordinate&, const TileCoordinate&) = default;
 };
 
-/// Index of a tile that does not exist; all its nodes are outside.
+/// Index of a tile that does not exist. Its nodes are outside.
 inline constexpr std::uint32_t kNoTile = std::numeric_limits<std::uint32_t>::max();
 
-/// Neighbours of a tile, by (dy + 1) * 3 + (dx + 1); the tile itself in the middle.
+/// Neighbours of a tile at index (dy + 1) * 3 + (dx + 1), with the tile itself in the middle.
 using Neighbourhood = std::array<std::uint32_t, 9>;
 
 /// The tiles of a frame, sorted, with their neighbours.
 class TileDirectory {
  public:
-  /// Forgets all tiles, keeps the memory.
+  /// Removes all tiles; keeps the memory.
   void Clear();
 
-  /// Adds a tile unless it is there. Returns its index, in the order in which tiles came.
-  /// Cost: constant on average.
+  /// Adds a tile if it does not exist. Returns its index, in insertion order. Cost: constant on
+  /// average.
   std::uint32_t Insert(TileCoordinate tile);
 
-  /// Sorts the tiles: from now on indices are positions in the sorted order. Later tiles are
-  /// appended, as ever.
+  /// Sorts the tiles. Indices become positions in the sorted order; later tiles are appended.
   void Sort();
 
   /// Sorts the tiles and links neighbours.
@@ -67,7 +66,7 @@ class TileDirectory {
 };
 
 inline std::size_t TileDirectory::Slot(TileCoordinate tile) const {
-  // Fibonacci hashing of the pair; neighbouring tiles land far apart.
+  // Fibonacci hashing of the pair; neighbouring tiles go to distant slots.
   const auto x = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.x));
   const auto y = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.y));
   std::uint64_t key = (y << 32 | x) * 0x9e3779b97f4a7c15u;
@@ -92,13 +91,14 @@ inline std::uint32_t TileDirectory::Find(TileCoordinate tile) const {
   return slots_.empty() ? kNoTile : slots_[Slot(tile)];
 }
 
-/// A node or cell by its tile and its place in it, 0 <= i, j < 32.
+/// A node or cell: its tile, and its column and row in it, 0 <= i, j < 32.
 struct TilePlace {
   std::uint32_t tile;
   int i, j;
 };
 
-/// The place (i, j) of `tile`, -32 <= i, j < 64, in the tile that owns it (tile kNoTile if none).
+/// The node or cell (i, j) relative to `tile`, -32 <= i, j < 64, in the tile that owns it (kNoTile
+/// if that does not exist).
 inline TilePlace Normalise(const TileDirectory& directory, std::uint32_t tile, int i, int j) {
   const int dx = i >> kTileShift;
   const int dy = j >> kTileShift;

@@ -4,7 +4,7 @@
 
 #include "base/prefetch.h"
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bins/masked_particles.cc"
 #include <hwy/foreach_target.h>
@@ -22,11 +22,11 @@ using Lanes = hn::CappedTag<float, ParticleBlock::kPadding>;
 using Indices = hn::RebindToUnsigned<Lanes>;
 using Bits = hn::RebindToSigned<Lanes>;
 
-// Particles between those that are looked at and those whose memory is asked for.
+// Prefetch distance in particles.
 constexpr std::uint32_t kAskedAhead = 128;
 
-// Adds those of a list's particles up to `last` that are in its cells to `near`. Reads whole
-// vectors, if need be of the particles behind them.
+// Adds the particles of a list up to `last` that lie in its cells to `near`. Reads whole vectors,
+// also beyond `last`.
 void ChooseParticles(std::span<const BinnedParticle> particles, const MaskedParticles::List& list,
                      std::uint32_t last, ParticleBlock& near) {
   const Lanes d;
@@ -41,7 +41,7 @@ void ChooseParticles(std::span<const BinnedParticle> particles, const MaskedPart
     PrefetchLines(particles.subspan(later, lanes));
     hn::Vec<Lanes> x, y, source;
     hn::LoadInterleaved3(d, &particles[first].x, x, y, source);
-    // Truncation rounds down: nothing is before its tile.
+    // Truncation rounds down: coordinates in a tile are not negative.
     const auto row = hn::GatherIndex(d_bits, rows, hn::ConvertTo(d_bits, y));
     const auto bit = hn::Shl(hn::Set(d_bits, 1), hn::ConvertTo(d_bits, x));
     const auto is_in = hn::And(hn::TestBit(row, bit), hn::FirstN(d_bits, last - first));
@@ -92,7 +92,7 @@ MaskedParticles::MaskedParticles(const ParticleBins& bins, std::uint32_t tile, c
   }
 }
 
-// Chooses particles until the block is full. Returns false if there are no more.
+// Selects particles until the block is full. Returns false if none are left.
 bool MaskedParticles::ChooseMore() {
   chosen_.count = 0;
   for (; list_ < list_count_; ++list_) {

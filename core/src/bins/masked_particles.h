@@ -1,4 +1,4 @@
-// The particles of a tile and of its neighbours that a step has to look at.
+// Walks over the particles in selected cells of a tile and its neighbours.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace partiemc {
 
-/// Particles around a tile, in cells relative to it, one after the other.
+/// A block of particles, in cells relative to the tile.
 struct ParticleBlock {
   static constexpr int kCapacity = 512;
-  // A vector of chosen lanes is written whole.
+  // Vectors of selected lanes are written whole.
   static constexpr int kPadding = 16;
   template <typename Value>
   using PerParticle = std::array<Value, kCapacity + kPadding>;
@@ -26,11 +26,11 @@ struct ParticleBlock {
   int count = 0;
 };
 
-/// A walk over the particles in cells of `mask`, or over all of a tile and its neighbours where it
-/// is null. Cost: linear in the lists of those tiles in which the mask has cells.
+/// A walk over the particles in the cells of `mask`, or over all particles of a tile and its
+/// neighbours if it is null. Cost: linear in the lists of the tiles in which the mask has cells.
 class MaskedParticles {
  public:
-  /// What is left of a tile's list: of its particles those in `cells`, shifted.
+  /// The rest of a tile's list: its particles in `cells`, to be shifted.
   struct List {
     std::uint32_t next, end;
     BitRows cells;
@@ -39,8 +39,8 @@ class MaskedParticles {
 
   MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask);
 
-  /// Calls visit(const ParticleBlock&) for all, a block after the other: tile after tile in the
-  /// order of Neighbourhood, those of each in the order of the frame.
+  /// Calls visit(const ParticleBlock&) for all blocks: tile by tile in the order of Neighbourhood,
+  /// within a tile in the order of the frame.
   template <typename Visit>
   void ForEachBlock(Visit visit) {
     while (ChooseMore()) visit(std::as_const(chosen_));
@@ -49,7 +49,7 @@ class MaskedParticles {
  private:
   static constexpr int kMaxLists = std::tuple_size_v<Neighbourhood>;
 
-  // A block is full when no more particles than this could be looked at.
+  // A block with less free capacity is full.
   static constexpr int kLeastRoom = 64;
 
   bool ChooseMore();
@@ -57,7 +57,7 @@ class MaskedParticles {
   std::span<const BinnedParticle> particles_;
   std::array<List, kMaxLists> lists_;
   int list_count_ = 0;
-  int list_ = 0;  // The one that the next particles come from.
+  int list_ = 0;  // The current list.
   ParticleBlock chosen_;
 };
 

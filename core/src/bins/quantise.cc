@@ -6,7 +6,7 @@
 
 #include "bins/lattice.h"
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bins/quantise.cc"
 #include <hwy/foreach_target.h>
@@ -22,9 +22,9 @@ constexpr float kCellsPerUnit = 1.0f / (1 << kFractionBits);
 constexpr int kUnitShift = kFractionBits + kTileShift;  // 2^kUnitShift units are a tile.
 constexpr double kMaxUnits = (1 << 30) * kUnitsPerCell;
 
-// Added to a number below 2^51 it rounds to a whole one, which the lower bits of the sum are: a
-// double between 2^52 and 2^53 has no fraction. Shifted by a tile's units, the bits are the tile's
-// number and what the shift leaves behind here.
+// Adding kRound to a number below 2^51 rounds it to an integer in the lower bits of the sum, as
+// doubles between 2^52 and 2^53 have no fraction. Shifted by a tile's units, the bits are the tile
+// number plus kRoundTile.
 constexpr double kRound = 0x1.8p52;
 constexpr auto kRoundTile =
     static_cast<std::uint32_t>(std::bit_cast<std::uint64_t>(kRound) >> kUnitShift);
@@ -49,7 +49,7 @@ HWY_INLINE hn::Vec<D> LoadDoubles(D d, const float* values) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, D>(), values));
 }
 
-// Does as many of the coordinates as fill vectors of `d`, from `first` on. Returns where it ended.
+// Converts coordinates from `first` on, in whole vectors of `d`. Returns the index after the last.
 template <class D, typename Real>
 HWY_INLINE std::size_t FindTilesIn(D d, std::span<const Real> coordinates, std::size_t first,
                                    double units_per_world, std::int32_t* HWY_RESTRICT tiles,

@@ -1,5 +1,4 @@
-// World coordinates -> tiles and positions in them, many at a time, in the vectors of the processor
-// at hand.
+// Converts world coordinates to tiles and positions in them, in vectors.
 #pragma once
 
 #include <cstdint>
@@ -9,24 +8,24 @@
 
 namespace partiemc {
 
-/// Positions are rounded to this fraction of a cell: a tile with the widest margin spans less than
-/// 2^7 cells, so that 24 bits of mantissa hold any position in it exactly.
+/// Positions are rounded to 2^-17 cells. A tile with the widest margin spans less than 2^7 cells,
+/// so the 24-bit mantissa of a float holds every position exactly.
 inline constexpr int kFractionBits = 17;
 
-/// Units are 2^-17 cells.
+/// Units (2^-17 cells) per world unit.
 double UnitsPerWorld(const Scale& scale);
 
-/// A length in cells, rounded up to the positions' resolution.
+/// A length in cells, rounded up to whole units.
 float RoundedUp(double cells);
 
-/// Whether a coordinate is at most 2^30 cells from the origin: beyond that a double no longer
-/// resolves a millionth of a cell.
+/// Whether a coordinate in units is at most 2^30 cells from the origin. Farther out, a double does
+/// not resolve a millionth of a cell.
 bool IsNearOrigin(double units);
 
-/// Of each coordinate its column or row of tiles, and its position in that tile in cells. Returns
-/// whether all are near the origin; where one is not, or is no number, its results mean nothing.
-/// Requires: `tiles` and `positions` have as many elements as `coordinates`.
-/// Every processor gives the same: each step is exact, or rounded once to a whole unit.
+/// For each coordinate: its tile column or row, and its position in that tile in cells. Returns
+/// whether all are near the origin; otherwise (or for NaN) the results are meaningless. Requires:
+/// `tiles` and `positions` have the size of `coordinates`. Each step is exact or rounds once to a
+/// whole unit, so all processors give the same bits.
 bool FindTiles(std::span<const float> coordinates, double units_per_world, std::int32_t* tiles,
                float* positions);
 bool FindTiles(std::span<const double> coordinates, double units_per_world, std::int32_t* tiles,

@@ -13,18 +13,18 @@
 namespace partiemc {
 namespace {
 
-// Steps of 1/16 move outlines by up to 0.06 spacings, of 1/8 by 0.15, of 1/4 by 0.23, of 1/2 by
-// 0.46 (core/METHOD.md, "Numbers"); the outline's own accuracy is 0.7 at its worst point.
+// Steps of 1/16 of the spacing move outlines by up to 0.06 spacings, 1/8 by 0.15, 1/4 by 0.23, 1/2
+// by 0.46 (core/METHOD.md, "Numbers"). The outline's own error is 0.7 at its worst point.
 constexpr double kDoubtfulStep = 1.0 / 16;
 constexpr double kMaxStep = 1.0 / 4;
 
-// Distance between a float of this size and the next larger one.
+// The distance from a float to the next larger one.
 double StepAt(double coordinate) {
   const auto value = static_cast<float>(coordinate);
   return std::nextafter(value, std::numeric_limits<float>::infinity()) - value;
 }
 
-// No coordinate in these tiles is larger.
+// An upper bound of the coordinates in these tiles.
 double BoundOf(const TileDirectory& tiles, double cell_size) {
   double farthest = 0;
   for (const TileCoordinate& tile : tiles.tiles()) {

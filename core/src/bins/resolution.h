@@ -1,4 +1,4 @@
-// Whether positions are fine enough for the spacing.
+// Checks that float32 positions resolve the spacing.
 #pragma once
 
 #include "absl/status/status.h"
@@ -9,11 +9,10 @@
 
 namespace partiemc {
 
-/// Coordinates that come as float32 have a smallest step, which grows with their distance from the
-/// origin: at 10^6 it is 1/16. Steps of more than 1/16 of the spacing are a doubt, of more than 1/4
-/// an error. Positions of float64 never are.
-/// Errors: OUT_OF_RANGE (reason RESOLUTION). Requires: a checked frame and its tiles.
-/// Cost: a look at each tile; at each particle only where that gives cause.
+/// float32 coordinates have a smallest step that grows with their distance from the origin: 1/16 at
+/// 10^6. A step above 1/16 of the spacing is a doubt, above 1/4 an error. Does nothing for float64.
+/// Errors: OUT_OF_RANGE (reason RESOLUTION). Requires: a checked frame and its tiles. Cost: linear
+/// in tiles; linear in particles if the tiles are suspicious.
 absl::Status CheckResolution(const Frame& frame, Plane plane, const TileDirectory& tiles,
                              double cell_size, double spacing, Doubts& doubts);
 

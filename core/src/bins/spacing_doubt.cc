@@ -13,19 +13,19 @@
 namespace partiemc {
 namespace {
 
-// So many particles are asked; first a few, that clear all frames but those that give cause.
+// Sample sizes: the first sample clears a frame with fewer than kCause contradictions.
 constexpr std::size_t kAsked = 64;
 constexpr std::size_t kAskedFirst = 16;
 constexpr std::size_t kCause = 3;
 
-// Particles looked at, at the most. Where tiles are full a particle takes two thousand looks.
+// Limit of the particles to look at. In full tiles a sample needs two thousand.
 constexpr std::size_t kMaxLooks = std::size_t{1} << 20;
 
-// A tile that holds this many particles for each square of the spacing has more than twice as fine
-// ones, wherever in it they are.
+// A tile with more particles per squared spacing has less than half the spacing, for any
+// arrangement.
 constexpr double kMaxDensity = 4;
 
-// The particle of a tile that is asked as its k-th: the place, not the order, decides.
+// The k-th sample of a tile. It depends on the positions, not on their order.
 const BinnedParticle& Chosen(std::span<const BinnedParticle> particles, std::uint64_t k) {
   const auto hash = [k](const BinnedParticle& particle) {
     const std::uint64_t bits = std::uint64_t{std::bit_cast<std::uint32_t>(particle.x)} << 32 |
@@ -44,8 +44,8 @@ const BinnedParticle& Chosen(std::span<const BinnedParticle> particles, std::uin
   return *chosen;
 }
 
-// NearRing::Distance() is 1 spacing on lattices and up to 1.2 where simulations have shaken them:
-// what is told is at least a factor of two.
+// NearRing::Distance() is 1 spacing on lattices and up to 1.2 in simulations, so these limits mean
+// a factor of at least two.
 constexpr double kMaxDistance = 2.4;
 constexpr double kMinDistance = 0.5;
 
@@ -56,12 +56,12 @@ class Probe {
         spacing_(scale.spacing),
         most_in_tile_(kMaxDensity * kTileNodes / (scale.spacing * scale.spacing)) {}
 
-  // Whether the k-th particle of `tile` that is asked tells another spacing.
+  // Whether the k-th sample of `tile` shows another spacing.
   bool Contradicts(std::size_t tile, std::uint64_t k) {
     const auto particles = ParticlesOf(tile);
     if (static_cast<double>(particles.size()) > most_in_tile_) return true;
     looks_ += particles.size();
-    // All of a small frame are asked.
+    // Small frames are sampled completely.
     const BinnedParticle& at =
         bins_.particles.size() <= kAsked ? particles[k] : Chosen(particles, k);
     NearRing ring;
@@ -83,7 +83,7 @@ class Probe {
     return std::span(bins_.particles).subspan(bins_.offsets[tile], bins_.CountOf(tile));
   }
 
-  // Takes the particles of `other`, unless all of it is farther away than those that are known.
+  // Adds the particles of `other`, unless the whole tile is farther away than the known ones.
   void Gather(std::size_t other, std::size_t tile, const BinnedParticle& at, NearRing& ring) {
     const double x =
         (static_cast<double>(bins_.tiles[other].x) - bins_.tiles[tile].x) * kTileSize - at.x;
@@ -97,7 +97,7 @@ class Probe {
     for (const BinnedParticle& particle : particles) ring.Add(x + particle.x, y + particle.y);
   }
 
-  // Those of all tiles that are no neighbours.
+  // Adds the particles of all tiles that are not neighbours.
   void GatherFar(std::size_t tile, const BinnedParticle& at, NearRing& ring) {
     looks_ += bins_.tiles.size();
     for (std::size_t other = 0; other < bins_.tiles.size() && !IsExhausted(); ++other) {
@@ -121,7 +121,8 @@ bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale) {
   std::size_t asked = 0, contradicting = 0;
   for (; asked < most && !probe.IsExhausted(); ++asked) {
     if (asked == kAskedFirst && contradicting < kCause) return false;
-    // Spread over all particles, the first few too: multiples of an odd step, modulo a power of 2.
+    // Spreads the samples, also the first few, over all particles: multiples of an odd step modulo
+    // a power of 2.
     const std::size_t place = asked * 37 % kAsked;
     const std::size_t particle = count <= kAsked ? asked : count * place / kAsked;
     const auto above = std::upper_bound(bins.offsets.begin(), bins.offsets.end(), particle);

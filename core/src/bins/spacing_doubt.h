@@ -1,4 +1,4 @@
-// Whether a frame's particles have another spacing than they are taken for.
+// Checks the spacing in use against the particles of a frame.
 #pragma once
 
 #include "bins/bins.h"
@@ -6,12 +6,11 @@
 
 namespace partiemc {
 
-/// Whether enough of the particles are surrounded (near_ring.h) at distances that tell a spacing of
-/// more than twice, or less than half, the one in use; between 2 and 2.4 times it depends on their
-/// arrangement. Spray, films and single particles do not count. Asks a sample of the particles that
-/// does not depend on their order, so that small parts of a frame may go unseen. Requires: bins of
-/// this scale. Cost: a few ten thousand looks at particles; a million where the first ones asked
-/// give cause.
+/// Whether enough particles are surrounded (near_ring.h) at distances that show more than twice, or
+/// less than half, the spacing in use. Between 2 and 2.4 times it depends on their arrangement.
+/// Spray, films and single particles do not count. Checks a sample that does not depend on the
+/// order of the particles, so small parts of a frame may be missed. Requires: bins of this scale.
+/// Cost: a few ten thousand particles; a million if the first samples contradict.
 bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale);
 
 }  // namespace partiemc

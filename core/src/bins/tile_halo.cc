@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bins/tile_halo.cc"
 #include <hwy/foreach_target.h>
@@ -20,7 +20,7 @@ using Lanes = hn::CappedTag<float, 16>;
 using Bits = hn::RebindToUnsigned<Lanes>;
 constexpr std::size_t kLanes = hn::MaxLanes(Lanes());
 
-// Bit stride * (d + 2) of a lane: whether a particle there reaches the tile d from its own along an
+// Bit stride * (d + 2) of a lane: whether the particle reaches the tile at distance d along an
 // axis.
 template <int kStride>
 HWY_INLINE hn::Vec<Bits> Along(hn::Vec<Lanes> at, float reach) {
@@ -38,7 +38,7 @@ HWY_INLINE hn::Vec<Bits> Along(hn::Vec<Lanes> at, float reach) {
   return hn::Or(hn::Or(below, above), hn::Set(d_bits, std::uint32_t{1} << 2 * kStride));
 }
 
-// A box of tiles is the product of its bits along both axes.
+// The bits of a box of tiles are the product of its bits along both axes.
 HWY_INLINE hn::Vec<Bits> BoxesOf(const BinnedParticle* particles, float reach) {
   hn::Vec<Lanes> x, y, source;
   hn::LoadInterleaved3(Lanes(), &particles->x, x, y, source);
@@ -57,7 +57,7 @@ std::uint32_t TilesReached(const BinnedParticle* particles, std::size_t count, f
   for (std::size_t k = 0; k + kLanes <= count; k += kLanes) {
     reached = hn::Or(reached, BoxesOf(particles + k, reach));
   }
-  // Nothing changes if some are looked at twice.
+  // Visiting a particle twice changes nothing.
   reached = hn::Or(reached, BoxesOf(particles + count - kLanes, reach));
   std::array<std::uint32_t, kLanes> lanes;
   hn::StoreU(reached, d, lanes.data());

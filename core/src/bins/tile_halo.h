@@ -1,4 +1,4 @@
-// Which tiles must exist because of the particles in one tile.
+// Finds the tiles that the particles of a tile require around it.
 #pragma once
 
 #include <bit>
@@ -10,19 +10,19 @@
 
 namespace partiemc {
 
-/// Sets of tiles around one: bit 5 (dy + 2) + dx + 2 stands for the one at (dx, dy) from it.
+/// Sets of tiles around a home tile: bit 5 (dy + 2) + dx + 2 is the tile at (dx, dy).
 class TileHalo {
  public:
-  /// `reach`: how far from a particle tiles exist, in cells, less than two tiles.
+  /// `reach`: distance from a particle within which tiles must exist, in cells, below two tiles.
   explicit TileHalo(float reach) : reach_(reach) {}
 
-  /// The tiles that particles of a tile reach. Cost: linear. The same for any instruction set.
+  /// The tiles that the particles of a tile reach. Cost: linear.
   std::uint32_t Of(std::span<const BinnedParticle> particles) const;
 
-  /// Whether they are the eight neighbours at most.
+  /// Whether at most the eight neighbours can be reached.
   bool AreNeighbours() const { return reach_ <= kTileSize; }
 
-  /// Calls visit(tile) for each.
+  /// Calls visit(tile) for each tile of a set.
   template <typename Visit>
   static void ForEach(TileCoordinate home, std::uint32_t reached, Visit visit) {
     for (; reached != 0; reached &= reached - 1) {

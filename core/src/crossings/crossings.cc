@@ -15,8 +15,8 @@ struct EdgePair {
   std::uint8_t entry, exit;
 };
 
-// Entry and exit of a cell's first segment by its case, inside on the left. A saddle's rows are
-// replaced by kSaddles.
+// Entry and exit of the first segment of a cell by its case, inside on the left. Saddles use
+// kSaddles.
 constexpr std::array<EdgePair, 16> kSegments = {{
     {0, 0},             // 0: all outside
     {kBottom, kLeft},   // 1: corner 0
@@ -45,8 +45,8 @@ constexpr EdgePair kSaddles[2][2][2] = {
     {{{kBottom, kLeft}, {kTop, kRight}}, {{kBottom, kRight}, {kTop, kLeft}}},   // 5: parted, joined
     {{{kRight, kBottom}, {kLeft, kTop}}, {{kLeft, kBottom}, {kRight, kTop}}}};  // 10
 
-// Whether the inside corners of a saddle are joined: the sign of F where its bilinear interpolant
-// is stationary, (F0 F2 - F1 F3) / (F0 + F2 - F1 - F3). 0 counts as outside, here too.
+// Whether the inside corners of a saddle are joined: the sign of F at the stationary point of its
+// bilinear interpolant, (F0 F2 - F1 F3) / (F0 + F2 - F1 - F3). 0 counts as outside.
 bool AreInsideCornersJoined(const std::array<float, 4>& f, unsigned corners) {
   // Products of two floats are exact in double.
   const double numerator = static_cast<double>(f[0]) * f[2] - static_cast<double>(f[1]) * f[3];
@@ -58,7 +58,7 @@ unsigned CaseOf(const NodeRows& nodes, int i, int j) {
          (nodes.right[j + 1] >> i & 1) << 2 | (nodes.left[j + 1] >> i & 1) << 3;
 }
 
-// The cells of a tile of which all corners are inside.
+// The cells of a tile with all corners inside.
 BitRows InteriorCells(const NodeRows& nodes) {
   BitRows interior;
   for (int j = 0; j < kTileSize; ++j) {
@@ -94,7 +94,7 @@ CrossingCounts ClassifyCells(const TileDirectory& directory, std::uint32_t tile,
   return counts;
 }
 
-// `next` is where the tile's cells and segments begin.
+// Writes the cells and segments of a tile from index `next` on.
 void FillTile(const TileDirectory& directory, const LevelSet& level_set, std::uint32_t tile,
               CrossingCounts next, Crossings& crossings) {
   const NodeRows nodes = InsideRows(directory, crossings.tiles, tile);

@@ -1,5 +1,5 @@
-// The rows of the lattice: active cells by row, and the horizontal edges that rings cross, which
-// tell what rings enclose without filling.
+// Visits active cells and crossed horizontal edges by row of the lattice. The edges show the
+// nesting of rings without filling them.
 #pragma once
 
 #include <array>
@@ -14,18 +14,18 @@
 
 namespace partiemc {
 
-/// Lists active cells by row of the lattice, then by column. Keeps its memory warm.
+/// Lists active cells by row of the lattice, then column. Reuses its memory.
 class CellsByRow {
  public:
-  /// The cells for which is_wanted(ActiveCell) holds, by index; valid until the next call.
-  /// Cost: linear in tiles and cells, without a branch on what a cell is.
+  /// The indices of the cells with is_wanted(ActiveCell); valid until the next call. Cost: linear
+  /// in tiles and cells, branch-free.
   template <typename IsWanted>
   std::span<const std::uint32_t> List(const TileDirectory& directory, const Crossings& crossings,
                                       IsWanted is_wanted);
 
  private:
   std::vector<std::uint32_t> cells_;
-  std::vector<std::uint32_t> wanted_;  // Of one row of tiles, by tile.
+  std::vector<std::uint32_t> wanted_;  // In one row of tiles, by tile.
 };
 
 template <typename IsWanted>
@@ -36,13 +36,14 @@ std::span<const std::uint32_t> CellsByRow::List(const TileDirectory& directory,
   wanted_.resize(cells.size());
   std::uint32_t listed = 0;
   std::uint32_t first = 0;
-  // Cells are sorted by tile, tiles by row: those of a row of tiles are dealt to its rows of cells.
+  // Cells are sorted by tile, tiles by row: a counting sort per row of tiles.
   for (std::size_t tile = 0; tile < directory.size();) {
     const std::int32_t y = directory[tile].y;
     while (tile < directory.size() && directory[tile].y == y) ++tile;
     const std::uint32_t last = tile < directory.size() ? crossings.tiles[tile].first_cell
                                                        : static_cast<std::uint32_t>(cells.size());
-    std::array<std::uint32_t, kTileSize> next{};  // By row of cells: how many, then where they go.
+    std::array<std::uint32_t, kTileSize>
+        next{};  // By row of cells: the count, then the next index.
     std::uint32_t count = 0;
     for (std::uint32_t cell = first; cell < last; ++cell) {
       const std::uint32_t wanted = is_wanted(cells[cell]) ? 1 : 0;
@@ -61,18 +62,19 @@ std::span<const std::uint32_t> CellsByRow::List(const TileDirectory& directory,
   return std::span(cells_).first(listed);
 }
 
-/// A horizontal lattice edge that a ring crosses. Along a row, edges that begin an inside stretch
-/// and edges that end one alternate, beginning with one that begins.
+/// A horizontal lattice edge that a ring crosses. Along a row, edges that begin and that end an
+/// inside stretch alternate.
 struct CrossedEdge {
   std::int32_t row = 0, column = 0;  ///< Its left node, in cells from the world's origin.
   std::uint32_t ring = kNoRing;
   bool begins_inside = false;  ///< Its right node is inside; otherwise its left one is.
 };
 
-/// Keeps its memory warm from frame to frame.
+/// Visits the crossed edges of rings. Reuses its memory.
 class Scanlines {
  public:
-  /// Ring k has segments [offsets[k], offsets[k + 1]); segments of no ring are not visited.
+  /// Sets the rings: ring k has segments [offsets[k], offsets[k + 1]). Segments outside all rings
+  /// are not visited.
   void SetRings(const Crossings& crossings, std::span<const std::uint32_t> segments,
                 std::span<const std::uint32_t> offsets);
 
@@ -99,7 +101,7 @@ inline void Scanlines::SetRings(const Crossings& crossings, std::span<const std:
 template <typename Visit>
 void Scanlines::ForEachEdge(const TileDirectory& directory, const Crossings& crossings,
                             Visit visit) {
-  // Every horizontal edge is the lower one of one cell, whose first segment runs through it.
+  // Every horizontal edge is the lower edge of one cell, whose first segment runs through it.
   const auto crosses_lower_edge = [](const ActiveCell& cell) {
     return ((cell.corners ^ cell.corners >> 1) & 1) != 0;
   };

@@ -16,7 +16,7 @@ void AddRows(const float* from, int stride, int rows, float* to) {
   }
 }
 
-// Copies `count` rows of kColumns values each. Returns whether any is not 0.
+// Copies rows of kColumns values. Returns whether any is not 0.
 template <int kColumns>
 bool CopyRows(const float* from, int stride, int rows, float* to) {
   std::uint32_t any = 0;
@@ -28,7 +28,7 @@ bool CopyRows(const float* from, int stride, int rows, float* to) {
   if (any == 0) return false;
   from -= rows * stride;
   for (int row = 0; row < rows; ++row, from += stride, to += kColumns) {
-    std::memcpy(to, from, kColumns * sizeof(float));  // Without a call, unlike copy_n.
+    std::memcpy(to, from, kColumns * sizeof(float));  // Inlined, unlike copy_n.
   }
   return true;
 }

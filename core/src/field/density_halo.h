@@ -1,4 +1,4 @@
-// What the kernels of a tile's particles add to nodes of the tiles around it.
+// Passes what the kernels of a tile add to nodes of neighbouring tiles.
 #pragma once
 
 #include <cstdint>
@@ -11,46 +11,46 @@
 
 namespace partiemc {
 
-/// The margins of the sums of all tiles that hold particles, kept until their neighbours take them.
+/// The margins of the sums of all tiles with particles, kept until the neighbours add them.
 ///
 ///   uuuuuuuuuuuuuu
-///   llll      rrrr     u: as many rows as the kernel reaches, l and r: kSumMargin columns
+///   llll      rrrr     u: rows within reach of the kernel; l and r: kSumMargin columns
 ///   llll tile rrrr
 ///   llll      rrrr
 ///   uuuuuuuuuuuuuu
 ///
-/// A part that no kernel of the tile reaches is left out.
+/// Parts that no kernel reaches are left out.
 class DensityHalo {
  public:
-  /// Makes room for kernels of a radius of at most kSumMargin.
+  /// Allocates the margins. Requires: radius <= kSumMargin.
   void Prepare(const ParticleBins& bins, float radius);
 
-  /// Asks the memory for where the margins of a tile will be kept. Requires: it holds particles.
+  /// Prefetches the memory for the margins of a tile. Requires: the tile has particles.
   void Prefetch(std::uint32_t tile) const {
     PrefetchLines(std::span(values_).subspan(std::size_t{rim_[tile]} * Size(),
                                              static_cast<std::size_t>(Size())));
   }
 
-  /// Keeps the margins of a tile's sums. Requires: the tile holds particles.
+  /// Stores the margins of a tile's sums. Requires: the tile has particles.
   void Keep(std::uint32_t tile, const NodeSums& sums);
 
-  /// Adds what the neighbours of a tile have kept for its 32 x 32 values, neighbour after neighbour
-  /// in the order of Neighbourhood.
+  /// Adds the margins of the neighbours to the 32 x 32 values of a tile, in the order of
+  /// Neighbourhood.
   void AddTo(const TileDirectory& directory, std::uint32_t tile, float* values) const;
 
  private:
-  // Places in a rim. The lower rows come first, then the upper ones, the left side and the right.
+  // Offsets in a margin: lower rows, upper rows, left side, right side.
   int UpperRows() const { return rows_ * kSumColumns; }
   int LeftSide() const { return 2 * rows_ * kSumColumns; }
   int RightSide() const { return LeftSide() + kTileSize * kSumMargin; }
   int Size() const { return RightSide() + kTileSize * kSumMargin; }
 
-  // Bits of the parts of a rim.
+  // Bits of the parts of a margin.
   enum Part : std::uint8_t { kLower = 1, kUpper = 2, kLeft = 4, kRight = 8 };
 
   int rows_ = 0;
-  std::vector<std::uint32_t> rim_;   // By tile: which of the rims below, or kNoTile.
-  std::vector<std::uint8_t> parts_;  // By rim: those that are kept, as some of it is not 0.
+  std::vector<std::uint32_t> rim_;   // By tile: index of its margin, or kNoTile.
+  std::vector<std::uint8_t> parts_;  // By margin: the parts that are not 0.
   std::vector<float> values_;
 };
 

@@ -14,13 +14,13 @@
 namespace partiemc {
 namespace {
 
-// How far the passes have come with a tile.
+// The last pass that a tile has been through.
 enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
 
-// A range of so many tiles has more than a few whose neighbours are all among them.
+// Tiles per task: enough that most have all neighbours in the same task.
 constexpr std::size_t kTilesAtOnce = 64;
 
-// Null where they are uniform.
+// Null if weights are uniform.
 const float* WeightsOf(const ParticleBins& bins) {
   return bins.weight.empty() ? nullptr : bins.weight.data();
 }
@@ -32,13 +32,13 @@ TileParticles ParticlesOf(const ParticleBins& bins, std::uint32_t tile) {
           bins.CountOf(tile)};
 }
 
-// What a sum of kernels is worth: with weights of their own, particles bring them along.
+// Factor from kernel sums to density; 1 if particles have own weights.
 float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
 
-// First pass: the kernels of a tile's own particles, or, where they reach too far for the margin of
-// the sums, of all around it.
+// First pass: sums the kernels of a tile's own particles, or of all particles around it if kernels
+// reach beyond the margin of the sums.
 void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
              LevelSet& level_set) {
   std::array<float, kTileNodes>& values = level_set.tiles[tile];
@@ -48,7 +48,7 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     values.fill(0);
     return;
   }
-  // Written to as soon as the sums are known, which takes longer than memory far away.
+  // Prefetched for writing: the sums take longer than distant memory.
   PrefetchLines(std::span<const float>(values));
   alignas(64) NodeSums sums;
   sums.fill(0);
@@ -61,14 +61,14 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
       ScatterNearKernels(near, WeightsOf(bins), radius, sums);
     });
   }
-  // Of a fixed size and without a call, unlike copy_n.
+  // Fixed size and inlined, unlike copy_n.
   for (int j = 0; j < kTileSize; ++j) {
     std::memcpy(values.data() + j * kTileSize, sums.data() + SumIndex(0, j),
                 kTileSize * sizeof(float));
   }
 }
 
-// Second pass: the density at every node, and what follows from it alone.
+// Second pass: the density at every node, and the sides that it decides.
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
@@ -78,7 +78,7 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
   ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
-// F at nodes of a tile, from the moments there. Returns those that are inside.
+// Sets F at the given nodes of a tile from the moments there. Returns which of them are inside.
 BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                     const AskedNodes& asked, LevelSet& level_set) {
   const NodeBlocks blocks = BlocksOf(asked.rows);
@@ -87,7 +87,7 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   CellMask mask = MaskOf(asked.rows);
   const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
   const bool masked = reach < kMaskMargin;
-  // A node is reached from the cells whose far side is less than the radius before it.
+  // The kernel reaches a node from cells whose far side is less than the radius before it.
   if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
   MaskedParticles(bins, tile, masked ? &mask : nullptr)
@@ -98,7 +98,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
                        level_set.tiles[tile].data());
 }
 
-// And, while the sums are in the nearest cache, F where the density leaves the side of a node open.
+// Second pass with F at the nodes that the density leaves open, while the sums are in the nearest
+// cache.
 void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                   LevelSet& level_set) {
   ClassifyByDensity(bins, scale, tile, level_set);
@@ -110,7 +111,7 @@ void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t ti
   for (int j = 0; j < kTileSize; ++j) level_set.inside[tile][j] |= inside[j];
 }
 
-// The nodes that have a neighbour on the other side.
+// The nodes with a neighbour on the other side.
 BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level_set,
                            std::uint32_t tile) {
   const Neighbourhood& near = directory.neighbours(tile);
@@ -130,7 +131,7 @@ BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level
   return ends;
 }
 
-// Third pass: F where the density has decided the side, but the isoline crosses an edge.
+// Third pass: F at the decided ends of crossed edges.
 void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   level_set.passes[tile] = kSampled;
@@ -139,12 +140,12 @@ void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32
   if (!IsEmpty(ends)) SampleNodes(bins, scale, tile, {ends, false, false}, level_set);
 }
 
-// The passes over the tiles [first, last). A pass looks at what the one before has left in the
-// tiles around, so that a tile goes through it as soon as these are ready, while they are in a near
-// cache. Tiles next to those of other ranges, which may not be ready, are left as they are.
+// Runs the passes over the tiles [first, last). A pass reads the results of the pass before in the
+// neighbouring tiles. A tile goes through it as soon as these are ready, while they are in a near
+// cache. Tiles next to other ranges, which may not be ready, are left for later.
 void SampleTiles(const ParticleBins& bins, const Scale& scale, std::uint32_t first,
                  std::uint32_t last, LevelSet& level_set) {
-  // The tile itself is among those around it.
+  // The neighbourhood includes the tile itself.
   const auto last_around = [&](std::uint32_t tile) {
     std::uint32_t result = tile;
     for (const std::uint32_t near : bins.tiles.neighbours(tile)) {

@@ -1,4 +1,4 @@
-// Stage 2 of 9: particles -> level set at every node (paper, Eq. 1-5).
+// Stage 2 of 9: computes the level set at the nodes of every tile (paper, Eq. 1-5).
 #pragma once
 
 #include <array>
@@ -11,22 +11,22 @@
 
 namespace partiemc {
 
-/// The level set F (level_set_formula.h), in cells: negative inside. Node (i, j) of a tile is value
+/// The level set F in cells, negative inside (level_set_formula.h). Node (i, j) of a tile has index
 /// j * 32 + i.
 ///
-/// Values are exact at both ends of every lattice edge that the isoline crosses. Anywhere else only
-/// the sign is F's: where the density alone decides the side, the value is the branch that does.
+/// Values are exact at both ends of every lattice edge that the outline crosses. Other nodes have
+/// the correct sign: their value may be the density term that decides their side.
 struct LevelSet {
   std::vector<std::array<float, kTileNodes>> tiles;
-  std::vector<BitRows> inside;  ///< By tile: the nodes at which F < 0.
-  float void_value = 0;         ///< F where no particle reaches, hence in tiles that do not exist.
+  std::vector<BitRows> inside;  ///< By tile: the nodes with F < 0.
+  float void_value = 0;         ///< F beyond all kernels, also in tiles that do not exist.
 
   // Scratch.
-  std::vector<BitRows> open;         ///< By tile: the nodes that the density does not decide.
-  std::vector<std::uint8_t> passes;  ///< By tile: how many are done (SampleField).
+  std::vector<BitRows> open;         ///< By tile: the nodes that the density leaves open.
+  std::vector<std::uint8_t> passes;  ///< By tile: the passes done.
   DensityHalo halo;
 
-  /// F at the node (i, j) of `tile`, 0 <= i, j <= 32: the last row and column are the neighbours'.
+  /// F at node (i, j) relative to `tile`, 0 <= i, j <= 32. Row and column 32 are in the neighbours.
   float At(const TileDirectory& directory, std::uint32_t tile, int i, int j) const {
     if (i < kTileSize && j < kTileSize) return tiles[tile][j * kTileSize + i];
     const TilePlace place = Normalise(directory, tile, i, j);
@@ -34,12 +34,12 @@ struct LevelSet {
   }
 };
 
-/// Samples F at the nodes of every tile of `bins`: the density everywhere, the moments only where
-/// the density leaves the side of a node open, and at the other end of an edge that is crossed.
-/// Accuracy: 1e-5 relative to f = 1 for f, for nodes and particles as rounded by the bins.
-/// Deterministic: sums run over the lists of a node's tile and of its neighbours in one order,
-/// whatever the threads and the instruction set. Parallel over tiles.
-/// Cost: linear in the particles, times the square of the kernel radius in cells.
+/// Computes F at the nodes of every tile of `bins`: the density everywhere; the moments at nodes
+/// that the density leaves open, and at the other ends of their crossed edges. Accuracy of f: 1e-5
+/// relative to f = 1, for the rounded positions of the bins.
+/// Deterministic for any number of threads and any instruction set: the particles of a node's tile
+/// and of its neighbours are summed in one order. Parallel over tiles. Cost: linear in the
+/// particles, times the square of the kernel radius in cells.
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 
 }  // namespace partiemc

@@ -4,7 +4,7 @@
 
 #include "field/tile_kernels.h"
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "field/moment_kernels.cc"
 #include <hwy/foreach_target.h>
@@ -22,15 +22,14 @@ using Lanes = hn::CappedTag<float, NodeBlock::kNodes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// Particles that a step has chosen: their coordinates along the axis that it chose by, and along
-// the other one.
+// Selected particles: their coordinates along the axis of selection, and along the other axis.
 struct Chosen {
   alignas(64) ParticleBlock::PerParticle<float> along, across;
   int count;
 };
 
-// Chooses particles whose kernels may reach nodes `first` to `first` + kSide - 1 along an axis.
-// Their coordinates along it are relative to that node from then on.
+// Selects the particles whose kernels may reach nodes `first` to `first` + kSide - 1 along an axis.
+// Their coordinates along it become relative to node `first`.
 HWY_INLINE void Choose(const float* along, const float* across, int count, int first, float radius,
                        Chosen& chosen) {
   const Lanes d;
@@ -51,11 +50,12 @@ HWY_INLINE void Choose(const float* along, const float* across, int count, int f
   chosen.count = chosen_count;
 }
 
-// Columns and rows of a block's nodes.
+// Columns and rows of the nodes of a block.
 alignas(64) constexpr float kColumns[] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 alignas(64) constexpr float kRows[] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
-// Adds the moments of particles at x and y of a block's first node. The sums stay in registers.
+// Adds the moments of particles; x and y are relative to the first node of the block. The sums stay
+// in registers.
 template <bool kKernel>
 HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inverse_square,
                            BlockSums& sums) {

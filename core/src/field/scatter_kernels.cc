@@ -4,7 +4,7 @@
 
 #include "field/tile_kernels.h"
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "field/scatter_kernels.cc"
 #include <hwy/foreach_target.h>
@@ -16,19 +16,19 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// A row of a kernel of three spacings is six nodes: more than eight lanes would idle.
+// A row of a kernel with R = 3 has six nodes; more than eight lanes would idle.
 using Lanes = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// The first node after `coordinate`. Truncation rounds down: no particle in or next to a tile is
-// farther from it than a tile's width, and no kernel reaches farther than that from a particle.
+// The first node after `coordinate`. The offset makes it positive, so that truncation rounds down:
+// particles are at most a tile away from the tile, and kernels reach at most a tile.
 HWY_INLINE int NodeAfter(float coordinate) {
   constexpr int kOffset = 2 * kTileSize;
   return static_cast<int>(coordinate + kOffset) - kOffset + 1;
 }
 
-// The same of many coordinates at once.
+// NodeAfter in vectors.
 template <class D>
 HWY_INLINE hn::Vec<hn::RebindToSigned<D>> NodesAfter(D d, hn::Vec<D> coordinates) {
   constexpr int kOffset = 2 * kTileSize;
@@ -42,9 +42,8 @@ HWY_INLINE void AddTo(float* HWY_RESTRICT sums, Vector term) {
   hn::StoreU(hn::Add(hn::LoadU(d, sums), term), d, sums);
 }
 
-// Adds the kernel of a particle to some rows and columns of sums, from `sums` on; x and y are
-// relative to that node. The kernel is a function of row term - column term:
-// k = max(0, that)^3 with 1 - dy^2 / R^2 and dx^2 / R^2.
+// Adds the kernel of a particle to `rows` x `columns` sums from `sums` on; x and y are relative to
+// that node. k = max(0, row term - column term)^3 with the terms 1 - dy^2 / R^2 and dx^2 / R^2.
 template <bool kWeighted>
 HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse_square,
                           float weight, float* HWY_RESTRICT sums) {
@@ -59,7 +58,7 @@ HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse
   }
   for (int column = 0; column < columns; column += kLanes) {
     const Vector dx = hn::Sub(hn::Set(d, x - static_cast<float>(column)), lane);
-    // Beyond the last column more than any row term, on every target alike: k = 0.
+    // The term exceeds any row term after the last column, so k = 0 for every instruction set.
     const auto reached = hn::Lt(lane, hn::Set(d, static_cast<float>(columns - column)));
     const Vector column_term =
         hn::IfThenElse(reached, hn::Mul(hn::Mul(dx, dx), scale), hn::Set(d, 2.0f));
@@ -72,11 +71,11 @@ HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse
   }
 }
 
-// Particles whose first nodes are looked for together.
+// Particles per block.
 constexpr int kBlock = 64;
 
-// Of particles of a tile: where they are relative to the first column and row that their kernels
-// reach, and where that node's sum is.
+// For particles of a tile: their position relative to the first column and row that the kernel
+// reaches, and the index of that node's sum.
 struct KernelCorners {
   alignas(64) std::array<float, kBlock> x, y;
   alignas(64) std::array<std::int32_t, kBlock> at;
@@ -108,8 +107,9 @@ HWY_INLINE void FindCorners(const BinnedParticle* particles, int count, float ra
   }
 }
 
-// Kernels that the margin has room for: every one covers the same number of rows and columns, so
-// that no branch depends on where a particle lies. add(x, y, index, first sum) adds one.
+// Calls add(x, y, index, first sum) for each particle of a tile. Requires: kernels fit the margin.
+// Each covers the same number of rows and columns, so no branch depends on the position of a
+// particle.
 template <typename Add>
 HWY_INLINE void ForEachCorner(const TileParticles& tile, float radius, NodeSums& sums, Add add) {
   KernelCorners corners;
@@ -123,8 +123,8 @@ HWY_INLINE void ForEachCorner(const TileParticles& tile, float radius, NodeSums&
   }
 }
 
-// Narrow kernels in vectors of sixteen: two rows of eight nodes at a time, which takes the same
-// steps for each node.
+// Narrow kernels in vectors of sixteen: two rows of eight nodes at a time, with the same operations
+// per node.
 #if HWY_TARGET <= HWY_AVX3
 constexpr int kNarrowSpan = kLanes;
 
@@ -146,7 +146,7 @@ void ScatterNarrow(const TileParticles& tile, float radius, int span, NodeSums& 
   ForEachCorner(tile, radius, sums, [&](float x, float y, int k, float* at) HWY_ATTR {
     const auto dx = hn::Sub(hn::Set(d, x), column);
     const auto dy = hn::Sub(hn::Set(d, y), lane);
-    // Beyond the span terms that make k = 0, on every target alike.
+    // These terms make k = 0 outside the span for every instruction set.
     const auto column_term =
         hn::IfThenElse(reached_column, hn::Mul(hn::Mul(dx, dx), inverse_square), hn::Set(d, 2.0f));
     const auto row_terms = hn::IfThenElseZero(

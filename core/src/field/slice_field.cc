@@ -14,7 +14,7 @@ namespace {
 
 using TileSums = std::array<SliceSums, kTileNodes>;
 
-// The nodes from `low` to below `high` that are nearer than `reach` to a coordinate.
+// The nodes [low, high) within `reach` of a coordinate.
 struct NodeRange {
   int low, high;
 
@@ -26,7 +26,7 @@ struct NodeRange {
 void AddParticle(const Scale& scale, double x, double y, double height, double weight,
                  TileSums& sums) {
   const double inverse_square = 1 / (scale.kernel_radius * scale.kernel_radius);
-  // 1 - s^2 in the plane straight below the particle.
+  // 1 - s^2 at the point of the plane directly below the particle.
   const double foot = 1 - height * height * inverse_square;
   const double reach = scale.kernel_radius * std::sqrt(std::max(foot, 0.0));
   const NodeRange columns(x, reach), rows(y, reach);

@@ -1,4 +1,4 @@
-// Stage 2 of 9, where the outline is a section of a body in space.
+// Stage 2 of 9 for slices: computes the level set on a plane through particles in space.
 #pragma once
 
 #include "bins/bins.h"
@@ -7,10 +7,10 @@
 
 namespace partiemc {
 
-/// As SampleField, for particles that have heights above the plane (ParticleBins::height): F at
-/// every node is that of space (SliceSums). Deterministic: the sums of a node run over the lists of
-/// its tile and of the neighbours in one order, in doubles. Parallel over tiles. Cost: linear in
-/// the particles of the slab, times the square of the kernel radius in cells.
+/// Like SampleField, for particles with heights above the plane (ParticleBins::height). Every node
+/// has F in space (SliceSums). Deterministic: the sums of a node run over the particles of its tile
+/// and the neighbours in one order, in doubles. Parallel over tiles. Cost: linear in the particles
+/// of the slab, times the square of the kernel radius in cells.
 void SampleSlice(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 
 }  // namespace partiemc

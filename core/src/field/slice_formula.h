@@ -1,5 +1,5 @@
-// The level set on a plane through particles in space, as a function of the kernel's moments at a
-// point of it (core/METHOD.md, "Slices").
+// The level set on a plane through particles in space, as a function of the kernel's moments
+// (core/METHOD.md, "Slices").
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,13 @@
 
 namespace partiemc {
 
-/// Where a particle lies relative to a point of the plane, in cells.
+/// Position of a particle relative to a point of the plane, in cells.
 struct SpaceOffset {
   double x, y;    ///< Along the plane.
   double height;  ///< Above it.
 };
 
-/// Sums over the particles around a point of the plane, D = x_i - x in space.
+/// Sums over the particles around a point of the plane; D = x_i - x in space.
 struct SliceSums {
   double kernel = 0;              ///< sum k
   double density = 0;             ///< f = sum w k
@@ -47,9 +47,9 @@ struct SliceSums {
     return std::sqrt(x * x + y * y + z * z) / kernel - scale.reference_radius;
   }
 
-  /// sigma: the largest eigenvalue of the moments, or somewhat more. Exact where one of the two
-  /// axes along the plane has nothing to do with the height, as between two flat bodies, however
-  /// they lie; inside of bodies, where moments are round, the difference is nothing.
+  /// sigma: an upper bound of the largest eigenvalue of the moments. It is exact if one axis along
+  /// the plane is independent of the height, as between two flat bodies in any position. Inside
+  /// bodies, where moments are isotropic, there is no difference.
   double Spread(const Scale& scale) const {
     const double along = LargerEigenvalue(xx, xy, yy);
     const double across = std::sqrt(xz * xz + yz * yz);
@@ -64,8 +64,8 @@ struct SliceSums {
   }
 };
 
-/// Sums for the gradients along the plane of what SliceSums tells, to be added up beside it. With
-/// t = 1 - s^2: grad k = 6 t^2 D / R^2.
+/// Sums for the gradients of SliceSums along the plane, to be added for the same particles. With t
+/// = 1 - s^2: grad k = 6 t^2 D / R^2.
 struct SliceSlopes {
   double x = 0, y = 0;            ///< sum t^2 D
   double xx = 0, xy = 0, yy = 0;  ///< sum t^2 D D^T
@@ -91,9 +91,9 @@ struct SliceSlopes {
     return {six * density_x, six * density_y};
   }
 
-  /// With the mean m = sum k D / sum k: grad phi = m . grad m / abs(m), and grad m = (sum grad k
-  /// D^T
-  /// - m sum grad k) / sum k - I. 0 where the mean is the point. Requires: sums.kernel > 0.
+  /// grad phi = m . grad m / |m| with the mean m = sum k D / sum k and
+  ///   grad m = (sum grad k D^T - m sum grad k) / sum k - I.
+  /// 0 if m = 0. Requires: sums.kernel > 0.
   Point OfPhi(const SliceSums& sums, const Scale& scale) const {
     const double length = std::sqrt(sums.x * sums.x + sums.y * sums.y + sums.z * sums.z);
     if (length == 0) return {};

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "field/tile_kernels.cc"
 #include <hwy/foreach_target.h>
@@ -56,12 +56,12 @@ void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& ins
   }
 }
 
-// The branches of F that the density decides.
+// The terms of F that depend on the density alone.
 struct DensityBranches {
   Vector guard, saturation;
 };
 
-// LevelSetValue in vectors, of what is known of nodes.
+// LevelSetValue in vectors.
 class NodeFormula {
  public:
   HWY_INLINE NodeFormula(const AskedNodes& asked, float weight, const Scale& scale)
@@ -76,7 +76,7 @@ class NodeFormula {
         void_value_(Constant(VoidValue(scale))),
         inverse_square_(Constant(1 / (scale.kernel_radius * scale.kernel_radius))) {}
 
-  // F at the nodes of a block from `first` on, which have `value` so far.
+  // F at the nodes of a block from `first` on. `value`: the result of ClassifyNodes there.
   HWY_INLINE Vector operator()(Vector value, const BlockSums& sums, int first) const {
     const auto load = [&](const BlockSums::Channel& of)
                           HWY_ATTR { return hn::Load(d_, of.data() + first); };
@@ -113,7 +113,7 @@ class NodeFormula {
       const Vector f = hn::Mul(weight_, value);
       return {hn::Mul(hn::Sub(guard_, f), slope_), hn::Mul(hn::Sub(saturation_, f), slope_)};
     }
-    // The value is the one that has decided the side, which the other then cannot change.
+    // The value is the term that decided the side; the other term cannot change it.
     const Vector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
     const auto is_inside = hn::Lt(value, hn::Zero(d_));
     return {hn::IfThenElse(is_inside, hn::Sub(value, between), value),
@@ -126,7 +126,7 @@ class NodeFormula {
       void_value_, inverse_square_;
 };
 
-// Sets the asked ones of a block's values to F. Returns which of them are inside.
+// Sets the requested values of a block to F. Returns which of them are inside.
 HWY_INLINE unsigned EvaluateBlock(const NodeFormula& formula, const BlockSums& sums, unsigned asked,
                                   BlockSums::Channel& values) {
   const Lanes d;

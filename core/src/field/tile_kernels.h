@@ -1,8 +1,8 @@
-// The inner loops of the field stage, over one tile, in the vectors of the processor at hand.
+// The inner loops of the field stage over one tile, in vectors.
 //
-// Every target (tile_kernels.cc, moment_kernels.cc and scatter_kernels.cc are compiled once for
-// each) gives the same bits: a lane does what the scalar formula says, in the same order, without
-// fused multiply-adds, and no sum runs across lanes.
+// Every instruction set gives the same bits (tile_kernels.cc, moment_kernels.cc and
+// scatter_kernels.cc are compiled once for each). A lane evaluates the scalar formula in the same
+// order without fused multiply-adds, and no sum runs across lanes.
 #pragma once
 
 #include <algorithm>
@@ -17,21 +17,21 @@
 
 namespace partiemc {
 
-/// Sums at the nodes of a tile, with a margin that takes what kernels of its particles add beyond
-/// its sides. Wider kernels than that are cut off at the tile's sides.
+/// Margin of the sums of a tile, for kernels that reach beyond its sides. Wider kernels are cut off
+/// at the sides.
 inline constexpr int kSumMargin = 8;
 inline constexpr int kSumColumns = kTileSize + 2 * kSumMargin;
 inline constexpr int SumIndex(int i, int j) {
   return (j + kSumMargin) * kSumColumns + i + kSumMargin;
 }
-/// Two rows more: the lanes of a vector may go on in the next row, and what is beyond the reach of
-/// the last particle in the one after it.
+/// Two more rows: vectors may write into the next row, and beyond the reach of the last particle
+/// into the one after.
 using NodeSums = std::array<float, (kTileSize + 2 * kSumMargin + 2) * kSumColumns>;
 
-/// A square of nodes of a tile, some of which are asked for moments.
+/// A square of nodes of a tile, some of which need moments.
 ///
 ///   12 13 14 15
-///    8  9 10 11   Bit k of `asked` stands for node k, the first one is (column, row) of the tile.
+///    8  9 10 11   Bit k of `asked` is node k; node 0 is (column, row) of the tile.
 ///    4  5  6  7
 ///    0  1  2  3
 struct NodeBlock {
@@ -41,7 +41,7 @@ struct NodeBlock {
   std::uint16_t asked = 0;
 };
 
-/// Blocks that together have each asked node of a tile once, those of a row side by side.
+/// Blocks that contain each requested node of a tile once, row by row.
 struct NodeBlocks {
   static constexpr int kMost = kTileNodes / NodeBlock::kNodes;
   std::array<NodeBlock, kMost> blocks;
@@ -50,14 +50,14 @@ struct NodeBlocks {
   const NodeBlock& operator[](int block) const { return blocks[block]; }
 };
 
-/// Rows and columns of blocks begin at the first asked node that none before them has.
+/// Greedy: each block begins at the first requested node that no earlier block contains.
 NodeBlocks BlocksOf(const BitRows& asked);
 
-/// Kernel sums at the nodes of one block. The moments are relative to the node, so that the mean
-/// loses no digits where the tile's corner is far.
+/// Kernel sums at the nodes of one block. Moments are relative to the node, so that the mean loses
+/// no digits far from the corner of the tile.
 struct alignas(64) BlockSums {
   using Channel = std::array<float, NodeBlock::kNodes>;
-  Channel kernel;    ///< sum k; only where the density does not tell it.
+  Channel kernel;    ///< sum k, unless the density gives it.
   Channel moment_x;  ///< sum k (x_i - x)
   Channel moment_y;
   Channel xx;  ///< sum k (x_i - x)^2, and so on.
@@ -66,41 +66,40 @@ struct alignas(64) BlockSums {
 };
 using MomentSums = std::array<BlockSums, NodeBlocks::kMost>;
 
-/// The nodes of a tile of which moments are asked.
+/// The nodes of a tile that need moments.
 struct AskedNodes {
   BitRows rows;
-  bool is_open;          ///< Whether the density left their sides open, else it has decided them.
-  bool has_kernel_sums;  ///< Whether their values so far are sum k (ClassifyNodes).
+  bool is_open;          ///< The density left their sides open; otherwise it decided them.
+  bool has_kernel_sums;  ///< Their values are sum k (ClassifyNodes).
 };
 
-/// The list of one tile. `weight` is null where weights are uniform.
+/// The particles of one tile. `weight` is null if weights are uniform.
 struct TileParticles {
   const BinnedParticle* particles;
   const float* weight;
   std::size_t count;
 };
 
-/// Adds the kernels of a tile's own particles to `sums`, times their weights where there are any,
-/// also beyond the tile's sides. Requires: radius <= kSumMargin.
+/// Adds the weighted kernels of a tile's own particles to `sums`, including the margin. Requires:
+/// radius <= kSumMargin.
 void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 
-/// The same of particles in and around a tile, to the tile's nodes only, for any radius. `weight`,
-/// by particle of the bins, is null where weights are uniform.
+/// Adds the kernels of particles in and around a tile to the tile's own nodes, for any radius.
+/// `weight`: by particle of the bins, null if uniform.
 void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums);
 
-/// Adds to the moments at the nodes of blocks, particle after particle. `sum k` is added up unless
-/// it is known.
+/// Adds particles to the moments of blocks, one after another. `has_kernel_sums`: sum k is known
+/// already and not added.
 void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums);
 
-/// What the density f = weight * sum says of the nodes of a tile: those that are inside, those that
-/// it leaves open, and, but for the latter, in place of the sums the branch of F that decides them;
-/// where f = 0, F itself.
+/// Classifies the nodes of a tile by the density f = weight * sum. Sets `inside`, and `open` for
+/// undecided nodes. Replaces the sums of decided nodes by the term of F that decides, or by F
+/// itself if f = 0.
 void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside, BitRows& open);
 
-/// Sets the values of the asked nodes, as ClassifyNodes has left them, to F. Returns those of them
-/// that are inside.
+/// Sets the requested values, as ClassifyNodes left them, to F. Returns which of them are inside.
 BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,
                       float weight, const Scale& scale, float* values);
 

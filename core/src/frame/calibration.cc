@@ -8,8 +8,8 @@ namespace partiemc {
 namespace {
 
 // Distance of the weighted mean from a point h/2 outside the outermost layer of an axis-aligned
-// lattice, in spacings: layers lie at d = k + 1/2, and the kernel integrated along a layer is
-// proportional to (1 - (d / beta)^2)^(7/2), or, in space, ^4.
+// lattice, in spacings. Layers lie at d = k + 1/2; the kernel integrated along a layer is
+// proportional to (1 - (d / beta)^2)^(7/2), in space ^4.
 template <bool kInSpace>
 double AxisAlignedLatticeDistance(double beta) {
   double moment = 0;

@@ -10,17 +10,17 @@
 namespace partiemc {
 namespace {
 
-// Half as much memory as ids have themselves.
+// The bitmap takes at most half the memory of the ids.
 constexpr std::uint64_t kMaxBitsPerId = 32;
 
-// Bits that have been seen.
+// A set of numbers below `count`.
 class Bitmap {
  public:
   Bitmap(std::uint64_t count, std::vector<std::uint64_t>& words) {
     words.assign(count / 64 + 1, 0);
     words_ = words.data();
   }
-  /// Whether the bit was set; it is from now on.
+  /// Sets a bit; returns whether it was set before.
   bool Set(std::uint64_t place) {
     std::uint64_t& word = words_[place / 64];
     const std::uint64_t bit = std::uint64_t{1} << (place % 64);
@@ -43,8 +43,8 @@ bool AllDifferByNumber(std::span<const std::uint64_t> ids, std::uint64_t lowest,
   return true;
 }
 
-// An id that an earlier one equals finds its bit set, as some others do by chance. Equals of these
-// have the same bit: what has such a bit is compared.
+// A repeated id finds its bit set, and so do a few others by chance. All ids with such a bit are
+// compared exactly.
 bool AllDifferByHash(std::span<const std::uint64_t> ids, DistinctIdsScratch& s) {
   const int width = static_cast<int>(std::bit_width(kMaxBitsPerId / 2 * ids.size()));
   const std::uint64_t places = std::uint64_t{1} << width;
@@ -66,7 +66,7 @@ bool AllDifferByHash(std::span<const std::uint64_t> ids, DistinctIdsScratch& s) 
   return std::adjacent_find(s.suspects.begin(), s.suspects.end()) == s.suspects.end();
 }
 
-// Of ids that do not all differ: whose frame is refused, so that time is no concern.
+// Requires: some id repeats. The frame is refused, so speed does not matter.
 RepeatedId FirstRepeated(std::span<const std::uint64_t> ids) {
   std::vector<std::size_t> places(ids.size());
   std::iota(places.begin(), places.end(), std::size_t{0});
@@ -87,7 +87,7 @@ std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
                                        DistinctIdsScratch& scratch) {
   if (ids.empty()) return std::nullopt;
   const std::uint64_t places = kMaxBitsPerId * ids.size();
-  std::uint64_t bits = 0;  // No id exceeds their union, which is found faster than the largest id.
+  std::uint64_t bits = 0;  // The union of the ids: an upper bound, cheaper than the maximum.
   for (const std::uint64_t id : ids) bits |= id;
   std::uint64_t lowest = 0, highest = bits;
   if (bits >= places) {

@@ -1,4 +1,4 @@
-// Whether all ids of a frame are different.
+// Checks that all ids of a frame are different.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace partiemc {
 
-/// Two places of one id.
+/// Two indices of the same id.
 struct RepeatedId {
   std::size_t first = 0, again = 0;
 };
@@ -20,11 +20,11 @@ struct DistinctIdsScratch {
   std::vector<std::uint64_t> suspects;  ///< Hashes.
 };
 
-/// The first id, in their order, that an earlier one equals; nothing if all are different.
-/// Ids are ticked off in a bitmap of at most 32 bits for each: by number where they are dense, as
-/// simulators number particles, else by hash; the few that share a bit are compared.
-/// Cost: linear in ids; n log n in those that share a bit, all of them where ids were chosen for
-/// it.
+/// Returns the first id that equals an earlier one; empty if all are different. Ids are marked in a
+/// bitmap of at most 32 bits per id: by number if they are dense, as simulators number particles,
+/// else by hash. Ids that share a bit are compared.
+/// Cost: linear in ids; n log n in the ids that share a bit, which is all of them for malicious
+/// ids.
 std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
                                        DistinctIdsScratch& scratch);
 

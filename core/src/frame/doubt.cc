@@ -19,12 +19,11 @@ std::string_view Name(Doubt doubt) {
 std::string_view Explanation(Doubt doubt) {
   switch (doubt) {
     case Doubt::kSpacingProvisional:
-      return "particles do not agree on a spacing yet, lengths are a guess; give the spacing";
+      return "particles do not agree on a spacing yet, lengths are estimates; give the spacing";
     case Doubt::kSpacingContradicted:
-      return "particles are more than twice as near or far as the spacing says; give the right one";
+      return "distances of particles are above twice or below half the spacing; give the right one";
     case Doubt::kVolumesContradictSpacing:
-      return "volumes are more than twice or less than half the squared spacing; look at their "
-             "unit";
+      return "volumes are above twice or below half the squared spacing; check their unit";
     case Doubt::kPositionsCoarse:
       return "float32 positions are coarse for the spacing; send float64, or relative to an origin";
   }

@@ -1,4 +1,4 @@
-// What particles carry besides: whether it is usable, and what of it is wanted.
+// Checks the attributes of a frame and selects the requested ones.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 64;
 
-// Errors reach logs and messages, which take text only.
+// Errors go to logs and messages, so values must be printable.
 std::string Escaped(std::string_view name) { return absl::CHexEscape({name.data(), name.size()}); }
 
 absl::Status CheckAttribute(const Frame& frame, std::size_t k) {
@@ -27,7 +27,8 @@ absl::Status CheckAttribute(const Frame& frame, std::size_t k) {
   const auto is_printable = [](char c) { return c >= ' ' && c <= '~'; };
   if (attribute.name.empty() || attribute.name.size() > kMostNameBytes ||
       !std::ranges::all_of(attribute.name, is_printable)) {
-    return InvalidFrame(kReasonOutOfRange, field + ".name", Escaped(attribute.name),
+    return InvalidFrame(kReasonOutOfRange, field + ".name",
+                        attribute.name.empty() ? "empty" : Escaped(attribute.name),
                         absl::StrCat("must be 1 to ", kMostNameBytes, " bytes of ASCII"));
   }
   for (const Attribute& before : frame.attributes.first(k)) {

@@ -13,21 +13,21 @@
 namespace partiemc {
 namespace {
 
-// The largest coordinate in world units: that many cells of the largest spacing. Squares of
-// distances stay finite.
+// The largest coordinate in world units: the largest number of cells times the largest spacing.
+// Squares of distances stay finite.
 constexpr double kMaxCoordinate = 1e69;
 
-// How far three-component positions may leave their plane, relative to their extent in it: above
-// the noise of a simulator's rounding, far below anything that a third dimension would need.
+// Largest distance of positions from their plane, relative to their extent in it: above the
+// rounding noise of simulators, far below real depth.
 constexpr double kPlanarTolerance = 1e-5;
 
-// Values that one task looks at: long enough to hide the cost of a task.
+// Values per task: enough to hide the cost of a task.
 constexpr std::size_t kCheckedAtOnce = 1 << 16;
 
 constexpr char kAxisNames[] = "xyz";
 
-// Whether every value is a number of at most kMaxCoordinate: no early exit, so that the loop is
-// done in vectors.
+// Whether every value is a number of at most kMaxCoordinate. Without early exit, so that the
+// compiler vectorises the loop.
 template <typename Real>
 bool AreCoordinates(std::span<const Real> values) {
   constexpr double kLargest = std::numeric_limits<Real>::max();
@@ -105,7 +105,7 @@ absl::Status CheckPlanar(const Frame& frame, Plane plane) {
                    ShortestNumber(high[axes.normal]), "]"));
 }
 
-// Whether there are no values of an optional array, or one for each particle.
+// Checks that an optional array is empty or has one value per particle.
 absl::Status CheckCount(const Frame& frame, std::string_view field, std::size_t values) {
   if (values == 0 || values == frame.ParticleCount()) return absl::OkStatus();
   return InvalidFrame(

@@ -1,4 +1,4 @@
-// The numbers of a frame: how they are read, and whether they are usable.
+// Reads the numbers of a frame and checks them.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,11 @@
 
 namespace partiemc {
 
-/// Reads the coordinate pairs of a frame whose numbers are of type Real.
+/// Reads the coordinate pairs of a frame with numbers of type Real.
 template <typename Real>
 class PositionReader {
  public:
-  /// Requires: `first`, `second` < `components`. `values` may be null where there are no particles.
+  /// Requires: `first`, `second` < `components`. `values` may be null if there are no particles.
   PositionReader(const Real* values, int components, int first, int second)
       : first_(values == nullptr ? nullptr : values + first),
         second_(values == nullptr ? nullptr : values + second),
@@ -31,8 +31,8 @@ class PositionReader {
     return {static_cast<double>(first_[at]), static_cast<double>(second_[at])};
   }
 
-  /// The pairs of `count` particles from `first` on, one after the other: in the frame itself where
-  /// it has two components, else copied. Requires: room for them in `copy`.
+  /// The interleaved pairs of `count` particles from `first` on: a view of the frame if it has two
+  /// components, else copied to `copy`, which must have space for them.
   std::span<const Real> Pairs(std::size_t first, std::size_t count, Real* copy) const {
     if (components_ == 2) return {first_ + 2 * first, 2 * count};
     for (std::size_t k = 0; k < count; ++k) {
@@ -42,7 +42,7 @@ class PositionReader {
     return {copy, 2 * count};
   }
 
-  /// Asks the memory for the numbers of `count` particles from `first` on.
+  /// Prefetches the numbers of `count` particles from `first` on.
   void Prefetch(std::size_t first, std::size_t count) const {
     PrefetchLines(std::span(first_ + first * components_, count * components_));
   }
@@ -55,19 +55,19 @@ class PositionReader {
   std::size_t components_;
 };
 
-/// The axes that span a plane, and the one across it: 0, 1, 2 for x, y, z.
+/// The axes that span a plane, and its normal axis: 0, 1, 2 for x, y, z.
 struct Axes {
   int first, second, normal;
 };
 Axes AxesOf(Plane plane);
 
-/// Those of a frame: with two components they are taken as they are.
+/// The axes for a frame; frames with two components have x and y.
 inline Axes AxesOf(const Frame& frame, Plane plane) {
   return AxesOf(frame.components == 3 ? plane : Plane::kXy);
 }
 
-/// Calls visit(reader) with the PositionReader of a frame: the type of its numbers is asked once
-/// for all particles. Requires: a frame that CheckFrame has passed.
+/// Calls visit(reader) with the PositionReader of a frame, so that the number type is resolved once
+/// for all particles. Requires: CheckFrame has passed the frame.
 template <typename Visit>
 auto VisitPositions(const Frame& frame, Plane plane, Visit visit) {
   const Axes axes = AxesOf(frame, plane);
@@ -87,19 +87,20 @@ struct PlaneVelocity {
 };
 PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle);
 
-/// "positions[17].x": the name of a coordinate of an array in a Violation.
+/// The name of a coordinate for a Violation: "positions[17].x".
 std::string CoordinateField(std::string_view array, std::size_t particle, int axis);
 
-/// An error about one field of the frame, with its Violation.
+/// INVALID_ARGUMENT with a Violation about one field of the frame.
 absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
                           std::string rule);
 
-/// The same of what its particles carry besides.
+/// Checks the attributes of a frame, like CheckFrame.
 absl::Status CheckAttributes(const Frame& frame);
 
-/// OK if every number of the frame is usable: coordinates finite and, without a slice, in one
-/// plane, volumes positive, ids distinct, velocities finite. Errors: INVALID_ARGUMENT with a
-/// Violation that names the first particle at fault.
+/// Checks that every number of the frame is usable: coordinates finite and, without a slice, in one
+/// plane; volumes positive; ids distinct; velocities and attributes finite.
+/// Errors: INVALID_ARGUMENT, RESOURCE_EXHAUSTED for too many particles; the Violation gives the
+/// first particle at fault.
 absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& parameters,
                         const FrameLimits& limits, DistinctIdsScratch& scratch);
 

@@ -1,4 +1,4 @@
-// The positions nearest to one, and what they tell of the spacing.
+// The nearest neighbours of a position, and the spacing that they show.
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,12 @@
 
 namespace partiemc {
 
-/// The six positions nearest to a point, as offsets from it. On a square lattice these are all at
-/// one constant and two at its diagonal, on a hexagonal one the whole ring around.
+/// The six positions nearest to a point, as offsets. On a square lattice the four at the lattice
+/// constant and two at the diagonal, on a hexagonal lattice the whole ring.
 class NearRing {
  public:
-  /// Takes an offset that is among the six nearest. The point itself and positions that are there
-  /// already count for nothing.
+  /// Adds an offset if it is among the six nearest. The point itself and repeated positions are
+  /// ignored.
   void Add(double x, double y) {
     const double square = x * x + y * y;
     if (square >= reach_square() || square == 0) return;
@@ -27,25 +27,25 @@ class NearRing {
     offsets_[k] = {x, y, square};
   }
 
-  /// Squared distance beyond which nothing is among the nearest: infinite until there are six.
+  /// Offsets beyond this squared distance are ignored; infinite until there are six.
   double reach_square() const { return offsets_[kCount - 1].square; }
 
-  /// Whether the six lie around the point at like distances: no half-plane is free of them, and the
-  /// farthest is at most 1.6 times as far as the second nearest. The nearest may be nearer: the
-  /// particles of many simulations form pairs. Of bodies' particles that are not at an edge, 0.4
-  /// (shaken or thinned at random) to 1 (in order) are surrounded; of random ones 0.24 and fewer.
+  /// Whether the six surround the point at similar distances: no half-plane is free of them, and
+  /// the farthest is at most 1.6 times as far as the second nearest. The nearest may be closer, as
+  /// the particles of many simulations form pairs. In bodies 40 % (shaken or thinned at random) to
+  /// 100 % (regular) of the inner particles are surrounded, of random points at most 24 %.
   bool IsAround() const;
 
-  /// About the spacing, where IsAround(): the distance of the fourth nearest, 1 to 1.4 spacings.
+  /// The distance of the fourth nearest: 1 to 1.4 spacings. Requires: IsAround().
   double Distance() const { return std::sqrt(offsets_[3].square); }
 
  private:
   static constexpr std::size_t kCount = 6;
-  // The square lattice's diagonal is at 1.41, a little noise included.
+  // The diagonal of a square lattice is at 1.41; the rest is for noise.
   static constexpr double kMaxRatio = 1.6;
 
-  // Two offsets that span less than this (a sine) do not tell that the side between them is taken:
-  // the straight edge of a lattice, bent by noise, has everything on one side.
+  // Two offsets whose angle has a smaller sine do not close the side between them. Otherwise noise
+  // would close the open side at the straight edge of a lattice.
   static constexpr double kMinSine = 0.25;
 
   struct Offset {
@@ -59,7 +59,7 @@ inline bool NearRing::IsAround() const {
   if (!std::isfinite(farthest) || farthest > kMaxRatio * kMaxRatio * offsets_[1].square) {
     return false;
   }
-  // Seen from each offset, another one comes within half a turn to its left.
+  // From each offset, another one follows within half a turn to the left.
   return std::all_of(offsets_.begin(), offsets_.end(), [&](const Offset& a) {
     return std::any_of(offsets_.begin(), offsets_.end(), [&](const Offset& b) {
       const double cross = a.x * b.y - a.y * b.x;
@@ -68,8 +68,8 @@ inline bool NearRing::IsAround() const {
   });
 }
 
-/// Whether `surrounded` of `asked` points are enough to believe what they agree on: a dozen, and
-/// three tenths. A strip of four layers has enough of them, ten drops do not.
+/// Whether enough of the sampled points are surrounded to trust them: a dozen, and 30 %. A strip of
+/// four layers has enough, ten drops do not.
 constexpr bool AreEnough(std::size_t surrounded, std::size_t asked) {
   return surrounded >= 12 && 10 * surrounded >= 3 * asked;
 }

@@ -20,7 +20,7 @@ constexpr auto kAllPlacements = [] {
   std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
   return placements;
 }();
-// Of a slice's plane. Squares and products stay finite.
+// Limits of slice planes: squares and products stay finite.
 constexpr double kMaxCoordinate = 1e69, kMinNormal = 1e-60;
 
 constexpr std::array kFills = {Fill::kNone, Fill::kGrid, Fill::kGreedy, Fill::kConforming,
@@ -32,7 +32,7 @@ absl::Status OutOfRange(std::string_view field, double value, std::string_view r
                          ShortestNumber(value), std::string(rule)});
 }
 
-// Names by value.
+// Names, in the order of the enumerators.
 constexpr std::array<std::string_view, 5> kFillNames = {"none", "grid", "greedy", "conforming",
                                                         "polygon"};
 constexpr std::array<std::string_view, 3> kPlaneNames = {"xy", "xz", "yz"};
@@ -51,7 +51,7 @@ absl::Status Refused(std::string field, std::string value, std::string rule) {
                          std::move(value), std::move(rule)});
 }
 
-// `of` is empty or the path of a section.
+// `of` is empty, or the path of a section.
 absl::Status CheckSlice(const std::string& of, const SlicePlane& slice) {
   constexpr std::string_view kAxes = "xyz";
   for (std::size_t k = 0; k < 3; ++k) {
@@ -77,7 +77,7 @@ absl::Status CheckIsovalue(const std::string& of, double isovalue) {
                     "must be in [0.01, 10]: the density is about 1 inside of bodies");
 }
 
-// What sections want of the rest is wanted once.
+// Checks slices, isovalues and sections, and the parameters that these require.
 absl::Status CheckOutlines(const ReconstructionParameters& p) {
   bool is_isoline = p.isovalue.has_value();
   if (p.slice) {
@@ -94,8 +94,7 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     const Section& section = p.sections[k];
     const std::string of = absl::StrCat("sections[", k, "].");
     if (section.slice && !p.slice) {
-      return Refused(of + "slice", "present",
-                     "must come with parameters.slice: particles fill space or lie in a plane");
+      return Refused(of + "slice", "present", "must be absent unless parameters.slice is set");
     }
     if (section.slice) {
       if (auto status = CheckSlice(of, *section.slice); !status.ok()) return status;
@@ -106,19 +105,18 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     }
   }
   if (p.slice && !p.spacing) {
-    return Refused("spacing", "absent",
-                   "must be given for a slice: particles beside the plane do not tell it");
+    return Refused("spacing", "absent", "must be given for a slice, which does not show it");
   }
   if (KeepsGuarantees(p.placement)) return absl::OkStatus();
   if (p.slice) {
     return Refused("placement", std::string(Name(p.placement)),
-                   "must be another one for a slice: its vertices would be particles, which lie "
-                   "beside the plane");
+                   "must be another one for a slice: its vertices are particles, which are not on "
+                   "the plane");
   }
   if (is_isoline) {
     return Refused("placement", std::string(Name(p.placement)),
-                   "must be another one for an isovalue: its vertices would be particles, which "
-                   "lie beside the isoline");
+                   "must be another one for an isovalue: its vertices are particles, which are not "
+                   "on the isoline");
   }
   return absl::OkStatus();
 }

@@ -1,4 +1,4 @@
-// What each placement needs of the stages: a row of one table.
+// The table of placements: what each requires of the stages.
 #pragma once
 
 #include <array>
@@ -12,26 +12,26 @@ namespace partiemc {
 struct PlacementTraits {
   Placement placement;
   std::string_view name;
-  /// Times the reference radius of an axis-aligned lattice: what a whole chain wants for no mean
-  /// offset on discs under relaxed sampling (core/METHOD.md, "Calibration"). Linear interpolation
-  /// cuts the contour's bulge off and so wants more, vertices on the level set less.
+  /// Factor of the reference radius of an axis-aligned lattice that gives no mean offset on disks
+  /// under relaxed sampling (core/METHOD.md, "Calibration"). Linear interpolation cuts bulges off
+  /// and needs a larger factor than vertices on the level set.
   double calibration;
-  /// How far from active cells it samples the field: so many cells, and so many kernel radii.
+  /// Distance from active cells at which it samples the field: cells plus kernel radii.
   double reach_cells, reach_kernels;
-  bool on_edges;  ///< A vertex on each crossed lattice edge,
-  bool in_cells;  ///< and one for each cell.
-  /// Vertices are particles, planes go through the weighted means of the cells
+  bool on_edges;  ///< One vertex on each crossed lattice edge.
+  bool in_cells;  ///< One vertex for each segment in its cell.
+  /// Vertices are particles, and planes go through the weighted means of the cells
   /// (farthest_particle.h). Rings may cross; the mesh connects the middles of the segments.
   bool takes_particles;
-  /// Vertices move along their rings, from the level set to where their surroundings put them, and
-  /// out of their cells: rings are repaired, and the interior loses the cells that they touch.
+  /// Vertices move from the level set along their normals and may leave their cells. Rings are
+  /// repaired, and the interior loses the cells that they touch.
   bool refines;
-  bool cleans;  ///< ReconstructionParameters::clean, where that is absent.
+  bool cleans;  ///< The default of ReconstructionParameters::clean.
 
   double Reach(double kernel_radius) const { return reach_cells + reach_kernels * kernel_radius; }
 };
 
-/// By the number of the placement.
+/// Indexed by Placement.
 inline constexpr std::array<PlacementTraits, 4> kPlacements = {{
     {.placement = Placement::kMarchingSquares,
      .name = "marching-squares",

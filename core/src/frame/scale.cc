@@ -10,25 +10,26 @@ constexpr double kFourOverPi = 1.27323954473516268615;
 // Over space it integrates to 64 pi R^3 / 315.
 constexpr double kSpaceNorm = 315.0 / 64 / 3.14159265358979323846;
 
-// The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 = 0.9 / beta^2 is
-// 0.10 at beta = 3, above what the void between two components has, below a lone particle's f.
+// The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 = 0.9 / beta^2,
+// which is 0.10 at beta = 3. This is above f in the void between two components and below f of a
+// lone particle.
 constexpr double kGuardFactor = 0.9;
-// A lone particle must survive, hence never more than this share of the lightest one's own f.
+// A lone particle must survive: at most this share of the lightest particle's own f.
 constexpr double kGuardShareOfLightest = 0.7;
-// Above this density a node is inside, whatever the weighted mean says: f is about 1 inside and
-// 0.5 on a flat boundary, and at the edge of a void of six particles' area about 0.6.
+// A node with a higher density is inside, whatever the weighted mean gives. For comparison: f is
+// about 1 inside, 0.5 on a flat boundary, 0.6 at the edge of a void with the area of six particles.
 constexpr double kSaturation = 0.85;
-// Gaps between bodies (ibid.): inside of bodies and on their boundaries the spread
-// is 0.1; half-way across a gap of 1.7 spacings it is 0.21.
+// The gap term: the spread is 0.1 inside bodies and on their boundaries, and 0.21 in the middle of
+// a gap of 1.7 spacings.
 constexpr double kGapSpread = 0.21;
-// A lone particle's spread at its reference radius is (r / R)^2. An outline that is asked for
-// farther out than usual must not be cut off: the calibrated radii come to 0.21, too, or less.
+// The spread at the reference radius of a lone particle is (r / R)^2. Outlines with a larger
+// reference radius than usual must not be cut off; the calibrated radii give at most 0.21.
 constexpr double kGapSpreadPerReference = 2.4;
-// Slope of the spread outside of a flat boundary, in 1 / R.
+// Slope of the spread outside a flat boundary, times R.
 constexpr double kSpreadSlope = 0.45;
-// Slope of f across a flat boundary, measured in 1 / R: makes F a length on both branches.
+// Slope of f across a flat boundary, times R: makes both terms lengths.
 constexpr double kBoundarySlope = 1.164;
-// In space it is the kernel's integral over a plane through its middle, times its norm.
+// In space: the normalised kernel integrated over a plane through its centre.
 constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 
 }  // namespace
@@ -55,7 +56,7 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
   scale.saturation = kSaturation;
   scale.guard_slope =
       scale.kernel_radius / (scale.is_slice ? kBoundarySlopeInSpace : kBoundarySlope);
-  // The two branches of F that the density decides are then the same one, which decides all.
+  // Both density terms of F are then the same and decide F alone.
   if (parameters.isovalue) scale.guard = scale.saturation = *parameters.isovalue;
   const double reference = scale.reference_radius / scale.kernel_radius;
   scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);

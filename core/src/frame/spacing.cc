@@ -16,42 +16,41 @@
 namespace partiemc {
 namespace {
 
-// About this many particles are asked for their neighbours: the median of so many is within a
-// percent of that of all.
+// Approximate size of the sample: its median is within a percent of the median of all.
 constexpr std::size_t kSampleSize = 1 << 14;
 
-// A particle whose nearest neighbour is this many medians away is spray and says nothing about the
-// spacing; within a body of fluid distances stay below two medians.
+// A particle whose nearest neighbour is this many medians away is spray. Inside bodies, distances
+// stay below two medians.
 constexpr double kLonelyRatio = 4;
 
-// Kernel sums that tell the density have this radius, in spacings as known so far. Each round
-// starts from what the one before has found; thinned particles need the third.
+// Radius of the kernel sums, in spacings as known so far. Each round starts from the result of the
+// round before; thinned particles need the third.
 constexpr double kDensityRadius = 3;
 constexpr int kDensityRounds = 3;
-// A point counts where bodies surround it: the mean of the particles is within this share of the
-// radius of it, and their mean square distance is about the 0.2 R^2 of a filled disc.
+// A point counts if particles surround it: their mean is within this share of the radius, and their
+// mean square distance is about the 0.2 R^2 of a filled disk.
 constexpr double kMaxImbalance = 0.15;
 constexpr double kMinSpread = 0.17;
 constexpr double kMaxSpread = 0.25;
-// Fewer such points say nothing: bodies are too thin or too small, distances have to do.
+// With fewer such points, bodies are too thin or too small; the distances decide.
 constexpr std::size_t kMinFilledPoints = 32;
-// In small or thin bodies the sums are off by up to this share: where distances agree as well, they
-// are the better answer, on lattices the exact one.
+// Relative error of the sums in small or thin bodies. If the distances agree within it, they are
+// the better estimate; on lattices they are exact.
 constexpr double kSumTolerance = 0.05;
 constexpr double kQuarterPi = 0.78539816339744830962;
 
-// Where points lie from their particles, in kernel radii: as far as the kernel reaches, so that the
-// particle itself adds nothing and the sums are those of the plane, whatever the arrangement.
+// Offsets of the points from their particles, in kernel radii. At distance 1 the particle itself
+// adds nothing, so the mean of the sums is unbiased for any arrangement.
 constexpr Point kDirections[] = {{1, 0},       {0.8, 0.6},  {0.6, 0.8},  {0, 1},
                                  {-0.6, 0.8},  {-0.8, 0.6}, {-1, 0},     {-0.8, -0.6},
                                  {-0.6, -0.8}, {0, -1},     {0.6, -0.8}, {0.8, -0.6}};
 
 double Along(const Point& position, int axis) { return axis == 0 ? position.x : position.y; }
 
-// Below so many positions a task would cost more than it saves.
+// Below this number of positions a task costs more than it saves.
 constexpr std::size_t kMinParallel = 1 << 13;
 
-// Orders positions into an implicit balanced k-d tree: the middle of a range splits it.
+// Orders positions into an implicit balanced k-d tree: the median of a range splits it.
 void BuildTree(std::span<Point> positions, int axis) {
   if (positions.size() < 2) return;
   const std::size_t middle = positions.size() / 2;
@@ -68,7 +67,7 @@ void BuildTree(std::span<Point> positions, int axis) {
   }
 }
 
-// The nearest other position.
+// Finds the nearest other position.
 struct Nearest {
   double square = std::numeric_limits<double>::infinity();
 
@@ -79,8 +78,8 @@ struct Nearest {
   double reach_square() const { return square; }
 };
 
-// Adds to `near` (Nearest, NearRing) the offsets of positions within its reach of `query`, of which
-// there is less with each. The tree's order decides between equal distances.
+// Adds to `near` (Nearest or NearRing) the offsets of positions within its reach of `query`. The
+// reach shrinks with each. The tree's order decides between equal distances.
 template <typename Near>
 void GatherNearest(std::span<const Point> tree, const Point& query, int axis, Near& near) {
   if (tree.empty()) return;
@@ -109,7 +108,7 @@ void ForEachWithin(std::span<const Point> tree, const Point& point, int axis, do
   if (across >= -radius) ForEachWithin(tree.subspan(middle + 1), point, 1 - axis, radius, visit);
 }
 
-// Sum of the kernel at a point, 0 where the particles do not surround it.
+// The kernel sum at a point; 0 if particles do not surround it.
 double FilledWeight(std::span<const Point> tree, const Point& point, double radius) {
   const double inverse = 1 / radius;
   double weight = 0, moment_x = 0, moment_y = 0, spread = 0;  // In radii.
@@ -130,8 +129,7 @@ double FilledWeight(std::span<const Point> tree, const Point& point, double radi
   return is_filled ? weight : 0;
 }
 
-// The spacing whose square, one for each particle, makes up for the density inside of bodies.
-// Nothing where no point is surrounded by them.
+// The spacing by the density inside bodies. Empty if too few points are surrounded.
 std::optional<double> SpacingOfDensity(std::span<const Point> tree, std::span<const Point> asked,
                                        double radius, std::vector<double>& weights) {
   weights.resize(asked.size());
@@ -149,7 +147,7 @@ std::optional<double> SpacingOfDensity(std::span<const Point> tree, std::span<co
 }
 
 std::uint64_t HashOf(const Point& position) {
-  // + 0.0 makes one zero of the two.
+  // + 0.0 maps -0 to 0.
   std::uint64_t hash = std::bit_cast<std::uint64_t>(position.x + 0.0) * 0x9e3779b97f4a7c15u;
   hash ^= hash >> 32;
   hash = (hash ^ std::bit_cast<std::uint64_t>(position.y + 0.0)) * 0xc2b2ae3d27d4eb4fu;
@@ -162,8 +160,8 @@ double MedianOf(std::vector<double>& values) {
   return *middle;
 }
 
-// What enough of the particles that are asked are surrounded at, within a factor of two: their
-// median distance. Nothing where they do not agree.
+// The median distance at which enough of the sampled particles are surrounded, within a factor of
+// two. Empty if they do not agree.
 std::optional<double> AgreedDistance(std::span<const Point> tree, std::span<const Point> asked,
                                      std::size_t asked_in_company, std::vector<double>& distances) {
   distances.resize(asked.size());
@@ -182,8 +180,8 @@ std::optional<double> AgreedDistance(std::span<const Point> tree, std::span<cons
   return median;
 }
 
-// The spacing by density, starting from a distance between neighbours, and that distance where the
-// two are the same but for the error of the sums, or where no density can be told.
+// Refines a distance between neighbours to the spacing by density. Returns the distance itself if
+// both agree within the error of the sums, or if there is no density.
 double RefineSpacing(double distance, SpacingScratch& scratch) {
   double spacing = distance;
   for (int round = 0; round < kDensityRounds; ++round) {
@@ -205,8 +203,8 @@ std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
   VisitPositions(frame, plane, [&](const auto& reader) {
     for (std::size_t k = 0; k < count; ++k) scratch.positions[k] = reader[k];
   });
-  // Sorted and without duplicates: the tree is the same for any order of the particles, and no
-  // query wades through a million copies of itself.
+  // Sorted and without duplicates: the tree does not depend on the order of the particles, and no
+  // query visits a million copies of one position.
   ParallelSort(std::span(positions),
                [](const Point& a, const Point& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
   const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
@@ -232,7 +230,7 @@ std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
   const std::optional<double> around =
       AgreedDistance(positions, asked, distances.size(), scratch.distances);
   if (!around) return SpacingEstimate{spacing, false};
-  // Neighbours within half of that have all but the place of their neighbour.
+  // Neighbours closer than half of that are pairs.
   const bool is_doubled = 2 * spacing < *around;
   return SpacingEstimate{is_doubled ? RefineSpacing(*around, scratch) : spacing, true};
 }

@@ -32,7 +32,7 @@ std::uint32_t Components::Root(std::uint32_t run) {
 void Components::Unite(std::uint32_t a, std::uint32_t b) {
   a = Root(a);
   b = Root(b);
-  // The smaller index becomes the root, so that components come out in the order of their runs.
+  // The smaller index becomes the root, so components are numbered in the order of their runs.
   if (a < b) {
     label_[b] = a;
   } else {
@@ -46,7 +46,7 @@ void Components::UniteRuns(const TileDirectory& directory, const Crossings& cros
   const std::uint32_t right = directory.neighbours(tile)[5];
   const std::uint32_t above = directory.neighbours(tile)[7];
   const bool full = IsFull(rows);
-  // One node of each stretch that two rows share joins their runs.
+  // One node of each overlap of two rows joins their runs.
   const auto unite_rows = [&](int j, std::uint32_t upper_tile, int upper_j) {
     const std::uint32_t upper_row = crossings.tiles[upper_tile].inside[upper_j];
     std::uint32_t shared = rows[j] & upper_row;
@@ -63,7 +63,7 @@ void Components::UniteRuns(const TileDirectory& directory, const Crossings& cros
   for (int j = 0; !full && j + 1 < kTileSize; ++j) unite_rows(j, tile, j + 1);
   if (above != kNoTile) unite_rows(kTileSize - 1, above, 0);
   if (right == kNoTile) return;
-  // Both full: one row speaks for all.
+  // If both are full, one row suffices.
   const int last = full && IsFull(crossings.tiles[right].inside) ? 1 : kTileSize;
   for (int j = 0; j < last; ++j) {
     if (rows[j] >> (kTileSize - 1) && (crossings.tiles[right].inside[j] & 1)) {
@@ -98,7 +98,7 @@ void Components::Label(const TileDirectory& directory, const Crossings& crossing
     if (!IsInside(crossings, a) || !IsInside(crossings, b)) continue;  // Cleaning cleared them.
     Unite(RunAt(crossings, a), RunAt(crossings, b));
   }
-  // Roots come before the runs below them, so one pass turns parents into component numbers.
+  // Roots precede their runs, so one pass turns parents into component numbers.
   count_ = 0;
   for (std::uint32_t run = 0; run < runs; ++run) {
     label_[run] = label_[run] == run ? count_++ : label_[label_[run]];
@@ -109,7 +109,7 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
   return label_[RunAt(crossings, node)];
 }
 
-// The component of all inside nodes of a tile and of its cells' corners beyond it.
+// The component of all inside nodes of a tile and of its cells' corners in neighbouring tiles.
 std::uint32_t Components::ComponentSeenFrom(const TileDirectory& directory,
                                             const Crossings& crossings, std::uint32_t tile) const {
   std::uint32_t seen = kNoComponent;
@@ -132,7 +132,7 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
   if (component == kNoComponent || component == kSeveralComponents) return {component, 0, 0};
   if (full && bins.weight.empty()) return {component, bins.CountOf(tile), 0};
 
-  BitRows cells;  // With an inside corner.
+  BitRows cells;  // Cells with an inside corner.
   const NodeRows rows = InsideRows(bins.tiles, crossings.tiles, tile);
   for (int j = 0; j < kTileSize; ++j) {
     cells[j] = rows.left[j] | rows.right[j] | rows.left[j + 1] | rows.right[j + 1];
@@ -151,12 +151,12 @@ std::uint32_t Components::ComponentOf(const TileDirectory& directory, const Cros
                                       std::uint32_t tile, float x, float y) const {
   const int i = static_cast<int>(x);
   const int j = static_cast<int>(y);
-  // The nearest of the four corners is inside as a rule; of equal ones the lower, the more left.
+  // Usually the nearest of the four corners is inside. Ties: the lower, then the left one.
   const TilePlace closest = Normalise(directory, tile, i + (x - static_cast<float>(i) > 0.5f),
                                       j + (y - static_cast<float>(j) > 0.5f));
   if (IsInside(crossings, closest)) return At(crossings, closest);
   TilePlace nearest{kNoTile, 0, 0};
-  float nearest_distance = 4;  // Above the square of a cell's diagonal.
+  float nearest_distance = 4;  // Above any squared distance in a cell.
   for (int corner = 0; corner < 4; ++corner) {
     const int di = corner & 1;
     const int dj = corner >> 1;

@@ -1,4 +1,4 @@
-// Connected components of the inside nodes: which polygon a node, a ring or a particle belongs to.
+// Connected components of the inside nodes, for nodes, rings and particles.
 #pragma once
 
 #include <cstdint>
@@ -11,29 +11,30 @@
 
 namespace partiemc {
 
-/// Marks a particle that belongs to no component.
+/// A particle without a component.
 inline constexpr std::uint32_t kNoComponent = 0xffffffff;
 
-/// Inside nodes joined along lattice edges and through the saddles whose inside corners are
-/// joined: exactly the connectivity of the isoline, so that each component has one outer ring.
+/// Components of inside nodes, connected along lattice edges and through saddles with joined inside
+/// corners. This is the connectivity of the outline: each component has one outer ring.
 class Components {
  public:
-  /// Labels the inside nodes of `crossings`. Components are numbered in the order of their first
-  /// nodes by tile, row, column. Cost: linear in runs of inside nodes.
+  /// Labels the inside nodes. Components are numbered in the order of their first nodes by tile,
+  /// row, column. Cost: linear in runs of inside nodes.
   void Label(const TileDirectory& directory, const Crossings& crossings);
 
   std::uint32_t size() const { return count_; }
 
-  /// Component of an inside node.
+  /// The component of an inside node.
   std::uint32_t At(const Crossings& crossings, const TilePlace& node) const;
 
-  /// The component that a particle at (x, y) of a tile belongs to: that of the inside corner of its
-  /// cell that is nearest to it. None: kNoComponent.
+  /// The component of a particle at (x, y) of a tile: of the nearest inside corner of its cell, or
+  /// kNoComponent without one.
   std::uint32_t ComponentOf(const TileDirectory& directory, const Crossings& crossings,
                             std::uint32_t tile, float x, float y) const;
 
-  /// Calls visit(component) for the components of which a tile's particles may be: once or several
-  /// times for each. Cost: linear in the runs of inside nodes on the tile and its upper right rim.
+  /// Calls visit(component) for the components to which particles of a tile may belong, with
+  /// repetitions. Cost: linear in the runs of inside nodes in the tile and along its upper and
+  /// right sides.
   template <typename Visit>
   void ForEachSeenFrom(const TileDirectory& directory, const Crossings& crossings,
                        std::uint32_t tile, Visit visit) const;
@@ -42,25 +43,24 @@ class Components {
   template <typename Visit>
   void ForEachRun(const Crossings& crossings, Visit visit) const;
 
-  /// Calls visit(tile, particle, component) for each particle that belongs to one (ComponentOf), by
-  /// its particle in the list of its own tile.
+  /// Calls visit(tile, particle, component) for each particle with a component (ComponentOf).
+  /// `particle` is an index into ParticleBins::particles.
   template <typename Visit>
   void ForEachParticle(const ParticleBins& bins, const Crossings& crossings, Visit visit) const;
   template <typename Visit>
   void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
                          Visit visit) const;
 
-  /// Adds the particles of each component to `counts`, and their weights, where particles have
-  /// weights of their own, to `weights`; both have size() elements.
-  /// In parallel over tiles: only where a tile sees several components is a particle asked for its
-  /// nearest corner, and where all of a tile is inside none is asked for anything.
+  /// Adds the particles of each component to `counts`, and their weights, if not uniform, to
+  /// `weights`; both have size() elements. Parallel over tiles. Looks up single particles only in
+  /// tiles with several components.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
                       std::span<std::uint64_t> counts, std::span<double> weights);
 
  private:
-  // What the particles of one tile add to the components.
+  // The particles of one tile, if they all belong to one component.
   struct TileShare {
-    std::uint32_t component;  // kNoComponent: none; kSeveralComponents: not counted yet.
+    std::uint32_t component;  // kNoComponent, or kSeveralComponents: not counted.
     std::uint32_t count;
     double weight;
   };
@@ -76,9 +76,9 @@ class Components {
   void Unite(std::uint32_t a, std::uint32_t b);
   void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
 
-  // By tile * 32 + row, and in the end how many. The rows of a tile that is all inside are one run.
+  // By tile * 32 + row: its first run; finally the number of runs. A full tile is one run.
   std::vector<std::uint32_t> first_run_;
-  std::vector<std::uint32_t> label_;  // By run: parent while uniting, then the component.
+  std::vector<std::uint32_t> label_;  // By run: its parent in the union, then its component.
   std::vector<TileShare> shares_;     // By tile.
   std::uint32_t count_ = 0;
 };
@@ -90,13 +90,13 @@ inline bool IsFull(const BitRows& rows) {
   return all == ~std::uint32_t{0};
 }
 
-/// The bits of a row at which a run of ones begins.
+/// The bits of a row where a run of ones begins.
 inline std::uint32_t RunStarts(std::uint32_t row) { return row & ~(row << 1); }
 
-/// Whether the ones of a row are one run. Requires: there are some.
+/// Whether a row has a single run of ones. Requires: not 0.
 inline bool IsOneRun(std::uint32_t row) { return (RunStarts(row) & (RunStarts(row) - 1)) == 0; }
 
-/// The run of ones of `row` that begins at its lowest set bit.
+/// The lowest run of ones of a row.
 inline std::uint32_t LowestRun(std::uint32_t row) { return row & ~(row + (row & -row)); }
 
 template <typename Visit>
@@ -113,8 +113,8 @@ void Components::ForEachRun(const Crossings& crossings, Visit visit) const {
   }
 }
 
-// Calls visit(first, count) for the runs of the tile and of its cells' corners beyond it. Runs are
-// numbered by tile, row, column, so that those of the tile are successive, and those of a row.
+// Calls visit(first, count) for the runs of the tile and of its cells' corners in neighbouring
+// tiles. Runs are numbered by tile, row, column, so the runs of a tile or row are consecutive.
 template <typename Visit>
 void Components::ForEachRunSeenFrom(const TileDirectory& directory, const Crossings& crossings,
                                     std::uint32_t tile, Visit visit) const {

@@ -11,21 +11,21 @@
 namespace partiemc {
 namespace {
 
-// Holes of less area than this many particles have are dents of the level set, not voids of the
-// fluid (core/METHOD.md, "Cleaning").
+// Smaller holes, in squared spacings, are dents of the level set, not voids of the fluid
+// (core/METHOD.md, "Cleaning").
 constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
-// Segments that a task takes at least.
+// Minimum number of segments per task.
 constexpr std::size_t kSegmentGrain = 512;
 
-// Rings that a task takes at least.
+// Minimum number of rings per task.
 constexpr std::size_t kRingGrain = 64;
 
-// How many segments before its turn the cache lines of a cell's values are prefetched.
+// Prefetch distance in segments.
 constexpr std::size_t kFetchedAhead = 16;
 
-// What follows each segment is found in parallel; what is left to do in order is to walk.
+// Successors are found in parallel; only the walk along the rings is sequential.
 void Trace(const TileDirectory& directory, const Crossings& crossings,
            std::vector<std::uint32_t>& next, RingTopology& rings) {
   constexpr std::uint32_t kTaken = 0xffffffff;
@@ -48,7 +48,7 @@ void Trace(const TileDirectory& directory, const Crossings& crossings,
   }
 }
 
-// The lattice edge through which a segment enters its cell, by its two nodes.
+// The nodes of the lattice edge through which a segment enters its cell.
 struct EdgeNodes {
   TilePlace inside, outside;
 };
@@ -62,20 +62,19 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
   const auto node = [&](int corner) {
     return Normalise(directory, cell.tile, cell.i + kCornerX[corner], cell.j + kCornerY[corner]);
   };
-  // Edge k joins corners k and k + 1. Entering the cell, the inside is on the left: the edge's
-  // first corner, counter-clockwise round the cell.
+  // Edge k joins corners k and k + 1. The inside is on the left of the segment: the first corner of
+  // its entry edge.
   return {node(here.entry), node((here.entry + 1) & 3)};
 }
 
-// Asks for the values of the level set at a cell's corners, which are far apart in memory from
-// those of the cells before. The next tile's are left out.
+// Prefetches the level set at the corners of a cell, except in the next tile.
 void FetchCorners(const LevelSet& level_set, const ActiveCell& cell) {
   const float* lower = level_set.tiles[cell.tile].data() + cell.j * kTileSize + cell.i;
   hwy::Prefetch(lower);
   if (cell.j + 1 < kTileSize) hwy::Prefetch(lower + kTileSize);
 }
 
-// Where each segment enters its cell.
+// Sets the points where segments enter their cells.
 void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
                      const Crossings& crossings, RingTopology& rings) {
   const std::size_t count = rings.segments.size();
@@ -88,7 +87,8 @@ void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
       return crossings.cells[segment_of(k).cell];
     };
     for (std::size_t k = first; k < last; ++k) {
-      // What tells where the values lie, and what tells where that lies, as long before each.
+      // The address of the values depends on the cell, and the cell on the segment: a prefetch for
+      // each.
       if (k + 3 * kFetchedAhead < last) hwy::Prefetch(&segment_of(k + 3 * kFetchedAhead));
       if (k + 2 * kFetchedAhead < last) hwy::Prefetch(&cell_of(k + 2 * kFetchedAhead));
       if (k + kFetchedAhead < last) FetchCorners(level_set, cell_of(k + kFetchedAhead));
@@ -97,7 +97,7 @@ void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
   });
 }
 
-// Signed area of a ring through its edge crossings, in cells.
+// The signed area of a ring through its edge crossings, in cells.
 double AreaOf(const RingTopology& rings, std::size_t ring) {
   const std::span<const Point> points =
       std::span(rings.entry_points)
@@ -118,16 +118,16 @@ void MeasureAreas(const RingTopology& rings, RingScratch& scratch) {
   });
 }
 
-// Clears the nodes of the components that are marked.
+// Clears the nodes of the marked components.
 void ClearDropped(const RingTopology& rings, const RingScratch& scratch, Crossings& crossings) {
   rings.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
-        // ForEachRun has already read this row: clearing its bits does not disturb it.
+        // ForEachRun has read this row already.
         if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
       });
 }
 
-// Clears the nodes of components without a particle.
+// Clears the nodes of components without particles.
 void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopology& rings) {
   scratch.dropped.clear();
   for (const std::uint64_t count : scratch.particle_count) scratch.dropped.push_back(count == 0);
@@ -136,8 +136,8 @@ void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopolog
   if (rings.dropped_components > 0) ClearDropped(rings, scratch, crossings);
 }
 
-// Sets every node that the ring encloses. The ring crosses a row of the lattice in pairs of
-// horizontal edges; the nodes between the two of a pair are enclosed.
+// Sets every node that a ring encloses. The ring crosses a row of the lattice in pairs of
+// horizontal edges, with the enclosed nodes between the two.
 void FillRing(const TileDirectory& directory, const RingTopology& rings, std::size_t ring,
               Crossings& crossings, std::vector<std::pair<std::int64_t, std::int64_t>>& edges) {
   edges.clear();
@@ -161,7 +161,7 @@ void FillRing(const TileDirectory& directory, const RingTopology& rings, std::si
   }
 }
 
-// Removes the rings that no longer separate an inside node from an outside one.
+// Removes the rings that no longer separate inside and outside nodes.
 void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings, RingScratch& scratch,
                    RingTopology& rings) {
   std::size_t kept = 0;
@@ -213,7 +213,8 @@ void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, R
   }
 }
 
-// Assigns holes and particles: the rings of one component are one outer ring and its holes.
+// Assigns holes to outer rings and particles to components. The rings of a component are one outer
+// ring and its holes.
 void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scratch,
           RingTopology& rings) {
   const std::size_t ring_count = rings.offsets.size() - 1;
@@ -239,9 +240,8 @@ void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scr
   }
 }
 
-// Finds the outer ring around each outer ring. A ring's lowest row shows what it lies in: going
-// left from there, the next ring is a hole of the one around it, or a neighbour in the same void,
-// which has been seen before.
+// Finds the outer ring around each outer ring. To the left of a ring's lowest row, the next ring is
+// a hole of the ring around it, or a neighbour in the same void that was visited before.
 void FindContainers(const TileDirectory& directory, const Crossings& crossings,
                     const RingTopology& rings, RingScratch& scratch) {
   scratch.outer_rings.clear();
@@ -261,10 +261,10 @@ void FindContainers(const TileDirectory& directory, const Crossings& crossings,
   });
 }
 
-// Decides which components are spray or lie in it. Returns how many.
+// Marks the components that are spray or lie inside spray. Returns their number.
 std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spacing,
                         const RingTopology& rings, RingScratch& scratch) {
-  // Outer rings come after those around them.
+  // Outer rings come after the rings around them.
   scratch.enclosed = rings.particle_count;
   for (std::size_t k = scratch.outer_rings.size(); k-- > 0;) {
     const std::uint32_t ring = scratch.outer_rings[k];

@@ -12,18 +12,18 @@
 namespace partiemc {
 namespace {
 
-// Marks tiles without a run.
+// A tile without a run.
 constexpr std::uint32_t kNoRun = 0xffffffff;
 
-// After so many tiles positions along x begin anew.
+// Number of tiles after which positions along x repeat.
 constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
 
-// Of differences of the spread, in kernel radii.
+// Step of the central differences of the spread, in kernel radii.
 constexpr double kGapStep = 1.0 / 1024;
 
 }  // namespace
 
-// Marks the cells of each tile that are asked for, and those that a kernel reaches from them.
+// Marks the cells in which points may lie, and the cells that kernels reach from them.
 void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
                                 double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
@@ -41,7 +41,7 @@ void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& cross
   };
   BitRows all_cells;
   all_cells.fill(~std::uint32_t{0});
-  // Farther than a mask holds all is asked for, and all is wanted.
+  // Masks end at their margin; farther out all cells are marked.
   const double distance = std::ceil(wander);
   const double reach = distance + std::ceil(scale_.kernel_radius);
   const int margin = static_cast<int>(std::min<double>(reach, kMaskMargin));
@@ -76,7 +76,7 @@ void LevelSetSampler::Build(const ParticleBins& bins, const Crossings& crossings
               [&](std::uint32_t tile) { LinkRuns(bins.tiles, tile); });
 }
 
-// Joins wanted tiles to runs, and makes room for what these hold.
+// Groups tiles into runs and allocates memory for their particles.
 void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   runs_.clear();
   run_of_.assign(tiles_.size(), kNoRun);
@@ -92,7 +92,7 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
     }
     runs_.back().last_tile = tile;
     run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
-    // Room for all particles of the tile: to count those that are wanted takes longer.
+    // Space for all particles of the tile; counting the needed ones takes longer.
     particle_count += bins.CountOf(tile);
   }
   std::uint32_t bucket_count = 0;
@@ -112,13 +112,13 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   height_.resize(bins.height.empty() ? 0 : particle_count);
 }
 
-// Tells a tile where the buckets around it are.
+// Finds the buckets around a tile.
 void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
   const Neighbourhood& neighbours = directory.neighbours(tile);
   for (int y = 0; y < 3; ++y) {
     RunBeside& beside = tiles_[tile].runs[y];
     beside = {};
-    // All of these that have a run have the same.
+    // All neighbours in a row with a run have the same.
     for (int x = 0; x < 3; ++x) {
       const std::uint32_t near = neighbours[y * 3 + x];
       if (near == kNoTile || run_of_[near] == kNoRun) continue;
@@ -133,10 +133,9 @@ void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t til
   }
 }
 
-// Sorts the wanted particles of a run by bucket.
+// Sorts the needed particles of a run by bucket: counting sort. offsets[b + 2] counts bucket b,
+// then offsets[b + 1] is its next index, and finally offsets[b] its first.
 void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
-  // The counts of buckets stand two places behind them, then where the next particle of a bucket
-  // goes one place behind it, and in the end is where the next bucket starts.
   const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);
   const auto for_each_tile = [&](auto visit) {
@@ -145,7 +144,7 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
     }
   };
   std::uint32_t chosen = run.first_particle;
-  // Where those of a tile, if all are wanted, are written: asked for while they are found.
+  // The output of a tile, if all its particles are needed: prefetched while they are selected.
   std::uint32_t room = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
     const std::uint32_t count = bins.CountOf(tile);
@@ -185,7 +184,7 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
   });
 }
 
-// Calls visit(offset, 1 - s^2, weight) for the particles of a slice that reach a point.
+// Calls visit(offset, 1 - s^2, weight) for the particles of a slice within R of a point.
 template <typename Visit>
 void LevelSetSampler::ForEachInSpace(std::uint32_t tile, double x, double y, Visit visit) const {
   const double inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius);
@@ -226,11 +225,11 @@ FieldSample LevelSetSampler::SampleSlice(std::uint32_t tile, double x, double y)
   sample.phi_y = phi.y;
   Point gradient = phi;
   if (sample.value != sample.phi) {
-    // Guard and saturation fall with the density alike.
+    // Guard and saturation have the same gradient.
     const Point density = slopes.OfDensity(scale_);
     gradient = {-scale_.guard_slope * density.x, -scale_.guard_slope * density.y};
     if (sample.value == (sample.spread - scale_.gap_spread) * scale_.gap_slope) {
-      // Few points lie in gaps: central differences will do.
+      // Few points lie in gaps, so central differences are fast enough.
       const double step = kGapStep * scale_.kernel_radius;
       const auto spread = [&](double dx, double dy) {
         const SliceSums beside = SliceSumsAt(tile, x + dx, y + dy);

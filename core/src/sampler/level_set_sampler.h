@@ -1,4 +1,4 @@
-// The level set and its gradient at any point near the isoline, not only at nodes.
+// Evaluates the level set and its gradient at any point near the outline.
 #pragma once
 
 #include <algorithm>
@@ -19,19 +19,19 @@
 
 namespace partiemc {
 
-/// F, phi and their gradients at a point, in cells (gradients are without unit).
+/// F, phi and their gradients at a point. Lengths in cells, gradients without unit.
 struct FieldSample {
   double density = 0;                     ///< f
   double mean_x = 0, mean_y = 0;          ///< xbar - x, the weighted mean relative to the point.
   double phi = 0;                         ///< |x - xbar| - r
-  double phi_x = 0, phi_y = 0;            ///< grad phi; 0 where x = xbar.
-  double spread = 0;                      ///< s
+  double phi_x = 0, phi_y = 0;            ///< grad phi; 0 if x = xbar.
+  double spread = 0;                      ///< sigma
   double value = 0;                       ///< F (level_set_formula.h)
-  double gradient_x = 0, gradient_y = 0;  ///< grad F, of the branch that F is.
-  bool has_support = false;               ///< Whether any particle is within the kernel radius.
+  double gradient_x = 0, gradient_y = 0;  ///< grad F, of the term that F equals.
+  bool has_support = false;               ///< Any particle is within the kernel radius.
 };
 
-/// A point of a tile, in cells relative to it; in tile kNoTile where no particle is near.
+/// A point in cells relative to a tile; kNoTile if no particle is near.
 struct FieldPoint {
   std::uint32_t tile = kNoTile;
   double x = 0, y = 0;
@@ -45,40 +45,37 @@ struct LevelSetSample {
 using FieldPoints = PointGroup<Point>;
 using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 
-/// Particles near the isoline, each once, sorted into rows of buckets (NeighbourGrid) that run
-/// through tiles side by side: a point looks at the buckets around it, in its tile and its
-/// neighbours.
+/// An index of the particles near the outline. It sorts them into rows of buckets (NeighbourGrid)
+/// that span adjacent tiles; a query visits the buckets around its points.
 class LevelSetSampler {
  public:
-  /// Indexes what points in active cells ask for, and points in cells that are up to `wander`
-  /// cells away from one, along each axis. Cost: linear in the particles of the tiles around those
-  /// cells; in all particles where kernel and `wander` together reach farther than kMaskMargin.
-  /// SourceOf can be asked if `tells_sources`.
+  /// Indexes the particles for points in active cells, and in cells up to `wander` cells from one
+  /// along each axis. SourceOf requires `tells_sources`. Cost: linear in the particles of the tiles
+  /// around those cells; in all particles if kernel and `wander` exceed kMaskMargin.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
              double wander, bool tells_sources);
 
-  /// Samples at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32.
-  /// Requires: the tile is indexed. Particles miss where Covers is false.
-  /// Deterministic: particles are summed in the order of buckets, then of the bins
-  /// (SampleAtPoints). Cost: the particles of the rows of buckets within a kernel radius.
+  /// The sample at a point of a tile, in cells relative to it, 0 <= x, y <= 32. Requires:
+  /// IsIndexed(tile). Incomplete outside Covers. Particles are summed in the order of buckets, then
+  /// of the bins (SampleAtPoints). Cost: the particles in the rows of buckets within R.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// The same of points of at most kQueriesAtOnce groups, for less than one after the other. Those
-  /// of a group look at the same particles: neighbours at best.
+  /// Samples the points of at most kQueriesAtOnce groups, faster than one by one. The points of a
+  /// group share their particles, so they should be neighbours.
   void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
-  /// Calls visit(x, y, particle) for the particles within `radius` of a point of `tile`, in cells
-  /// relative to it, and for some more. Requires: radius <= kernel radius.
+  /// Calls visit(x, y, particle) for the particles within `radius` of a point, in cells relative to
+  /// `tile`, and some more. Requires: radius <= R.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// Sets `near` to the particles within `radius` of any of some points, which have x and y, and
-  /// some more, for a kernel of vectors. All of `points` in cells relative to the tile.
+  /// Sets `near` to the particles within `radius` of any of `points`, which have members x and y in
+  /// cells relative to the tile, and some more.
   template <typename Member>
   void FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
                 NeighbourRows& near) const;
 
-  /// Index in the frame of a particle that ForEachNear visits. Requires: built to tell it.
+  /// The index in the frame of a particle of ForEachNear. Requires: Build with `tells_sources`.
   std::uint32_t SourceOf(std::uint32_t particle) const { return source_[particle]; }
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
@@ -89,38 +86,39 @@ class LevelSetSampler {
   }
 
  private:
-  // Tiles side by side whose particles are sorted as one: each row of buckets runs through all of
-  // them, so that a query finds one span in it. Where one tile between two is missing, or not
-  // wanted, its buckets are there and empty: no query sees two runs in a row of tiles.
+  // Adjacent tiles in a row whose particles are sorted together: each row of buckets spans all of
+  // them, so a query reads one span per row. A single missing tile is bridged by empty buckets, so
+  // no query sees two runs in a row of tiles.
   struct Run {
     std::uint32_t first_tile = 0, last_tile = 0;
-    std::int32_t first_column = 0;  // Of tiles.
-    std::uint32_t row_stride = 0;   // Buckets of a row.
+    std::int32_t first_column = 0;  // In tiles.
+    std::uint32_t row_stride = 0;   // Buckets per row.
     std::uint32_t first_bucket = 0;
     std::uint32_t first_particle = 0;
   };
 
-  // The run above, beside or below a tile, as seen from it.
+  // The run above, beside or below a tile, relative to the tile.
   struct RunBeside {
-    std::uint32_t bucket = 0;  // The one in the tile's first column, of the first row, modulo 2^32.
+    std::uint32_t bucket = 0;  // At the tile's first column in the first row, modulo 2^32.
     std::uint32_t row_stride = 0;
-    int first = 0, end = 0;  // Its columns, from the tile's first.
+    int first = 0, end = 0;  // Its columns, relative to the tile.
   };
 
-  // sqrt(2) - 1, rounded up: a diagonal is at most its box's longer side and so much of the other.
+  // sqrt(2) - 1, rounded up: a diagonal is at most the longer side of its box plus this times the
+  // shorter.
   static constexpr double kDiagonal = 0.41422;
 
-  // More than floats are off by, in cells: particles that far out add nothing to a sum.
+  // More than the rounding error of floats, in cells. Particles that far out contribute nothing.
   static constexpr double kDiscMargin = 1e-3;
 
   struct Tile {
-    std::array<RunBeside, 3> runs;  // From below to above.
-    float column;                   // Of its first node (kColumnPeriod).
-    bool is_asked;                  // Whether points may lie in any of its cells.
+    std::array<RunBeside, 3> runs;  // Below, beside, above.
+    float column;                   // Of its first node, modulo kColumnPeriod.
+    bool is_asked;                  // Points may lie in its cells.
   };
 
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
-  // Of its buckets, and two more.
+  // Number of offsets of a run: its buckets and two more.
   std::uint32_t OffsetCount(const Run& run) const {
     return run.row_stride * static_cast<std::uint32_t>(grid_.rows.size()) + 2;
   }
@@ -135,12 +133,12 @@ class LevelSetSampler {
   Scale scale_;
   NeighbourGrid grid_;
   std::vector<Tile> tiles_;
-  std::vector<BitRows> asked_;   // By tile: the cells in which points may lie.
-  std::vector<BitRows> wanted_;  // By tile: the cells that a kernel reaches from those.
+  std::vector<BitRows> asked_;   // By tile: cells in which points may lie.
+  std::vector<BitRows> wanted_;  // By tile: cells that kernels reach from there.
   std::vector<Run> runs_;
-  std::vector<std::uint32_t> run_of_;  // By tile; kNoRun where there is none.
+  std::vector<std::uint32_t> run_of_;  // By tile, or kNoRun.
   std::vector<std::uint32_t> bucket_offsets_;
-  // Those of each run as they are found: tile after tile, which end at chosen_end_.
+  // The selected particles of each run, tile by tile up to chosen_end_.
   struct Chosen {
     std::uint32_t bucket, particle;
   };
@@ -168,12 +166,12 @@ void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> point
   near.column = of.column + near.origin_x;
   near.centre_x = static_cast<float>((low.x + high.x) / 2 - near.origin_x);
   near.centre_y = static_cast<float>((low.y + high.y) / 2 - near.origin_y);
-  // Half the diagonal of the points' box is at most this.
+  // At least half the diagonal of the bounding box of the points.
   const double width = high.x - low.x, height = high.y - low.y;
   const double half = (std::max(width, height) + kDiagonal * std::min(width, height)) / 2;
   const double disc = radius + half + kDiscMargin;
   near.reach_square = static_cast<float>(disc * disc);
-  // What lies on the rim, or nearer to it than positions are to each other, adds nothing to a sum.
+  // Particles at the rim, within the resolution of positions, contribute nothing.
   const double reach = radius - NeighbourGrid::kStep / 2;
   const auto& [columns, rows] = grid_;
   const int first_column = columns.Along(low.x - reach) - columns.size();

@@ -1,4 +1,4 @@
-// The particles around a few points, as they lie in memory.
+// The particles around a few points, as spans of memory.
 #pragma once
 
 #include <array>
@@ -7,37 +7,35 @@
 
 namespace partiemc {
 
-/// Vectors may read so many particles past the end of a row of buckets.
+/// Vectors may read this many particles past the end of a row of buckets.
 inline constexpr int kRowPadding = 16;
 
-/// A query asks for sums at up to so many points, which look at the same particles: those of four
-/// segments.
+/// Points per query that share their particles: of four segments.
 inline constexpr std::size_t kPointsAtOnce = 8;
-/// So many queries run at once: none waits for what is looked up for another.
+/// Queries that run at once, so that none waits for memory alone.
 inline constexpr std::size_t kQueriesAtOnce = 6;
 
-/// Positions along x are told modulo this many cells, which is more than any points see of them.
+/// Positions along x are modulo this many cells, more than any query spans.
 inline constexpr float kColumnPeriod = 128;
 
-/// Successive buckets of successive rows, of tiles side by side.
+/// Consecutive buckets in consecutive rows of a run.
 struct NeighbourBand {
-  const std::uint32_t* offsets;  ///< The first particle of the first bucket, and so on.
+  const std::uint32_t* offsets;  ///< The first particles of the buckets.
   int columns, rows;             ///< Buckets to look at.
   int row_stride;                ///< Buckets from one row to the next.
-  float origin_y;                ///< NeighbourRows::origin_y, relative to those tiles.
+  float origin_y;                ///< NeighbourRows::origin_y, relative to the run's tiles.
 };
 
-/// Particles around points of a tile: row after row of buckets, each row a contiguous span. Not
-/// initialised: most points need one band.
+/// The particles around points of a tile: one span per row of buckets. Not initialised: most
+/// queries need one band.
 struct NeighbourRows {
   const float* x;       ///< By particle, in cells, modulo kColumnPeriod.
-  const float* y;       ///< By particle, in cells relative to the tile that it lies in.
-  const float* weight;  ///< By particle; null where all weigh Scale::uniform_weight.
-  /// The corner of a cell near the points, relative to the tile: sums run in floats, in coordinates
-  /// relative to it.
+  const float* y;       ///< By particle, in cells relative to its own tile.
+  const float* weight;  ///< By particle; null if all have Scale::uniform_weight.
+  /// The corner of a cell near the points, relative to the tile. Sums use floats relative to it.
   float origin_x, origin_y;
-  float column;  ///< Where it is among `x`.
-  /// Only particles in this disc count, whose centre is relative to the origin.
+  float column;  ///< The origin in the coordinates of `x`.
+  /// Only particles in this disk count; its centre is relative to the origin.
   float centre_x, centre_y, reach_square;
   std::array<NeighbourBand, 3> bands;
   int band_count;

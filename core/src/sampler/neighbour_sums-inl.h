@@ -1,8 +1,7 @@
-// Sums over the particles near a point, in vectors of floats. Particles within reach are copied
-// together first, so that the sums of all points of a cell run over one short array. Particle k of
-// that array goes to partial sum k modulo sixteen, and the sixteen are added up in one tree,
-// however wide the vectors of the processor are: the bits are the same everywhere. Compiled once
-// for each target, hence the guard that each of them turns.
+// Sums over the particles near a point in vectors of floats. The particles within reach are first
+// copied to a short array, which serves all points of a query. Particle k of the array goes to
+// partial sum k modulo sixteen, and the sixteen are added in one tree. So the bits do not depend on
+// the width of vectors. Compiled once for each instruction set, so the include guard toggles.
 #if defined(PARTIEMC_NEIGHBOUR_SUMS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PARTIEMC_NEIGHBOUR_SUMS_INL_H
 #undef PARTIEMC_NEIGHBOUR_SUMS_INL_H
@@ -34,8 +33,8 @@ using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 constexpr int kParts = kPartialSums / kLanes;
 
-// Particles beside each other, in coordinates relative to NeighbourRows' origin, then at least
-// kPartialSums that are far from everything.
+// Packed particles in coordinates relative to the origin of NeighbourRows, followed by at least
+// kPartialSums distant ones.
 struct NeighbourChunk {
   static constexpr int kCapacity = 128;
   static constexpr float kFar = 1e6f;
@@ -47,7 +46,7 @@ struct NeighbourChunk {
   int count;
 };
 
-// Where particles of a query lie, and which of them are within reach, in registers.
+// The data of a query in registers.
 class NeighbourDisc {
  public:
   HWY_INLINE explicit NeighbourDisc(const NeighbourRows& near)
@@ -59,9 +58,9 @@ class NeighbourDisc {
         centre_y_(hn::Set(Lanes(), near.centre_y)),
         reach_square_(hn::Set(Lanes(), near.reach_square)) {}
 
-  // Writes those of the particles [first, last) of a band, at most kPartialSums, that are within
-  // reach behind the first `to` particles of a chunk, which has room for them. Returns how many it
-  // has then.
+  // Appends the particles of [first, last), at most kPartialSums, that are within reach to the
+  // first `to` particles of a chunk. Requires: space for kPartialSums. Returns the new number of
+  // particles.
   template <bool kWeighted>
   HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
                         NeighbourChunk& chunk) const {
@@ -96,7 +95,7 @@ class NeighbourDisc {
   Vector column_, centre_x_, centre_y_, reach_square_;
 };
 
-// Ends a chunk with particles that are far from everything.
+// Appends distant particles, which fill the last vector.
 template <bool kWeighted>
 HWY_INLINE void Close(NeighbourChunk& chunk) {
   const Lanes d;
@@ -108,8 +107,8 @@ HWY_INLINE void Close(NeighbourChunk& chunk) {
   }
 }
 
-// Collects the particles of `near` in a chunk. Whenever there may be no room for more, make_room()
-// has to use it up, or returns false to give up. Returns false if it did.
+// Collects the particles of `near` in a chunk. If it may be full, make_room() must consume it, or
+// return false to stop. Returns false if stopped.
 template <bool kWeighted, typename MakeRoom>
 HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
   const NeighbourDisc disc(near);
@@ -136,7 +135,7 @@ HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRo
   return true;
 }
 
-// Calls visit(chunk) for the particles of `near`, as many at a time as a chunk holds.
+// Calls visit(chunk) for the particles of `near`, one full chunk at a time.
 template <bool kWeighted, typename Visit>
 HWY_INLINE void ForEachChunk(const NeighbourRows& near, NeighbourChunk& chunk, Visit visit) {
   const auto empty = [&]() HWY_ATTR {
@@ -148,7 +147,7 @@ HWY_INLINE void ForEachChunk(const NeighbourRows& near, NeighbourChunk& chunk, V
   if (chunk.count > 0) empty();
 }
 
-// The particles of `near` in one chunk. Returns false if they may not fit.
+// Collects the particles of `near` in one chunk. Returns false if they may not fit.
 template <bool kWeighted>
 HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
   const bool fits = Collect<kWeighted>(near, chunk, [] { return false; });
@@ -156,9 +155,9 @@ HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
   return fits;
 }
 
-// Calls visit(query, chunk, is_all) for the particles of each of a few queries, as many at a time
-// as a chunk holds: is_all where these are all that the query has. First copies those of all
-// queries, so that the sums of one need not wait for what is looked up for it.
+// Calls visit(query, chunk, is_all) for the particles of each query, one full chunk at a time;
+// `is_all` if a query has only one. Copies the particles of all queries first, so that the sums of
+// one do not wait for its memory.
 template <bool kWeighted, typename Query, typename Visit>
 HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   NeighbourChunk chunks[kQueriesAtOnce];
@@ -177,11 +176,12 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   }
 }
 
-// Sixteen partial sums of each of several channels.
+// Sixteen partial sums of several channels.
 template <int kChannels>
 class PartialSums {
  public:
-  // Calls add(k, sums) for each vector of a chunk, k its first particle and sums its channels.
+  // Calls add(k, sums) for each vector of a chunk: k is its first particle, `sums` has one vector
+  // per channel.
   template <typename Add>
   HWY_INLINE PartialSums(const NeighbourChunk& chunk, Add add) {
     for (int part = 0; part < kParts; ++part) {
@@ -192,7 +192,7 @@ class PartialSums {
     }
   }
 
-  // Keeps them for TotalsAtPoints.
+  // Stores the partial sums for TotalsAtPoints.
   template <typename Parts>
   HWY_INLINE void Store(Parts& parts, std::size_t point) const {
     for (int channel = 0; channel < kChannels; ++channel) {
@@ -202,7 +202,7 @@ class PartialSums {
     }
   }
 
-  // Adds the channels' totals to `totals`.
+  // Adds the totals of the channels to `totals`.
   HWY_INLINE void AddTo(double (&totals)[kChannels]) {
     HWY_ALIGN float sums[kGroups * kGroup];
     for (int group = 0; group < kGroups; ++group) Total(group * kGroup, sums + group * kGroup);
@@ -210,11 +210,11 @@ class PartialSums {
   }
 
  private:
-  static constexpr int kGroup = 4;  // Channels that are added up at once.
+  static constexpr int kGroup = 4;  // Channels that are totalled at once.
   static constexpr int kGroups = (kChannels + kGroup - 1) / kGroup;
   using Group = hn::CappedTag<float, kGroup>;
 
-  // Partial sums i and i + 8, then i and i + 4.
+  // Adds partial sums i and i + 8, then i and i + 4.
   HWY_INLINE hn::Vec<Group> Fold(int channel) {
     if (channel >= kChannels) return hn::Zero(Group());
     for (int count = kParts / 2; count > 0; count /= 2) {
@@ -235,7 +235,7 @@ class PartialSums {
       return sums;
   }
 
-  // The totals of four channels: partial sums i and i + 2, then both of them.
+  // The totals of four channels: adds partial sums i and i + 2, then the last two.
   HWY_INLINE void Total(int channel, float* totals) {
     const Group d;
     hn::Vec<Group> sums[kGroup];
@@ -258,8 +258,8 @@ class PartialSums {
   Vector parts_[kChannels][kParts];
 };
 
-// Totals of one channel at kLanes points from the partial sums of each, added up as PartialSums
-// does: lane k is that of parts[first + k], or of parts[last] if that comes before.
+// The totals of one channel at kLanes points, added like in PartialSums. Lane k: the total of
+// parts[min(first + k, last)].
 HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t first,
                                  std::size_t last) {
   const Lanes d;
@@ -281,7 +281,7 @@ HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t
       sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 8], sums[k]),
                         hn::ConcatUpperUpper(d, sums[k + 8], sums[k]));
     }
-    // In blocks of four lanes: those of k, k + 4, k + 8, k + 12.
+    // In blocks of four lanes: k, k + 4, k + 8, k + 12.
     for (int k = 0; k < 4; ++k) {
       sums[k] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(sums[k + 4]), sums[k]),
                         hn::OddEvenBlocks(sums[k + 4], hn::SwapAdjacentBlocks(sums[k])));

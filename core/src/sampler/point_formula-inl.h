@@ -1,6 +1,6 @@
-// The level set at points as a function of sums over particles, in vectors of doubles, a lane for
-// each point: F as level_set_formula.h tells it, and its gradient. Compiled once for each target,
-// hence the guard that each of them turns.
+// The level set and its gradient at points as a function of sums over particles
+// (level_set_formula.h), in vectors of doubles with one lane per point. Compiled once for each
+// instruction set, so the include guard toggles.
 #if defined(PARTIEMC_POINT_FORMULA_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PARTIEMC_POINT_FORMULA_INL_H
 #undef PARTIEMC_POINT_FORMULA_INL_H
@@ -24,9 +24,9 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// With t = 1 - d^2 / R^2: k = t^3 and dk / da = 6 t^2 d_a / R^2, whose factor comes last; d = x_i -
-// x, a and b stand for x and y. Sums over w k etc. follow from the others where all weights are the
-// same.
+// With t = 1 - d^2 / R^2: k = t^3 and dk / da = 6 t^2 d_a / R^2, where the factor 6 / R^2 is
+// applied last. d = x_i - x; a and b are x or y. With uniform weights, the weighted sums follow
+// from the others.
 enum Channel {
   kKernel,  // k
   kMomentX,
@@ -42,22 +42,22 @@ enum Channel {
   kSums
 };
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
-// (dk / da) d_b d_c, the same in any order; few points ask for them.
+// (dk / da) d_b d_c, symmetric in a, b, c; few points need them.
 enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
 
 template <bool kWeighted>
 class PointFormula {
  public:
-  // By channel and point.
+  // Indexed by channel and point.
   using Totals = double[kWeighted ? int{kWeightedSums} : int{kSums}][PointSamples::kCapacity];
-  // Points that are computed at once.
+  // Points per vector.
   static constexpr std::size_t kLanes = hn::MaxLanes(hn::CappedTag<double, 8>());
 
   HWY_INLINE explicit PointFormula(const Scale& scale)
       : scale_(scale), inverse_square_(1 / (scale.kernel_radius * scale.kernel_radius)) {}
 
-  // Sets the samples at the first points, of which there are `count`, and some behind them. Returns
-  // those whose gradient is that of the gap, which is left: bit k is point k.
+  // Sets the samples at the first `count` points, and some more to fill vectors. Returns the points
+  // whose gradient is the gap's, which is not set: bit k is point k.
   HWY_INLINE std::uint64_t operator()(const Totals& totals, std::size_t count,
                                       PointSamples& samples) const {
     std::uint64_t gaps = 0;
@@ -67,7 +67,7 @@ class PointFormula {
     return gaps & ((std::uint64_t{1} << count) - 1);
   }
 
-  // The gradient of the gap at a point, from its sums and third sums.
+  // The gradient of the gap term at a point, from its sums and third sums.
   Point GapGradient(const Totals& totals, const double (&third)[kThirdSums],
                     std::size_t point) const {
     const auto sum = [&](int channel) { return totals[channel][point]; };
@@ -75,13 +75,13 @@ class PointFormula {
     const double share = inverse_square_ / sum(kKernel);
     const double xx = sum(kKxx) * share, xy = sum(kKxy) * share, yy = sum(kKyy) * share;
     const double spread = LargerEigenvalue(xx, xy, yy);
-    // The eigenvector's square e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue; where both
-    // are the same, either direction is as good.
+    // The eigenvector as e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue. If both are
+    // equal, any direction will do.
     const double gap = 2 * spread - (xx + yy);
     const double exx = gap > 0 ? (spread - yy) / gap : 0.5;
     const double exy = gap > 0 ? xy / gap : 0;
     const double eyy = 1 - exx;
-    // ds = e . dM e, where M is a ratio of sums, and d_a = x_i - x falls as x grows.
+    // ds = e . dM e. M is a ratio of sums; d_a = x_i - x decreases as x increases.
     const auto along = [&](double dxx, double dxy, double dyy, double kernel_slope) {
       return ((exx * dxx + 2 * exy * dxy + eyy * dyy) * share -
               spread * kernel_slope / sum(kKernel)) *
@@ -103,7 +103,8 @@ class PointFormula {
     return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
   }
 
-  // Samples at the points from `at` on; bit k of what it returns is that of point at + k.
+  // Sets the samples at the points from `at` on. Bit k of the result: the gap decides at point at +
+  // k.
   HWY_INLINE std::uint8_t Sample(const Totals& totals, std::size_t at,
                                  PointSamples& samples) const {
     const Doubles d;
@@ -156,7 +157,7 @@ class PointFormula {
     const Vector value = hn::Min(hn::Max(hn::Max(phi, guard), gap), saturation);
     const auto is_phi = hn::Eq(value, phi);
     const auto is_gap = hn::And(hn::AndNot(is_phi, hn::Eq(value, gap)), has_support);
-    // Guard and saturation fall with the density alike.
+    // Guard and saturation have the same gradient.
     const auto gradient = [&](Vector phi_along, int weighted_channel, int channel) HWY_ATTR {
       const Vector along = hn::Mul(slope, weighted(weighted_channel, channel));
       return hn::IfThenElse(is_phi, phi_along, hn::Neg(hn::Mul(along, guard_slope)));

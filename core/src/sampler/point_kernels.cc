@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <iterator>
 
-// Highway compiles the rest of this file once for each target.
+// Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sampler/point_kernels.cc"
 #include <hwy/foreach_target.h>
@@ -18,7 +18,7 @@ HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-// What particles contribute: d, t and t^2; t is 0 beyond the kernel.
+// The terms of a vector of particles: d, t and t^2. t is 0 beyond the kernel.
 struct Terms {
   Vector dx, dy, t, t2;
 };
@@ -75,7 +75,7 @@ struct AddThirdSums {
   }
 };
 
-// The sums over a chunk's particles at a point.
+// The sums over the particles of a chunk at a point.
 template <typename AddTerms>
 HWY_INLINE PartialSums<AddTerms::kChannels> SumChunk(double inverse_square,
                                                      const NeighbourRows& near,
@@ -103,9 +103,8 @@ void SumThird(double inverse_square, const NeighbourRows& near, const Point& poi
   });
 }
 
-// Sums at the points of some queries. The totals of all points are added up at once. Where
-// particles are too many for one chunk, the totals of each chunk go to a sum in doubles, point by
-// point.
+// Sums at the points of some queries. The totals of all points are computed at once. If a query has
+// several chunks, the totals of each chunk are added in doubles, point by point.
 template <bool kWeighted>
 class SumsAtPoints {
  public:
@@ -131,7 +130,7 @@ class SumsAtPoints {
         if ((alone_ >> point & 1) != 0) TakeAlone(point, point);
       }
     } else {
-      // What is behind the last point counts for nothing, but is computed with.
+      // The lanes after the last point need defined values.
       constexpr std::size_t kEnd = std::max(kFewPoints, PointFormula<kWeighted>::kLanes);
       for (std::size_t point = 0; point < kEnd; ++point) {
         TakeAlone(std::min(point, count_ - 1), point);
@@ -144,7 +143,7 @@ class SumsAtPoints {
 
  private:
   static constexpr int kChannels = AddSums<kWeighted>::kChannels;
-  // The totals of so many are faster added up one by one.
+  // So few points are totalled faster one by one.
   static constexpr std::size_t kFewPoints = 2;
   static_assert(PointSamples::kCapacity % kPartialSums == 0 && PointSamples::kCapacity < 64);
 
@@ -177,7 +176,7 @@ class SumsAtPoints {
   }
 
   std::size_t count_ = 0;
-  std::uint64_t alone_ = 0;  // Those in totals_alone_: bit k is point k.
+  std::uint64_t alone_ = 0;  // Points with totals_alone_: bit k is point k.
   HWY_ALIGN float parts_[kChannels][PointSamples::kCapacity][kPartialSums];
   HWY_ALIGN typename PointFormula<kWeighted>::Totals totals_;
   double totals_alone_[PointSamples::kCapacity][kChannels];

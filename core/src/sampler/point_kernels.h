@@ -1,4 +1,4 @@
-// The sums over particles behind LevelSetSampler::Sample, in the vectors of the processor at hand.
+// The kernels of LevelSetSampler::Sample, in vectors.
 #pragma once
 
 #include <algorithm>
@@ -12,16 +12,16 @@
 
 namespace partiemc {
 
-/// Up to kPointsAtOnce points, in cells relative to the tile, and the particles around them, at
-/// least those within R of each.
+/// Up to kPointsAtOnce points, in cells relative to the tile, and at least the particles within R
+/// of each.
 struct PointQuery {
   NeighbourRows near;
   std::span<const Point> points;
 };
 
-/// What the field is at points (FieldSample), those of one query after those of the other.
+/// Samples (FieldSample) at the points of the queries, in order.
 struct PointSamples {
-  /// Whole vectors of them.
+  /// A multiple of the vector size.
   static constexpr std::size_t kCapacity =
       std::max<std::size_t>(kQueriesAtOnce * kPointsAtOnce, kRowPadding);
   using PerPoint = std::array<double, kCapacity>;
@@ -30,11 +30,11 @@ struct PointSamples {
   PerPoint density, mean_x, mean_y, phi, phi_x, phi_y, spread, value, gradient_x, gradient_y;
 };
 
-/// Samples at the points of at most kQueriesAtOnce queries, all or none of them with weights. Terms
-/// are floats, and so are their sums over up to 128 particles: off by a few 1e-7 of the sum of
-/// their magnitudes. What follows from the sums is in doubles. Same bits for any processor,
-/// whatever is asked at once: a query's particles within reach are dealt to sixteen partial sums by
-/// their place among them, and the sixteen are added up in one order (neighbour_sums-inl.h).
+/// Samples the points of at most kQueriesAtOnce queries. Requires: all of them have weights, or
+/// none. Terms, and their sums over up to 128 particles, are floats with an error of a few 1e-7 of
+/// the sum of their magnitudes; the rest is doubles. The bits depend neither on the processor nor
+/// on the other queries. The particles of a query go to sixteen partial sums by their index, and
+/// these are added in one order (neighbour_sums-inl.h).
 void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries, PointSamples& samples);
 
 }  // namespace partiemc

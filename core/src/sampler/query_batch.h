@@ -1,4 +1,4 @@
-// Points that are near each other, collected so that the particles around them are looked up once.
+// Batches nearby points, so that their particles are looked up once.
 #pragma once
 
 #include <array>
@@ -11,27 +11,27 @@
 
 namespace partiemc {
 
-/// Points of a tile, in cells relative to it: neighbours, which look at the same particles.
+/// Neighbouring points of a tile, in cells relative to it, which share their particles.
 template <typename Member>
 struct PointGroup {
   std::uint32_t tile = kNoTile;
   std::size_t count = 0;
   std::array<Member, kPointsAtOnce> points;
-  std::array<std::size_t, kPointsAtOnce> vertices;  ///< What each belongs to.
+  std::array<std::size_t, kPointsAtOnce> vertices;  ///< By point: its vertex.
 };
 
-/// Collects points of successive vertices of rings in groups, and hands on kQueriesAtOnce groups at
-/// a time to a sink, a function of std::span<const PointGroup<Member>>. Which points share a group
-/// depends on what is added between two calls of Part alone, not on when groups are handed on.
+/// Collects points of consecutive vertices in groups. Passes kQueriesAtOnce groups at a time to a
+/// sink, a function of std::span<const PointGroup<Member>>. The points between two calls of Part
+/// alone determine the groups, so the results do not depend on the batches.
 template <typename Member, typename Sink>
 class QueryBatch {
  public:
   explicit QueryBatch(Sink sink) : sink_(sink) {}
 
-  /// What comes is in no group with what has come.
+  /// Later points do not join the groups of earlier ones.
   void Part() { is_open_ = false; }
 
-  /// A point joins the last group if that is of its tile and has room.
+  /// Adds a point. It joins the last group, if that is of its tile and not full.
   void Add(std::size_t vertex, std::uint32_t tile, const Member& point) {
     if (!is_open_ || groups_[count_ - 1].tile != tile ||
         groups_[count_ - 1].count == kPointsAtOnce) {
@@ -45,7 +45,7 @@ class QueryBatch {
     group.points[group.count++] = point;
   }
 
-  /// Hands on what is left. Call it last.
+  /// Passes on the remaining groups. Call it last.
   void Finish() {
     if (count_ > 0) HandOn();
   }
@@ -63,18 +63,17 @@ class QueryBatch {
   bool is_open_ = false;
 };
 
-/// Collects for `sink`.
 template <typename Member, typename Sink>
 QueryBatch<Member, Sink> CollectPoints(Sink sink) {
   return QueryBatch<Member, Sink>(sink);
 }
 
-/// Points of so many successive segments share a group. Those of more would lie so far apart that
-/// each looks at too many of the others' particles.
+/// Consecutive segments whose points share a group. With more, each point would look at too many
+/// particles of the others.
 inline constexpr std::size_t kSegmentsOfGroup = 4;
 static_assert(2 * kSegmentsOfGroup <= kPointsAtOnce, "a segment has two points");
 
-/// The segment with which the group of a segment begins, both by their index in the ring.
+/// The first segment of the group of a segment; both are indices in the ring.
 constexpr std::size_t BeginOfGroup(std::size_t segment) {
   return segment - segment % kSegmentsOfGroup;
 }

@@ -1,63 +1,212 @@
+// The bytes of a state. Little-endian layout: magic, version, cell size and spacing (0: none), area
+// offset and time (kAbsent: none), identities given, the counts of normals, rings, runs and
+// samples, these, checksum.
+//
+// A state with sections has another magic, the version and the number of states. Then follows each
+// state, the main one first, as its number of bytes and its bytes; checksum.
 #include "partiemc/state.h"
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/internal/byte_string.h"
 #include "partiemc/parameters.h"
 #include "partiemc/status.h"
-#include "state/state_parts.h"
 
 namespace partiemc {
 namespace {
 
-// Layout, little-endian: magic, version, cell size, spacing (0: none), area offset, time (kAbsent:
-// none), identities given, a count of each of kKinds, then these, checksum.
-//
-// With sections there are several states: another magic, version, their number, then of each, the
-// stream's own first, the number of its bytes and these; checksum.
 constexpr std::uint32_t kMagic = 0x53504d45;          // "EMPS"
 constexpr std::uint32_t kSectionsMagic = 0x4d504d45;  // "EMPM"
 constexpr std::uint32_t kVersion = 5;
-constexpr std::uint64_t kAbsent = 0x7ff8000000000000;  // Not a number.
-constexpr std::size_t kNormalBytes = 4 + 4 + 4 + 4;
+constexpr std::uint64_t kAbsent = 0x7ff8000000000000;             // Not a number.
+constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;  // No stream reaches it.
 constexpr std::size_t kChecksumBytes = 8;
+constexpr char kAsWritten[] = "must be what Serialize wrote";
 
-// What there may be any number of, in the order in which it is written.
+// The arrays of a state in the order of the layout, and the bytes of an element.
 struct Kind {
   const char* name;
   std::size_t bytes;
 };
-constexpr std::array<Kind, 4> kKinds = {{{"normals", kNormalBytes},
-                                         {"rings", kRingBytes},
-                                         {"runs", kRunBytes},
-                                         {"samples", kSampleBytes}}};
+constexpr std::array<Kind, 4> kKinds = {
+    {{"normals", 16}, {"rings", 32}, {"runs", 16}, {"samples", 20}}};
 using Counts = std::array<std::uint64_t, kKinds.size()>;
+
+auto ArraysOf(auto& state) {
+  auto& history = state.history;
+  return std::tie(state.normals, history.rings, history.runs, history.samples);
+}
+
+// The numbers of an element in the order of the layout.
+auto NumbersOf(auto& item) {
+  using Item = std::remove_cvref_t<decltype(item)>;
+  if constexpr (std::is_same_v<Item, CellNormal>) {
+    return std::tie(item.column, item.row, item.x, item.y);
+  } else if constexpr (std::is_same_v<Item, KnownRing>) {
+    return std::tie(item.identity, item.is_hole, item.outer, item.velocity_x, item.velocity_y);
+  } else if constexpr (std::is_same_v<Item, NodeRun>) {
+    return std::tie(item.row, item.first, item.last, item.ring);
+  } else {
+    return std::tie(item.hash, item.column, item.row, item.ring);
+  }
+}
 
 constexpr std::size_t kHeaderBytes = 4 + 4 + 5 * 8 + 8 * kKinds.size();
 constexpr std::size_t kSectionsHeaderBytes = 4 + 4 + 8;
 
-bool IsLength(double value) { return value >= 1e-62 && value <= 1e62; }
+absl::Status Corrupt(std::string value, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonCorruptState), "state", std::move(value), std::move(rule)});
+}
+
+absl::Status CheckLengths(const State& state) {
+  const auto is_length = [](double value) { return value >= 1e-62 && value <= 1e62; };
+  if (state.cell_size.has_value() != state.spacing.has_value() ||
+      !is_length(state.cell_size.value_or(1)) || !is_length(state.spacing.value_or(1))) {
+    return Corrupt(absl::StrCat("cell size ", ShortestNumber(state.cell_size.value_or(0)),
+                                ", spacing ", ShortestNumber(state.spacing.value_or(0))),
+                   "must both be absent or both be lengths");
+  }
+  const double offset = state.area_offset.value_or(0);
+  if (offset >= -1 && offset <= 1) return absl::OkStatus();
+  return Corrupt(absl::StrCat("area offset ", ShortestNumber(offset)),
+                 "must be absent or in [-1, 1] spacings");
+}
 
 absl::Status CheckNormals(const std::vector<CellNormal>& normals) {
   for (std::size_t k = 0; k < normals.size(); ++k) {
     const CellNormal& normal = normals[k];
     const float square = normal.x * normal.x + normal.y * normal.y;
     if (!(square > 0.99f && square < 1.01f)) {
-      return CorruptState(absl::StrCat("normal ", k), "must have unit length");
+      return Corrupt(absl::StrCat("normal ", k), "must have unit length");
     }
     if (k > 0 && std::tie(normals[k - 1].row, normals[k - 1].column) >=
                      std::tie(normal.row, normal.column)) {
-      return CorruptState(absl::StrCat("normal ", k), "must come after the one before it");
+      return Corrupt(absl::StrCat("normal ", k), "must come after the one before it");
     }
   }
   return absl::OkStatus();
+}
+
+absl::Status CheckRings(const RingHistory& history) {
+  for (std::size_t k = 0; k < history.rings.size(); ++k) {
+    const KnownRing& ring = history.rings[k];
+    const std::uint64_t after = k == 0 ? 0 : history.rings[k - 1].identity;
+    if (ring.identity <= after || ring.identity > history.identities_given) {
+      return Corrupt(
+          absl::StrCat("identity ", ring.identity),
+          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
+    }
+    if (ring.outer != kNoRing && (!ring.is_hole || ring.outer >= history.rings.size() ||
+                                  history.rings[ring.outer].is_hole)) {
+      return Corrupt(absl::StrCat("ring ", k, " in ring ", ring.outer),
+                     "must be a hole in an outer ring, or stand alone");
+    }
+    if (!std::isfinite(ring.velocity_x) || !std::isfinite(ring.velocity_y)) {
+      return Corrupt(absl::StrCat("velocity of ring ", k), "must be finite");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckRuns(const RingHistory& history) {
+  for (std::size_t k = 0; k < history.runs.size(); ++k) {
+    const NodeRun& run = history.runs[k];
+    if (run.first > run.last || run.ring >= history.rings.size()) {
+      return Corrupt(absl::StrCat("run ", k), "must have nodes and a ring");
+    }
+    if (k > 0 && std::tie(history.runs[k - 1].row, history.runs[k - 1].last) >=
+                     std::tie(run.row, run.first)) {
+      return Corrupt(absl::StrCat("run ", k), "must come after the one before it");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSamples(const RingHistory& history) {
+  std::vector<std::uint32_t> count(history.rings.size());
+  for (std::size_t k = 0; k < history.samples.size(); ++k) {
+    const ParticleSample& sample = history.samples[k];
+    if (sample.ring >= history.rings.size() || history.rings[sample.ring].is_hole ||
+        ++count[sample.ring] > kMaxSamples) {
+      return Corrupt(absl::StrCat("sample ", k),
+                     absl::StrCat("must be one of at most ", kMaxSamples, " of an outer ring"));
+    }
+    if (k > 0 && history.samples[k - 1].hash >= sample.hash) {
+      return Corrupt(absl::StrCat("sample ", k), "must come after the one before it");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckContents(const State& state) {
+  const RingHistory& history = state.history;
+  if (history.identities_given > kMaxIdentities) {
+    return Corrupt(absl::StrCat(history.identities_given, " identities"),
+                   absl::StrCat("must be at most ", kMaxIdentities));
+  }
+  if (history.time && !std::isfinite(*history.time)) {
+    return Corrupt(absl::StrCat("time ", ShortestNumber(*history.time)),
+                   "must be absent or finite");
+  }
+  absl::Status status = CheckLengths(state);
+  if (status.ok()) status = CheckNormals(state.normals);
+  if (status.ok()) status = CheckRings(history);
+  if (status.ok()) status = CheckRuns(history);
+  if (status.ok()) status = CheckSamples(history);
+  return status;
+}
+
+// Checks the last bytes, the checksum of all before them. Requires: there are enough bytes.
+absl::Status CheckSum(std::string_view bytes) {
+  const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
+  std::string_view tail = bytes.substr(body.size());
+  if (TakeNumber<std::uint64_t>(tail) == ChecksumOf(body)) return absl::OkStatus();
+  return Corrupt("a wrong checksum", kAsWritten);
+}
+
+absl::Status CheckVersion(std::string_view& rest) {
+  const auto version = TakeNumber<std::uint32_t>(rest);
+  if (version == kVersion) return absl::OkStatus();
+  return Corrupt(absl::StrCat("version ", version), absl::StrCat("must be version ", kVersion));
+}
+
+Counts CountsOf(const State& state) {
+  return std::apply([](const auto&... arrays) { return Counts{arrays.size()...}; },
+                    ArraysOf(state));
+}
+
+std::uint64_t BytesOf(const Counts& counts) {
+  std::uint64_t bytes = 0;
+  for (std::size_t k = 0; k < kKinds.size(); ++k) bytes += counts[k] * kKinds[k].bytes;
+  return bytes;
+}
+
+// Takes the counts of the arrays that fill the rest. Each is bounded before it is multiplied.
+absl::StatusOr<Counts> TakeCounts(std::string_view& rest) {
+  Counts counts;
+  for (std::uint64_t& count : counts) count = TakeNumber<std::uint64_t>(rest);
+  bool is_possible = true;
+  for (std::size_t k = 0; k < kKinds.size(); ++k) {
+    is_possible = is_possible && counts[k] <= rest.size() / kKinds[k].bytes;
+  }
+  if (is_possible && BytesOf(counts) == rest.size()) return counts;
+  std::string value = absl::StrCat(rest.size(), " bytes"), rule = "must consist of";
+  for (std::size_t k = 0; k < kKinds.size(); ++k) {
+    absl::StrAppend(&value, k == 0 ? " for " : ", ", counts[k], " ", kKinds[k].name);
+    absl::StrAppend(&rule, k == 0 ? " " : ", ", kKinds[k].name, " of ", kKinds[k].bytes);
+  }
+  return Corrupt(std::move(value), absl::StrCat(rule, " bytes"));
 }
 
 std::optional<double> TakeOptional(std::string_view& rest) {
@@ -70,158 +219,103 @@ void PutOptional(std::optional<double> value, std::string& bytes) {
   PutNumber(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
 }
 
-absl::Status CheckAreaOffset(std::optional<double> offset) {
-  if (!offset || (*offset >= -1 && *offset <= 1)) return absl::OkStatus();
-  return CorruptState(absl::StrCat("area offset ", ShortestNumber(*offset)),
-                      "must be absent or in [-1, 1] spacings");
-}
-
-Counts CountsOf(const State& state) {
-  const RingHistory& history = state.history;
-  return {state.normals.size(), history.rings.size(), history.runs.size(), history.samples.size()};
-}
-
-std::uint64_t BytesOf(const Counts& counts) {
-  std::uint64_t bytes = 0;
-  for (std::size_t k = 0; k < kKinds.size(); ++k) bytes += counts[k] * kKinds[k].bytes;
-  return bytes;
-}
-
-// Of all bytes before the last ones, which it is. Requires: there are so many.
-absl::Status CheckSum(std::string_view bytes) {
-  const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
-  std::string_view tail = bytes.substr(body.size());
-  if (TakeNumber<std::uint64_t>(tail) == ChecksumOf(body)) return absl::OkStatus();
-  return CorruptState("a wrong checksum", "must be what Serialize wrote");
-}
-
-// Takes the counts of what fills the bytes after them. Each is bounded before it is multiplied.
-absl::StatusOr<Counts> TakeCounts(std::string_view& rest) {
-  Counts counts;
-  for (std::uint64_t& count : counts) count = TakeNumber<std::uint64_t>(rest);
-  bool possible = true;
-  for (std::size_t k = 0; k < kKinds.size(); ++k) {
-    possible = possible && counts[k] <= rest.size() / kKinds[k].bytes;
+// A flag is a number of 4 bytes, 0 or 1.
+template <typename Number>
+bool TakeNumberOrFlag(std::string_view& rest, Number& number) {
+  if constexpr (std::is_same_v<Number, bool>) {
+    const auto flag = TakeNumber<std::uint32_t>(rest);
+    number = flag == 1;
+    return flag <= 1;
+  } else {
+    number = TakeNumber<Number>(rest);
+    return true;
   }
-  if (possible && BytesOf(counts) == rest.size()) return counts;
-  std::string told = absl::StrCat(rest.size(), " bytes"), rule = "must be made of";
-  for (std::size_t k = 0; k < kKinds.size(); ++k) {
-    absl::StrAppend(&told, k == 0 ? " for " : ", ", counts[k], " ", kKinds[k].name);
-    absl::StrAppend(&rule, k == 0 ? " " : ", ", kKinds[k].name, " of ", kKinds[k].bytes);
+}
+
+void PutNumberOrFlag(auto number, std::string& bytes) {
+  if constexpr (std::is_same_v<decltype(number), bool>) {
+    PutNumber(std::uint32_t{number}, bytes);
+  } else {
+    PutNumber(number, bytes);
   }
-  return CorruptState(std::move(told), absl::StrCat(rule, " bytes"));
 }
-
-absl::Status TakeNormals(std::string_view& rest, std::vector<CellNormal>& normals) {
-  for (CellNormal& normal : normals) {
-    normal.column = TakeNumber<std::int32_t>(rest);
-    normal.row = TakeNumber<std::int32_t>(rest);
-    normal.x = TakeNumber<float>(rest);
-    normal.y = TakeNumber<float>(rest);
-  }
-  return CheckNormals(normals);
-}
-
-}  // namespace
-
-absl::Status CorruptState(std::string value, std::string rule) {
-  return ViolationError(
-      absl::StatusCode::kInvalidArgument,
-      {std::string(kReasonCorruptState), "state", std::move(value), std::move(rule)});
-}
-
-namespace {
 
 std::size_t OwnBytes(const State& state) {
   return kHeaderBytes + BytesOf(CountsOf(state)) + kChecksumBytes;
 }
 
-// Without its sections.
+// Appends a state without its sections.
 void PutOwn(const State& state, std::string& bytes) {
   const std::size_t start = bytes.size();
-  const RingHistory& history = state.history;
-  const Counts counts = CountsOf(state);
   PutNumber(kMagic, bytes);
   PutNumber(kVersion, bytes);
   PutNumber(state.cell_size.value_or(0), bytes);
   PutNumber(state.spacing.value_or(0), bytes);
   PutOptional(state.area_offset, bytes);
-  PutOptional(history.time, bytes);
-  PutNumber(history.identities_given, bytes);
-  for (const std::uint64_t count : counts) PutNumber(count, bytes);
-  for (const CellNormal& normal : state.normals) {
-    PutNumber(normal.column, bytes);
-    PutNumber(normal.row, bytes);
-    PutNumber(normal.x, bytes);
-    PutNumber(normal.y, bytes);
-  }
-  PutHistory(history, bytes);
+  PutOptional(state.history.time, bytes);
+  PutNumber(state.history.identities_given, bytes);
+  for (const std::uint64_t count : CountsOf(state)) PutNumber(count, bytes);
+  const auto put = [&](const auto& numbers) {
+    std::apply([&](const auto&... number) { (PutNumberOrFlag(number, bytes), ...); }, numbers);
+  };
+  const auto put_all = [&](const auto& array) {
+    for (const auto& item : array) put(NumbersOf(item));
+  };
+  std::apply([&](const auto&... arrays) { (put_all(arrays), ...); }, ArraysOf(state));
   PutNumber(ChecksumOf(std::string_view(bytes).substr(start)), bytes);
 }
 
 absl::StatusOr<State> ParseOwn(std::string_view bytes) {
-  const std::size_t size = bytes.size();
-  if (size < kHeaderBytes + kChecksumBytes) {
-    return CorruptState(absl::StrCat(size, " bytes"),
-                        absl::StrCat("must have at least ", kHeaderBytes + kChecksumBytes));
+  if (bytes.size() < kHeaderBytes + kChecksumBytes) {
+    return Corrupt(absl::StrCat(bytes.size(), " bytes"),
+                   absl::StrCat("must have at least ", kHeaderBytes + kChecksumBytes));
   }
-  const std::string_view body = bytes.substr(0, size - kChecksumBytes);
-  std::string_view rest = body;
+  std::string_view rest = bytes.substr(0, bytes.size() - kChecksumBytes);
   if (TakeNumber<std::uint32_t>(rest) != kMagic) {
-    return CorruptState("another kind of data", "must be a state");
+    return Corrupt("another kind of data", "must be a state");
   }
-  if (const auto version = TakeNumber<std::uint32_t>(rest); version != kVersion) {
-    return CorruptState(absl::StrCat("version ", version),
-                        absl::StrCat("must be version ", kVersion));
-  }
+  if (absl::Status status = CheckVersion(rest); !status.ok()) return status;
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   State state;
   if (const auto cell_size = TakeNumber<double>(rest); cell_size != 0) state.cell_size = cell_size;
   if (const auto spacing = TakeNumber<double>(rest); spacing != 0) state.spacing = spacing;
-  if (state.cell_size.has_value() != state.spacing.has_value() ||
-      !IsLength(state.cell_size.value_or(1)) || !IsLength(state.spacing.value_or(1))) {
-    return CorruptState(absl::StrCat("cell size ", ShortestNumber(state.cell_size.value_or(0)),
-                                     ", spacing ", ShortestNumber(state.spacing.value_or(0))),
-                        "must both be absent or both be lengths");
-  }
   state.area_offset = TakeOptional(rest);
-  if (absl::Status status = CheckAreaOffset(state.area_offset); !status.ok()) return status;
   state.history.time = TakeOptional(rest);
   state.history.identities_given = TakeNumber<std::uint64_t>(rest);
   const auto counts = TakeCounts(rest);
   if (!counts.ok()) return counts.status();
-  const auto& [normals, rings, runs, samples] = *counts;
-  state.normals.resize(normals);
-  state.history.rings.resize(rings);
-  state.history.runs.resize(runs);
-  state.history.samples.resize(samples);
-  if (absl::Status status = TakeNormals(rest, state.normals); !status.ok()) return status;
-  if (absl::Status status = TakeHistory(rest, state.history); !status.ok()) return status;
+  bool has_flags = true;
+  const auto take = [&](auto numbers) {
+    std::apply([&](auto&... number) { ((has_flags &= TakeNumberOrFlag(rest, number)), ...); },
+               numbers);
+  };
+  std::size_t kind = 0;
+  const auto take_all = [&](auto& array) {
+    array.resize((*counts)[kind++]);
+    for (auto& item : array) take(NumbersOf(item));
+  };
+  std::apply([&](auto&... arrays) { (take_all(arrays), ...); }, ArraysOf(state));
+  if (!has_flags) return Corrupt("a ring of another kind", "must be of kind 0 or 1");
+  if (absl::Status status = CheckContents(state); !status.ok()) return status;
   return state;
 }
 
 absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
-  const std::size_t size = bytes.size();
-  if (size < kSectionsHeaderBytes + kChecksumBytes) {
-    return CorruptState(absl::StrCat(size, " bytes"), "must be what Serialize wrote");
+  constexpr std::size_t kMostStates = 1 + ReconstructionParameters::kMaxSections;
+  if (bytes.size() < kSectionsHeaderBytes + kChecksumBytes) {
+    return Corrupt(absl::StrCat(bytes.size(), " bytes"), kAsWritten);
   }
-  const std::string_view body = bytes.substr(0, size - kChecksumBytes);
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
-  std::string_view rest = body.substr(4);
-  if (const auto version = TakeNumber<std::uint32_t>(rest); version != kVersion) {
-    return CorruptState(absl::StrCat("version ", version),
-                        absl::StrCat("must be version ", kVersion));
-  }
+  std::string_view rest = bytes.substr(4, bytes.size() - 4 - kChecksumBytes);
+  if (absl::Status status = CheckVersion(rest); !status.ok()) return status;
   const auto count = TakeNumber<std::uint64_t>(rest);
-  if (count < 2 || count > 1 + ReconstructionParameters::kMaxSections) {
-    return CorruptState(absl::StrCat(count, " states"),
-                        absl::StrCat("must be 2 to ", 1 + ReconstructionParameters::kMaxSections));
+  if (count < 2 || count > kMostStates) {
+    return Corrupt(absl::StrCat(count, " states"), absl::StrCat("must be 2 to ", kMostStates));
   }
   State state;
   for (std::uint64_t k = 0; k < count; ++k) {
-    if (rest.size() < 8) return CorruptState("states cut off", "must be what Serialize wrote");
-    const auto own = TakeNumber<std::uint64_t>(rest);
-    if (own > rest.size()) return CorruptState("states cut off", "must be what Serialize wrote");
+    const std::uint64_t own = rest.size() < 8 ? ~std::uint64_t{0} : TakeNumber<std::uint64_t>(rest);
+    if (own > rest.size()) return Corrupt("states cut off", kAsWritten);
     auto parsed = ParseOwn(rest.substr(0, own));
     if (!parsed.ok()) return parsed;
     rest.remove_prefix(own);
@@ -231,11 +325,8 @@ absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
       state.sections.push_back(*std::move(parsed));
     }
   }
-  if (!rest.empty()) {
-    return CorruptState(absl::StrCat(rest.size(), " bytes too many"),
-                        "must be what Serialize wrote");
-  }
-  return state;
+  if (rest.empty()) return state;
+  return Corrupt(absl::StrCat(rest.size(), " bytes too many"), kAsWritten);
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <optional>
+#include <sstream>
 #include <thread>
 
 namespace partiemc::client {
@@ -73,6 +75,22 @@ Ran RunPartiemc(const std::vector<std::string>& arguments) {
   return {exit_code, program.Out(), program.Error()};
 }
 
+Ran RunPartiemcOnFullDisk(int kilobytes, std::vector<std::string> arguments) {
+  // Without the signal, write fails with EFBIG. dash counts blocks of 512 bytes.
+  const std::string limited =
+      "trap '' XFSZ; ulimit -f " + std::to_string(2 * kilobytes) + "; exec \"$0\" \"$@\"";
+  arguments.insert(arguments.begin(), {"-c", limited, PARTIEMC_PROGRAM});
+  Program program("/bin/sh", arguments);
+  const int exit_code = program.Wait();
+  return {exit_code, program.Out(), program.Error()};
+}
+
+std::string LastLine(const std::string& lines) {
+  if (lines.empty()) return lines;
+  const std::string whole = lines.substr(0, lines.size() - (lines.back() == '\n' ? 1 : 0));
+  return whole.substr(whole.rfind('\n') + 1);
+}
+
 ServerProgram::ServerProgram()
     : program_(PARTIEMC_SERVER_PROGRAM,
                {"--address", "127.0.0.1:0", "--port-file", directory_.Path("port")}) {
@@ -105,6 +123,23 @@ std::vector<std::string> FilesIn(const std::filesystem::path& directory) {
 std::string Content(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<std::string> Column(const std::string& csv, const std::string& name) {
+  std::istringstream lines(csv);
+  std::vector<std::string> values;
+  std::optional<std::size_t> wanted;
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<std::string> cells;
+    std::istringstream cells_of_line(line);
+    for (std::string cell; std::getline(cells_of_line, cell, ',');) cells.push_back(cell);
+    if (wanted) {
+      values.push_back(cells.at(*wanted));
+    } else {
+      wanted = static_cast<std::size_t>(std::ranges::find(cells, name) - cells.begin());
+    }
+  }
+  return values;
 }
 
 }  // namespace partiemc::client

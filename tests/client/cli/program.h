@@ -41,6 +41,11 @@ struct Ran {
 
 /// `partiemc` with these arguments, until it ends.
 Ran RunPartiemc(const std::vector<std::string>& arguments);
+/// The same where no file may be longer than `kilobytes`: as on a full disk, writing fails.
+Ran RunPartiemcOnFullDisk(int kilobytes, std::vector<std::string> arguments);
+
+/// The last of these lines, without its end.
+std::string LastLine(const std::string& lines);
 
 /// The real server on a port that the system chose.
 class ServerProgram {
@@ -60,6 +65,9 @@ class ServerProgram {
 std::vector<std::string> FilesIn(const std::filesystem::path& directory);
 
 std::string Content(const std::string& path);
+
+/// One column of a statistics file.
+std::vector<std::string> Column(const std::string& csv, const std::string& name);
 
 /// The bundled recording.
 inline const std::string kDamBreak = PARTIEMC_SOURCE_DIR "/client/recordings/dam_break.pemc";

@@ -147,7 +147,7 @@ TEST_F(Record, OfAStreamThatDoesNotShowItsParticlesIsRefused) {
   Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20"}));
   const Ran ran = Watch({"--record", Path("seen.pemc")});
   EXPECT_EQ(ran.exit_code, 1);
-  EXPECT_THAT(ran.error, HasSubstr("--record: the stream does not show its particles"));
+  EXPECT_THAT(ran.error, HasSubstr("--record: the stream does not echo its particles"));
   EXPECT_FALSE(std::filesystem::exists(Path("seen.pemc")));
 }
 

@@ -25,24 +25,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// One column of a statistics file.
-std::vector<std::string> Column(const std::string& csv, const std::string& name) {
-  std::istringstream lines(csv);
-  std::vector<std::string> values;
-  std::optional<std::size_t> wanted;
-  for (std::string line; std::getline(lines, line);) {
-    std::vector<std::string> cells;
-    std::istringstream cells_of_line(line);
-    for (std::string cell; std::getline(cells_of_line, cell, ',');) cells.push_back(cell);
-    if (wanted) {
-      values.push_back(cells.at(*wanted));
-    } else {
-      wanted = static_cast<std::size_t>(std::ranges::find(cells, name) - cells.begin());
-    }
-  }
-  return values;
-}
-
 // Three small frames; the second one holds what no frame may hold.
 void WriteFrames(const support::TemporaryFolder& directory) {
   for (int k = 0; k < 3; ++k) {
@@ -93,7 +75,7 @@ TEST(Replay, ByTheLatestPolicyEveryFrameIsReplayedOrSkippedAndCounted) {
     const auto skipped = 75 - frames.size();
     if (skipped > 0) {
       EXPECT_THAT(ran.error, HasSubstr(std::to_string(skipped) + " frame"));
-      EXPECT_THAT(ran.error, HasSubstr("skipped, because newer ones came"));
+      EXPECT_THAT(ran.error, HasSubstr("skipped because newer ones arrived"));
     } else {
       EXPECT_EQ(ran.error.find("skipped"), std::string::npos);
     }
@@ -346,7 +328,7 @@ TEST(Replay, AServerThatDiesIsExitCodeFourInOneLineAndKeepsWhatCameBefore) {
     const support::TemporaryFolder directory;
     const auto replay =
         BeginReplay(directory, {"--server", server.address(), "--quiet", "--checkpoint-interval",
-                                interval, "--deadline", "2"});
+                                interval, "--deadline", "2", "--give-up-after", "2"});
     server.Signal(SIGKILL);
     EXPECT_EQ(replay->Wait(), 4);
     const std::string error = replay->Error();

@@ -43,6 +43,7 @@ struct Entry {
   std::string name;
   std::string content;
   bool deflate = false;
+  std::string surplus = {};  // Behind the packed content, of whose size the directory knows.
 };
 
 std::string Zip(const std::vector<Entry>& entries) {
@@ -50,7 +51,7 @@ std::string Zip(const std::vector<Entry>& entries) {
   std::string directory;
   for (const Entry& entry : entries) {
     const std::string data =
-        entry.deflate ? Deflated(entry.content, Wrapping::kNone) : entry.content;
+        (entry.deflate ? Deflated(entry.content, Wrapping::kNone) : entry.content) + entry.surplus;
     const auto crc = crc32(0, reinterpret_cast<const Bytef*>(entry.content.data()),
                            static_cast<uInt>(entry.content.size()));
     const std::string common = LittleEndian(20, 2) + LittleEndian(0, 2) +
@@ -133,6 +134,15 @@ TEST(Npy, DamageAndDeclaredSizesAreFoundOut) {
   ExpectRefused(refusal("2"), absl::StatusCode::kDataLoss, {"shape"});
 }
 
+TEST(Npy, RefusesBytesBehindTheArray) {
+  const support::TemporaryFolder directory;
+  const std::string one = Npy("'<f8'", "(2, 2)", Bytes(kPositions));
+  for (const std::string& surplus : {std::string("\n"), one}) {
+    ExpectRefused(ReadAll(directory.Write("pos.npy", one + surplus)).status,
+                  absl::StatusCode::kDataLoss, {"pos.npy", "behind the 32 of the array"});
+  }
+}
+
 TEST(Npz, NamedArraysAreRecognisedStoredAndDeflated) {
   const support::TemporaryFolder directory;
   for (const bool deflate : {false, true}) {
@@ -164,6 +174,24 @@ TEST(Npz, SeparateAxesAreRecognisedAndOthersChosen) {
   EXPECT_THAT(ReadOne(path, {.columns = "where"}).positions, testing::ElementsAreArray(kPositions));
   ExpectRefused(ReadAll(path, {.select = {"type=fluid"}}).status,
                 absl::StatusCode::kFailedPrecondition, {"type=fluid", "numbers"});
+}
+
+TEST(Npz, RefusesSurplusData) {
+  const support::TemporaryFolder directory;
+  const auto refusal = [&](const std::string& archive) {
+    return ReadAll(directory.Write("frame.npz", archive)).status;
+  };
+  const std::string array = Npy("'<f8'", "(2, 2)", Bytes(kPositions));
+  for (const bool deflate : {false, true}) {
+    ExpectRefused(refusal(Zip({{"pos.npy", array + "surplus", deflate}})),
+                  absl::StatusCode::kDataLoss, {"frame.npz", "pos", "behind the 32 of the array"});
+    ExpectRefused(refusal(Zip({{"pos.npy", array, deflate, "surplus"}})),
+                  absl::StatusCode::kDataLoss, {"frame.npz", "pos", "damaged"});
+    const std::string whole = Zip({{"pos.npy", array, deflate}});
+    EXPECT_TRUE(refusal(whole).ok());
+    ExpectRefused(refusal(whole + "surplus"), absl::StatusCode::kDataLoss,
+                  {"frame.npz", "behind its directory"});
+  }
 }
 
 TEST(Npz, PickledObjectsAreRefusedWithTheWayOut) {

@@ -68,6 +68,25 @@ TEST_P(Packed, DamageIsAnError) {
 
 INSTANTIATE_TEST_SUITE_P(Packings, Packed, testing::Values(&Gzip, &Zstd));
 
+// Comments, which cost little to read.
+std::string MostlyComments(std::size_t bytes) {
+  const std::string comment = "#" + std::string(4094, '-') + "\n";
+  std::string table = "x,y\n";
+  while (table.size() < bytes) table += comment;
+  return table + "1,2\n";
+}
+
+TEST(Packed, RefusesWhatExpandsTooMuch) {
+  const support::TemporaryFolder directory;
+  const std::string path = directory.Write("bomb.csv.zst", Zstd(MostlyComments(80 << 20)));
+  ASSERT_LT(std::filesystem::file_size(path), 80u << 10) << "a thousandth";
+  ExpectRefused(ReadAll(path).status, absl::StatusCode::kResourceExhausted,
+                {"bomb.csv.zst", "64 MiB and 1000 times its size", "--max-expansion"});
+  EXPECT_THAT(ReadOne(path, {.max_expansion = 1e6}).positions, testing::ElementsAre(1, 2));
+  const std::string small = directory.Write("small.csv.zst", Zstd(MostlyComments(60 << 20)));
+  EXPECT_THAT(ReadOne(small).positions, testing::ElementsAre(1, 2));
+}
+
 TEST(Packed, TablesMayBePackedToo) {
   const support::TemporaryFolder directory;
   EXPECT_THAT(ReadOne(directory.Write("frame.csv.gz", Gzip("x,y\n1,2\n"))).positions,

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-/// No file may grow beyond `bytes` while this lives: what a full disk looks like from here.
+/// Limits the size of files, to simulate a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {
@@ -38,7 +38,7 @@ class FileSizeLimit {
   void (*handler_)(int);
 };
 
-TEST(AtomicFile, WhatWasAppendedIsTheWholeContent) {
+TEST(AtomicFile, HasExactlyTheAppendedBytes) {
   support::TemporaryFolder directory;
   auto file = AtomicFile::Create(directory / "out.txt");
   ASSERT_TRUE(file.ok()) << file.status();
@@ -55,7 +55,7 @@ TEST(AtomicFile, WhatWasAppendedIsTheWholeContent) {
   EXPECT_THAT(directory.Entries(), ElementsAre("out.txt"));
 }
 
-TEST(AtomicFile, NothingHasTheNameBeforeCommit) {
+TEST(AtomicFile, HasNoNameBeforeCommit) {
   support::TemporaryFolder directory;
   auto file = AtomicFile::Create(directory / "out.txt");
   ASSERT_TRUE(file.ok());
@@ -63,7 +63,7 @@ TEST(AtomicFile, NothingHasTheNameBeforeCommit) {
   EXPECT_FALSE(std::filesystem::exists(directory / "out.txt"));
 }
 
-TEST(AtomicFile, AFileThatIsGivenUpLeavesNothingAndTheOldOneAsItWas) {
+TEST(AtomicFile, KeepsTheOldFileWithoutCommit) {
   support::TemporaryFolder directory;
   ASSERT_TRUE(WriteFileAtomically(directory / "out.txt", "old").ok());
   {
@@ -82,23 +82,23 @@ TEST(AtomicFile, AnOldFileIsReplaced) {
   EXPECT_EQ(ReadFile(directory / "out.txt"), "new");
 }
 
-TEST(AtomicFile, AMissingDirectoryIsNamedAndNothingIsLeft) {
+TEST(AtomicFile, NamesAMissingDirectory) {
   support::TemporaryFolder directory;
   const absl::Status status = WriteFileAtomically(directory / "missing/out.txt", "text");
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(status.message()), HasSubstr("missing/out.txt"));
-  EXPECT_THAT(std::string(status.message()), HasSubstr("make its directory first"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("create its directory first"));
   EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
-TEST(AtomicFile, ADirectoryInItsPlaceIsRefusedBeforeAnythingIsWritten) {
+TEST(AtomicFile, RefusesADirectoryBeforeWriting) {
   support::TemporaryFolder directory;
   std::filesystem::create_directory(directory / "out.txt");
   EXPECT_FALSE(AtomicFile::Create(directory / "out.txt").ok());
   EXPECT_THAT(directory.Entries(), ElementsAre("out.txt"));
 }
 
-TEST(AtomicFile, AFullDiskInTheMiddleLeavesNothing) {
+TEST(AtomicFile, LeavesNothingIfTheDiskIsFull) {
   support::TemporaryFolder directory;
   const FileSizeLimit limit(150'000);
   auto file = AtomicFile::Create(directory / "out.txt");
@@ -112,11 +112,11 @@ TEST(AtomicFile, AFullDiskInTheMiddleLeavesNothing) {
   EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
-TEST(AtomicFile, AFullDiskAtTheEndLeavesNothingEither) {
+TEST(AtomicFile, LeavesNothingIfTheDiskIsFullAtTheEnd) {
   support::TemporaryFolder directory;
   auto file = AtomicFile::Create(directory / "out.txt");
   ASSERT_TRUE(file.ok()) << file.status();
-  ASSERT_TRUE(file->Append(std::string(2000, 'x')).ok());  // Waits for Commit.
+  ASSERT_TRUE(file->Append(std::string(2000, 'x')).ok());  // Buffered until Commit.
   {
     const FileSizeLimit limit(1000);
     EXPECT_FALSE(file->Commit().ok());
@@ -125,13 +125,12 @@ TEST(AtomicFile, AFullDiskAtTheEndLeavesNothingEither) {
   EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
-// A pipe of its own stands for all that is no regular file: with /dev/null, a mistake would
-// replace the machine's.
-TEST(AtomicFile, APipeIsWrittenStraightAwayAndStaysAPipe) {
+// Uses a new pipe, because a mistake with /dev/null would replace the machine's.
+TEST(AtomicFile, WritesAPipeDirectly) {
   support::TemporaryFolder directory;
   const std::filesystem::path pipe = directory / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  // Open for reading first, so that a writer does not wait for a reader.
+  // Opened for reading first, so that the writer does not block.
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
   ASSERT_GE(reader, 0);
   EXPECT_TRUE(WriteFileAtomically(pipe, "text").ok());
@@ -152,12 +151,12 @@ TEST(AtomicFile, ASymbolicLinkIsFollowed) {
   EXPECT_EQ(ReadFile(directory / "real.txt"), "new");
 }
 
-TEST(AtomicFile, AMessageStaysOneLineWhateverTheName) {
+TEST(AtomicFile, MessagesAreOneLine) {
   const absl::Status status = WriteFileAtomically("/missing\ndirectory/out.txt", "text");
   EXPECT_THAT(std::string(status.message()), Not(HasSubstr("\n")));
 }
 
-TEST(AtomicFile, PermissionsAreThoseOfAnOrdinaryNewFile) {
+TEST(AtomicFile, HasThePermissionsOfANewFile) {
   support::TemporaryFolder directory;
   const mode_t before = ::umask(027);
   ASSERT_TRUE(WriteFileAtomically(directory / "out.txt", "text").ok());

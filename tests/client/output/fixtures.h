@@ -1,4 +1,4 @@
-// Results made by hand.
+// Hand-made results.
 #pragma once
 
 #include <atomic>
@@ -53,14 +53,14 @@ inline void AddRing(Rings& rings, const std::vector<double>& points, std::uint32
   rings.measures.push_back(measures);
 }
 
-///   a 4 x 4 square with a 1 x 1 hole, meshed by 8 triangles, beside a triangle of its own:
-///   three rings, area 15 + 0.5
+/// A 4 x 4 square with a 1 x 1 hole and 8 triangles, and a separate triangle: three rings, area
+/// 15 + 0.5.
 inline Result SquareWithHoleAndIsland() {
   Result result;
   AddRing(result.rings, {0, 0, 4, 0, 4, 4, 0, 4}, kNoRing, 150, 7);
   AddRing(result.rings, {10, 0, 11, 0, 10, 1}, kNoRing, 5, 9);
   AddRing(result.rings, {1, 1, 1, 2, 2, 2, 2, 1}, 0);
-  result.rings.parents = {3, 7};  // The square goes on and took ring 3 in.
+  result.rings.parents = {3, 7};  // The square continues, merged with ring 3.
   result.rings.parent_offsets = {0, 2, 2, 2};
   result.mesh.points = result.rings.points;
   result.mesh.triangles = {0, 1, 10, 0, 10, 7, 1, 2, 9, 1, 9, 10, 2, 3,

@@ -79,7 +79,7 @@ TEST(Numbers, TheShortestFormReadsBackTheSameBits) {
   EXPECT_EQ(text, "0.1");
 }
 
-TEST(GeoJson, ThereIsOnePolygonPerOuterRingWithItsHoles) {
+TEST(GeoJson, HasOnePolygonPerOuterRing) {
   const Result result = SquareWithHoleAndIsland();
   const json file = json::parse(Encode(FrameFormat::kGeoJson, {.index = 3, .result = result}));
   EXPECT_EQ(file.at("type"), "FeatureCollection");
@@ -107,7 +107,7 @@ TEST(GeoJson, EveryRingEndsWithItsFirstPoint) {
   EXPECT_EQ(rings, 3);
 }
 
-TEST(GeoJson, OuterRingsRunCounterClockwiseAndHolesClockwiseWhateverTheResultSays) {
+TEST(GeoJson, OrientsOuterRingsAndHoles) {
   Result reversed;
   AddRing(reversed.rings, {0, 4, 4, 4, 4, 0, 0, 0}, kNoRing);
   AddRing(reversed.rings, {2, 1, 2, 2, 1, 2, 1, 1}, 0);
@@ -123,7 +123,7 @@ TEST(GeoJson, OuterRingsRunCounterClockwiseAndHolesClockwiseWhateverTheResultSay
   }
 }
 
-TEST(GeoJson, TheOrientationIsRightFarFromTheOriginToo) {
+TEST(GeoJson, OrientsRingsFarFromTheOrigin) {
   constexpr double kFar = 1e12;
   Result result;
   AddRing(result.rings, {kFar, kFar + 0.5, kFar + 0.5, kFar + 0.5, kFar + 0.5, kFar, kFar, kFar},
@@ -134,7 +134,7 @@ TEST(GeoJson, TheOrientationIsRightFarFromTheOriginToo) {
                                 kFar + 0.5, kFar, kFar + 0.5));
 }
 
-TEST(GeoJson, PropertiesTellAreaWithoutHolesPerimeterParticlesIdentityFrameAndTime) {
+TEST(GeoJson, HasPropertiesOfEachPolygon) {
   const Result result = SquareWithHoleAndIsland();
   const json file =
       json::parse(Encode(FrameFormat::kGeoJson, {.index = 12, .time = 0.1, .result = result}));
@@ -159,13 +159,13 @@ TEST(GeoJson, CoordinatesReadBackTheSame) {
               ElementsAre(third, tiny, 1e300, 0.1 + 0.2, -2.0 / 3, 5, third, tiny));
 }
 
-TEST(GeoJson, AnEmptyFrameIsACollectionWithoutFeatures) {
+TEST(GeoJson, WritesAnEmptyFrameAsAnEmptyCollection) {
   const Result result;
   const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
   EXPECT_THAT(file.at("features"), IsEmpty());
 }
 
-TEST(GeoJson, ARingThatCrossesItselfIsWrittenPointByPoint) {
+TEST(GeoJson, WritesASelfIntersectingRingUnchanged) {
   Result bow_tie;
   AddRing(bow_tie.rings, {0, 0, 2, 2, 2, 0, 0, 2}, kNoRing);
   const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = bow_tie}));
@@ -179,7 +179,7 @@ TEST(GeoJson, ATimeThatIsNotFiniteIsNull) {
   EXPECT_TRUE(file.at("time").is_null());
 }
 
-TEST(FrameWriter, ACoordinateThatIsNotFiniteIsNeverWritten) {
+TEST(FrameWriter, RefusesNonFiniteCoordinates) {
   Result result = SquareWithHoleAndIsland();
   result.rings.points[3] = std::numeric_limits<double>::infinity();
   for (const FrameFormat format : AllFrameFormats()) {
@@ -189,12 +189,12 @@ TEST(FrameWriter, ACoordinateThatIsNotFiniteIsNeverWritten) {
   }
 }
 
-TEST(Svg, YPointsUpAndTheBoxIsThatOfTheSequence) {
+TEST(Svg, UsesTheBoxOfTheSequence) {
   Result result;
   AddRing(result.rings, {0, 0, 1, 0, 0, 1}, kNoRing);
   const std::string svg =
       Encode(FrameFormat::kSvg, {.result = result}, {.picture_box = Box{0, 0, 2, 1}});
-  // The longer side of 2 with its margins of 0.04 on both sides takes 1000 units: 480.769 each.
+  // The longer side, 2, and two margins of 0.04 have 1000 units: 480.769 per unit of length.
   EXPECT_THAT(svg, HasSubstr("viewBox=\"0 0 1000 519.231\""));
   EXPECT_THAT(svg, HasSubstr("d=\"M19.231 500L500 500L19.231 19.231Z\""));
 }
@@ -208,7 +208,7 @@ TEST(Svg, EveryMeshEdgeIsDrawnOnce) {
   EXPECT_EQ(CountOf(path, "M"), 19u);
 }
 
-TEST(Svg, ParticlesAreDrawnWhereTheyAreWanted) {
+TEST(Svg, DrawsParticlesOnRequest) {
   const Result result = SquareWithHoleAndIsland();
   const std::vector<double> particles = {1, 1, 2, 2, 3, std::nan("")};
   const FrameRecord frame{.result = result, .particles = particles};
@@ -224,7 +224,7 @@ TEST(Svg, AnEmptyFrameIsAPictureToo) {
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
 }
 
-TEST(Obj, FacesAndClosedPolylinesShareTheVerticesOfTheMesh) {
+TEST(Obj, SharesVerticesOfFacesAndRings) {
   const Result result = SquareWithHoleAndIsland();
   const auto lines = ObjLines(Encode(FrameFormat::kObj, {.result = result}));
   std::size_t vertices = 0, faces = 0;
@@ -255,7 +255,7 @@ TEST(Obj, WithoutAMeshThereAreOnlyPolylines) {
   EXPECT_EQ(CountOf(obj, "\nl "), 3u);
 }
 
-TEST(Obj, AMeshThatDoesNotBeginWithTheRingsHasVerticesOfItsOwn) {
+TEST(Obj, GivesAnUnrelatedMeshItsOwnVertices) {
   Result result = SquareWithHoleAndIsland();
   result.mesh.points[0] = -1;
   const std::string obj = Encode(FrameFormat::kObj, {.result = result});
@@ -278,7 +278,7 @@ TEST(Csv, WithoutNormalsTheirColumnsAreEmpty) {
   EXPECT_THAT(Encode(FrameFormat::kCsv, {.result = result}), HasSubstr("\n0,2,-1,0,,\n"));
 }
 
-TEST(Vtp, LinesComeBeforePolygonsAndEachCellHasItsClassWhereTheBuildHasVtk) {
+TEST(Vtp, HasLinesBeforePolygonsWithClasses) {
   const Result result = SquareWithHoleAndIsland();
   const auto formats = AllFrameFormats();
   if (std::find(formats.begin(), formats.end(), FrameFormat::kVtp) == formats.end()) {
@@ -296,7 +296,7 @@ TEST(Vtp, LinesComeBeforePolygonsAndEachCellHasItsClassWhereTheBuildHasVtk) {
   EXPECT_THAT(vtp, HasSubstr("</VTKFile>"));
 }
 
-TEST(FrameWriter, FilesAreNumberedByTheIndexInTheInput) {
+TEST(FrameWriter, NumbersFilesByTheIndexInTheInput) {
   support::TemporaryFolder directory;
   const auto writer = FrameWriter::Create({.directory = directory / "made/on/the/way",
                                            .formats = {FrameFormat::kGeoJson, FrameFormat::kObj}});
@@ -312,7 +312,7 @@ TEST(FrameWriter, FilesAreNumberedByTheIndexInTheInput) {
                                           "frame_12345678.geojson", "frame_12345678.obj"));
 }
 
-TEST(FrameWriter, SectionsAreFilesOfTheirOwnAndLinesInThePicture) {
+TEST(FrameWriter, WritesSectionsAsFilesAndAsLines) {
   support::TemporaryFolder directory;
   Result result = SquareWithHoleAndIsland();
   result.sections.resize(2);
@@ -349,7 +349,7 @@ TEST(FrameWriter, SectionsAreFilesOfTheirOwnAndLinesInThePicture) {
       << "they need not lie in its plane";
 }
 
-TEST(FrameWriter, ADirectoryThatGoesAwayIsToldAndLeavesNothing) {
+TEST(FrameWriter, ReportsAVanishedDirectory) {
   support::TemporaryFolder directory;
   const auto writer =
       FrameWriter::Create({.directory = directory / "out", .formats = {FrameFormat::kSvg}});
@@ -362,7 +362,7 @@ TEST(FrameWriter, ADirectoryThatGoesAwayIsToldAndLeavesNothing) {
   EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
-TEST(FrameWriter, AFileInPlaceOfTheDirectoryIsRefused) {
+TEST(FrameWriter, RefusesAFileInsteadOfADirectory) {
   support::TemporaryFolder directory;
   std::ofstream(directory / "out") << "a file";
   const auto writer = FrameWriter::Create({.directory = directory / "out"});
@@ -370,13 +370,13 @@ TEST(FrameWriter, AFileInPlaceOfTheDirectoryIsRefused) {
   EXPECT_EQ(ReadFile(directory / "out"), "a file");
 }
 
-TEST(FrameFormats, AListKeepsItsOrderAndNamesEachOnce) {
+TEST(FrameFormats, ListsKeepTheirOrderWithoutDuplicates) {
   const auto formats = ParseFrameFormats("svg,geojson,svg");
   ASSERT_TRUE(formats.ok());
   EXPECT_THAT(*formats, ElementsAre(FrameFormat::kSvg, FrameFormat::kGeoJson));
 }
 
-TEST(FrameFormats, AnUnknownWordIsNamedWithWhatMayStandThere) {
+TEST(FrameFormats, NamesAnUnknownFormatAndTheKnownOnes) {
   for (const char* list : {"svg,stl", "stl", "svg,", ""}) {
     const auto formats = ParseFrameFormats(list);
     ASSERT_EQ(formats.status().code(), absl::StatusCode::kInvalidArgument) << list;
@@ -415,14 +415,14 @@ TEST(Svg, ColoursByAnAttributeWithALegend) {
   const std::string plain = Encode(FrameFormat::kSvg, frame);
   EXPECT_EQ(plain.find("class=\"bands\""), std::string::npos);
   const std::string colored = Encode(FrameFormat::kSvg, frame, {.color_by = "height"});
-  EXPECT_GT(CountOf(colored, " fill=\"#"), 2 * kColorBands - 2);  // Of the bands and the legend.
+  EXPECT_GT(CountOf(colored, " fill=\"#"), 2 * kColorBands - 2);  // Bands and legend.
   EXPECT_THAT(colored, HasSubstr(">0</text>"));
   EXPECT_THAT(colored, HasSubstr(">4</text>"));
   EXPECT_THAT(colored, HasSubstr(">height</text>"));
   EXPECT_EQ(Encode(FrameFormat::kSvg, frame, {.color_by = "other"}), plain);
 }
 
-TEST(Svg, ColoursTheOutlineWhereThereIsNoMesh) {
+TEST(Svg, ColoursTheOutlineWithoutAMesh) {
   Result result = WithAttributes();
   result.mesh = {};
   for (AttributeValues& one : result.attributes) {

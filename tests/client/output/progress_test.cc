@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "client/output/text.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -33,7 +34,7 @@ class ProgressTest : public ::testing::Test {
   std::vector<std::string> shown_;
 };
 
-TEST_F(ProgressTest, ATerminalGetsOneLineThatIsDrawnAnew) {
+TEST_F(ProgressTest, RedrawsOneLineOnATerminal) {
   {
     Progress progress(Options(true, 200));
     now_ += std::chrono::seconds(10);
@@ -46,7 +47,7 @@ TEST_F(ProgressTest, ATerminalGetsOneLineThatIsDrawnAnew) {
   EXPECT_EQ(shown_[2], "\n");
 }
 
-TEST_F(ProgressTest, TheLineNeverFillsTheTerminal) {
+TEST_F(ProgressTest, NeverFillsTheTerminalLine) {
   for (columns_ = 1; columns_ < 120; ++columns_) {
     shown_.clear();
     Progress progress(Options(true, 75));
@@ -60,7 +61,7 @@ TEST_F(ProgressTest, TheLineNeverFillsTheTerminal) {
   }
 }
 
-TEST_F(ProgressTest, ATerminalIsNotRedrawnMoreThanTenTimesASecond) {
+TEST_F(ProgressTest, RedrawsAtMostTenTimesPerSecond) {
   Progress progress(Options(true, 1000));
   for (std::uint64_t k = 0; k < 1000; ++k) {
     now_ += std::chrono::milliseconds(1);
@@ -70,7 +71,7 @@ TEST_F(ProgressTest, ATerminalIsNotRedrawnMoreThanTenTimesASecond) {
   EXPECT_GE(shown_.size(), 9u);
 }
 
-TEST_F(ProgressTest, TheLastStateIsAlwaysShown) {
+TEST_F(ProgressTest, AlwaysShowsTheLastState) {
   for (const bool terminal : {true, false}) {
     shown_.clear();
     Progress progress(Options(terminal, 75));
@@ -84,7 +85,7 @@ TEST_F(ProgressTest, TheLastStateIsAlwaysShown) {
   }
 }
 
-TEST_F(ProgressTest, ElsewhereThereIsALineEveryTwoSecondsAndALastOne) {
+TEST_F(ProgressTest, WritesALineEveryTwoSecondsWithoutATerminal) {
   Progress progress(Options(false, 100));
   for (std::uint64_t k = 1; k <= 50; ++k) {
     now_ += std::chrono::milliseconds(100);
@@ -96,7 +97,7 @@ TEST_F(ProgressTest, ElsewhereThereIsALineEveryTwoSecondsAndALastOne) {
                                   "50 of 100 frames, 10 frames/s, 0:05 left\n"));
 }
 
-TEST_F(ProgressTest, WithoutATotalThereIsNoShareAndNoTimeLeft) {
+TEST_F(ProgressTest, HasNoShareWithoutATotal) {
   for (const bool terminal : {true, false}) {
     shown_.clear();
     Progress progress(Options(terminal, std::nullopt));
@@ -109,13 +110,14 @@ TEST_F(ProgressTest, WithoutATotalThereIsNoShareAndNoTimeLeft) {
   }
 }
 
-TEST_F(ProgressTest, QuietShowsNothingButNotes) {
+TEST_F(ProgressTest, ShowsOnlyNotesIfQuiet) {
   for (const bool terminal : {true, false}) {
     Progress::Options options = Options(terminal, 10);
     options.quiet = true;
     Progress progress(options);
     now_ += std::chrono::seconds(10);
     progress.Update(5);
+    progress.Wait("lost it");
     progress.Finish();
     EXPECT_THAT(shown_, IsEmpty());
   }
@@ -125,7 +127,27 @@ TEST_F(ProgressTest, QuietShowsNothingButNotes) {
   EXPECT_THAT(shown_, ElementsAre("frame 3: refused\n"));
 }
 
-TEST_F(ProgressTest, ANoteDoesNotTearTheBar) {
+TEST_F(ProgressTest, WaitingIsShownInPlaceOfTheState) {
+  for (const bool terminal : {true, false}) {
+    shown_.clear();
+    Progress progress(Options(terminal, 10));
+    now_ += std::chrono::seconds(3);
+    progress.Update(5);
+    shown_.clear();
+    for (int k = 0; k <= 250; ++k) {
+      progress.Wait(Concat("lost it, ", k / 10, " s"));
+      now_ += std::chrono::milliseconds(100);
+    }
+    EXPECT_EQ(shown_.size(), terminal ? 251u : 3u);
+    EXPECT_EQ(shown_.back(), terminal ? "\r\x1b[Klost it, 25 s" : "lost it, 20 s\n");
+    progress.Update(6);
+    EXPECT_THAT(shown_.back(), HasSubstr(terminal ? "6/10" : "6 of 10"));
+    progress.Wait("lost it again");
+    EXPECT_THAT(shown_.back(), HasSubstr("again"));
+  }
+}
+
+TEST_F(ProgressTest, NotesDoNotBreakTheBar) {
   Progress progress(Options(true, 10));
   now_ += std::chrono::seconds(1);
   progress.Update(5);
@@ -136,7 +158,7 @@ TEST_F(ProgressTest, ANoteDoesNotTearTheBar) {
   EXPECT_EQ(shown_[2], bar);
 }
 
-TEST_F(ProgressTest, MoreFramesThanExpectedDoNotBreakTheBar) {
+TEST_F(ProgressTest, AcceptsMoreFramesThanExpected) {
   Progress progress(Options(true, 10));
   now_ += std::chrono::seconds(1);
   progress.Update(25);
@@ -144,7 +166,7 @@ TEST_F(ProgressTest, MoreFramesThanExpectedDoNotBreakTheBar) {
   EXPECT_THAT(shown_[0], HasSubstr("] 100 %"));
 }
 
-TEST_F(ProgressTest, FinishIsSaidOnce) {
+TEST_F(ProgressTest, FinishesOnce) {
   Progress progress(Options(false, 10));
   progress.Update(10);
   progress.Finish();

@@ -20,7 +20,7 @@ using ::testing::IsEmpty;
 using ::testing::Key;
 using ::testing::Not;
 
-/// What is between `begin` and `end`, for each `begin` of the text.
+/// The text between `begin` and `end`, for each `begin`.
 std::vector<std::string> Between(const std::string& text, const std::string& begin,
                                  const std::string& end) {
   std::vector<std::string> found;
@@ -54,7 +54,7 @@ std::string Page(const ReportOptions& options, const std::vector<FrameRecord>& f
   return ReadFile(directory / "report.html");
 }
 
-/// Reads what report_geometry.h describes, straight from that description.
+/// Reads the format of report_geometry.h, written from its description.
 class Reader {
  public:
   explicit Reader(std::string bytes) : bytes_(std::move(bytes)) {}
@@ -158,7 +158,7 @@ void ExpectNear(const std::vector<double>& found, const std::vector<double>& exp
   for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k], expected[k], tolerance);
 }
 
-TEST(Report, ThePageHoldsEveryFrameWithItsNumbersAndGeometry) {
+TEST(Report, HasNumbersAndGeometryOfEveryFrame) {
   const Result full = SquareWithHoleAndIsland();
   const Result empty;
   const std::string page =
@@ -174,6 +174,8 @@ TEST(Report, ThePageHoldsEveryFrameWithItsNumbersAndGeometry) {
   EXPECT_EQ(first.at("triangles"), 9);
   EXPECT_EQ(first.at("milliseconds"), 3);
   EXPECT_EQ(first.at("stages").size(), kStageCount);
+  EXPECT_TRUE(first.at("stages").contains(kStageNames[0]));
+  EXPECT_TRUE(first.at("doubts").empty());
   EXPECT_EQ(first.at("measures").size(), 3u);
   EXPECT_EQ(first.at("measures")[0], (json{16.0, 16.0, 150, "7", {"3", "7"}}));
   EXPECT_TRUE(first.at("measures")[1][4].empty());
@@ -184,9 +186,20 @@ TEST(Report, ThePageHoldsEveryFrameWithItsNumbersAndGeometry) {
   EXPECT_EQ(Decode(bytes).points.size(), full.rings.points.size());
 }
 
-TEST(Report, ThePageNeedsNothingFromOutside) {
-  const Result result = SquareWithHoleAndIsland();
+TEST(Report, ExplainsDoubts) {
+  Result result;
+  result.statistics.doubts.Add(Doubt::kPositionsCoarse);
   const std::string page = Page({.title = "t"}, {{.result = result}});
+  EXPECT_EQ(json::parse(Numbers(page).at(0)).at("doubts"),
+            json{std::string(Explanation(Doubt::kPositionsCoarse))});
+}
+
+TEST(Report, RefersToNoOtherResource) {
+  const Result result = SquareWithHoleAndIsland();
+  std::string page = Page({.title = "t"}, {{.result = result}});
+  // The name of a namespace is not a reference.
+  const std::string name = "http://www.w3.org/2000/svg";
+  for (std::size_t at; (at = page.find(name)) != std::string::npos;) page.erase(at, name.size());
   for (const char* reference :
        {"http://", "https://", " src=", "href=", "@import", "url(", "//cdn"}) {
     EXPECT_THAT(page, Not(HasSubstr(reference)));
@@ -194,13 +207,13 @@ TEST(Report, ThePageNeedsNothingFromOutside) {
   EXPECT_THAT(page, HasSubstr("default-src 'none'"));
 }
 
-TEST(Report, NoMarkOfTheTemplateIsLeft) {
+TEST(Report, HasNoMarkOfTheTemplate) {
   const std::string page = Page({.title = "t"}, {});
   EXPECT_THAT(page, Not(HasSubstr("{{")));
   EXPECT_THAT(page, HasSubstr("</html>"));
 }
 
-TEST(Report, TextOfOthersIsShownAndNeverRun) {
+TEST(Report, EscapesForeignText) {
   const std::string hostile =
       "</title></script><script>alert('1')</script><img onerror=\"x\">&{{script}}";
   const std::string page =
@@ -210,10 +223,10 @@ TEST(Report, TextOfOthersIsShownAndNeverRun) {
   const std::string escaped =
       "&lt;/title&gt;&lt;/script&gt;&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt;"
       "&lt;img onerror=&quot;x&quot;&gt;&amp;{{script}}";
-  EXPECT_EQ(Between(page, escaped, "").size(), 5u) << "twice the title, subtitle, parameter";
+  EXPECT_EQ(Between(page, escaped, "").size(), 5u) << "title twice, subtitle, parameter";
 }
 
-TEST(Report, TheTableAndTheParametersAreOnThePage) {
+TEST(Report, HasSummaryAndParameters) {
   const Result result = SquareWithHoleAndIsland();
   const std::string page = Page({.title = "t", .parameters = {{"kernel radius", "3 spacings"}}},
                                 {{.result = result, .total_ms = 1.25}});
@@ -223,7 +236,7 @@ TEST(Report, TheTableAndTheParametersAreOnThePage) {
   EXPECT_THAT(page, HasSubstr("whole frame</th><td>1.250</td>"));
 }
 
-TEST(Report, ANumberThatIsNotFiniteIsNull) {
+TEST(Report, WritesNonFiniteNumbersAsNull) {
   Result result;
   result.statistics.area = std::nan("");
   const std::string page = Page({.title = "t"}, {{.time = std::nan(""), .result = result}});
@@ -232,7 +245,7 @@ TEST(Report, ANumberThatIsNotFiniteIsNull) {
   EXPECT_TRUE(numbers.at("time").is_null());
 }
 
-TEST(Report, WithoutFinishThereIsNoPage) {
+TEST(Report, LeavesNoFileWithoutFinish) {
   support::TemporaryFolder directory;
   const Result result = SquareWithHoleAndIsland();
   {
@@ -243,25 +256,25 @@ TEST(Report, WithoutFinishThereIsNoPage) {
   EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
-TEST(Report, AMissingDirectoryIsToldBeforeTheWork) {
+TEST(Report, RefusesAMissingDirectoryAtOnce) {
   support::TemporaryFolder directory;
   const auto report = ReportWriter::Create(directory / "missing/report.html", {.title = "t"});
   EXPECT_EQ(report.status().code(), absl::StatusCode::kNotFound);
 }
 
-TEST(Report, TellsTheRangeOfColoursAndTheirName) {
+TEST(Report, HasNameAndRangeOfTheAttribute) {
   Result result = SquareWithHoleAndIsland();
   result.attributes.resize(1);
   result.attributes[0] = {.name = "<p>", .values = std::vector<float>(11, 1.0f)};
   result.attributes[0].values[3] = 3;
   const std::string page = Page({.title = "t", .color_by = "<p>"}, {{.result = result}});
   EXPECT_EQ(json::parse(Numbers(page).at(0)).at("colors"), (json{1.0, 3.0}));
-  EXPECT_THAT(page, HasSubstr("&lt;p&gt;</label>"));
+  EXPECT_THAT(page, HasSubstr("data-color=\"&lt;p&gt;\""));
   const std::string plain = Page({.title = "t"}, {{.result = result}});
   EXPECT_FALSE(json::parse(Numbers(plain).at(0)).contains("colors"));
 }
 
-TEST(Report, SectionsAreAmongTheParameters) {
+TEST(Report, DescribesSections) {
   const auto lines = DescribeParameters(
       {.slice = SlicePlane{.origin = {0, 0, 0.5}},
        .isovalue = 0.25,
@@ -273,7 +286,7 @@ TEST(Report, SectionsAreAmongTheParameters) {
   EXPECT_THAT(lines, Contains(std::pair("section 2", "slice through (1, 2, 3), normal (1, 0, 0)")));
 }
 
-TEST(Report, ParametersAreDescribedUnderTheirNames) {
+TEST(Report, DescribesParameters) {
   const auto lines = DescribeParameters({.placement = Placement::kFarthestParticle,
                                          .fill = Fill::kGrid,
                                          .spacing = 0.0303,
@@ -292,7 +305,7 @@ TEST(Report, ParametersAreDescribedUnderTheirNames) {
                   std::pair("fewest particles", "3")));
 }
 
-TEST(ReportGeometry, RingsMeshAndParticlesComeBackWithinHalfAStep) {
+TEST(ReportGeometry, RoundsToHalfAStep) {
   const Result result = SquareWithHoleAndIsland();
   const std::vector<double> particles = {3.1, 3.2, 0.1, 0.3, 1.23, 0.31};
   const Decoded decoded = DecodeFrame({.result = result, .particles = particles});
@@ -309,7 +322,7 @@ TEST(ReportGeometry, RingsMeshAndParticlesComeBackWithinHalfAStep) {
   ExpectNear(decoded.particles, {0.1, 0.3, 1.23, 0.31, 3.1, 3.2}, half);
 }
 
-// The square, with another one around it and one of which the picture shows nothing.
+// The square, a larger square around it, and a triangle outside the picture.
 Result WithSections() {
   Result result = SquareWithHoleAndIsland();
   result.sections.resize(2);
@@ -318,7 +331,7 @@ Result WithSections() {
   return result;
 }
 
-TEST(ReportGeometry, IsolinesAreTheSectionsOfTheSamePlane) {
+TEST(ReportGeometry, IsolinesAreSectionsInThePlane) {
   const Result result = WithSections();
   const std::vector<std::size_t> in_plane = {1};
   const Decoded decoded = DecodeFrame({.result = result, .sections_in_plane = in_plane});
@@ -327,7 +340,7 @@ TEST(ReportGeometry, IsolinesAreTheSectionsOfTheSamePlane) {
   EXPECT_THAT(DecodeFrame({.result = result}).isoline_sizes, IsEmpty());
 }
 
-TEST(ReportGeometry, ColoursAreSharesOfTheRangeOfAnAttribute) {
+TEST(ReportGeometry, ColoursAreSharesOfTheRange) {
   Result result = SquareWithHoleAndIsland();
   result.attributes.resize(2);
   result.attributes[0] = {.name = "p", .values = std::vector<float>(11, 1.0f)};
@@ -339,26 +352,26 @@ TEST(ReportGeometry, ColoursAreSharesOfTheRangeOfAnAttribute) {
     return DecodeFrame({.result = result}, 1000, max_triangles, name).colors;
   };
   EXPECT_THAT(colors("p"), ElementsAre(0, 0, 0, 255, 128, 0, 0, 0, 0, 0, 0));
-  EXPECT_EQ(colors("v")[0], 255) << "of a vector its length";
+  EXPECT_EQ(colors("v")[0], 255) << "length of a vector";
   EXPECT_THAT(colors("q"), IsEmpty());
   EXPECT_THAT(colors(""), IsEmpty());
-  EXPECT_EQ(colors("p", 8).size(), result.rings.PointCount()) << "without a mesh the outline";
+  EXPECT_EQ(colors("p", 8).size(), result.rings.PointCount()) << "outline only, without a mesh";
 }
 
-TEST(ReportGeometry, NormalsAreTurnsOf256Steps) {
+TEST(ReportGeometry, NormalsHave256Directions) {
   Result result;
   AddRing(result.rings, {1, 0, 0, 1, -1, 0, 0, -1}, kNoRing);
   EXPECT_THAT(DecodeFrame({.result = result}).normals, ElementsAre(0, 64, 128, 192));
 }
 
-TEST(ReportGeometry, AMeshWithPointsOfItsOwnComesBackToo) {
+TEST(ReportGeometry, KeepsAMeshWithOwnPoints) {
   Result result = SquareWithHoleAndIsland();
   result.mesh.points[0] = -1;
   const Decoded decoded = DecodeFrame({.result = result});
   ExpectNear(decoded.mesh_points, result.mesh.points, decoded.step * 0.5001);
 }
 
-TEST(ReportGeometry, AFlyerFarAwayCostsStepsButNotTheFrame) {
+TEST(ReportGeometry, KeepsTheFrameBesideADistantParticle) {
   const Result result = SquareWithHoleAndIsland();
   const std::vector<double> particles = {1e9, -1e9};
   const Decoded decoded = DecodeFrame({.result = result, .particles = particles});
@@ -366,7 +379,7 @@ TEST(ReportGeometry, AFlyerFarAwayCostsStepsButNotTheFrame) {
   ExpectNear(decoded.particles, particles, decoded.step);
 }
 
-TEST(ReportGeometry, AFrameFarFromTheOriginKeepsItsShape) {
+TEST(ReportGeometry, KeepsTheShapeFarFromTheOrigin) {
   Result result;
   AddRing(result.rings, {1e8, 1e8, 1e8 + 1, 1e8, 1e8, 1e8 + 1}, kNoRing);
   result.statistics.spacing = 0.1;
@@ -374,7 +387,7 @@ TEST(ReportGeometry, AFrameFarFromTheOriginKeepsItsShape) {
   ExpectNear(decoded.points, result.rings.points, decoded.step);
 }
 
-TEST(ReportGeometry, BeyondTheLimitsParticlesAreThinnedEvenlyAndTheMeshIsLeftOut) {
+TEST(ReportGeometry, ThinsParticlesAndDropsLargeMeshes) {
   const Result result = SquareWithHoleAndIsland();
   std::vector<double> particles;
   for (int k = 0; k < 100; ++k) particles.insert(particles.end(), {0.04 * k, 0.0});
@@ -385,7 +398,7 @@ TEST(ReportGeometry, BeyondTheLimitsParticlesAreThinnedEvenlyAndTheMeshIsLeftOut
   EXPECT_THAT(decoded.triangles, IsEmpty());
 }
 
-TEST(ReportGeometry, AParticleThatIsNotFiniteIsLeftOut) {
+TEST(ReportGeometry, DropsNonFiniteParticles) {
   const Result result;
   const std::vector<double> particles = {std::nan(""), 1, 2, 3};
   const Decoded decoded = DecodeFrame({.result = result, .particles = particles});

@@ -38,7 +38,7 @@ std::string Written(const std::filesystem::path& path, const std::vector<FrameRe
   return ReadFile(path);
 }
 
-TEST(Statistics, CsvHasExactlyTheseColumnsAndOneRowPerFrame) {
+TEST(Statistics, CsvHasTheDocumentedColumns) {
   support::TemporaryFolder directory;
   Result result = SquareWithHoleAndIsland();
   result.statistics.perimeter = 23.5;
@@ -67,7 +67,7 @@ TEST(Statistics, SectionsHaveRowsOfTheirOwn) {
   EXPECT_THAT(csv, HasSubstr(",0000000000000003,0000000000000004,0.1,,2\n"));
 }
 
-TEST(Statistics, DoubtsAreNamedInACellOfTheirOwn) {
+TEST(Statistics, NamesDoubtsInOneCell) {
   support::TemporaryFolder directory;
   Result result = SquareWithHoleAndIsland();
   result.statistics.doubts.Add(Doubt::kVolumesContradictSpacing);
@@ -91,14 +91,14 @@ TEST(Statistics, JsonIsAnArrayOfObjects) {
   EXPECT_EQ(rows[1].at("rings_digest"), "0123456789abcdef");
 }
 
-TEST(Statistics, NamesAreUniqueSoThatAnObjectHoldsEveryColumn) {
+TEST(Statistics, HasUniqueColumnNames) {
   support::TemporaryFolder directory;
   const Result result = SquareWithHoleAndIsland();
   const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
   EXPECT_EQ(rows[0].size(), StatisticsColumns().size());
 }
 
-TEST(Statistics, NoFramesAtAllAreAHeaderOrAnEmptyArray) {
+TEST(Statistics, WritesNoFramesAsHeaderOrEmptyArray) {
   support::TemporaryFolder directory;
   EXPECT_EQ(Written(directory / "stats.csv", {}), std::string(kHeader) + "\n");
   EXPECT_THAT(ordered_json::parse(Written(directory / "stats.json", {})), IsEmpty());
@@ -112,7 +112,7 @@ TEST(Statistics, AnAreaReadsBackTheSame) {
   EXPECT_EQ(rows[0].at("area").get<double>(), 0.1 + 0.2);
 }
 
-TEST(Statistics, ANumberThatIsNotFiniteIsNullInJson) {
+TEST(Statistics, WritesNonFiniteNumbersAsNullInJson) {
   support::TemporaryFolder directory;
   Result result;
   result.statistics.area = std::numeric_limits<double>::quiet_NaN();
@@ -120,7 +120,7 @@ TEST(Statistics, ANumberThatIsNotFiniteIsNullInJson) {
   EXPECT_TRUE(rows[0].at("area").is_null());
 }
 
-TEST(Statistics, AnotherExtensionIsRefusedAndNothingIsLeft) {
+TEST(Statistics, RefusesOtherExtensions) {
   support::TemporaryFolder directory;
   const auto writer = StatisticsWriter::Create(directory / "stats.txt");
   EXPECT_EQ(writer.status().code(), absl::StatusCode::kInvalidArgument);

@@ -40,7 +40,7 @@ std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
-TEST(Summary, RowsHoldMeanMedianAndNinetyNinthPercentile) {
+TEST(Summary, HasMeanMedianAndPercentile) {
   const Summary summary = HundredFrames();
   const SummaryRow whole = RowOf(summary, "  whole frame");
   EXPECT_EQ(whole.mean, "50.500");
@@ -49,11 +49,11 @@ TEST(Summary, RowsHoldMeanMedianAndNinetyNinthPercentile) {
   const SummaryRow particles = RowOf(summary, "particles");
   EXPECT_EQ(particles.mean, "50,500.0");
   EXPECT_EQ(particles.p99, "99,000");
-  EXPECT_EQ(RowOf(summary, "polylines").mean, "3.0");
+  EXPECT_EQ(RowOf(summary, "rings").mean, "3.0");
   EXPECT_EQ(RowOf(summary, "  bins").p50, "0.250");
 }
 
-TEST(Summary, TheReductionIsTheMeanOfTheFramesThatHaveAGrid) {
+TEST(Summary, AveragesReductionOverFramesWithTriangles) {
   Summary summary = HundredFrames();
   EXPECT_DOUBLE_EQ(summary.MeanReductionPercent(), 75);
   const Result empty;
@@ -69,7 +69,7 @@ TEST(Summary, EveryStageHasItsRow) {
   }
 }
 
-TEST(Summary, TheHeadlineTellsFramesRefusedOnesAndFramesPerSecond) {
+TEST(Summary, HeadlineHasFramesRefusalsAndRate) {
   Summary summary = HundredFrames();
   EXPECT_EQ(summary.Headline(4), "100 frames in 4.00 s, 25.0 frames per second");
   summary.AddRefused();
@@ -77,7 +77,7 @@ TEST(Summary, TheHeadlineTellsFramesRefusedOnesAndFramesPerSecond) {
   EXPECT_EQ(summary.Headline(4), "100 frames (and 2 refused) in 4.00 s, 25.0 frames per second");
 }
 
-TEST(Summary, BrokenPromisesAreToldOnlyWhereThereAreAny) {
+TEST(Summary, ReportsDefectsOnlyIfThereAreAny) {
   Summary summary = HundredFrames();
   EXPECT_THAT(summary.Headline(1), Not(HasSubstr("self-intersections")));
   Result result;
@@ -87,7 +87,7 @@ TEST(Summary, BrokenPromisesAreToldOnlyWhereThereAreAny) {
   EXPECT_THAT(summary.Headline(1), HasSubstr("self-intersections: 3; folded triangles: 2"));
 }
 
-TEST(Summary, WarnsOncePerKindOfDoubtAndTellsInHowManyFrames) {
+TEST(Summary, WarnsOncePerKindOfDoubt) {
   Summary summary = HundredFrames();
   EXPECT_TRUE(summary.Warnings().empty());
   Result result;
@@ -102,7 +102,7 @@ TEST(Summary, WarnsOncePerKindOfDoubtAndTellsInHowManyFrames) {
   EXPECT_THAT(warnings[1], HasSubstr("in 1 of 102 frames: positions-coarse: "));
 }
 
-TEST(Summary, TheTableIsPlainTextWithColumnsThatEndBelowEachOther) {
+TEST(Summary, AlignsTheTable) {
   const std::vector<std::string> lines = Lines(HundredFrames().Table(4));
   ASSERT_GT(lines.size(), 10u);
   const std::size_t width = lines[1].size();
@@ -116,7 +116,7 @@ TEST(Summary, TheTableIsPlainTextWithColumnsThatEndBelowEachOther) {
   }
 }
 
-TEST(Summary, AReplayWithoutFramesHasATableToo) {
+TEST(Summary, HasATableWithoutFrames) {
   const Summary summary;
   EXPECT_THAT(summary.Table(0), HasSubstr("0 frames in 0.00 s\n"));
   EXPECT_THAT(summary.Table(0), Not(HasSubstr("nan")));

@@ -284,6 +284,19 @@ TEST_F(Recording, AFrameInAnotherFramesPlaceIsDamage) {
   }
 }
 
+TEST_F(Recording, RefusesBlocksThatExpandTooMuch) {
+  RecordedFrame frame;
+  frame.positions.assign(std::size_t{1} << 22, 0.0);
+  std::vector<RecordedFrame> frames(6, frame);
+  Write(Path(), frames);
+  const WhatWasRead read = Read(Path());
+  EXPECT_EQ(read.status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(read.status.message()), HasSubstr("--max-expansion"));
+  const auto trusting = RecordingReader::Open(Path(), "", false, 1e9);
+  ASSERT_TRUE(trusting.ok());
+  for (std::size_t k = 0; k < frames.size(); ++k) ASSERT_TRUE(*(*trusting)->Next(frame)) << k;
+}
+
 TEST_F(Recording, BytesBehindTheEndAreDamage) {
   Write(Path(), RandomFrames(2));
   WriteBytes(Path(), Bytes(Path()) + "x");

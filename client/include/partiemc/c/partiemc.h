@@ -86,8 +86,8 @@ typedef struct partiemc_options {
   const char* token;      /* Or the token itself. */
   double connect_timeout; /* Seconds to reach the server; 0: 2. */
   double deadline;        /* Seconds for each answer; 0: 30. */
-  double give_up_after;   /* Seconds to mend a lost connection for; 0: 30. Negative: the stream
-                             ends with its connection. */
+  double give_up_after;   /* Seconds after which a lost connection ends the stream; 0: 300, with
+                             `latest` 30. Negative: at once. */
   double send_timeout; /* Seconds for partiemc_send to get a place in the window, whatever becomes
                           of the connection: DEADLINE_EXCEEDED then, and the stream goes on; 0:
                           as long as the stream lives. */

@@ -72,6 +72,14 @@ struct StreamInfo {
   StreamLimits limits;
 };
 
+/// The search for a server after a loss.
+struct Reconnecting {
+  std::string loss;                            ///< Where and why: "lost HOST:PORT (WHY)".
+  std::string refusal;                         ///< What came of the last attempt, in one line.
+  std::chrono::milliseconds elapsed{0};        ///< Since the loss.
+  std::chrono::milliseconds give_up_after{0};  ///< ReconnectPolicy::give_up_after.
+};
+
 enum class Received : std::uint8_t {
   kEvent,       ///< The event was filled.
   kNothingYet,  ///< The time to wait is over, nothing has come.
@@ -106,6 +114,9 @@ class FrameStream {
   /// stream's deadline, DATA_LOSS when an answer makes no sense; both end the stream.
   virtual absl::StatusOr<Received> Receive(
       Event& event, std::optional<std::chrono::milliseconds> wait = std::nullopt) = 0;
+
+  /// While the stream looks for a server, having lost one; the receiver's thread only.
+  virtual std::optional<Reconnecting> reconnecting() const { return std::nullopt; }
 
   /// Frames sent and not yet received.
   virtual std::size_t InFlight() const = 0;

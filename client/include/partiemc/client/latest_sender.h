@@ -36,6 +36,9 @@ struct OfferHooks {
       [](std::uint64_t, const absl::Status&) {};
 };
 
+/// Give the stream kShortPatience as ReconnectPolicy::give_up_after if the simulator has to learn
+/// soon that its server is gone; frames are skipped until then.
+///
 /// Beside the window of the stream there is one frame that waits for a place in it and one that
 /// waits for that: memory for two copies of a frame, which is used again. One thread offers; the
 /// sending is done by a thread of its own. Answers are received from the stream as ever; `time`

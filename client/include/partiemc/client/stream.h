@@ -41,11 +41,16 @@ struct Outputs {
   std::vector<std::string> attributes = {};
 };
 
+/// Patience of a producer that waits for its server, and of one that skips frames meanwhile or
+/// watches.
+inline constexpr std::chrono::minutes kPatience{5};
+inline constexpr std::chrono::seconds kShortPatience{30};
+
 /// How a stream goes on after its connection or its server was lost.
 struct ReconnectPolicy {
-  /// For how long to try, from the loss to the next new answer, before the stream ends with the
-  /// error. 0: not at all.
-  std::chrono::milliseconds give_up_after{30000};
+  /// Time from the loss to the next new answer, after which the stream ends with an error. A lost
+  /// connection is noticed within 10 s. 0: the stream ends with its connection.
+  std::chrono::milliseconds give_up_after{kPatience};
   /// Each address is tried once at once. Then pauses follow, each twice as long as the one before,
   /// of which a random part is left out, so that many clients do not come back as one.
   std::chrono::milliseconds first_pause{50};

@@ -45,7 +45,7 @@ struct WatcherOptions {
   /// lost its producer: the stream is looked for at every address. In mode kEvery, and with
   /// from_sequence, it goes on after the last frame that was received, so that nothing is missed
   /// that the server still holds; else with the newest. `announce` is not used: frames tell.
-  ReconnectPolicy rejoin = {};
+  ReconnectPolicy rejoin = {.give_up_after = kShortPatience};
   /// For reaching the server; a server that starts meanwhile is found.
   std::chrono::milliseconds connect_timeout{2000};
   /// For the server to answer. Frames may take any time: they come when the producer sends them.
@@ -124,6 +124,9 @@ class Watcher {
 
   /// Once the watch has ended; what the server said of it, if it did.
   virtual const WatchEnd& end() const = 0;
+
+  /// While the watch looks for its lost stream; the receiver's thread only.
+  virtual std::optional<Reconnecting> reconnecting() const { return std::nullopt; }
 
   /// Leaves at once: calls under way and later ones return CANCELLED.
   virtual void Cancel() = 0;

@@ -1,14 +1,14 @@
-/** Red, green, blue of sRGB, each from 0 to 1. */
+/** sRGB: red, green, blue from 0 to 1. */
 export type Rgb = readonly [number, number, number];
 
-/** The colours of a picture where everything of a kind has the same. */
+/** Colours of a picture in one theme. */
 export interface Theme {
   background: Rgb;
   /** Triangles between the outline and the merged interior. */
   band: Rgb;
-  /** Triangles that were merged from whole cells. */
+  /** Triangles of merged whole cells. */
   interior: Rgb;
-  /** The same two where only the outline is to have colours. */
+  /** `band` and `interior` if only the outline has colours. */
   neutralBand: Rgb;
   neutralInterior: Rgb;
   edge: Rgb;
@@ -16,9 +16,10 @@ export interface Theme {
   hole: Rgb;
   particle: Rgb;
   normal: Rgb;
-  /** Of what is selected. */
+  isoline: Rgb;
+  /** Selected rings. */
   accent: Rgb;
-  /** Where there is no identity or no number to colour by. */
+  /** Rings without an identity, points without a number. */
   missing: Rgb;
 }
 
@@ -33,6 +34,7 @@ const LIGHT: Theme = {
   hole: rgb('#2b86a8'),
   particle: rgb('#44596b'),
   normal: rgb('#2e8560'),
+  isoline: rgb('#a3470f'),
   accent: rgb('#d9480f'),
   missing: rgb('#76838f'),
 };
@@ -48,6 +50,7 @@ const DARK: Theme = {
   hole: rgb('#58b9cf'),
   particle: rgb('#a9bac8'),
   normal: rgb('#6fcf9f'),
+  isoline: rgb('#f2a271'),
   accent: rgb('#ff9248'),
   missing: rgb('#7c8894'),
 };
@@ -56,29 +59,29 @@ export function theme(dark: boolean): Theme {
   return dark ? DARK : LIGHT;
 }
 
-/** Of `#rrggbb`. */
+/** Parses `#rrggbb`. */
 export function rgb(hex: string): Rgb {
   const value = Number.parseInt(hex.slice(1), 16);
   return [(value >> 16) / 255, ((value >> 8) & 255) / 255, (value & 255) / 255];
 }
 
-/** As `#rrggbb`. */
+/** Returns `#rrggbb`. */
 export function hex(colour: Rgb): string {
   return '#' + colour.map((part) => byte(part).toString(16).padStart(2, '0')).join('');
 }
 
-/** As the graphics card reads it from a 32-bit number: red in the lowest byte, opaque. */
+/** The colour as a 32-bit number for the shaders: red in the lowest byte, opaque. */
 export function packed(colour: Rgb): number {
   const [red, green, blue] = colour;
   return (byte(red) | (byte(green) << 8) | (byte(blue) << 16) | (255 << 24)) >>> 0;
 }
 
-/** Of what `packed` made. */
+/** The inverse of `packed`. */
 export function unpacked(colour: number): Rgb {
   return [(colour & 255) / 255, ((colour >> 8) & 255) / 255, ((colour >> 16) & 255) / 255];
 }
 
-/** The way from one colour to another, `share` of it gone. */
+/** Linear interpolation between two colours. */
 export function mix(from: Rgb, to: Rgb, share: number): Rgb {
   return [
     from[0] + (to[0] - from[0]) * share,
@@ -88,8 +91,8 @@ export function mix(from: Rgb, to: Rgb, share: number): Rgb {
 }
 
 /**
- * A colour by lightness (0 to 1), chroma (0 to about .3) and hue (in turns) of OKLCH, in which
- * equal steps look equal. Chroma shrinks until the screen can show the colour.
+ * A colour by lightness (0 to 1), chroma (0 to about .3) and hue (in turns) of OKLCH. Equal steps
+ * in OKLCH look equal. Chroma is reduced until the colour lies in sRGB.
  */
 export function oklch(lightness: number, chroma: number, hue: number): Rgb {
   for (let share = 1; share > 0; share -= 0.05) {
@@ -105,12 +108,12 @@ const HUES = 256;
 const TIERS = 2;
 const GOLDEN_RATIO = 0x9e3779b1; // Times 2^-32.
 
-/** By theme: for each tier of lightness all hues. Made when first needed. */
+/** All hues of each tier of lightness, by theme. Made at first use. */
 const identityColours: { light?: Rgb[]; dark?: Rgb[] } = {};
 
 /**
  * The colour of an identity, given by its lower and upper 32 bits. Hues of successive identities
- * are a golden angle apart, so that neighbours in time differ; 0, not tracked, is grey.
+ * are a golden angle apart, so that neighbours in time differ. 0 (not tracked) is grey.
  */
 export function identityColour(low: number, high: number, dark: boolean): Rgb {
   if (low === 0 && high === 0) return theme(dark).missing;
@@ -144,7 +147,7 @@ function fromOklab(lightness: number, a: number, b: number): Rgb {
   ];
 }
 
-/** Linear light as sRGB numbers it. */
+/** Converts linear light to an sRGB component. */
 function companded(light: number): number {
   return light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
 }

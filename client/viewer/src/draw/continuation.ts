@@ -1,14 +1,14 @@
 import { type Frame, NO_RING, type Rings } from '../protocol/frame';
 import { RingIndex } from './pick';
 
-/** Points of a ring by which its place is told. */
+/** Vertices of a ring that are compared. */
 const SAMPLES = 16;
 
 /**
- * Outer rings of a later frame that continue the `chosen` ones of an earlier frame under another
- * identity, told by place where the frames between them, and thus the parents, were not seen. A
- * ring that has vanished goes on in the one that covers its place; a ring that is new comes out of
- * the one on whose place it lies. At least half of a ring's points have to agree.
+ * Finds outer rings of a later frame that continue the `chosen` rings of an earlier frame under
+ * another identity. Used if frames in between were missed, so that parents are unknown. A vanished
+ * ring continues in the ring that covers its position. A new ring continues the ring at whose
+ * position it lies. At least half of a ring's samples must agree.
  */
 export function continuations(before: Frame, chosen: readonly number[], after: Frame): number[] {
   const surviving = new Set(after.rings.identities);
@@ -21,22 +21,22 @@ export function continuations(before: Frame, chosen: readonly number[], after: F
   if (vanished.length > 0) {
     const index = new RingIndex(after.rings);
     for (const ring of vanished) {
-      const cover = placeOf(before, ring, after, index);
+      const cover = ringAround(before, ring, after, index);
       if (cover !== null) found.add(cover);
     }
   }
   if (fresh.length > 0) {
     const index = new RingIndex(before.rings);
     for (const ring of fresh) {
-      const origin = placeOf(after, ring, before, index);
+      const origin = ringAround(after, ring, before, index);
       if (origin !== null && chosen.includes(origin)) found.add(ring);
     }
   }
   return [...found];
 }
 
-/** The ring of the other frame in which at least half of this one's points lie. */
-function placeOf(own: Frame, ring: number, other: Frame, index: RingIndex): number | null {
+/** The ring of another frame that contains at least half of this ring's samples, or null. */
+function ringAround(own: Frame, ring: number, other: Frame, index: RingIndex): number | null {
   const { points, offsets } = own.rings;
   const count = offsets[ring + 1] - offsets[ring];
   const [right, up] = [own.origin[0] - other.origin[0], own.origin[1] - other.origin[1]];

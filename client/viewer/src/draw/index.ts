@@ -1,4 +1,4 @@
-/** Drawing: frames on a canvas by WebGL2, moving about in them, asking what is where. */
+/** Draws frames on a canvas, pans and zooms, and finds the ring at a position. */
 export { DEFAULT_LOOK, type Look } from './look';
 export { attachNavigation } from './navigation';
 export { Scene, type Legend, type Picked } from './scene';

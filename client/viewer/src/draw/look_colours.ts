@@ -2,14 +2,14 @@ import { NO_RING, type Rings } from '../protocol/frame';
 import { identityColour, packed, type Rgb, theme } from './colours';
 import { attributeOf, type Look } from './look';
 
-/** Of triangles that no identity colours. */
+/** Colours of triangles without a colour of their own. */
 export function fillTones(look: Look): { band: Rgb; interior: Rgb } {
   const { band, interior, neutralBand, neutralInterior } = theme(look.dark);
   return attributeOf(look) === null
     ? { band, interior } : { band: neutralBand, interior: neutralInterior };
 }
 
-/** What colour a ring has, packed as the shaders read it. */
+/** Returns a function from ring to colour, packed for the shaders. */
 export function ringColours(rings: Rings, look: Look): (ring: number) => number {
   if (look.colour === 'identity') {
     const halves = identityHalves(rings);
@@ -21,7 +21,7 @@ export function ringColours(rings: Rings, look: Look): (ring: number) => number 
   return (ring) => (rings.outerOf[ring] === NO_RING ? outline : hole);
 }
 
-/** Lower and upper 32 bits of each identity: numbers are many times faster than bigints. */
+/** Lower and upper 32 bits of each identity. Numbers are many times faster than bigints. */
 function identityHalves(rings: Rings): Uint32Array {
   const { buffer, byteOffset, length } = rings.identities;
   return new Uint32Array(buffer, byteOffset, 2 * length);

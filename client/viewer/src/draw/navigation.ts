@@ -1,23 +1,23 @@
 import { panBy, zoomAt, type Size, type View } from './view';
 
-/** What can be moved about: a scene, or one in a test. */
+/** The part of a scene that navigation uses. */
 export interface Navigable {
   view: View;
   readonly size: Size;
   fit(): void;
 }
 
-/** Magnification per CSS pixel of the wheel, as an exponent. A notch of 100 pixels: 1.22 times. */
+/** Exponent of the zoom per CSS pixel of the wheel. A notch of 100 pixels zooms by 1.22. */
 const WHEEL_RATE = 0.002;
-/** Of a pinch on a touchpad, which comes as a wheel with Ctrl in smaller steps. */
+/** The same for a pinch on a touchpad, which arrives as a wheel event with Ctrl. */
 const PINCH_RATE = 0.01;
 const LINE_PIXELS = 16;
 const PAGE_PIXELS = 400;
-/** Of one press of a key. */
+/** Zoom and pan per key press. */
 const KEY_ZOOM = 1.25;
 const KEY_PAN = 48;
 const FAST = 4;
-/** A pointer that moves farther than this between press and release drags and does not click. */
+/** A pointer that moves farther between press and release drags instead of clicking. */
 const CLICK_PIXELS = 4;
 
 const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
@@ -27,7 +27,7 @@ const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowDown: [0, -1],
 };
 
-/** How many times larger a turn of the wheel makes the picture. */
+/** Zoom factor of a wheel event. */
 export function wheelFactor(event: Pick<WheelEvent, 'deltaY' | 'deltaMode' | 'ctrlKey'>): number {
   const unit = event.deltaMode === 1 ? LINE_PIXELS : event.deltaMode === 2 ? PAGE_PIXELS : 1;
   const pixels = Math.min(Math.max(event.deltaY * unit, -PAGE_PIXELS), PAGE_PIXELS);
@@ -35,8 +35,8 @@ export function wheelFactor(event: Pick<WheelEvent, 'deltaY' | 'deltaMode' | 'ct
 }
 
 /**
- * What a key does to the view: arrows move what is seen the other way, + and - magnify about the
- * middle, 0 fits. False where the key means nothing here.
+ * Applies a key to the view: arrows pan, + and - zoom about the centre, 0 fits. Returns false for
+ * other keys.
  */
 export function applyKey(scene: Navigable, key: string, fast: boolean): boolean {
   const { width, height } = scene.size;
@@ -56,7 +56,7 @@ export function applyKey(scene: Navigable, key: string, fast: boolean): boolean 
   return true;
 }
 
-/** Where two fingers, or one pointer, are: their middle and how far they are apart. */
+/** Centre and distance of two fingers, or one pointer with distance 0. */
 interface Grip {
   x: number;
   y: number;
@@ -64,11 +64,12 @@ interface Grip {
 }
 
 /**
- * Lets a person move and magnify the scene by pointer, touch, wheel and keys, and tells each
- * change. A click that ends a drag is kept from others. Gives back what takes all of it away again.
+ * Pans and zooms the scene by pointer, touch, wheel and keys, and calls `onChange`. A click that
+ * ends a drag is not passed on. `scrolls`: the document scrolls, so the wheel zooms only with Ctrl
+ * and a vertical swipe scrolls. Returns a function that detaches everything.
  */
 export function attachNavigation(
-  canvas: HTMLCanvasElement, scene: Navigable, onChange: () => void,
+  canvas: HTMLCanvasElement, scene: Navigable, onChange: () => void, scrolls = false,
 ): () => void {
   const pointers = new Map<number, { x: number; y: number }>();
   let travelled = 0;
@@ -104,6 +105,7 @@ export function attachNavigation(
   };
 
   const onWheel = (event: WheelEvent): void => {
+    if (scrolls && !event.ctrlKey && !event.metaKey) return;
     event.preventDefault();
     scene.view = zoomAt(
       scene.view, scene.size, event.offsetX, event.offsetY, wheelFactor(event));
@@ -119,7 +121,7 @@ export function attachNavigation(
 
   const controller = new AbortController();
   const { signal } = controller;
-  canvas.style.touchAction = 'none'; // Else the browser scrolls the page by the same fingers.
+  canvas.style.touchAction = scrolls ? 'pan-y' : 'none';
   canvas.addEventListener('pointerdown', onPointerDown, { signal });
   canvas.addEventListener('pointermove', onPointerMove, { signal });
   canvas.addEventListener('pointerup', onPointerEnd, { signal });

@@ -2,12 +2,12 @@ import { NO_RING, type Rings } from '../protocol/frame';
 
 const SEGMENTS_PER_BUCKET = 4;
 const MOST_BUCKETS = 8192;
-/** Entries of all buckets per segment, above which there are fewer buckets: bounds the memory. */
+/** Limit on bucket entries per segment. Above it, fewer buckets are used. Bounds the memory. */
 const MOST_ENTRIES = 8;
 
 /**
- * Which ring is at a place: segments sorted into horizontal buckets. Making it takes about a
- * millisecond for 30,000 points; a question looks at one bucket or a few.
+ * Finds the ring at a position. Segments are sorted into horizontal buckets. Construction takes
+ * about a millisecond for 30,000 vertices; a query visits a few buckets.
  */
 export class RingIndex {
   private readonly bottom: number;
@@ -57,9 +57,8 @@ export class RingIndex {
   }
 
   /**
-   * The ring at the place, relative to the frame's origin: the one whose line is nearest within
-   * the tolerance, else the outer ring that the place is in and in no hole of; null where there is
-   * none.
+   * The ring at a position relative to the frame's origin: the nearest ring within the tolerance,
+   * else the outer ring around the position. Null outside all rings and inside a hole.
    */
   ringAt(x: number, y: number, tolerance: number): number | null {
     const near = this.nearest(x, y, tolerance);
@@ -68,7 +67,7 @@ export class RingIndex {
     return inner !== null && this.rings.outerOf[inner] === NO_RING ? inner : null;
   }
 
-  /** The smallest ring around the place, by the number of its segments to the right of it. */
+  /** The smallest ring around a position, by counting its segments to the right. */
   innermost(x: number, y: number): number | null {
     const { points, area } = this.rings;
     const around = new Set<number>();
@@ -110,7 +109,7 @@ export class RingIndex {
     return ring;
   }
 
-  /** First and last bucket of the segment that begins at a point. */
+  /** First and last bucket of the segment that begins at vertex `k`. */
   private bucketsOf(k: number, buckets: number): [number, number] {
     const { points } = this.rings;
     const from = this.bucket(points[2 * k + 1], buckets);
@@ -123,7 +122,7 @@ export class RingIndex {
   }
 
   private bucket(y: number, buckets: number): number {
-    const place = Math.floor((y - this.bottom) * this.perHeight);
-    return place > 0 ? Math.min(place, buckets - 1) : 0;
+    const bucket = Math.floor((y - this.bottom) * this.perHeight);
+    return bucket > 0 ? Math.min(bucket, buckets - 1) : 0;
   }
 }

@@ -3,8 +3,8 @@ import { RingIndex } from './pick';
 
 /**
  * The colour of the outer ring for each point of the mesh. Triangles that share a point belong to
- * the same component, thus one point of an outline tells the component of a whole piece; a piece
- * without one is found by the place of its first triangle. Some 3 ms for 100,000 points.
+ * the same component, so one vertex of a ring identifies the ring of a whole piece. A piece without
+ * such a vertex is located by its first triangle. Takes about 3 ms for 100,000 points.
  */
 export function pieceTints(
   mesh: Mesh, rings: Rings, colourOf: (ring: number) => number,
@@ -28,13 +28,13 @@ export function pieceTints(
     const [a, b, c] = [2 * triangles[k], 2 * triangles[k + 1], 2 * triangles[k + 2]];
     const x = (points[a] + points[b] + points[c]) / 3;
     const y = (points[a + 1] + points[b + 1] + points[c + 1]) / 3;
-    ringOfPiece[piece] = index.innermost(x, y) ?? 0; // Null by rounding at most.
+    ringOfPiece[piece] = index.innermost(x, y) ?? 0;  // Null only by rounding.
   }
   for (let k = 0; k < pieces.length; ++k) pieces[k] = colours[ringOfPiece[pieces[k]]];
   return pieces;
 }
 
-/** For each point the smallest point that triangles join it with. */
+/** For each point, the smallest point in its connected component. */
 function piecesOf(count: number, triangles: Uint32Array): Uint32Array {
   const parent = new Uint32Array(count);
   for (let k = 0; k < count; ++k) parent[k] = k;
@@ -45,12 +45,12 @@ function piecesOf(count: number, triangles: Uint32Array): Uint32Array {
     const smallest = Math.min(a, b, c);
     parent[a] = parent[b] = parent[c] = smallest;
   }
-  // A parent is never larger than its child, thus it has come to its own root before.
+  // A parent is never larger than its child, so its own root is already known.
   for (let k = 0; k < count; ++k) parent[k] = parent[parent[k]];
   return parent;
 }
 
-/** The smallest point of the set so far, halving the path to it. */
+/** Root of a union-find tree, with path halving. */
 function root(parent: Uint32Array, point: number): number {
   let k = point;
   while (parent[k] !== k) {

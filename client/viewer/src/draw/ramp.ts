@@ -1,11 +1,11 @@
 import { hex, oklch, type Rgb } from './colours';
 
-/** Colours that a legend shows, from the smallest to the largest number. */
+/** Colours in a legend. */
 const STOPS = 9;
 
 /**
- * The colour of a number between 0 and 1: violet over teal to yellow, its lightness in equal steps.
- * On a dark ground the map is lighter as a whole, so that both ends stand out from the ground.
+ * The colour of a number from 0 to 1: violet, teal, yellow, with lightness in equal steps. The dark
+ * theme uses lighter colours, so that both ends contrast with the background.
  */
 export function rampColour(share: number, dark: boolean): Rgb {
   const t = Math.min(Math.max(share, 0), 1);
@@ -14,12 +14,12 @@ export function rampColour(share: number, dark: boolean): Rgb {
   return oklch(lightness, 0.16 - 0.02 * t, hue);
 }
 
-/** As `#rrggbb`, for a legend. */
+/** Colours of a legend, as `#rrggbb`. */
 export function rampStops(dark: boolean): string[] {
   return Array.from({ length: STOPS }, (_, k) => hex(rampColour(k / (STOPS - 1), dark)));
 }
 
-/** As bytes red, green, blue, alpha, from the smallest to the largest number. */
+/** Colours as RGBA bytes, from the smallest to the largest number. */
 export function rampTexels(count: number, dark: boolean): Uint8Array {
   const texels = new Uint8Array(4 * count);
   for (let k = 0; k < count; ++k) {
@@ -32,13 +32,18 @@ export function rampTexels(count: number, dark: boolean): Uint8Array {
   return texels;
 }
 
-/** The smallest and the largest number of an attribute. */
+/** Range of an attribute. */
 export interface Range {
   min: number;
   max: number;
 }
 
-/** Of the finite numbers; null where there is none. */
+/** Position of a number in a range, 0 to 1. */
+export function shareOf({ min, max }: Range, value: number): number {
+  return max > min ? (value - min) / (max - min) : 0;
+}
+
+/** Range of the finite numbers; null if there are none. */
 export function rangeOf(values: Float32Array): Range | null {
   let min = Infinity;
   let max = -Infinity;

@@ -2,14 +2,15 @@ import type { Frame } from '../protocol/frame';
 import { attributeOf, DEFAULT_LOOK, type Look } from './look';
 import { RingIndex } from './pick';
 import { type Range, rampStops, rangeOf } from './ramp';
-import { Renderer } from './webgl/renderer';
 import { Selection } from './selection';
+import { SvgDrawing } from './svg_drawing';
+import { type Drawing, Renderer } from './webgl/renderer';
 import { boundsOf, fitBounds, toWorld, type Size, type View } from './view';
 
-/** How near to a line the pointer is on it, in CSS pixels. */
+/** Distance at which the pointer is on a line, in CSS pixels. */
 const PICK_TOLERANCE = 6;
 
-/** What a place of the canvas shows. */
+/** Content of the canvas at a position. */
 export interface Picked {
   /** World coordinates. */
   x: number;
@@ -17,43 +18,37 @@ export interface Picked {
   ring: number | null;
 }
 
-/** Numbers and colours of the attribute that rings are coloured by. */
+/** Range and colours of the attribute that the look colours by. */
 export interface Legend {
   min: number;
   max: number;
-  /** From the smallest to the largest number, in equal steps. */
+  /** Colours from the smallest to the largest number, in equal steps. */
   stops: string[];
 }
 
 /**
- * A canvas that shows one frame after another. Nothing is drawn but by `draw`; whoever changes
- * frame, look, view, size or selection calls it, once per refresh of the screen.
+ * A canvas that shows one frame after another. Only `draw` draws: the caller calls it after changes
+ * of frame, look, view, size or selection, once per refresh of the screen.
  */
 export class Scene {
   view: View = { x: 0, y: 0, scale: 1 };
+  /** Ring under the pointer. */
+  hovered: number | null = null;
+  /** Range of the attribute's colours. Null: the range of all frames so far. */
+  fixedRange: Range | null = null;
   /** Main-thread time of the last `show`, milliseconds. */
   lastUploadMs = 0;
 
-  private readonly gl: WebGL2RenderingContext;
   private readonly selection = new Selection();
-  private renderer: Renderer | null;
+  private drawing: Drawing | null;
   private look: Look = DEFAULT_LOOK;
   private frame: Frame | null = null;
   private index: RingIndex | null = null;
   private range: Range | null = null;
   private selected: readonly number[] = [];
 
-  /** Throws where the browser cannot draw (no WebGL2). */
   constructor(readonly canvas: HTMLCanvasElement) {
-    const gl = canvas.getContext('webgl2', {
-      alpha: false, antialias: false, depth: false, stencil: true, preserveDrawingBuffer: false,
-    });
-    if (!gl) {
-      throw new Error('This browser cannot draw here: WebGL2 is off or missing. Turn on hardware ' +
-        'acceleration, or use a newer browser.');
-    }
-    this.gl = gl;
-    this.renderer = new Renderer(gl);
+    this.drawing = this.newDrawing();
     canvas.addEventListener('webglcontextlost', this.onLost);
     canvas.addEventListener('webglcontextrestored', this.onRestored);
     this.resize();
@@ -64,19 +59,20 @@ export class Scene {
     return { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
   }
 
-  /** The rings of the frame that are selected: several after a split. */
+  /** The selected rings of the frame: several after a split. */
   get selectedRings(): readonly number[] {
     return this.selected;
   }
 
   /**
-   * The frame that is drawn from now on; null for none. Its arrays are kept, not copied. Throws a
-   * RangeError, and goes on showing nothing, where the graphics card has no room for it.
+   * Sets the frame to draw, or null. Keeps its arrays without a copy. If the frame is too large for
+   * the graphics card, throws a RangeError and shows nothing.
    */
   show(frame: Frame | null): void {
     const begin = performance.now();
     this.frame = frame;
     this.index = null;
+    this.hovered = null;
     this.selected = frame ? this.selection.ringsOf(frame) : [];
     this.widenRange(frame === null);
     try {
@@ -96,7 +92,7 @@ export class Scene {
     this.prepare();
   }
 
-  /** Shows all of the frame. Without one, or where it is empty, the view stays. */
+  /** Fits the view to the frame, unless it is empty. */
   fit(): void {
     if (!this.frame) return;
     const { rings, particles, origin } = this.frame;
@@ -105,8 +101,8 @@ export class Scene {
   }
 
   /**
-   * Takes over the size of the canvas on the page, and the screen's pixels per CSS pixel. Where
-   * they have changed, the canvas is empty until `draw`.
+   * Adopts the size of the canvas on the page. If the size has changed, the canvas is empty until
+   * `draw`.
    */
   resize(): void {
     const width = Math.max(1, Math.round(this.size.width * devicePixelRatio));
@@ -116,24 +112,24 @@ export class Scene {
   }
 
   draw(): void {
-    if (!this.renderer || this.gl.isContextLost()) return;
-    this.renderer.draw({
+    this.drawing?.draw({
       frame: this.frame,
       look: this.look,
       view: this.view,
       ratio: this.canvas.width / Math.max(this.size.width, 1),
-      range: this.attribute() && this.range,
+      range: this.attribute() && this.colourRange,
       selected: this.selected,
+      hovered: this.hovered,
     });
   }
 
-  /** Marks the ring of this identity, now and as it splits and merges; null for none. */
+  /** Selects the ring of this identity and follows it through splits and merges; null for none. */
   select(identity: bigint | null): void {
     this.selection.start(identity);
     this.selected = this.frame ? this.selection.ringsOf(this.frame) : [];
   }
 
-  /** What lies at CSS pixels from the canvas's upper left corner. */
+  /** Picks at CSS pixels from the upper left corner of the canvas. */
   pick(cssX: number, cssY: number): Picked {
     const [x, y] = toWorld(this.view, this.size, cssX, cssY);
     if (!this.frame) return { x, y, ring: null };
@@ -143,34 +139,45 @@ export class Scene {
     return { x, y, ring: this.index.ringAt(x - originX, y - originY, tolerance) };
   }
 
-  /** Of the attribute that the look colours by; null where there is none. */
+  /** Legend of the attribute that the look colours by; null without one. */
   legend(): Legend | null {
-    if (!this.range) return null;
-    return { ...this.range, stops: rampStops(this.look.dark) };
+    const range = this.colourRange;
+    return range && { ...range, stops: rampStops(this.look.dark) };
   }
 
   destroy(): void {
     this.canvas.removeEventListener('webglcontextlost', this.onLost);
     this.canvas.removeEventListener('webglcontextrestored', this.onRestored);
-    this.renderer?.destroy();
-    this.renderer = null;
+    this.drawing?.destroy();
+    this.drawing = null;
     this.frame = null;
   }
 
   private prepare(): void {
-    if (this.frame && this.renderer && !this.gl.isContextLost()) {
-      this.renderer.textures.prepare(this.frame, this.look);
-    }
+    if (this.frame) this.drawing?.prepare(this.frame, this.look);
   }
 
+  private newDrawing(): Drawing {
+    const gl = this.canvas.getContext('webgl2', {
+      alpha: false, antialias: false, depth: false, stencil: true, preserveDrawingBuffer: false,
+    });
+    return gl ? new Renderer(gl) : new SvgDrawing(this.canvas);
+  }
+
+  private get colourRange(): Range | null {
+    return this.range && (this.fixedRange ?? this.range);
+  }
+
+  /** Numbers of the mesh, which include those of the rings, or of the rings alone. */
   private attribute(): Float32Array | null {
     const name = attributeOf(this.look);
-    return (name !== null && this.frame?.rings.attributes.get(name)) || null;
+    if (name === null || !this.frame) return null;
+    return this.frame.mesh?.attribute(name) ?? this.frame.rings.attributes.get(name) ?? null;
   }
 
-  /** The range grows from frame to frame: a colour keeps its meaning while a stream runs. */
-  private widenRange(anew: boolean): void {
-    if (anew) this.range = null;
+  /** The range grows from frame to frame, so that a colour keeps its meaning in a stream. */
+  private widenRange(restart: boolean): void {
+    if (restart) this.range = null;
     const values = this.attribute();
     const range = values && rangeOf(values);
     if (!range) return;
@@ -180,12 +187,12 @@ export class Scene {
   }
 
   private readonly onLost = (event: Event): void => {
-    event.preventDefault(); // Else the browser never gives it back.
-    this.renderer = null;
+    event.preventDefault();  // Otherwise the browser never restores the context.
+    this.drawing = null;
   };
 
   private readonly onRestored = (): void => {
-    this.renderer = new Renderer(this.gl);
+    this.drawing = this.newDrawing();
     this.prepare();
     this.draw();
   };

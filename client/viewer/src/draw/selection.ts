@@ -1,27 +1,27 @@
 import type { Frame } from '../protocol/frame';
 import { continuations } from './continuation';
 
-/** Frames that may have been missed for a ring still to lie about where it was. */
+/** Largest gap between frames over which a ring is still found by its position. */
 const NEAR_FRAMES = 16n;
 
 /**
- * A ring that was clicked, and what becomes of it. Each identity that continues it counts from the
- * frame on in which it came to do so: after a merge the one that swallowed it, after a split all
- * parts. Before that frame the same identity was another's ring.
+ * Follows a selected ring through splits and merges. Each identity that continues the ring counts
+ * from the frame in which it took over: after a merge the merged ring, after a split all parts.
+ * In earlier frames that identity belonged to another ring.
  */
 export class Selection {
-  /** From which frame on an identity counts. */
+  /** The first frame in which an identity counts. */
   private readonly since = new Map<bigint, bigint>();
   private latest: { frame: Frame; rings: readonly number[] } | null = null;
 
-  /** Begins anew with one identity; null and 0, not tracked, select nothing. */
+  /** Selects one identity. Null and 0 (not tracked) select nothing. */
   start(identity: bigint | null): void {
     this.since.clear();
     this.latest = null;
     if (identity) this.since.set(identity, 0n);
   }
 
-  /** The rings of the frame that are selected. */
+  /** The selected rings of a frame. */
   ringsOf(frame: Frame): number[] {
     if (this.since.size === 0) return [];
     const rings = new Set<number>();
@@ -37,7 +37,7 @@ export class Selection {
     return selected;
   }
 
-  /** Rings that continue selected ones of the latest frame: by their parents, else by place. */
+  /** Rings that continue selected ones of the latest frame, by parents or else by position. */
   private joining(frame: Frame): number[] {
     if (!this.latest || this.latest.rings.length === 0) return [];
     const passed = frame.sequence - this.latest.frame.sequence;

@@ -1,41 +1,43 @@
-/** Measures that the screen and exported pictures share, in CSS pixels unless they say. */
+/** Sizes of screen and exported pictures, in CSS pixels unless stated otherwise. */
 
-/** Of an edge between two triangles. */
+/** Edge between two triangles. */
 export const EDGE_WIDTH = 1;
 export const EDGE_ALPHA = 0.8;
 
-/** How much of an identity's colour triangles and edges get; the rest is the background. */
+/** Share of the identity's colour in triangles and edges; the rest is background. */
 export const BAND_TINT = 0.52;
 export const INTERIOR_TINT = 0.34;
 export const EDGE_TINT = 0.8;
 
 export const NORMAL_WIDTH = 1.5;
-/** Length of a normal in spacings, and its bounds. */
+/** Length of a normal in spacings; limits in pixels. */
 const NORMAL_SPACINGS = 1.2;
 const SHORTEST_NORMAL = 6;
 const LONGEST_NORMAL = 40;
-/** Between the normals that are drawn. */
+/** Smallest distance between drawn normals. */
 const NORMAL_GAP = 4;
 
+export const ISOLINE_WIDTH = 1.2;
+
 export const PARTICLE_ALPHA = 0.85;
-/** Diameter of a particle's dot in spacings, and its bounds. */
+/** Diameter of a particle's dot in spacings; limits in pixels. */
 const DOT_SPACINGS = 0.4;
 const SMALLEST_DOT = 1.25;
 const LARGEST_DOT = 12;
 
-/** Diameter of a particle's dot where particles are so far apart. */
+/** Diameter of a particle's dot, from the spacing in pixels. */
 export function dotDiameter(spacing: number): number {
   return Math.min(Math.max(DOT_SPACINGS * spacing, SMALLEST_DOT), LARGEST_DOT);
 }
 
-/** Length of a normal where particles are so far apart. */
+/** Length of a normal, from the spacing in pixels. */
 export function normalLength(spacing: number): number {
   return Math.min(Math.max(NORMAL_SPACINGS * spacing, SHORTEST_NORMAL), LONGEST_NORMAL);
 }
 
 /**
- * Of `count` vertices so far apart, every n-th shows its normal, n being a power of two, so that
- * few appear or vanish as one zooms.
+ * Every how many vertices a normal is drawn, for `count` vertices at a distance of `gap` pixels. A
+ * power of two, so that few normals appear or vanish during a zoom.
  */
 export function normalStride(gap: number, count: number): number {
   let stride = 1;

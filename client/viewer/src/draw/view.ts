@@ -1,19 +1,19 @@
-/** The part of the world that is seen. World y goes up, CSS y goes down. */
+/** The visible part of the world. World y points up, CSS y points down. */
 export interface View {
-  /** World coordinates of the middle of the canvas. */
+  /** World coordinates of the canvas centre. */
   x: number;
   y: number;
   /** CSS pixels per unit of length. */
   scale: number;
 }
 
-/** Of a canvas, in CSS pixels. */
+/** Size of a canvas, in CSS pixels. */
 export interface Size {
   width: number;
   height: number;
 }
 
-/** A box of world coordinates. */
+/** A box in world coordinates. */
 export interface Bounds {
   left: number;
   bottom: number;
@@ -21,11 +21,11 @@ export interface Bounds {
   top: number;
 }
 
-/** Single precision, in which the graphics card calculates, ends a little beyond. */
+/** Limits of the single precision of shaders, with a margin. */
 const SMALLEST_SCALE = 1e-30;
 const LARGEST_SCALE = 1e30;
 
-/** Air around what fits the canvas, as a share of its shorter side. */
+/** Margin around fitted bounds, as a share of the canvas. */
 const MARGIN = 0.06;
 
 export function toWorld(view: View, size: Size, cssX: number, cssY: number): [number, number] {
@@ -42,7 +42,7 @@ export function toCss(view: View, size: Size, x: number, y: number): [number, nu
   ];
 }
 
-/** The view magnified by `factor`; what lies at the CSS position stays there. */
+/** The view zoomed by `factor` about a CSS position. */
 export function zoomAt(view: View, size: Size, cssX: number, cssY: number, factor: number): View {
   const scale = Math.min(Math.max(view.scale * factor, SMALLEST_SCALE), LARGEST_SCALE);
   const [x, y] = toWorld(view, size, cssX, cssY);
@@ -53,12 +53,12 @@ export function zoomAt(view: View, size: Size, cssX: number, cssY: number, facto
   };
 }
 
-/** The view after its content was moved by so many CSS pixels to the right and down. */
+/** The view with its content moved by CSS pixels. */
 export function panBy(view: View, right: number, down: number): View {
   return { x: view.x - right / view.scale, y: view.y + down / view.scale, scale: view.scale };
 }
 
-/** The view in which the bounds fill the canvas but for a margin. */
+/** The view in which the bounds fill the canvas, with a margin. */
 export function fitBounds(bounds: Bounds, size: Size): View {
   const room = 1 - 2 * MARGIN;
   const horizontal = (size.width * room) / (bounds.right - bounds.left);
@@ -71,7 +71,7 @@ export function fitBounds(bounds: Bounds, size: Size): View {
   };
 }
 
-/** The box around finite points x, y; null where there are none. */
+/** The box of the finite points; null if there are none. */
 export function boundsOf(points: Float32Array, origin: readonly [number, number]): Bounds | null {
   let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
   for (let k = 0; k + 1 < points.length; k += 2) {
@@ -89,5 +89,13 @@ export function boundsOf(points: Float32Array, origin: readonly [number, number]
     bottom: bottom + origin[1],
     right: right + origin[0],
     top: top + origin[1],
+  };
+}
+
+/** The box around two boxes. */
+export function union(a: Bounds, b: Bounds): Bounds {
+  return {
+    left: Math.min(a.left, b.left), bottom: Math.min(a.bottom, b.bottom),
+    right: Math.max(a.right, b.right), top: Math.max(a.top, b.top),
   };
 }

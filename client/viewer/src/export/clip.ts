@@ -1,15 +1,15 @@
-/** What a browser may be able to record, the best first. */
+/** Formats that browsers record, the best first. */
 const FORMATS = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm'];
 
-/** Enough for thin lines on an even ground, in bits per pixel and second. */
+/** Bits per pixel and second, enough for thin lines on a plain background. */
 const BITS_PER_PIXEL = 6;
 const FEWEST_BITS = 2_500_000;
 
-/** A recording of a canvas, as a film of what is drawn on it. */
+/** Records a canvas as a video. */
 export interface Clip {
-  /** Throws where the browser records no WebM, or where it records already. */
+  /** Throws if the browser cannot record WebM, or a recording is running. */
   start(): void;
-  /** The film since `start`. */
+  /** Returns the video since `start`. */
   stop(): Promise<Blob>;
 }
 
@@ -18,10 +18,10 @@ export function clip(canvas: HTMLCanvasElement): Clip {
   let parts: Blob[] = [];
   return {
     start() {
-      if (recorder) throw new Error('A clip is being recorded already.');
+      if (recorder) throw new Error('A clip is already being recorded.');
       const format = typeof MediaRecorder === 'undefined'
         ? undefined : FORMATS.find((one) => MediaRecorder.isTypeSupported(one));
-      if (!format) throw new Error('This browser records no WebM. Save pictures instead.');
+      if (!format) throw new Error('This browser cannot record WebM. Save pictures instead.');
       parts = [];
       recorder = new MediaRecorder(canvas.captureStream(), {
         mimeType: format,

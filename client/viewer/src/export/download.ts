@@ -1,11 +1,11 @@
-/** The browser has begun to read the data by then, milliseconds. */
-const READ_BY = 60_000;
+/** Delay until the data is released; the browser has started to read it by then. */
+const RELEASE_MS = 60_000;
 
-/** Has the browser save the data as a file of this name. */
+/** Saves data as a file. */
 export function download(name: string, blob: Blob): void {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
   link.download = name;
   link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), READ_BY);
+  setTimeout(() => URL.revokeObjectURL(link.href), RELEASE_MS);
 }

@@ -2,9 +2,9 @@ import { type Frame, NO_RING, type Rings } from '../protocol/frame';
 
 /**
  * The frame as GeoJSON: a polygon for each outer ring with its holes, outer rings
- * counter-clockwise, in world coordinates of double precision. Properties are those that
- * `partiemc replay` writes: area and perimeter of the whole polygon, particles, ring, identity,
- * parents, frame, time. Identities are integers of 64 bits, of which some readers keep 53.
+ * counter-clockwise, in float64 world coordinates. Properties as in `partiemc replay`: area and
+ * perimeter of the whole polygon, particles, ring, identity, parents, frame, time. Identities
+ * are integers of 64 bits; some readers keep only 53.
  */
 export function geojson(frame: Frame): string {
   const { rings, sequence, time } = frame;
@@ -40,7 +40,7 @@ function feature(frame: Frame, outer: number, holes: readonly number[]): string 
     `"geometry":{"type":"Polygon","coordinates":[${coordinates.join(',')}]}}`;
 }
 
-/** The ring with its first point again at the end. */
+/** The coordinates of a ring, with the first vertex repeated at the end. */
 function closed(rings: Rings, ring: number, origin: readonly [number, number]): string {
   const points: string[] = [];
   for (let k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
@@ -52,7 +52,7 @@ function closed(rings: Rings, ring: number, origin: readonly [number, number]): 
   return `[${points.join(',')}]`;
 }
 
-/** JSON has no word for what is not finite. */
+/** A number in JSON; null unless finite. */
 function number(value: number): string {
   return Number.isFinite(value) ? String(value) : 'null';
 }

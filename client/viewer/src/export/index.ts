@@ -1,4 +1,4 @@
-/** What is seen, as files. */
+/** Files of the current picture. */
 export { clip, type Clip } from './clip';
 export { download } from './download';
 export { geojson } from './geojson';

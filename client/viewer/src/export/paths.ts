@@ -1,7 +1,7 @@
 import { type View, type Size, toCss } from '../draw/view';
 import type { Mesh, Rings } from '../protocol/frame';
 
-/** Points relative to an origin, as a picture of this view and size has them, in CSS pixels. */
+/** Projects points relative to an origin to CSS pixels of a view. */
 export class Projection {
   private readonly scale: number;
   private readonly left: number;
@@ -20,12 +20,12 @@ export class Projection {
     return this.top - points[2 * k + 1] * this.scale;
   }
 
-  /** As a path's coordinates. */
-  place(points: Float32Array, k: number): string {
+  /** Coordinates in a path. */
+  text(points: Float32Array, k: number): string {
     return `${short(this.x(points, k))} ${short(this.y(points, k))}`;
   }
 
-  /** Whether a figure through these points may be seen: their box touches the picture's. */
+  /** Whether the box of these points touches the picture. */
   sees(points: Float32Array, members: Iterable<number>): boolean {
     let [left, top, right, bottom] = [Infinity, Infinity, -Infinity, -Infinity];
     for (const k of members) {
@@ -38,24 +38,24 @@ export class Projection {
   }
 }
 
-/** Hundredths of a pixel: finer than any screen shows. */
+/** Rounds to hundredths of a pixel. */
 export function short(pixels: number): string {
   return String(Math.round(pixels * 100) / 100);
 }
 
-/** The rings as closed figures; those out of sight are left out. */
+/** Path of the rings. Rings outside the picture are left out. */
 export function ringPath(rings: Rings, which: Iterable<number>, at: Projection): string {
   let path = '';
   for (const ring of which) {
     const [first, end] = [rings.offsets[ring], rings.offsets[ring + 1]];
     if (!at.sees(rings.points, range(first, end))) continue;
-    for (let k = first; k < end; ++k) path += (k === first ? 'M' : 'L') + at.place(rings.points, k);
+    for (let k = first; k < end; ++k) path += (k === first ? 'M' : 'L') + at.text(rings.points, k);
     path += 'Z';
   }
   return path;
 }
 
-/** Triangles as closed figures, by what `keyOf` makes of each; null leaves one out. */
+/** Paths of triangles, grouped by `keyOf`. A null key leaves a triangle out. */
 export function trianglePaths<Key>(
   mesh: Mesh, keyOf: (triangle: number) => Key | null, at: Projection,
 ): Map<Key, string> {
@@ -66,13 +66,13 @@ export function trianglePaths<Key>(
     const corners = triangles.subarray(k, k + 3);
     if (key === null || !at.sees(points, corners)) continue;
     const [a, b, c] = corners;
-    const path = `M${at.place(points, a)}L${at.place(points, b)}L${at.place(points, c)}Z`;
+    const path = `M${at.text(points, a)}L${at.text(points, b)}L${at.text(points, c)}Z`;
     paths.set(key, (paths.get(key) ?? '') + path);
   }
   return paths;
 }
 
-/** Edges of the triangles by what `keyOf` makes of a point of each, every edge once. */
+/** Paths of the edges, grouped by `keyOf` of their first point. Every edge occurs once. */
 export function edgePaths<Key>(
   mesh: Mesh, keyOf: (point: number) => Key, at: Projection,
 ): Map<Key, string> {
@@ -87,38 +87,35 @@ export function edgePaths<Key>(
     if (drawn.has(edge) || !at.sees(points, [from, to])) continue;
     drawn.add(edge);
     const key = keyOf(from);
-    const path = `M${at.place(points, from)}L${at.place(points, to)}`;
+    const path = `M${at.text(points, from)}L${at.text(points, to)}`;
     paths.set(key, (paths.get(key) ?? '') + path);
   }
   return paths;
 }
 
-/** A line without length and with round ends is a dot. */
+/** Path of dots: lines without length, for round line caps. */
 export function dotPath(points: Float32Array, at: Projection): string {
   let path = '';
   for (let k = 0; k < points.length / 2; ++k) {
-    if (at.sees(points, [k])) path += `M${at.place(points, k)}h0`;
+    if (at.sees(points, [k])) path += `M${at.text(points, k)}h0`;
   }
   return path;
 }
 
-/** Lines of so many CSS pixels along the normals of every n-th point. */
+/** Path of the normals of every `stride`-th vertex, `length` CSS pixels long. */
 export function normalPath(
   points: Float32Array, normals: Float32Array, stride: number, length: number, at: Projection,
 ): string {
   let path = '';
   for (let k = 0; k < points.length / 2; k += stride) {
     if (!at.sees(points, [k])) continue;
-    path += `M${at.place(points, k)}l${short(length * normals[2 * k])} ` +
+    path += `M${at.text(points, k)}l${short(length * normals[2 * k])} ` +
       `${short(-length * normals[2 * k + 1])}`;
   }
   return path;
 }
 
-/**
- * The rings cut where their colour changes, by colour: `colourOf` is that of the segment between a
- * point and the next.
- */
+/** Paths of the segments of rings, grouped by the colour of a segment. */
 export function segmentPaths(
   rings: Rings, colourOf: (point: number, next: number) => string, at: Projection,
 ): Map<string, string> {
@@ -131,12 +128,56 @@ export function segmentPaths(
     for (let k = first; k < end; ++k) {
       const next = k + 1 < end ? k + 1 : first;
       const own = colourOf(k, next);
-      const begin = own === colour ? '' : `M${at.place(points, k)}`;
+      const begin = own === colour ? '' : `M${at.text(points, k)}`;
       colour = own;
-      paths.set(own, `${paths.get(own) ?? ''}${begin}L${at.place(points, next)}`);
+      paths.set(own, `${paths.get(own) ?? ''}${begin}L${at.text(points, next)}`);
     }
   }
   return paths;
+}
+
+/**
+ * Paths of the mesh, one for each of `bands` equal parts of the values from 0 to 1. Values are
+ * linear in a triangle, so each triangle is cut at the limits of the bands.
+ */
+export function bandPaths(
+  mesh: Mesh, valueOf: (point: number) => number, bands: number, at: Projection,
+): string[] {
+  const { points, triangles } = mesh;
+  const paths = new Array<string>(bands).fill('');
+  const bandOf = (value: number) => Math.max(0, Math.min(bands - 1, Math.floor(value * bands)));
+  for (let k = 0; k < triangles.length; k += 3) {
+    const corners = triangles.subarray(k, k + 3);
+    if (!at.sees(points, corners)) continue;
+    let rest = Array.from(corners, (point): Corner =>
+      [at.x(points, point), at.y(points, point), valueOf(point)]);
+    const values = rest.map(([, , value]) => value);
+    if (!values.every(Number.isFinite)) continue;
+    const last = bandOf(Math.max(...values));
+    for (let band = bandOf(Math.min(...values)); band <= last; ++band) {
+      const part = band === last ? rest : clip(rest, (band + 1) / bands, -1);
+      if (part.length > 2) paths[band] += `M${part.map(([x, y]) => `${short(x)} ${short(y)}`).join('L')}Z`;
+      rest = clip(rest, (band + 1) / bands, 1);
+    }
+  }
+  return paths;
+}
+
+/** x, y, value. */
+type Corner = [number, number, number];
+
+/** The part of a convex polygon with values above `limit` (side 1) or below (side -1). */
+function clip(polygon: Corner[], limit: number, side: 1 | -1): Corner[] {
+  const kept: Corner[] = [];
+  polygon.forEach((from, k) => {
+    const to = polygon[(k + 1) % polygon.length];
+    const isInside = side * (from[2] - limit) >= 0;
+    if (isInside) kept.push(from);
+    if (isInside === (side * (to[2] - limit) >= 0)) return;
+    const share = (limit - from[2]) / (to[2] - from[2]);
+    kept.push([from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]), limit]);
+  });
+  return kept;
 }
 
 function* range(first: number, end: number): Generator<number> {

@@ -1,27 +1,28 @@
 import { hex, mix, type Rgb, theme, unpacked } from '../draw/colours';
 import { attributeOf, type Look } from '../draw/look';
 import { pieceTints } from '../draw/pieces';
-import { type Range, rampColour, rangeOf } from '../draw/ramp';
+import { type Range, rampColour, rangeOf, shareOf } from '../draw/ramp';
 import { fillTones, ringColours } from '../draw/look_colours';
 import {
-  BAND_TINT, dotDiameter, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT, NORMAL_WIDTH,
-  normalLength, normalStride, PARTICLE_ALPHA,
+  BAND_TINT, dotDiameter, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT, ISOLINE_WIDTH,
+  NORMAL_WIDTH, normalLength, normalStride, PARTICLE_ALPHA,
 } from '../draw/style';
 import type { Size, View } from '../draw/view';
 import { type Frame, type Mesh, NO_RING, type Rings, TRIANGLE_CLASS } from '../protocol/frame';
 import {
-  dotPath, edgePaths, normalPath, Projection, ringPath, segmentPaths, short, trianglePaths,
+  bandPaths, dotPath, edgePaths, normalPath, Projection, ringPath, segmentPaths, short, trianglePaths,
 } from './paths';
 
-/** Steps of colour along an outline that is coloured by an attribute. */
+/** Colours of an attribute. */
 const RAMP_STEPS = 64;
 
 /**
- * What is seen, as a picture of lines and areas, in CSS pixels. `range` is that of the attribute
- * which the look colours by; without it, the frame's own.
+ * The frame as an SVG picture, in CSS pixels. `range`: of the attribute that the look colours by;
+ * null: the frame's own. `selected`: rings to highlight.
  */
 export function svg(
   frame: Frame, look: Look, view: View, size: Size, range: Range | null = null,
+  selected: readonly number[] = [],
 ): string {
   const at = new Projection(view, size, frame.origin);
   const colours = theme(look.dark);
@@ -29,12 +30,12 @@ export function svg(
     `<svg xmlns="http://www.w3.org/2000/svg" width="${short(size.width)}" ` +
       `height="${short(size.height)}" viewBox="0 0 ${short(size.width)} ${short(size.height)}">`,
     `<title>Frame ${frame.sequence}, time ${frame.time}</title>`,
-    '<style>path{stroke-linecap:round;stroke-linejoin:round}</style>',
+    '<g stroke-linecap="round" stroke-linejoin="round">',
     `<rect width="100%" height="100%" fill="${hex(colours.background)}"/>`,
   ];
-  const { rings, mesh, statistics } = frame;
+  const { rings, isolines, mesh, statistics } = frame;
   const ringColour = ringColours(rings, look);
-  if (look.fill) parts.push(...areas(frame, look, ringColour, at));
+  if (look.fill) parts.push(...areas(frame, look, ringColour, range, at));
   if (look.edges && mesh) parts.push(...edges(mesh, rings, look, ringColour, at));
   if (look.particles && frame.particles) {
     parts.push(line(dotPath(frame.particles, at), colours.particle,
@@ -48,17 +49,25 @@ export function svg(
       colours.normal, NORMAL_WIDTH));
   }
   if (look.outline) parts.push(...outline(rings, look, ringColour, range, at));
-  return [...parts.filter((part) => part !== ''), '</svg>', ''].join('\n');
+  if (look.isolines && isolines) {
+    parts.push(line(ringPath(isolines, isolines.outerOf.keys(), at), colours.isoline, ISOLINE_WIDTH));
+  }
+  parts.push(line(ringPath(rings, selected, at), colours.accent, Math.max(look.lineWidth, 1) + 0.5));
+  return [...parts.filter((part) => part !== ''), '</g></svg>', ''].join('\n');
 }
 
 /**
- * The inside in the colour of the band, with the merged triangles on top: as one figure, so that no
- * seams show between triangles.
+ * The inside in the colour of the band, with the merged triangles on top as one path, so that no
+ * seams appear between triangles.
  */
 function areas(
-  frame: Frame, look: Look, ringColour: (ring: number) => number, at: Projection,
+  frame: Frame, look: Look, ringColour: (ring: number) => number, range: Range | null,
+  at: Projection,
 ): string[] {
   const { rings, mesh } = frame;
+  const name = attributeOf(look);
+  const values = name === null ? undefined : mesh?.attribute(name);
+  if (mesh && values) return colouredMesh(mesh, values, look, range, at);
   const { background } = theme(look.dark);
   const { band, interior } = fillTones(look);
   const tinted = look.colour === 'identity';
@@ -82,6 +91,18 @@ function areas(
   return parts;
 }
 
+/** The mesh in the colours of an attribute. A stroke of the same colour hides the seams. */
+function colouredMesh(
+  mesh: Mesh, values: Float32Array, look: Look, range: Range | null, at: Projection,
+): string[] {
+  const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
+  const paths = bandPaths(mesh, (point) => shareOf(extent, values[point]), RAMP_STEPS, at);
+  return paths.map((path, band) => {
+    const colour = hex(rampColour((band + 0.5) / RAMP_STEPS, look.dark));
+    return path && `<path fill="${colour}" stroke="${colour}" stroke-width="0.7" d="${path}"/>`;
+  });
+}
+
 function edges(
   mesh: Mesh, rings: Rings, look: Look, ringColour: (ring: number) => number, at: Projection,
 ): string[] {
@@ -103,9 +124,9 @@ function outline(
     return Array.from(grouped(rings, ringColour), ([colour, group]) =>
       line(ringPath(rings, group, at), unpacked(colour), look.lineWidth));
   }
-  const { min, max } = range ?? rangeOf(values) ?? { min: 0, max: 1 };
+  const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
   const colourOf = (point: number, next: number): string => {
-    const share = max > min ? ((values[point] + values[next]) / 2 - min) / (max - min) : 0;
+    const share = shareOf(extent, (values[point] + values[next]) / 2);
     if (!Number.isFinite(share)) return hex(theme(look.dark).missing);
     return hex(rampColour(Math.round(share * RAMP_STEPS) / RAMP_STEPS, look.dark));
   };
@@ -113,7 +134,7 @@ function outline(
     stroke(path, colour, look.lineWidth, 1));
 }
 
-/** Rings by colour. */
+/** Groups rings by colour. */
 function grouped(rings: Rings, colourOf: (ring: number) => number): Map<number, number[]> {
   const groups = new Map<number, number[]>();
   for (let ring = 0; ring < rings.outerOf.length; ++ring) {

@@ -1,15 +1,15 @@
-// What the columns of a table mean, by their names: as client/input/base/columns.h has it.
+// Meaning of table columns by their names, with the rules of client/input/base/columns.h.
 import { InputError } from './source';
 
 export interface ColumnPlan {
-  /** Index of the columns of x, y, z; null for an axis that the table lacks. */
+  /** Columns of x, y, z; null for a missing axis. */
   positions: (number | null)[];
   velocities: (number | null)[];
   id: number | null;
   volume: number | null;
-  /** Everything else that may be numbers. */
+  /** All other columns. */
   scalars: { name: string; column: number }[];
-  /** Positions are LAMMPS's xs ys zs: fractions of the box. */
+  /** Positions are fractions of the box (LAMMPS xs, ys, zs). */
   scaled: boolean;
 }
 
@@ -20,10 +20,10 @@ const VELOCITIES = ['v', 'vel', 'velocity', 'velocities'];
 const IDS = ['id', 'ids', 'idp', 'particleid', 'particleids', 'originalid', 'pid', 'gid', 'tag'];
 const VOLUMES = ['volume', 'volumes', 'vol', 'area', 'areas', 'particlevolume', 'particlearea',
   'volumetricmeasure'];
-/** More scalars than anybody chooses from cost more than they tell. */
+/** Limit, because every scalar is sent to the server. */
 const MOST_SCALARS = 8;
 
-/** "Pos.x [m]" -> "posx": what is left of a name when people's habits are taken away. */
+/** Removes units, separators and case from a name: "Pos.x [m]" -> "posx". */
 function canonical(name: string): string {
   const unit = name.search(/[[(]/);
   return (unit > 0 ? name.slice(0, unit) : name).toLowerCase().replace(/[ _.:\-"']/g, '');
@@ -33,8 +33,8 @@ function spellings(stems: string[], axis: number): string[] {
   return stems.flatMap((stem) => [stem + AXES[axis], `${stem}${axis}`, AXES[axis] + stem]);
 }
 
-function find(names: string[], wanted: string[]): number | null {
-  for (const name of wanted) {
+function find(names: string[], candidates: string[]): number | null {
+  for (const name of candidates) {
     const at = names.indexOf(name);
     if (at >= 0) return at;
   }
@@ -63,7 +63,7 @@ function planVelocities(names: string[]): (number | null)[] {
   return u >= 0 && v >= 0 ? [u, v, find(names, ['w'])] : axes;  // PySPH's names.
 }
 
-/** A plan for a table that names its columns. Throws InputError where there are no positions. */
+/** Plans a table with named columns. Throws InputError if there are no positions. */
 export function planNamedColumns(given: string[]): ColumnPlan {
   const names = given.map(canonical);
   for (const [k, family] of FAMILIES.entries()) {
@@ -78,14 +78,14 @@ export function planNamedColumns(given: string[]): ColumnPlan {
     return { positions, velocities, id, volume, scalars, scaled: k >= FIRST_SCALED_FAMILY };
   }
   throw new InputError(
-    `No columns of positions among ${given.slice(0, 12).join(', ')}. Name them x and y.`);
+    `No position columns in ${given.slice(0, 12).join(', ')}. Name them x and y.`);
 }
 
-/** A plan for a table of `count` columns without names: two are x y, three are x y z. */
+/** Plans a table without names: two columns are x y, three are x y z. */
 export function planUnnamedColumns(count: number): ColumnPlan {
   if (count !== 2 && count !== 3) {
-    throw new InputError(`${count} columns without names. Write a first line that names them, ` +
-                         'with x and y among them.');
+    throw new InputError(
+      `${count} columns without names. Add a first line with names, including x and y.`);
   }
   return {
     positions: [0, 1, count === 3 ? 2 : null], velocities: [null, null, null], id: null,

@@ -5,7 +5,7 @@ import { InputError, type FrameSource } from './source';
 import { parseTable } from './table';
 import { textOf } from './text_file';
 
-/** Times of frames, by their index: a table with the columns frame and t (or time), or one column. */
+/** Times of frames by index. The table has the columns frame and t (or time), or one column. */
 export function parseTimes(text: string, name: string): Map<number, number> {
   const table = parseTable(text, name);
   const names = table.names.map((column) => column.toLowerCase());
@@ -13,20 +13,20 @@ export function parseTimes(text: string, name: string): Map<number, number> {
     : Math.max(names.indexOf('t'), names.indexOf('time'));
   const frameAt = names.indexOf('frame');
   if (timeAt < 0 || (frameAt < 0 && table.columnCount > 1)) {
-    throw new InputError(`${name} tells no times. It must have the columns frame,t or a single one.`);
+    throw new InputError(`${name} has no times. It must have the columns frame,t or a single column.`);
   }
   return new Map(table.rows.map((cells, k) =>
     [frameAt < 0 ? k : Number(cells[frameAt]), Number(cells[timeAt])]));
 }
 
-/** One frame a file, in their order. */
+/** CSV files, one frame each. */
 export class CsvSource implements FrameSource {
   readonly spacing = null;
 
   private constructor(readonly title: string, private readonly files: File[],
                       private readonly times: Map<number, number>, readonly scalars: string[]) {}
 
-  /** Reads the first frame, which says what the others have. Throws InputError. */
+  /** Reads the first frame, whose scalars all frames have. Throws InputError. */
   static async open(files: File[], timesFile: File | null, title: string): Promise<CsvSource> {
     const times = timesFile ? parseTimes(await textOf(timesFile), timesFile.name)
       : new Map<number, number>();

@@ -5,7 +5,7 @@ import { isRecording, RecordingSource } from './recording';
 import { InputError, type FrameSource } from './source';
 import { plainName, textOf } from './text_file';
 
-/** Files of an entry that was dropped, those of folders included. */
+/** Files of a dropped entry, including folders. */
 async function filesOfEntry(entry: FileSystemEntry): Promise<File[]> {
   if (entry.isFile) {
     return [await new Promise<File>((resolve, reject) => {
@@ -14,7 +14,7 @@ async function filesOfEntry(entry: FileSystemEntry): Promise<File[]> {
   }
   const reader = (entry as FileSystemDirectoryEntry).createReader();
   const files: File[] = [];
-  while (true) {  // A reader gives at most 100 entries at a time.
+  while (true) {  // A reader returns at most 100 entries per call.
     const entries = await new Promise<FileSystemEntry[]>((resolve, reject) => {
       reader.readEntries(resolve, reject);
     });
@@ -23,7 +23,7 @@ async function filesOfEntry(entry: FileSystemEntry): Promise<File[]> {
   }
 }
 
-/** Everything that was dropped. To be called while the event is handled. */
+/** All dropped files. Call during the event. */
 export async function filesOfDrop(transfer: DataTransfer): Promise<File[]> {
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry())
     .filter((entry): entry is FileSystemEntry => entry !== null);
@@ -39,11 +39,11 @@ const isTable = (file: File) => /\.(csv|txt|dat|tsv)$/.test(plainName(file));
 const isDump = (file: File) => /\.(lammpstrj|dump)$|^dump\./.test(plainName(file));
 const isTimes = (file: File) => plainName(file) === 'times.csv';
 
-/** What was dropped, as frames. Throws InputError, which says what can be read. */
+/** Opens dropped files as frames. Throws InputError. */
 export async function openDropped(dropped: File[]): Promise<FrameSource> {
   const files = dropped.filter((file) => !file.name.startsWith('.'))
     .sort((a, b) => naturalOrder(a.webkitRelativePath || a.name, b.webkitRelativePath || b.name));
-  if (files.length === 0) throw new InputError('Nothing was dropped that could be read.');
+  if (files.length === 0) throw new InputError('No readable file was dropped.');
   const first = files[0];
   if (isRecording(await headOf(first))) {
     return RecordingSource.open(new Uint8Array(await first.arrayBuffer()), first.name);
@@ -59,8 +59,8 @@ export async function openDropped(dropped: File[]): Promise<FrameSource> {
       : `${tables.length} files, ${tables[0].name} to ${tables[tables.length - 1].name}`;
     return CsvSource.open(tables, files.find(isTimes) ?? null, title);
   }
-  throw new InputError(`${first.name} cannot be read here. Drop CSV files or their folder, a LAMMPS ` +
-                       'text dump or a recording (.pemc); `partiemc convert` makes one of VTK and NPY.');
+  throw new InputError(`${first.name} cannot be read here. Drop CSV files or their folder, a LAMMPS text ` +
+                       'dump or a recording (.pemc). `partiemc convert` makes recordings of VTK and NPY files.');
 }
 
 async function isDumpInside(file: File): Promise<boolean> {

@@ -1,14 +1,14 @@
-// LAMMPS text dumps ("dump atom" and "dump custom"): frames of sections that begin with "ITEM:".
+// LAMMPS text dumps of the styles atom and custom. A frame has sections that start with "ITEM:".
 import type { Particles } from '../protocol/particles';
 import { planNamedColumns } from './columns';
 import { particlesOf, type Unscale } from './particles';
 import { InputError, type FrameSource } from './source';
 import { splitAtBlanks } from './table';
 
-/** A point of the box is origin + sum over axes of (fraction * edge). */
+/** A position in the box is origin + sum over axes of (fraction * edge). */
 interface Box { origin: number[]; edges: number[][] }
 
-/** Lower and upper bounds, and for a triclinic box the tilts xy xz yz, which widen its bounds. */
+/** Parses lower and upper bounds. A triclinic box has tilts xy, xz, yz, which widen the bounds. */
 function boxOf(lines: string[]): Box {
   const numbers = lines.map((line) => splitAtBlanks(line).map(Number));
   const low = numbers.map((line) => line[0]);
@@ -37,7 +37,7 @@ function unscaleIn(box: Box): Unscale {
   };
 }
 
-/** One frame's lines. Throws InputError. */
+/** Parses one frame. Throws InputError. */
 export function parseLammpsFrame(text: string, index: number, name: string): Particles {
   const where = `${name}, frame ${index + 1}`;
   const lines = text.split(/\r?\n/);
@@ -66,13 +66,13 @@ export function parseLammpsFrame(text: string, index: number, name: string): Par
       return particlesOf(rows, plan, time, index, where, unscale);
     }
   }
-  throw new InputError(`${where} has no atoms. Only text dumps of style atom and custom are read.`);
+  throw new InputError(`${where} has no atoms. Only text dumps of the styles atom and custom can be read.`);
 }
 
 const FRAME_MARK = 'ITEM: TIMESTEP';
 const CHUNK_BYTES = 4 << 20;
 
-/** A dump of many frames, cut at its marks and read where needed. */
+/** A dump. Frames are read on demand. */
 export class LammpsSource implements FrameSource {
   readonly spacing = null;
 
@@ -81,7 +81,7 @@ export class LammpsSource implements FrameSource {
 
   static async open(file: Blob, title: string): Promise<LammpsSource> {
     const offsets = await marksOf(file);
-    if (offsets.length === 0) throw new InputError(`${title} holds no frame of a LAMMPS dump.`);
+    if (offsets.length === 0) throw new InputError(`${title} has no frame of a LAMMPS dump.`);
     const source = new LammpsSource(file, title, [...offsets, file.size], []);
     const first = await source.frame(0);
     source.scalars.push(...(first.scalars ?? []).map(({ name }) => name));
@@ -96,7 +96,7 @@ export class LammpsSource implements FrameSource {
   }
 }
 
-/** Where the frames of a dump begin. Reads the file once, a piece at a time. */
+/** Offsets of the frames of a dump. Reads the file once, in pieces. */
 async function marksOf(file: Blob): Promise<number[]> {
   const offsets: number[] = [];
   for (let at = 0; at < file.size; at += CHUNK_BYTES) {

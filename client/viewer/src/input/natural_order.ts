@@ -1,4 +1,4 @@
-/** Order of names as people number them: runs of digits compare by value, frame_2 < frame_10. */
+/** Natural order of names: digits compare by value, frame_2 < frame_10. */
 export function naturalOrder(a: string, b: string): number {
   const partsA = a.split(/(\d+)/);
   const partsB = b.split(/(\d+)/);
@@ -13,7 +13,7 @@ function compareText(a: string, b: string): number {
   return a < b ? -1 : a > b ? 1 : 0;
 }
 
-/** Of digits: without leading zeros the longer is larger. */
+/** Compares digits: without leading zeros the longer number is larger. */
 function compareNumbers(a: string, b: string): number {
   const x = a.replace(/^0+/, '');
   const y = b.replace(/^0+/, '');

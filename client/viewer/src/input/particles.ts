@@ -4,10 +4,10 @@ import type { Particles } from '../protocol/particles';
 import type { ColumnPlan } from './columns';
 import { InputError } from './source';
 
-/** Rounding in text with six digits is below it, a real third dimension far above. */
+/** Relative extent above which an axis counts. Above the rounding of six-digit text. */
 const FLAT = 1e-6;
 
-/** Which two of the axes the particles lie in. Throws InputError where they are 3D. */
+/** The two axes of the particles' plane. Throws InputError for 3D particles. */
 function planeOf(axes: (Float64Array | null)[], name: string): [number, number] {
   const there = axes.flatMap((axis, k) => axis ? [k] : []);
   if (there.length === 2) return [there[0], there[1]];
@@ -18,7 +18,7 @@ function planeOf(axes: (Float64Array | null)[], name: string): [number, number] 
     return axis === 0 ? [1, 2] : [0, axis === 1 ? 2 : 1];
   }
   const text = extents.map((extent) => extent.toPrecision(3)).join(' x ');
-  throw new InputError(`${name} is 3D (extents ${text}). The outline is of 2D data: slice it first.`);
+  throw new InputError(`${name} is 3D (extents ${text}). The page reads 2D data only. Extract a slice first.`);
 }
 
 function extentOf(values: Float64Array): number {
@@ -36,7 +36,7 @@ function column(rows: string[][], at: number, name: string): Float64Array {
   rows.forEach((cells, i) => {
     const value = Number(cells[at]);
     if (Number.isNaN(value) && !/^[+-]?nan$/i.test(cells[at])) {
-      throw new InputError(`${name}, row ${i + 1}: '${cells[at]}' is no number.`);
+      throw new InputError(`${name}, row ${i + 1}: '${cells[at]}' is not a number.`);
     }
     values[i] = value;
   });
@@ -52,7 +52,7 @@ function interleaved<T extends Float32Array | Float64Array>(x: Float64Array, y: 
   return out;
 }
 
-/** Ids as they are; null where one is no id or comes twice. */
+/** Ids; null if one is invalid or a duplicate. */
 function idsOf(rows: string[][], at: number): BigUint64Array | null {
   const ids = new BigUint64Array(rows.length);
   const seen = new Set<bigint>();
@@ -64,7 +64,7 @@ function idsOf(rows: string[][], at: number): BigUint64Array | null {
   return seen.size === rows.length ? ids : null;
 }
 
-/** float32 of a column; null where one is not finite, or not `positive` where that is asked for. */
+/** A column as float32; null if a value is not finite, or not positive if `positive` is set. */
 function floatsOf(rows: string[][], at: number, positive: boolean): Float32Array | null {
   const values = new Float32Array(rows.length);
   for (const [i, cells] of rows.entries()) {
@@ -74,10 +74,10 @@ function floatsOf(rows: string[][], at: number, positive: boolean): Float32Array
   return values;
 }
 
-/** Turns fractions of a box into coordinates, in place. */
+/** Converts fractions of a box to coordinates, in place. */
 export type Unscale = (axes: (Float64Array | null)[]) => void;
 
-/** A frame of a table's rows. Without a time, `index` stands for it, and velocities mean nothing. */
+/** Converts table rows to a frame. Without a time, uses `index` and drops velocities. */
 export function particlesOf(rows: string[][], plan: ColumnPlan, time: number | null, index: number,
                             name: string, unscale?: Unscale): Particles {
   const axes = plan.positions.map((at) => at === null ? null : column(rows, at, name));

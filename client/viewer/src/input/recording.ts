@@ -1,5 +1,4 @@
-// The project's own recordings (client/recording/recording.h): marks and zstd blocks, each of some
-// messages behind their lengths.
+// Recordings (client/recording/recording.h): marks and zstd blocks of length-prefixed messages.
 import { fromBinary } from '@bufbuild/protobuf';
 import { BinaryReader } from '@bufbuild/protobuf/wire';
 import { RecordingHeaderSchema } from '@proto/recording/v1/recording_pb';
@@ -17,8 +16,7 @@ export function isRecording(head: Uint8Array): boolean {
   return head.length >= 16 && new TextDecoder('latin1').decode(head.subarray(8, 16)) === FILE_TAG;
 }
 
-/** The end of the zstd frame that begins at `at`, by the sizes of its blocks (RFC 8878, 3.1.1);
- * null where the file ends before. */
+/** End of the zstd frame at `at`, from its block sizes (RFC 8878, 3.1.1); null if it is truncated. */
 function frameEnd(bytes: Uint8Array, at: number): number | null {
   const descriptor = bytes[at + 4];
   const single = (descriptor >> 5) & 1;
@@ -37,7 +35,7 @@ function frameEnd(bytes: Uint8Array, at: number): number | null {
   return next <= bytes.length ? next : null;
 }
 
-/** The messages of a block: each behind its length. */
+/** The length-prefixed messages of a block. */
 function messagesOf(block: Uint8Array): Uint8Array[] {
   const reader = new BinaryReader(block);
   const messages: Uint8Array[] = [];
@@ -45,14 +43,14 @@ function messagesOf(block: Uint8Array): Uint8Array[] {
   return messages;
 }
 
-/** Where a frame is: which block, and which of its messages. */
-interface Place { block: number; message: number }
+/** Location of a frame: a block and a message in it. */
+interface Location { block: number; message: number }
 
-/** Keeps the file as it is, packed, and unpacks a block where one of its frames is needed. A file
- * that was cut off ends after its last whole block. */
+/** A recording in memory. Decompresses a block when one of its frames is read. A truncated file ends
+ * after its last whole block. */
 export class RecordingSource implements FrameSource {
   readonly scalars: string[] = [];
-  private readonly places: Place[] = [];
+  private readonly locations: Location[] = [];
   private unpacked: { block: number; messages: Uint8Array[] } | null = null;
 
   private constructor(private readonly bytes: Uint8Array, private readonly blocks: number[],
@@ -60,22 +58,22 @@ export class RecordingSource implements FrameSource {
 
   /** Throws InputError. */
   static open(bytes: Uint8Array, name: string): RecordingSource {
-    if (!isRecording(bytes)) throw new InputError(`${name} is no recording.`);
+    if (!isRecording(bytes)) throw new InputError(`${name} is not a recording.`);
     const blocks = blocksOf(bytes);
     const header = fromBinary(RecordingHeaderSchema, messagesOf(unpack(bytes, blocks, 0, name))[0]);
     const source = new RecordingSource(bytes, blocks, header.title || name, header.spacing ?? null);
     for (let block = 1; block + 1 < blocks.length; ++block) {
       const messages = messagesOf(unpack(bytes, blocks, block, name));
-      messages.forEach((_, message) => source.places.push({ block, message }));
+      messages.forEach((_, message) => source.locations.push({ block, message }));
     }
-    if (source.count === 0) throw new InputError(`${name} holds no frame.`);
+    if (source.count === 0) throw new InputError(`${name} has no frame.`);
     return source;
   }
 
-  get count(): number { return this.places.length; }
+  get count(): number { return this.locations.length; }
 
   async frame(index: number): Promise<Particles> {
-    const { block, message } = this.places[index];
+    const { block, message } = this.locations[index];
     if (this.unpacked?.block !== block) {
       const messages = messagesOf(unpack(this.bytes, this.blocks, block, this.title));
       this.unpacked = { block, messages };
@@ -88,7 +86,7 @@ export class RecordingSource implements FrameSource {
   }
 }
 
-/** Where the blocks begin, and at last where the last whole one ends. */
+/** Starts of the whole blocks, and the end of the last one. */
 function blocksOf(bytes: Uint8Array): number[] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const blocks = [MARK_BYTES];
@@ -106,6 +104,6 @@ function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string
   try {
     return decompress(bytes.subarray(blocks[block], blocks[block + 1]));
   } catch {
-    throw new InputError(`${name} is damaged. Only the frames before can be read by the command line.`);
+    throw new InputError(`${name} is damaged. The command line can read the frames before the damage.`);
   }
 }

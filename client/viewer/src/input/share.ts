@@ -2,7 +2,7 @@ import { arrayOf } from '../protocol/arrays';
 import { particleBytes } from '../protocol/positions';
 import type { Particles } from '../protocol/particles';
 
-/** A number in [0, 100) that depends on `id` alone, evenly spread (finaliser of MurmurHash3). */
+/** A uniform hash of `id` in [0, 100) (finaliser of MurmurHash3). */
 function percentile(id: number): number {
   let h = id | 0;
   h = Math.imul(h ^ (h >>> 16), 0x85ebca6b);
@@ -10,7 +10,7 @@ function percentile(id: number): number {
   return ((h ^ (h >>> 16)) >>> 0) % 100;
 }
 
-/** The rows of `bytes` whose index is in `kept`; empty stays empty. */
+/** Selects rows of `bytes`. Empty bytes stay empty. */
 function rows(bytes: Uint8Array | undefined, rowBytes: number, kept: Uint32Array): Uint8Array {
   if (!bytes || bytes.length === 0) return new Uint8Array(0);
   const out = new Uint8Array(kept.length * rowBytes);
@@ -20,8 +20,7 @@ function rows(bytes: Uint8Array | undefined, rowBytes: number, kept: Uint32Array
   return out;
 }
 
-/** About `percent` of a frame's particles: always the same ones, by their ids where they have some,
- * else by their place in the frame. */
+/** Selects about `percent` of the particles. The choice depends on ids, or on indices without ids. */
 export function shareOf(frame: Particles, percent: number): Particles {
   if (percent >= 100) return frame;
   const rowBytes = particleBytes(frame.positionFormat);

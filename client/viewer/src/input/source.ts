@@ -1,17 +1,17 @@
 import type { Particles } from '../protocol/particles';
 
-/** Frames of particles that were dropped on the page, read as they are needed. */
+/** Dropped files as frames of particles, read on demand. */
 export interface FrameSource {
-  /** For a person: what it is. */
+  /** Name for the user. */
   readonly title: string;
   readonly count: number;
-  /** World units; null where it has to be estimated. */
+  /** World units; null: to be estimated. */
   readonly spacing: number | null;
   /** Names of scalars that every frame has. */
   readonly scalars: string[];
-  /** Frame `index`, from 0 on. Throws InputError. */
+  /** Reads frame `index`, starting at 0. Throws InputError. */
   frame(index: number): Promise<Particles>;
 }
 
-/** What is wrong with a file, and what to do. */
+/** Error of a file, with a remedy. */
 export class InputError extends Error {}

@@ -1,8 +1,8 @@
-// Text tables: CSV and its relatives, as client/input/base/text_table.h reads them.
+// Text tables with the rules of client/input/base/text_table.h.
 import { InputError } from './source';
 
 export interface Table {
-  /** Empty where the table does not name its columns. */
+  /** Empty if the columns have no names. */
   names: string[];
   columnCount: number;
   rows: string[][];
@@ -20,7 +20,7 @@ function unquoted(cell: string): string {
     ? bare.slice(1, -1).trim() : bare;
 }
 
-/** A line's cells; a separator within quotes separates nothing. */
+/** Splits a line. Separators within quotes do not count. */
 function splitAt(line: string, separator: string): string[] {
   const cells = line.includes('"')
     ? line.match(new RegExp(`("[^"]*"|[^${separator}])+|(?<=${separator})(?=${separator})`, 'g')) ?? []
@@ -39,7 +39,7 @@ function splitter(line: string): (line: string) => string[] {
   return (other) => splitAtBlanks(other).map(unquoted);
 }
 
-/** Throws InputError where a row has fewer cells than the first one. */
+/** Throws InputError if a row has fewer cells than the first one. */
 export function parseTable(text: string, name: string): Table {
   const lines = text.split(/\r?\n|\r/);
   const first = lines.findIndex((line) => line.trim() !== '' && !isComment(line.trim()));
@@ -60,7 +60,7 @@ export function parseTable(text: string, name: string): Table {
     if (line.trim() === '' || isComment(line.trim())) continue;
     const cells = split(line);
     if (cells.length < head.length) {
-      throw new InputError(`${name}, line ${k + 1}: ${cells.length} cells where the first row has ` +
+      throw new InputError(`${name}, line ${k + 1}: ${cells.length} cells, but the first row has ` +
                            `${head.length}. The file may be truncated.`);
     }
     rows.push(cells);

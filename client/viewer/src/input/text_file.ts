@@ -1,6 +1,6 @@
 import { decompress } from 'fzstd';
 
-/** Text of a file, unpacked where its name says that it is packed. */
+/** Text of a file. Decompresses .gz and .zst. */
 export async function textOf(file: File): Promise<string> {
   if (file.name.endsWith('.gz')) {
     return new Response(file.stream().pipeThrough(new DecompressionStream('gzip'))).text();
@@ -11,7 +11,7 @@ export async function textOf(file: File): Promise<string> {
   return file.text();
 }
 
-/** The name without what tells how it is packed, in lower case. */
+/** The name in lower case, without .gz or .zst. */
 export function plainName(file: File): string {
   return file.name.toLowerCase().replace(/\.(gz|zst)$/, '');
 }

@@ -1,12 +1,12 @@
-// Bulk arrays of messages: bytes, little-endian and packed, as every machine with a browser has them.
+// Arrays of messages: packed little-endian bytes. Every machine with a browser is little-endian.
 
 interface ArrayType<T> {
   readonly BYTES_PER_ELEMENT: number;
   new (buffer: ArrayBufferLike, byteOffset: number, length: number): T;
 }
 
-/** Elements of `bytes`: a view where they are aligned, else a copy. A tail that is no whole element
- * is an error of the sender, which the server has checked. */
+/** Elements of `bytes`: a view if they are aligned, else a copy. Bytes after the last whole element
+ * are ignored. */
 export function arrayOf<T>(type: ArrayType<T>, bytes: Uint8Array): T {
   const size = type.BYTES_PER_ELEMENT;
   const length = Math.floor(bytes.byteLength / size);
@@ -14,7 +14,7 @@ export function arrayOf<T>(type: ArrayType<T>, bytes: Uint8Array): T {
   return new type(bytes.slice().buffer, 0, length);
 }
 
-/** The bytes of an array, not copied. */
+/** View of the bytes of an array. */
 export function bytesOf(array: ArrayBufferView): Uint8Array {
   return new Uint8Array(array.buffer, array.byteOffset, array.byteLength);
 }

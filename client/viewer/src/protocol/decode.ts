@@ -1,5 +1,6 @@
 import {
-  CoordinateFormat, Doubt, type Mesh as MeshMessage, Plane, type ReconstructedFrame, type Rings as RingsMessage,
+  CoordinateFormat, type Mesh as MeshMessage, type NamedAttribute, Plane, type ReconstructedFrame,
+  type Rings as RingsMessage,
 } from '@proto/v1/reconstruction_pb';
 import { arrayOf, bytesOf } from './arrays';
 import type { Frame, Mesh, Rings, Statistics } from './frame';
@@ -7,19 +8,7 @@ import { relativePositions } from './positions';
 
 const EMPTY = new Uint8Array(0);
 
-const DOUBTS: Record<number, string> = {
-  [Doubt.SPACING_PROVISIONAL]:
-    'The spacing is a guess of this frame alone. Give the spacing.',
-  [Doubt.SPACING_CONTRADICTED]:
-    'The particles are more than twice as near or as far from each other as the spacing says. ' +
-    'Give the right spacing; look at the units.',
-  [Doubt.VOLUMES_CONTRADICT_SPACING]:
-    "Most volumes do not fit the spacing. Send areas, in the square of the positions' unit.",
-  [Doubt.POSITIONS_COARSE]:
-    'float32 is coarse at these coordinates. Send float64, or coordinates near the origin.',
-};
-
-/** float64 world coordinates as float32 relative to their first point. */
+/** Converts float64 world coordinates to float32 relative to their first point. */
 class Relative {
   origin: [number, number];
 
@@ -51,15 +40,24 @@ class Relative {
   }
 }
 
+/** One number per point: the length of a vector. */
+function magnitudesOf({ values, components }: NamedAttribute): Float32Array {
+  const numbers = arrayOf(Float32Array, values);
+  if (components <= 1) return numbers;
+  return Float32Array.from({ length: numbers.length / components }, (_, k) =>
+    Math.hypot(...numbers.subarray(k * components, (k + 1) * components)));
+}
+
 /**
- * The mesh of a message. A message's arrays are rarely aligned, and copying them takes longer than
- * to upload them: they are copied when somebody reads them as numbers.
+ * The mesh of a message. Arrays of a message are rarely aligned, and a copy takes longer than an
+ * upload. They are therefore copied when they are first read as numbers.
  */
 class MessageMesh implements Mesh {
   readonly classes: Uint8Array;
   readonly bytes: Mesh['bytes'];
   private numbers: Float32Array | null = null;
   private indices: Uint32Array | null = null;
+  private readonly attributes = new Map<string, Float32Array>();
 
   constructor(private readonly message: MeshMessage, private readonly relative: Relative) {
     this.classes = message.classes;
@@ -76,38 +74,29 @@ class MessageMesh implements Mesh {
   get triangles(): Uint32Array {
     return (this.indices ??= arrayOf(Uint32Array, this.message.triangles));
   }
+
+  attribute(name: string): Float32Array | undefined {
+    const message = this.message.attributes.find((one) => one.name === name);
+    if (message && !this.attributes.has(name)) this.attributes.set(name, magnitudesOf(message));
+    return this.attributes.get(name);
+  }
 }
 
 function decodeRings(message: RingsMessage | undefined, points: Float32Array): Rings {
   const measures = message?.measures ?? [];
-  const count = measures.length;
-  const rings: Rings = {
+  const attributes = message?.attributes ?? [];
+  return {
     points,
     offsets: message ? arrayOf(Uint32Array, message.offsets) : new Uint32Array(1),
     outerOf: arrayOf(Uint32Array, message?.outerOf ?? EMPTY),
     identities: arrayOf(BigUint64Array, message?.identities ?? EMPTY),
-    area: new Float64Array(count),
-    perimeter: new Float64Array(count),
-    particles: new Float64Array(count),
+    area: Float64Array.from(measures, ({ area }) => area),
+    perimeter: Float64Array.from(measures, ({ perimeter }) => perimeter),
+    particles: Float64Array.from(measures, ({ particleCount }) => Number(particleCount)),
     parents: measures.map((measure) => measure.parentIdentities),
     normals: message && message.normals.length > 0 ? arrayOf(Float32Array, message.normals) : null,
-    attributes: new Map(),
+    attributes: new Map(attributes.map((attribute) => [attribute.name, magnitudesOf(attribute)])),
   };
-  measures.forEach((measure, k) => {
-    rings.area[k] = measure.area;
-    rings.perimeter[k] = measure.perimeter;
-    rings.particles[k] = Number(measure.particleCount);
-  });
-  for (const attribute of message?.attributes ?? []) {
-    rings.attributes.set(attribute.name, arrayOf(Float32Array, attribute.values));
-  }
-  return rings;
-}
-
-function decodeMesh(message: ReconstructedFrame, relative: Relative): Mesh | null {
-  const mesh = message.mesh;
-  if (!mesh) return null;
-  return new MessageMesh(mesh, relative);
 }
 
 function decodeStatistics(message: ReconstructedFrame): Statistics {
@@ -119,26 +108,26 @@ function decodeStatistics(message: ReconstructedFrame): Statistics {
     area: statistics?.area ?? 0,
     perimeter: statistics?.perimeter ?? 0,
     spacing: statistics?.spacing ?? 0,
-    cellSize: statistics?.cellSize ?? 0,
     milliseconds: statistics?.milliseconds ?? 0,
-    stages: (statistics?.stages ?? []).map(({ stage, milliseconds }) => ({ stage, milliseconds })),
-    doubts: (statistics?.doubts ?? []).map((doubt) => DOUBTS[doubt] ?? `Doubt ${doubt}.`),
+    droppedHoles: Number(statistics?.droppedHoles ?? 0),
+    droppedComponents: Number(statistics?.droppedComponents ?? 0),
+    droppedSpray: Number(statistics?.droppedSpray ?? 0),
+    selfIntersections: Number(statistics?.selfIntersections ?? 0),
+    foldedTriangles: Number(statistics?.foldedTriangles ?? 0),
+    doubts: statistics?.doubts ?? [],
   };
 }
 
-/** A result as it is drawn. `bytes` is the size of its message, `plane` that of echoed particles
- * with three components. */
-export function decodeFrame(message: ReconstructedFrame, bytes: number, receivedAt: number,
-                            plane: Plane): Frame {
+/** Decodes a result. `plane`: the plane of echoed particles with three components. */
+export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
   const relative = new Relative(message);
   return {
     sequence: message.sequence,
     time: message.time,
-    bytes,
-    receivedAt,
     origin: relative.origin,
     rings: decodeRings(message.rings, relative.points(message.rings?.points ?? EMPTY)),
-    mesh: decodeMesh(message, relative),
+    isolines: null,
+    mesh: message.mesh ? new MessageMesh(message.mesh, relative) : null,
     particles: message.particles.length > 0
       ? relativePositions(message.particleFormat, message.particles, plane, relative.origin)
       : null,

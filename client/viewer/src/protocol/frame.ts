@@ -1,59 +1,63 @@
-/** Where a mesh's triangle lies. */
+/** Class of a mesh triangle. */
 export const TRIANGLE_CLASS = { band: 0, interior: 1 } as const;
 
 export interface Rings {
-  /** x, y of every point, relative to the frame's origin. */
+  /** x, y of every vertex, relative to the frame's origin. */
   points: Float32Array;
-  /** Ring k has the points [offsets[k], offsets[k + 1]). */
+  /** Ring k has the vertices [offsets[k], offsets[k + 1]). */
   offsets: Uint32Array;
-  /** Of each ring its outer ring; NO_RING for an outer ring itself. */
+  /** Outer ring of each hole; NO_RING for an outer ring. */
   outerOf: Uint32Array;
   identities: BigUint64Array;
   area: Float64Array;
   perimeter: Float64Array;
   particles: Float64Array;
-  /** Identities, in the frame before, of the rings that each ring continues. */
+  /** Identities, in the previous frame, of the rings that each ring continues. */
   parents: bigint[][];
   normals: Float32Array | null;
-  /** Per point, by the scalar's name. */
+  /** One number per vertex, by the attribute's name; the length of a vector. */
   attributes: Map<string, Float32Array>;
 }
 
 export interface Mesh {
+  /** The first points are the vertices of the rings. */
   readonly points: Float32Array;
   readonly triangles: Uint32Array;
-  /** Of each triangle: 0 boundary band, 1 merged interior. */
+  /** TRIANGLE_CLASS of each triangle. */
   readonly classes: Uint8Array;
-  /** The same numbers as bytes, aligned or not: what drawing takes, without a copy. */
+  /** `points` and `triangles` as bytes of any alignment, for an upload without a copy. */
   readonly bytes: { readonly points: Uint8Array; readonly triangles: Uint8Array };
+  /** One number per point; undefined if the mesh lacks the attribute. */
+  attribute(name: string): Float32Array | undefined;
 }
 
 export interface Statistics {
   particles: number;
   triangles: number;
-  /** What fill `grid` would have made of the same rings. */
+  /** Triangles that fill `grid` would make of the same rings. */
   trianglesGrid: number;
   area: number;
   perimeter: number;
   spacing: number;
-  cellSize: number;
   milliseconds: number;
-  stages: { stage: string; milliseconds: number }[];
-  /** In words, what speaks against the result. */
-  doubts: string[];
+  droppedHoles: number;
+  droppedComponents: number;
+  droppedSpray: number;
+  selfIntersections: number;
+  foldedTriangles: number;
+  /** Numbers for `Track.doubtText`. */
+  doubts: number[];
 }
 
-/** One result as it is drawn. Arrays are views into the message where alignment allows. */
+/** One result, ready to draw. Arrays are views into the message if its alignment allows. */
 export interface Frame {
   sequence: bigint;
   time: number;
-  /** Of the message. */
-  bytes: number;
-  /** performance.now() when it came. */
-  receivedAt: number;
-  /** World coordinates of what all points are relative to. */
+  /** World coordinates of the point that all positions are relative to. */
   origin: [number, number];
   rings: Rings;
+  /** Rings of further isovalues in the same plane; null if there are none. */
+  isolines: Rings | null;
   mesh: Mesh | null;
   /** x, y of every particle, relative to the origin. */
   particles: Float32Array | null;
@@ -62,5 +66,22 @@ export interface Frame {
   meshDigest: bigint;
 }
 
-/** In Rings.outerOf: the ring is an outer ring. */
+/** In Rings.outerOf: an outer ring. */
 export const NO_RING = 0xffffffff;
+
+/** Rings without measures, identities and attributes: lines to draw. */
+export function bareRings(points: Float32Array, offsets: Uint32Array): Rings {
+  const count = offsets.length - 1;
+  return {
+    points,
+    offsets,
+    outerOf: new Uint32Array(count).fill(NO_RING),
+    identities: new BigUint64Array(count),
+    area: new Float64Array(count),
+    perimeter: new Float64Array(count),
+    particles: new Float64Array(count),
+    parents: Array.from({ length: count }, () => []),
+    normals: null,
+    attributes: new Map(),
+  };
+}

@@ -1,6 +1,6 @@
 import type { PositionFormat } from '@proto/v1/reconstruction_pb';
 
-/** One frame of particles as it is sent: bytes as in ParticleFrame. */
+/** One frame of particles to send, with the bytes of a ParticleFrame. */
 export interface Particles {
   time: number;
   positionFormat: PositionFormat;

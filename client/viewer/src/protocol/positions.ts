@@ -1,7 +1,7 @@
 import { Plane, PositionFormat } from '@proto/v1/reconstruction_pb';
 import { arrayOf } from './arrays';
 
-/** Which two of three components span a plane. */
+/** The two of three components that span a plane. */
 function axesOf(plane: Plane): [number, number] {
   if (plane === Plane.XZ) return [0, 2];
   if (plane === Plane.YZ) return [1, 2];
@@ -17,7 +17,7 @@ function numbersOf(format: PositionFormat, bytes: Uint8Array): Float32Array | Fl
   return wide ? arrayOf(Float64Array, bytes) : arrayOf(Float32Array, bytes);
 }
 
-/** Bytes of one particle's position. */
+/** Bytes per position. */
 export function particleBytes(format: PositionFormat): number {
   const wide = format === PositionFormat.FLOAT64_2 || format === PositionFormat.FLOAT64_3;
   return componentsOf(format) * (wide ? 8 : 4);

@@ -1,4 +1,4 @@
-/** Pauses between tries: from `first` milliseconds, twice as long each time, up to `longest`. */
+/** Pauses between attempts: from `first` milliseconds, doubled each time, up to `longest`. */
 export class Backoff {
   private next: number;
 
@@ -6,14 +6,13 @@ export class Backoff {
     this.next = first;
   }
 
-  /** Milliseconds to wait before the next try. */
+  /** Milliseconds until the next attempt. */
   take(): number {
     const pause = this.next;
     this.next = Math.min(2 * this.next, this.longest);
     return pause;
   }
 
-  /** After a success. */
   reset(): void {
     this.next = this.first;
   }

@@ -1,4 +1,4 @@
-import type { Plane, ReconstructedFrame, ReconstructionParameters, StreamOpened }
+import type { ReconstructedFrame, ReconstructionParameters, StreamOpened }
   from '@proto/v1/reconstruction_pb';
 import { InputError, type FrameSource } from '../input/source';
 import { shareOf } from '../input/share';
@@ -7,34 +7,36 @@ import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { Player, type Range } from './player';
 import { Producer, parseResult } from './producer';
-import { outputsFor, parametersOf, type Settings } from './settings';
+import { methodOf, outputsFor, parametersOf, type Settings } from './settings';
+import { decodeFrame } from '../protocol/decode';
 import type { Particles } from '../protocol/particles';
-import { CallError, inWords, mayTryAgain, type CallStatus } from './status';
+import { relativePositions } from '../protocol/positions';
+import { CallError, describe, mayRetry, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
-import { HISTORY_BYTES, type Track, type TrackState } from './track';
+import { HISTORY_BYTES, type Method, type Track, type TrackState } from './track';
 
-/** Frames a second at speed 1. */
+/** Frames per second at speed 1. */
 const RATE = 30;
-/** Frames before the player's place that are kept where results take more than there is room for. */
+/** Frames kept before the player's position if the history is full. */
 const KEPT_BEHIND = 8;
 
-/** Files that were dropped on the page: a stream of their own through the server. Frame k of the
- * source has the sequence k + 1. */
+/** Dropped files, sent to the server as a stream. Frame k of the source has the sequence k + 1. */
 export class FileTrack implements Track {
   readonly kind = 'file';
   readonly history = new History(HISTORY_BYTES);
   readonly player: Player;
   readonly counts: Counts = { received: 0, drawn: 0, dropped: 0 };
-  state: TrackState = { kind: 'busy', words: 'Connecting' };
+  state: TrackState = { kind: 'busy', text: 'Connecting' };
   parameters: ReconstructionParameters | null = null;
-  /** What the server calls the stream. */
+  /** The server's id of the stream. */
   streamId = '';
 
   private readonly backoff = new Backoff();
   private producer: Producer | null = null;
   private retry: ReturnType<typeof setTimeout> | null = null;
   private wakeSender: (() => void) | null = null;
-  private refused = '';
+  /** Error of a frame or a file, or empty. */
+  private problem = '';
   private hasAttributes = false;
   private attempt = 0;
 
@@ -45,28 +47,38 @@ export class FileTrack implements Track {
   }
 
   get title(): string { return this.source.title; }
-  get plane(): Plane { return 0; }
+  get method(): Method | null { return methodOf(this.parameters); }
+  get bounds(): null { return null; }
 
   range(): Range { return { first: 1, last: this.source.count }; }
   rate(): number { return RATE; }
   livePosition(): null { return null; }
 
   entryAt(sequence: number): Entry | null { return this.history.get(sequence); }
+  labelOf(sequence: number): string { return String(sequence); }
+  sequenceOf(label: number): number { return label; }
+  doubtText(doubt: number): string { return this.gateway.doubtText(doubt); }
 
   async particlesOf(sequence: number): Promise<Particles> {
     const frame = await this.source.frame(sequence - 1);
     return this.hasAttributes ? frame : { ...frame, scalars: [] };
   }
 
+  /** The server does not return the particles of its producer. */
+  async drawnParticles(sequence: number, origin: [number, number]): Promise<Float32Array> {
+    const { positionFormat, positions } = await this.particlesOf(sequence);
+    return relativePositions(positionFormat, positions, 0, origin);
+  }
+
   reopen(settings: Settings): void {
     this.close();
     this.settings = settings;
     this.history.clear();
-    this.refused = '';
+    this.problem = '';
     this.connect();
   }
 
-  moved(): void {
+  refresh(): void {
     this.wakeSender?.();
   }
 
@@ -78,7 +90,7 @@ export class FileTrack implements Track {
     if (this.retry !== null) clearTimeout(this.retry);
   }
 
-  /** Scalars go along where the server can colour by them. */
+  /** Sends scalars if the server supports attributes. */
   private connect(): void {
     const attempt = ++this.attempt;
     this.gateway.info()
@@ -102,8 +114,8 @@ export class FileTrack implements Track {
       next: (sequence) => this.next(sequence, producer),
       frame: (frame, message) => this.frame(frame, message),
       error: (error) => {
-        this.refused = `Frame ${error.sequence} is refused: ${error.message}.`;
-        this.state = { kind: 'failed', words: this.refused };
+        this.problem = `Frame ${error.sequence} is refused: ${error.message}.`;
+        this.state = { kind: 'failed', text: this.problem };
       },
       ended: (status) => this.ended(status),
     });
@@ -114,30 +126,30 @@ export class FileTrack implements Track {
     this.parameters = opened.parameters ?? null;
     this.streamId = opened.streamId;
     this.backoff.reset();
-    this.state = { kind: 'well', words: 'Streaming' };
+    this.state = { kind: 'well', text: 'Streaming' };
   }
 
-  /** The particles of the frame to send next, once there is room for its result. */
+  /** Waits for capacity for the result, then reads the particles of the next frame. */
   private async next(sequence: number, producer: Producer): Promise<Particles | null> {
     if (sequence > this.source.count) return null;
-    while (producer === this.producer && !this.hasRoomFor(sequence)) {
+    while (producer === this.producer && !this.hasCapacityFor(sequence)) {
       await new Promise<void>((wake) => { this.wakeSender = wake; });
     }
     try {
       return shareOf(await this.particlesOf(sequence), this.settings.share);
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
-      this.refused = error.message;
-      this.state = { kind: 'failed', words: error.message };
+      this.problem = error.message;
+      this.state = { kind: 'failed', text: error.message };
       return null;
     }
   }
 
-  private hasRoomFor(sequence: number): boolean {
+  private hasCapacityFor(sequence: number): boolean {
     const first = this.history.first;
     if (!first || this.history.bytes < 0.9 * HISTORY_BYTES) return true;
-    const place = this.player.sequence ?? 1;
-    return first.sequence < place - KEPT_BEHIND || sequence <= place + 1;
+    const position = this.player.sequence ?? 1;
+    return first.sequence < position - KEPT_BEHIND || sequence <= position + 1;
   }
 
   private frame(frame: ReconstructedFrame, message: Uint8Array): void {
@@ -149,10 +161,10 @@ export class FileTrack implements Track {
       receivedAt: performance.now(),
       bytes: message.length,
       summary: summarise(frame, this.counts),
-      parse: () => parseResult(message),
+      frame: () => decodeFrame(parseResult(message), 0),
     }, Math.max(1, (this.player.sequence ?? 1) - KEPT_BEHIND));
-    if (sequence === this.source.count && !this.refused) {
-      this.state = { kind: 'well', words: 'All frames are here' };
+    if (sequence === this.source.count && !this.problem) {
+      this.state = { kind: 'well', text: 'All frames received' };
     }
   }
 
@@ -160,11 +172,11 @@ export class FileTrack implements Track {
     this.producer = null;
     this.wakeSender?.();
     if (status.code === 0) return;
-    if (!mayTryAgain(status)) {
-      this.state = { kind: 'failed', words: inWords(status) };
+    if (!mayRetry(status)) {
+      this.state = { kind: 'failed', text: describe(status) };
       return;
     }
-    this.state = { kind: 'lost', words: `${inWords(status)} Trying again.` };
+    this.state = { kind: 'lost', text: `${describe(status)} Trying again.` };
     this.retry = setTimeout(() => this.connect(), this.backoff.take());
   }
 }

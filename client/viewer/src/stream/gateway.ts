@@ -1,33 +1,34 @@
 import { create, fromBinary, toBinary, type DescMessage, type MessageInitShape, type MessageShape }
   from '@bufbuild/protobuf';
 import {
-  GetServerInfoRequestSchema, GetServerInfoResponseSchema, type GetServerInfoResponse,
+  GetServerInfoRequestSchema, GetServerInfoResponseSchema, type DoubtText,
+  type GetServerInfoResponse,
 } from '@proto/v1/reconstruction_pb';
-import { CallError, parseStatus, UNAVAILABLE, type CallStatus } from './status';
+import { CallError, parseStatus, sentence, UNAVAILABLE, type CallStatus } from './status';
 
 const PROTOCOL = 'partiemc.v1';
 
 const LOST: CallStatus = {
-  code: UNAVAILABLE, reason: '', message: 'The server does not answer',
+  code: UNAVAILABLE, reason: '', message: 'The server does not respond',
 };
 
-/** What happens on a channel. After `ended`, nothing more does. */
+/** Events of a channel. `ended` is the last one. */
 export interface ChannelEvents {
   opened(): void;
   message(bytes: Uint8Array): void;
   ended(status: CallStatus): void;
 }
 
-/** A call that streams: one binary message is one serialised request or response. */
+/** A streaming call. A binary message is one serialised request or response. */
 export class Channel {
   private readonly socket: WebSocket;
-  private over = false;
-  private told: CallStatus | null = null;
+  private isOver = false;
+  private status: CallStatus | null = null;
 
   constructor(url: URL, protocols: string[], private readonly events: ChannelEvents) {
     this.socket = new WebSocket(url, protocols);
     this.socket.binaryType = 'arraybuffer';
-    this.socket.onopen = () => { if (!this.over) events.opened(); };
+    this.socket.onopen = () => { if (!this.isOver) events.opened(); };
     this.socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => this.receive(event.data);
     this.socket.onclose = (event) => this.closed(event);
   }
@@ -37,35 +38,35 @@ export class Channel {
     this.socket.send(toBinary(schema, create(schema, request)) as Uint8Array<ArrayBuffer>);
   }
 
-  /** Bytes that were sent and have not left this machine yet. */
+  /** Sent bytes that have not left this machine. */
   get unsentBytes(): number { return this.socket.bufferedAmount; }
 
-  /** Nothing more will be sent; answers still come. */
+  /** Ends the requests. Responses still arrive. */
   halfClose(): void {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send('end');
   }
 
-  /** Gives the call up; `ended` is not called. */
+  /** Cancels the call without calling `ended`. */
   close(): void {
-    this.over = true;
+    this.isOver = true;
     this.socket.close();
   }
 
   private receive(data: ArrayBuffer | string): void {
-    if (this.over) return;
-    if (typeof data === 'string') this.told = parseStatus(data);
+    if (this.isOver) return;
+    if (typeof data === 'string') this.status = parseStatus(data);
     else this.events.message(new Uint8Array(data));
   }
 
   private closed(event: CloseEvent): void {
-    if (this.over) return;
-    this.over = true;
+    if (this.isOver) return;
+    this.isOver = true;
     const code = event.code >= 4000 ? event.code - 4000 : event.code === 1000 ? 0 : UNAVAILABLE;
-    this.events.ended(this.told ?? (code === UNAVAILABLE ? LOST : { ...LOST, code, message: '' }));
+    this.events.ended(this.status ?? (code === UNAVAILABLE ? LOST : { ...LOST, code, message: '' }));
   }
 }
 
-/** base64url without padding, of the token's UTF-8. */
+/** base64url without padding, of the text in UTF-8. */
 function base64Url(text: string): string {
   const bytes = new TextEncoder().encode(text);
   return btoa(String.fromCharCode(...bytes))
@@ -76,8 +77,9 @@ function base64Url(text: string): string {
 export class Gateway {
   token = '';
   private known: Promise<GetServerInfoResponse> | null = null;
+  private doubts: DoubtText[] = [];
 
-  /** `base`: the address of the page's server. */
+  /** `base`: address of the page's server. */
   constructor(private readonly base: URL) {}
 
   open(path: '/v1/watch' | '/v1/reconstruct', events: ChannelEvents): Channel {
@@ -87,14 +89,23 @@ export class Gateway {
     return new Channel(url, [PROTOCOL, ...bearer], events);
   }
 
-  /** What the server is and can do; asked for once. Throws CallError. */
+  /** Information on the server, requested once. Throws CallError. */
   info(): Promise<GetServerInfoResponse> {
     this.known ??= this.call('/v1/info', GetServerInfoRequestSchema, GetServerInfoResponseSchema, {})
+      .then((info) => {
+        this.doubts = info.doubts;
+        return info;
+      })
       .catch((error: unknown) => {
         this.known = null;
         throw error;
       });
     return this.known;
+  }
+
+  /** The server's explanation of a doubt; its number until the server has answered `info`. */
+  doubtText(doubt: number): string {
+    return sentence(this.doubts.find((one) => one.doubt === doubt)?.explanation ?? `Doubt ${doubt}`);
   }
 
   /** Calls a unary method. Throws CallError. */
@@ -106,7 +117,7 @@ export class Gateway {
     const body = new Uint8Array(await response.arrayBuffer());
     if (response.ok) return fromBinary(responseSchema, body);
     const status = parseStatus(new TextDecoder().decode(body));
-    throw new CallError(status ?? { ...LOST, message: `The server answers ${response.status}` });
+    throw new CallError(status ?? { ...LOST, message: `The server responds with HTTP status ${response.status}` });
   }
 
   private async post(path: string, body: Uint8Array): Promise<Response> {

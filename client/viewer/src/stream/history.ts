@@ -1,57 +1,60 @@
-import type { ReconstructedFrame } from '@proto/v1/reconstruction_pb';
+import type { Frame } from '../protocol/frame';
 
-/** Numbers of a frame for the curves. */
+/** Figures of a frame for the curves. NaN: unknown. */
 export interface Summary {
   area: number;
   rings: number;
   triangles: number;
   trianglesGrid: number;
   milliseconds: number;
-  /** In the order of STAGES. */
+  /** Milliseconds, in the order of STAGES. */
   stages: number[];
-  /** Counts since the track began, when the frame came. */
+  /** Counts since the start of the track, at the arrival of the frame. */
   received: number;
   drawn: number;
   dropped: number;
-  /** Milliseconds from the frame's coming to its first drawing; NaN until then. */
+  /** Milliseconds from the arrival of the frame to its first drawing. */
   latency: number;
 }
 
-/** A frame that is kept: its message, which is parsed when it is drawn, and what curves tell. */
+/** A frame in the history. Keeps its message and decodes it on demand. */
 export interface Entry {
   readonly sequence: number;
   readonly time: number;
   readonly receivedAt: number;
+  /** Size of the message. */
   readonly bytes: number;
   readonly summary: Summary;
-  parse(): ReconstructedFrame;
+  frame(): Frame;
 }
 
-/** What an entry takes beside its message, about. */
+/** Approximate size of an entry without its message. */
 const ENTRY_BYTES = 600;
 
-/** Frames by their sequence, bounded in bytes. */
-export class History {
-  private entries: Entry[] = [];
+/** Frames in the order of their sequence, limited in bytes. */
+export class History<E extends Entry = Entry> {
+  private entries: E[] = [];
   private heldBytes = 0;
 
   constructor(private readonly limitBytes: number) {}
 
   get size(): number { return this.entries.length; }
   get bytes(): number { return this.heldBytes; }
-  get first(): Entry | null { return this.entries[0] ?? null; }
-  get last(): Entry | null { return this.entries[this.entries.length - 1] ?? null; }
+  get first(): E | null { return this.entries[0] ?? null; }
+  get last(): E | null { return this.entries[this.entries.length - 1] ?? null; }
 
-  /** The k-th of the entries, the oldest is 0. */
-  entry(k: number): Entry { return this.entries[k]; }
+  /** The k-th oldest entry. */
+  entry(k: number): E { return this.entries[k]; }
 
-  /** Keeps an entry. For room the oldest give way, but none from `keepFrom` on: then false, and the
-   * entry is not kept. One that is there already stays. */
-  insert(entry: Entry, keepFrom: number): boolean {
+  /**
+   * Adds an entry, or keeps the existing one of the same sequence. Evicts the oldest entries to stay
+   * within the limit, but none from `keepFrom` on. Returns false if the entry does not fit.
+   */
+  insert(entry: E, keepFrom: number): boolean {
     if (this.get(entry.sequence)) return true;
     const bytes = entry.bytes + ENTRY_BYTES;
-    const mayGo = Math.min(keepFrom, entry.sequence);
-    while (this.heldBytes + bytes > this.limitBytes && this.entries[0]?.sequence < mayGo) {
+    const evictBefore = Math.min(keepFrom, entry.sequence);
+    while (this.heldBytes + bytes > this.limitBytes && this.entries[0]?.sequence < evictBefore) {
       this.heldBytes -= this.entries[0].bytes + ENTRY_BYTES;
       this.entries.shift();
     }
@@ -61,18 +64,18 @@ export class History {
     return true;
   }
 
-  get(sequence: number): Entry | null {
+  get(sequence: number): E | null {
     const entry = this.entries[this.lowerBound(sequence)];
     return entry?.sequence === sequence ? entry : null;
   }
 
-  /** The newest entry that is not above `sequence`. */
-  atOrBefore(sequence: number): Entry | null {
+  /** The newest entry up to `sequence`. */
+  atOrBefore(sequence: number): E | null {
     return this.entries[this.lowerBound(sequence + 1) - 1] ?? null;
   }
 
-  /** The oldest entry above `sequence`. */
-  after(sequence: number): Entry | null {
+  /** The oldest entry after `sequence`. */
+  after(sequence: number): E | null {
     return this.entries[this.lowerBound(sequence + 1)] ?? null;
   }
 
@@ -81,7 +84,7 @@ export class History {
     this.heldBytes = 0;
   }
 
-  /** Index of the first entry whose sequence is not below `sequence`. */
+  /** Index of the first entry from `sequence` on. */
   private lowerBound(sequence: number): number {
     let low = 0;
     let high = this.entries.length;

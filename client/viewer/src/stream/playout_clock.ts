@@ -1,22 +1,22 @@
-// When to draw which frame, so that motion is as smooth as it was when it was sent although frames
-// come in bursts: the arrivals of the last frames give a line, sequence over time; what is drawn
-// follows this line at a fixed distance.
+// Decides when to draw which frame, so that motion is smooth although frames arrive in bursts. A line
+// is fitted to the last arrivals, sequence over time. The drawn position follows this line at a fixed
+// latency.
 
 interface Arrival { sequence: number; at: number }
 
-/** Arrivals that the line is drawn through: about a second of a fast stream. */
+/** Arrivals in the fit: about a second of a fast stream. */
 const WINDOW = 64;
-/** A pause of this many milliseconds, or of this many intervals, begins a new line. */
+/** A pause of this many milliseconds or intervals starts a new line. */
 const LONG_PAUSE_MS = 1000;
 const LONG_PAUSE_INTERVALS = 8;
-/** Frames a second until two have come. */
+/** Frames per second before the second arrival. */
 const FIRST_RATE = 30;
 
 export class PlayoutClock {
   private arrivals: Arrival[] = [];
   private shown = -Infinity;
 
-  /** `latencyMs`: how far what is drawn lies behind what comes. */
+  /** `latencyMs`: delay of drawing after arrival. */
   constructor(readonly latencyMs = 100) {}
 
   arrived(sequence: number, now: number): void {
@@ -30,7 +30,7 @@ export class PlayoutClock {
     if (this.arrivals.length > WINDOW) this.arrivals.shift();
   }
 
-  /** Frames a second. */
+  /** Frames per second. */
   get rate(): number {
     const n = this.arrivals.length;
     if (n < 2) return FIRST_RATE;
@@ -40,7 +40,7 @@ export class PlayoutClock {
     return seconds > 0 ? (last.sequence - first.sequence) / seconds : FIRST_RATE;
   }
 
-  /** The sequence to draw now, with a fraction; null before any arrival. Never goes back. */
+  /** The sequence to draw now, with a fraction; null before any arrival. Never decreases. */
   position(now: number): number | null {
     const n = this.arrivals.length;
     if (n === 0) return null;

@@ -9,28 +9,28 @@ import type { CallStatus } from './status';
 
 export interface ProducerEvents {
   opened(opened: StreamOpened): void;
-  /** Frame `sequence` of the stream, from 1 on; null ends the stream. */
+  /** Provides frame `sequence`, starting at 1. Null ends the stream. */
   next(sequence: number): Promise<Particles | null>;
   frame(frame: ReconstructedFrame, message: Uint8Array): void;
   error(error: FrameError): void;
   ended(status: CallStatus): void;
 }
 
-/** The result in a message of a producer's stream that holds one. */
+/** Parses a message that contains a result. */
 export function parseResult(message: Uint8Array): ReconstructedFrame {
   const { response } = fromBinary(ReconstructResponseSchema, message);
-  if (response.case !== 'frame') throw new Error('a message without frame');
+  if (response.case !== 'frame') throw new Error('message without frame');
   return response.value;
 }
 
-/** One call of Reconstruct: sends frames as fast as their answers come. */
+/** One call of Reconstruct. Sends frames at the rate of their results. */
 export class Producer {
   private readonly channel: Channel;
   private window = 0;
   private sent = 0;
   private answered = 0;
   private sending = false;
-  private over = false;
+  private isOver = false;
 
   constructor(gateway: Gateway, open: MessageInitShape<typeof OpenStreamSchema>,
               private readonly events: ProducerEvents) {
@@ -39,14 +39,14 @@ export class Producer {
         ReconstructRequestSchema, { request: { case: 'open', value: open } }),
       message: (bytes) => this.receive(bytes),
       ended: (status) => {
-        this.over = true;
+        this.isOver = true;
         events.ended(status);
       },
     });
   }
 
   close(): void {
-    this.over = true;
+    this.isOver = true;
     this.channel.close();
   }
 
@@ -65,16 +65,16 @@ export class Producer {
     void this.sendMore();
   }
 
-  /** Fills the window; one at a time, as frames may take a while to read. */
+  /** Sends frames until the window is full. */
   private async sendMore(): Promise<void> {
     if (this.sending) return;
     this.sending = true;
-    while (!this.over && this.sent - this.answered < this.window) {
+    while (!this.isOver && this.sent - this.answered < this.window) {
       const sequence = this.sent + 1;
       const frame = await this.events.next(sequence);
-      if (this.over) break;
+      if (this.isOver) break;
       if (!frame) {
-        this.over = true;
+        this.isOver = true;
         this.channel.halfClose();
         break;
       }

@@ -3,8 +3,9 @@ import {
   CoordinateFormat, Fill, OutputsSchema, Placement, ReconstructionParametersSchema,
   type ReconstructionParameters,
 } from '@proto/v1/reconstruction_pb';
+import type { Method } from './track';
 
-/** The paper's switches. Null and UNSPECIFIED: as the stream has it. Lengths are in spacings. */
+/** Settings of a reconstruction. Null and UNSPECIFIED: the value of the stream. Lengths in spacings. */
 export interface Settings {
   placement: Placement;
   fill: Fill;
@@ -12,7 +13,7 @@ export interface Settings {
   referenceRadius: number | null;
   cellSize: number | null;
   surfaceOffset: number | null;
-  /** Percent of the particles. */
+  /** Share of particles to use, in percent. */
   share: number;
 }
 
@@ -38,7 +39,7 @@ export const FILLS: Record<string, Fill> = {
   polygon: Fill.POLYGON,
 };
 
-/** The name of a placement or fill, as the command line has it. */
+/** Name of a placement or fill on the command line. */
 export function nameOf(names: Record<string, number>, value: number): string {
   return Object.keys(names).find((name) => names[name] === value) ?? '';
 }
@@ -47,7 +48,7 @@ export function isAsStreamed(settings: Settings): boolean {
   return settingsText(settings) === '';
 }
 
-/** Settings as the page's address has them: `placement:qef;fill:none`. */
+/** Settings in the page's address: `placement:qef;fill:none`. */
 export function settingsText(settings: Settings): string {
   const parts: [string, string | number | null][] = [
     ['placement', nameOf(PLACEMENTS, settings.placement)],
@@ -67,7 +68,7 @@ function numberOf(text: string | undefined): number | null {
   return Number.isFinite(value) ? value : null;
 }
 
-/** The inverse of settingsText; what it does not know is as streamed. */
+/** The inverse of settingsText. Ignores unknown names and values. */
 export function parseSettings(text: string): Settings {
   const values = new Map(text.split(';').map((part) => {
     const at = part.indexOf(':');
@@ -85,8 +86,15 @@ export function parseSettings(text: string): Settings {
   };
 }
 
-/** Parameters of a stream or frame: those of `base` where the settings say nothing. `spacing` is
- * what `base` used where it does not name one. */
+/** Placement and fill of the parameters. */
+export function methodOf(parameters: ReconstructionParameters | null): Method | null {
+  return parameters && {
+    placement: nameOf(PLACEMENTS, parameters.placement), fill: nameOf(FILLS, parameters.fill),
+  };
+}
+
+/** Parameters of a stream or frame: `base`, overridden by the settings. `spacing`: the spacing that
+ * `base` estimated. */
 export function parametersOf(settings: Settings, base: ReconstructionParameters | null,
                              spacing: number | null): ReconstructionParameters {
   const placement = settings.placement || (base?.placement ?? Placement.UNSPECIFIED);
@@ -100,7 +108,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     spacingRule: base?.spacingRule,
     kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
     cellSize: settings.cellSize ?? base?.cellSize,
-    // Calibrated, and chosen, for a placement and a kernel: another one gets its own.
+    // The radius is calibrated for a placement and a kernel. Other ones get their own.
     referenceRadius: settings.referenceRadius ?? (sameField ? base?.referenceRadius : undefined),
     clean: sameField ? base?.clean : undefined,
     surfaceOffset: farthest ? settings.surfaceOffset ?? base?.surfaceOffset : undefined,
@@ -111,7 +119,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
   });
 }
 
-/** All that can be drawn. */
+/** Outputs of everything that the page draws. */
 export function outputsFor(attributes: string[]) {
   return create(OutputsSchema, {
     rings: true, mesh: true, normals: true, attributes,

@@ -1,52 +1,47 @@
-// How calls end, and what that means for whoever looks at the page.
-
-/** The status of a call, as the server tells it in JSON. */
+/** Status of a call, from the server's JSON. */
 export interface CallStatus {
-  /** Of gRPC; 0: well. */
+  /** gRPC code; 0: OK. */
   code: number;
   reason: string;
+  /** Describes the error and a remedy. */
   message: string;
 }
 
 export const UNAVAILABLE = 14;
 export const UNAUTHENTICATED = 16;
 
-/** What to do about a reason, where it is not plain from its words. */
-const ADVICE: Record<string, string> = {
-  TOKEN_MISSING: 'Enter the access token and connect again.',
-  TOKEN_UNKNOWN: 'This server does not know the access token. Enter another one.',
-  NOT_PERMITTED: 'The access token does not allow this. Enter another one.',
-  NO_SUCH_STREAM: 'No stream of this name is open. The page waits for it.',
-  TOO_MANY_WATCHERS: 'The server has no place for another viewer. The page tries again.',
-  TOO_MANY_STREAMS: 'The server has no place for another stream. The page tries again.',
-  CALLER_WATCHERS: 'You watch as many streams as you may. Close another page.',
-  FELL_BEHIND: 'This page was too slow for the stream. It goes on with the newest frame.',
-  DRAINING: 'The server is going away. The page connects again.',
-  MEMORY_BUDGET: 'The server has no memory for this now. Try again.',
-  RESOLUTION: 'The frame is too wide for float32. Look at its coordinates.',
-  NOT_PLANAR: 'The particles do not lie in one plane.',
-  OUT_OF_RANGE: 'Change the setting that is named.',
+/** What the user or the page does next. The server's message describes the error itself. */
+const NEXT_STEPS: Record<string, string> = {
+  TOKEN_MISSING: 'Enter an access token.',
+  TOKEN_UNKNOWN: 'Enter another access token.',
+  NOT_PERMITTED: 'Enter another access token.',
+  CALLER_WATCHERS: 'Close another page.',
+  FELL_BEHIND: 'The page continues with the newest frame.',
 };
 
-/** Reasons that no second try can mend. */
+/** Reasons that a retry cannot fix. */
 const FINAL = new Set([
   'TOKEN_MISSING', 'TOKEN_UNKNOWN', 'NOT_PERMITTED', 'PROTOCOL', 'OUT_OF_RANGE', 'UNSUPPORTED',
   'NAME', 'LABELS', 'MALFORMED', 'OPEN_BYTES',
 ]);
 
-/** Whether trying again can help. */
-export function mayTryAgain(status: CallStatus): boolean {
+export function mayRetry(status: CallStatus): boolean {
   return !FINAL.has(status.reason) && status.code !== UNAUTHENTICATED;
 }
 
-/** One or two sentences: what happened, and what to do. */
-export function inWords(status: CallStatus): string {
-  const what = status.message || (status.reason ? `The server says ${status.reason}.` : '');
-  const advice = ADVICE[status.reason] ?? '';
-  return [what && !/[.!?]$/.test(what) ? `${what}.` : what, advice].filter(Boolean).join(' ');
+/** Adds a capital letter and a full stop. Names such as `open.fill` stay as they are. */
+export function sentence(text: string): string {
+  const start = /^[a-z]+[ ,]/.test(text) ? text[0].toUpperCase() + text.slice(1) : text;
+  return start === '' || /[.!?]$/.test(start) ? start : `${start}.`;
 }
 
-/** A status from the server's JSON; null where the text is none. */
+/** The server's message and the next step. */
+export function describe(status: CallStatus): string {
+  const message = status.message || (status.reason ? `The server reports ${status.reason}` : '');
+  return [sentence(message), NEXT_STEPS[status.reason] ?? ''].filter(Boolean).join(' ');
+}
+
+/** Parses a status from the server's JSON; null if the text is not a status. */
 export function parseStatus(text: string): CallStatus | null {
   try {
     const value: unknown = JSON.parse(text);
@@ -63,9 +58,9 @@ export function parseStatus(text: string): CallStatus | null {
   }
 }
 
-/** Thrown where a unary method fails. */
+/** Error of a unary method. */
 export class CallError extends Error {
   constructor(readonly status: CallStatus) {
-    super(inWords(status));
+    super(describe(status));
   }
 }

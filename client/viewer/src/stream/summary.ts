@@ -1,15 +1,15 @@
 import type { ReconstructedFrame } from '@proto/v1/reconstruction_pb';
 import type { Summary } from './history';
 
-/** Names of the stages, as statistics give them. */
+/** Names of the stages in statistics. */
 export const STAGES = [
-  'bins', 'field', 'crossings', 'rings', 'normals', 'vertices', 'identities', 'mesh',
+  'bins', 'field', 'crossings', 'rings', 'normals', 'vertices', 'identities', 'mesh', 'attributes',
 ] as const;
 
-/** Counts of a track, from its beginning. */
+/** Frames since the start of a track. */
 export interface Counts { received: number; drawn: number; dropped: number }
 
-/** `counts`: null for a frame of history, whose coming says nothing of the stream. */
+/** `counts`: null for a frame fetched from the server's history. */
 export function summarise(frame: ReconstructedFrame, counts: Counts | null): Summary {
   const statistics = frame.statistics;
   const stages = STAGES.map(

@@ -1,40 +1,55 @@
-import type { Plane, ReconstructionParameters } from '@proto/v1/reconstruction_pb';
+import type { ReconstructionParameters } from '@proto/v1/reconstruction_pb';
+import type { Bounds } from '../draw/view';
 import type { Entry, History } from './history';
 import type { Playable, Player } from './player';
 import type { Particles } from '../protocol/particles';
 import type { Settings } from './settings';
 import type { Counts } from './summary';
 
-/** Bytes of messages that a track keeps for going back. */
+/** Limit of a track's history, in bytes of messages. */
 export const HISTORY_BYTES = 64 << 20;
 
-/** How a track does, for a person. */
 export interface TrackState {
-  /** `busy`: on its way; `lost`: trying again; `failed`: a person has to do something. */
+  /** `lost`: retrying; `failed`: the user must act. */
   kind: 'busy' | 'well' | 'lost' | 'ended' | 'failed';
-  words: string;
+  /** For the status line. */
+  text: string;
 }
 
-/** Results over time: of a stream that is watched, or of files that were dropped. */
+/** Names of placement and fill. */
+export interface Method { placement: string; fill: string }
+
+/** A sequence of results: a watched stream, dropped files, or the frames of a report. */
 export interface Track extends Playable {
-  readonly kind: 'watch' | 'file';
+  readonly kind: 'watch' | 'file' | 'report';
   readonly title: string;
   readonly player: Player;
   readonly history: History;
   readonly counts: Counts;
   readonly state: TrackState;
-  /** As the server resolved them; null until it has. */
+  /** Null until the server has answered. */
+  readonly method: Method | null;
+  /** As resolved by the server; null until it has answered. */
   readonly parameters: ReconstructionParameters | null;
-  readonly plane: Plane;
-  /** What is to be shown at a place; null where it is not there yet. */
+  /** Bounds of all frames; null if they are unknown. */
+  readonly bounds: Bounds | null;
+  /** The entry to show at a sequence; null if it is not available yet. */
   entryAt(sequence: number): Entry | null;
-  /** The particles of a frame, for another reconstruction; null where nobody has them. */
+  /** The number of a frame for the user. */
+  labelOf(sequence: number): string;
+  /** The inverse of `labelOf`; for a label between two frames, the next one. */
+  sequenceOf(label: number): number;
+  /** Explanation of a doubt. */
+  doubtText(doubt: number): string;
+  /** Particles of a frame, for another reconstruction; null if they are not available. */
   particlesOf(sequence: number): Promise<Particles | null>;
-  /** What its frames are made with; only of files. */
+  /** x, y of the particles relative to `origin`, for a frame whose result lacks them. */
+  drawnParticles?(sequence: number, origin: [number, number]): Promise<Float32Array>;
+  /** Settings of all frames. Files only. */
   readonly settings?: Settings;
-  /** Does it all again with other settings; only of files. */
+  /** Reconstructs all frames with other settings. Files only. */
   reopen?(settings: Settings): void;
-  /** To be called where the player is at another place: fetches what is missing there. */
-  moved(): void;
+  /** Called once per refresh of the screen: fetches frames that the player needs. */
+  refresh(): void;
   close(): void;
 }

@@ -1,33 +1,26 @@
-import {
-  ReconstructFrameRequestSchema, ReconstructFrameResponseSchema, type ReconstructedFrame,
-} from '@proto/v1/reconstruction_pb';
+import { ReconstructFrameRequestSchema, ReconstructFrameResponseSchema } from '@proto/v1/reconstruction_pb';
 import { shareOf } from '../input/share';
+import { decodeFrame } from '../protocol/decode';
+import type { Frame } from '../protocol/frame';
 import type { Gateway } from './gateway';
 import { outputsFor, parametersOf, settingsText, type Settings } from './settings';
 import type { Track } from './track';
 
-export interface VariantResult {
-  sequence: number;
-  frame: ReconstructedFrame;
-  bytes: number;
-}
-
-/** The frame that a track shows, reconstructed by itself with other settings: one request at a time,
- * always for the newest wish. */
+/** One frame of a track with other settings. Sends one request at a time, for the newest frame. */
 export class Variant {
-  result: VariantResult | null = null;
-  /** Why there is none; empty: there is one, or it is on its way. */
+  result: Frame | null = null;
+  /** The last error, or empty. */
   problem = '';
-  private wanted = '';
+  private requested = '';
   private busy = false;
 
   constructor(private readonly gateway: Gateway, private readonly changed: () => void) {}
 
-  /** Asks for a frame; nothing happens while it is the one that was asked for last. */
-  want(track: Track, sequence: number, settings: Settings): void {
+  /** Requests a frame, unless it was the last one requested. */
+  request(track: Track, sequence: number, settings: Settings): void {
     const key = `${track.title}|${sequence}|${settingsText(settings)}`;
-    if (this.busy || key === this.wanted) return;
-    this.wanted = key;
+    if (this.busy || key === this.requested) return;
+    this.requested = key;
     this.busy = true;
     this.fetch(track, sequence, settings)
       .then((result) => {
@@ -44,32 +37,32 @@ export class Variant {
       });
   }
 
-  /** Forgets what it has, so that the same is asked for anew. */
+  /** Drops the result, so that the next call of `request` sends a request. */
   reset(): void {
     this.result = null;
     this.problem = '';
-    this.wanted = '';
+    this.requested = '';
   }
 
-  private async fetch(track: Track, sequence: number, settings: Settings): Promise<VariantResult> {
+  private async fetch(track: Track, sequence: number, settings: Settings): Promise<Frame> {
     const particles = await track.particlesOf(sequence);
     if (!particles) {
-      throw new Error('Other settings need the particles, and this stream does not show them. ' +
+      throw new Error('Other settings need the particles, which this stream does not send. ' +
                       'Start its producer with --echo-particles.');
     }
     const chosen = shareOf(particles, settings.share);
-    const spacing = track.entryAt(sequence)?.parse().statistics?.spacing ?? null;
+    const spacing = track.entryAt(sequence)?.frame().statistics.spacing ?? null;
     const response = await this.gateway.call(
       '/v1/frame', ReconstructFrameRequestSchema, ReconstructFrameResponseSchema, {
         parameters: parametersOf(settings, track.parameters, spacing),
         outputs: outputsFor((particles.scalars ?? []).map(({ name }) => name)),
         frame: chosen,
       });
-    if (!response.frame) throw new Error('The server gives no frame.');
+    if (!response.frame) throw new Error('The response of the server has no frame.');
     const frame = response.frame;
     frame.sequence = BigInt(sequence);
     frame.particleFormat = chosen.positionFormat;
     frame.particles = chosen.positions;
-    return { sequence, frame, bytes: frame.mesh?.points.length ?? 0 };
+    return decodeFrame(frame, track.parameters?.plane ?? 0);
   }
 }

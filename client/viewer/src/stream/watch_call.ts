@@ -9,16 +9,16 @@ import type { CallStatus } from './status';
 
 export interface WatchEvents {
   opened(opened: WatchOpened): void;
-  /** Every frame is taken: what has no room ends the call. */
+  /** The receiver closes the call if it cannot keep the frame. */
   frame(frame: WatchedFrame, message: Uint8Array): void;
-  /** `told`: what the server said before, of the stream's end. */
-  ended(status: CallStatus, told: WatchEnded | null): void;
+  /** `end`: the server's message on the end of the stream, if it sent one. */
+  ended(status: CallStatus, end: WatchEnded | null): void;
 }
 
-/** The frame of a message of a watch that holds one. */
+/** Parses a message that contains a frame. */
 export function parseWatchedFrame(message: Uint8Array): ReconstructedFrame {
   const { response } = fromBinary(WatchStreamResponseSchema, message);
-  if (response.case !== 'frame' || !response.value.frame) throw new Error('a message without frame');
+  if (response.case !== 'frame' || !response.value.frame) throw new Error('message without frame');
   return response.value.frame;
 }
 
@@ -26,8 +26,9 @@ export function parseWatchedFrame(message: Uint8Array): ReconstructedFrame {
 export class WatchCall {
   private readonly channel: Channel;
   private readonly credit = new Credit();
-  private told: WatchEnded | null = null;
-  /** `from`: the first frame of the server's history that is wanted; null: the newest ones only. */
+  private end: WatchEnded | null = null;
+
+  /** `from`: the first frame to send from the server's history; null: new frames only. */
   constructor(gateway: Gateway, stream: string, from: number | null, mode: WatchMode,
               private readonly events: WatchEvents) {
     this.channel = gateway.open('/v1/watch', {
@@ -43,7 +44,7 @@ export class WatchCall {
         },
       }),
       message: (bytes) => this.receive(bytes),
-      ended: (status) => events.ended(status, this.told),
+      ended: (status) => events.ended(status, this.end),
     });
   }
 
@@ -54,7 +55,7 @@ export class WatchCall {
   private receive(bytes: Uint8Array): void {
     const { response } = fromBinary(WatchStreamResponseSchema, bytes);
     if (response.case === 'opened') this.events.opened(response.value);
-    if (response.case === 'ended') this.told = response.value;
+    if (response.case === 'ended') this.end = response.value;
     if (response.case !== 'frame') return;
     this.events.frame(response.value, bytes);
     this.allow(bytes.length);

@@ -1,35 +1,39 @@
 import {
-  WatchMode, type Plane, type ReconstructionParameters, type WatchEnded, type WatchOpened,
-  type WatchedFrame,
+  WatchMode, type ReconstructedFrame, type ReconstructionParameters, type WatchEnded,
+  type WatchOpened, type WatchedFrame,
 } from '@proto/v1/reconstruction_pb';
 import { Backoff } from './backoff';
 import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { PlayoutClock } from './playout_clock';
 import { Player, type Range } from './player';
+import { decodeFrame } from '../protocol/decode';
 import type { Particles } from '../protocol/particles';
-import { inWords, mayTryAgain, type CallStatus } from './status';
+import { methodOf } from './settings';
+import { describe, mayRetry, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
-import { HISTORY_BYTES, type Track, type TrackState } from './track';
+import { HISTORY_BYTES, type Method, type Track, type TrackState } from './track';
 import { WatchCall, parseWatchedFrame } from './watch_call';
 
-/** Between two requests for what is missing: one that brought nothing is not repeated at once. */
+/** Pause between two requests for missing frames. */
 const FETCH_PAUSE_MS = 500;
 
-/** A stream that was held back goes on once this share of what is held has been passed. */
-const ROOM_SHARE = 0.1;
+/** A suspended watch resumes once the player has passed this share of the history. */
+const RESUME_SHARE = 0.1;
 
-/** So many have come when the page has surely shown something. */
-const FRAMES_OF_THE_BEGINNING = 10;
+/** Frames after which the page fetches the past even if it has drawn nothing. */
+const FRAMES_BEFORE_PAST = 10;
 
-/** A stream that is watched. Connects again by itself; what it missed and the server still has is
- * fetched: from before its coming, while it was away, and what did not fit while it was paused. */
+interface WatchEntry extends Entry { message(): ReconstructedFrame }
+
+/** A watched stream. Reconnects by itself, and fetches missed frames that the server still holds:
+ * from before the watch, from a lost connection, and from a suspended watch. */
 export class WatchTrack implements Track {
   readonly kind = 'watch';
-  readonly history = new History(HISTORY_BYTES);
+  readonly history = new History<WatchEntry>(HISTORY_BYTES);
   readonly player: Player;
   readonly counts: Counts = { received: 0, drawn: 0, dropped: 0 };
-  state: TrackState = { kind: 'busy', words: 'Connecting' };
+  state: TrackState = { kind: 'busy', text: 'Connecting' };
   parameters: ReconstructionParameters | null = null;
 
   private readonly clock = new PlayoutClock();
@@ -38,24 +42,26 @@ export class WatchTrack implements Track {
   private backfill: WatchCall | null = null;
   private retry: ReturnType<typeof setTimeout> | null = null;
   private lineage = '';
-  /** Up to here frames are history, which comes as fast as it can and says nothing of the pace. */
+  /** Frames up to here are history. They arrive in a burst, so the clock ignores them. */
   private historyEnd = 0;
-  /** What the server holds and has made: nothing outside is worth asking for. */
+  /** Oldest frame that the server holds, and newest frame of the stream. */
   private serverOldest = Infinity;
   private newest = -Infinity;
   private wasOpen = false;
   private mode = WatchMode.EVERY;
-  private isHeldBack = false;
-  private pastMissing = false;
-  private wanted: number | null = null;
+  private isSuspended = false;
+  private isPastMissing = false;
+  private requested: number | null = null;
   private nextFetch = 0;
 
   constructor(private readonly gateway: Gateway, readonly title: string) {
     this.player = new Player(this, true);
     this.connect();
+    this.gateway.info().catch(() => {});  // For `doubtText`. The watch reports errors.
   }
 
-  get plane(): Plane { return this.parameters?.plane ?? 0; }
+  get method(): Method | null { return methodOf(this.parameters); }
+  get bounds(): null { return null; }
 
   range(): Range | null {
     const first = this.history.first;
@@ -68,36 +74,40 @@ export class WatchTrack implements Track {
     return this.clock.position(now) ?? this.history.last?.sequence ?? null;
   }
 
-  entryAt(sequence: number): Entry | null {
+  entryAt(sequence: number): WatchEntry | null {
     return this.history.atOrBefore(sequence) ?? this.history.first;
   }
 
+  labelOf(sequence: number): string { return String(sequence); }
+  sequenceOf(label: number): number { return label; }
+  doubtText(doubt: number): string { return this.gateway.doubtText(doubt); }
+
   async particlesOf(sequence: number): Promise<Particles | null> {
-    const frame = this.entryAt(sequence)?.parse();
+    const frame = this.entryAt(sequence)?.message();
     if (!frame || frame.particles.length === 0) return null;
     return { time: frame.time, positionFormat: frame.particleFormat, positions: frame.particles };
   }
 
-  moved(): void {
+  refresh(): void {
     this.fetchPast();
-    const place = this.player.sequence;
-    if (place === null) return;
+    const position = this.player.sequence;
+    if (position === null) return;
     const { mode } = this.player;
-    if (this.isHeldBack && (mode === 'live' || this.passedShare(place) > ROOM_SHARE)) this.connect();
-    if (mode === 'live' || (mode === 'paused' && this.history.get(place))) return;
-    const missing = this.missingFrom(place);
+    if (this.isSuspended && (mode === 'live' || this.passedShare(position) > RESUME_SHARE)) this.connect();
+    if (mode === 'live' || (mode === 'paused' && this.history.get(position))) return;
+    const missing = this.missingFrom(position);
     const now = performance.now();
     if (!missing || now < this.nextFetch) return;
     this.nextFetch = now + FETCH_PAUSE_MS;
     this.fetch(missing.first, missing.last);
   }
 
-  /** A frame that somebody wants to see as soon as can be. */
-  want(sequence: number): void {
-    this.wanted = sequence;
+  /** Fetches a frame first. */
+  request(sequence: number): void {
+    this.requested = sequence;
   }
 
-  /** Whether neither the page nor the server has a frame any more. */
+  /** Whether neither the page nor the server holds a frame. */
   isGone(sequence: number): boolean {
     return this.wasOpen && sequence < this.serverOldest && this.history.get(sequence) === null;
   }
@@ -108,55 +118,55 @@ export class WatchTrack implements Track {
     if (this.retry !== null) clearTimeout(this.retry);
   }
 
-  /** What was before its coming, once the first picture is there; from the wanted frame on first. */
+  /** Fetches frames from before the watch, after the first picture. Starts at the requested frame. */
   private fetchPast(): void {
     const first = this.history.first?.sequence;
-    if (!this.pastMissing || this.backfill || first === undefined) return;
-    // A picture with settings of its own draws none of these frames.
-    const hasBegun = this.counts.drawn > 0 || this.counts.received >= FRAMES_OF_THE_BEGINNING;
-    if (!hasBegun && this.wanted === null) return;
-    const from = Math.max(this.serverOldest, Math.min(this.wanted ?? -Infinity, first - 1));
-    this.pastMissing = from > this.serverOldest;
-    this.wanted = null;
+    if (!this.isPastMissing || this.backfill || first === undefined) return;
+    // A pane with other settings draws none of these frames.
+    const hasStarted = this.counts.drawn > 0 || this.counts.received >= FRAMES_BEFORE_PAST;
+    if (!hasStarted && this.requested === null) return;
+    const from = Math.max(this.serverOldest, Math.min(this.requested ?? -Infinity, first - 1));
+    this.isPastMissing = from > this.serverOldest;
+    this.requested = null;
     if (from < first) this.fetch(from, first - 1);
   }
 
-  /** The gap at or right behind a place, as far as the server can fill it. */
-  private missingFrom(place: number): Range | null {
-    const entry = this.history.atOrBefore(place);
-    const next = this.history.after(place);
-    const first = Math.max((entry?.sequence ?? place - 1) + 1, this.serverOldest);
+  /** The gap at or after a position, as far as the server can fill it. */
+  private missingFrom(position: number): Range | null {
+    const entry = this.history.atOrBefore(position);
+    const next = this.history.after(position);
+    const first = Math.max((entry?.sequence ?? position - 1) + 1, this.serverOldest);
     const last = next ? next.sequence - 1 : this.newest;
     return last >= first ? { first, last } : null;
   }
 
-  /** Of the frames that are held, the share that lies before a place and may go. */
-  private passedShare(place: number): number {
-    const first = this.history.first?.sequence ?? place;
-    const last = this.history.last?.sequence ?? place;
-    return last > first ? (place - first) / (last - first) : 0;
+  /** Share of the history before a position, which may be evicted. */
+  private passedShare(position: number): number {
+    const first = this.history.first?.sequence ?? position;
+    const last = this.history.last?.sequence ?? position;
+    return last > first ? (position - first) / (last - first) : 0;
   }
 
   private connect(): void {
-    this.isHeldBack = false;
+    this.isSuspended = false;
     const last = this.history.last?.sequence;
     const call = new WatchCall(this.gateway, this.title, last === undefined ? null : last + 1, this.mode, {
       opened: (opened) => this.opened(opened),
       frame: (frame, message) => {
-        if (!this.take(frame, message, true)) this.holdBack();
+        if (!this.take(frame, message, true)) this.suspend();
       },
-      ended: (status, told) => this.ended(status, told),
+      ended: (status, end) => this.ended(status, end),
     });
     this.call = call;
   }
 
-  /** There is no room before the place that is looked at: the rest is for later. */
-  private holdBack(): void {
+  /** The history is full up to the player's position. Later frames are fetched later. */
+  private suspend(): void {
     this.call?.close();
     this.call = null;
-    this.isHeldBack = true;
+    this.isSuspended = true;
     this.state = {
-      kind: 'well', words: 'The page holds as much as it can; the stream goes on without it.',
+      kind: 'well', text: 'The history is full. The page fetches later frames when you move forward.',
     };
   }
 
@@ -168,11 +178,11 @@ export class WatchTrack implements Track {
     this.historyEnd = opened.hasFrames ? Number(opened.newestSequence) : 0;
     this.serverOldest = opened.hasFrames ? Number(opened.oldestSequence) : Infinity;
     this.backoff.reset();
-    this.state = { kind: 'well', words: 'Live' };
-    this.pastMissing = true;
+    this.state = { kind: 'well', text: 'Live' };
+    this.isPastMissing = true;
   }
 
-  /** Another stream has taken the name. */
+  /** Another stream has the name now. */
   private forget(): void {
     this.history.clear();
     this.clock.reset();
@@ -182,7 +192,7 @@ export class WatchTrack implements Track {
     this.player.restart();
   }
 
-  /** Keeps a frame; false where there is no room for it. */
+  /** Adds a frame to the history. Returns false if it does not fit. */
   private take(watched: WatchedFrame, message: Uint8Array, live: boolean): boolean {
     const frame = watched.frame;
     if (!frame) return true;
@@ -196,31 +206,33 @@ export class WatchTrack implements Track {
       if (sequence > this.historyEnd) this.clock.arrived(sequence, now);
     }
     const keepFrom = this.player.mode === 'live' ? Infinity : this.player.sequence ?? Infinity;
+    const parse = () => parseWatchedFrame(message);
     return this.history.insert({
       sequence,
       time: frame.time,
       receivedAt: now,
       bytes: message.length,
       summary: summarise(frame, live ? this.counts : null),
-      parse: () => parseWatchedFrame(message),
+      message: parse,
+      frame: () => decodeFrame(parse(), this.parameters?.plane ?? 0),
     }, keepFrom);
   }
 
-  private ended(status: CallStatus, told: WatchEnded | null): void {
+  private ended(status: CallStatus, end: WatchEnded | null): void {
     this.call = null;
-    // Every frame, until it turns out that this is too much.
+    // Requests every frame until the page has proved too slow.
     if (status.reason === 'FELL_BEHIND') this.mode = WatchMode.LATEST;
-    if (!mayTryAgain(status)) {
-      this.state = { kind: 'failed', words: inWords(status) };
+    if (!mayRetry(status)) {
+      this.state = { kind: 'failed', text: describe(status) };
       return;
     }
-    this.state = told && status.code === 0
-      ? { kind: 'ended', words: 'The stream has ended. The page waits for it to come back.' }
-      : { kind: 'lost', words: `${inWords(status)} Trying again.` };
+    this.state = end && status.code === 0
+      ? { kind: 'ended', text: 'The stream has ended. Waiting for it to start again.' }
+      : { kind: 'lost', text: `${describe(status)} Trying again.` };
     this.retry = setTimeout(() => this.connect(), this.backoff.take());
   }
 
-  /** Asks for frames of the server's history, one stretch at a time. */
+  /** Fetches frames from the server's history, one range at a time. */
   private fetch(first: number, last: number): void {
     if (this.backfill) return;
     const done = () => {

@@ -1,13 +1,13 @@
 import type { View } from '../draw';
 import { parseSettings, settingsText, type Settings } from '../stream/settings';
 
-/** What one pane shows. An empty stream: the same as the first pane's. */
+/** Content of a pane. Empty `stream`: the stream of the first pane. */
 export interface PaneAddress { stream: string; settings: Settings }
 
-/** What the address of the page holds, so that a link shows the same. */
+/** The state in the page's address. */
 export interface Address {
   panes: PaneAddress[];
-  /** Null: the newest. */
+  /** Null: the newest frame. */
   frame: number | null;
   view: View | null;
   look: string;
@@ -30,7 +30,7 @@ export function addressText(address: Address): string {
   return parts.length > 0 ? `#${parts.join('&')}` : '';
 }
 
-/** Commas, colons and semicolons may stand as they are, for whoever reads the address. */
+/** Percent-encodes all but commas, colons and semicolons, so that the address stays readable. */
 function escaped(value: string): string {
   return encodeURIComponent(value).replace(/%(2C|3A|3B)/g, decodeURIComponent);
 }
@@ -40,7 +40,7 @@ function parseView(text: string | null): View | null {
   return [x, y, scale].every(Number.isFinite) && scale > 0 ? { x, y, scale } : null;
 }
 
-/** The inverse of addressText. What it does not know is left out. */
+/** The inverse of addressText. Ignores unknown parts. */
 export function parseAddress(hash: string): Address {
   const values = new URLSearchParams(hash.replace(/^#/, ''));
   const frame = Number(values.get('frame') || NaN);

@@ -4,7 +4,7 @@ import { AS_STREAMED, type Settings } from '../stream/settings';
 import type { Track } from '../stream/track';
 import { WatchTrack } from '../stream/watch_track';
 import { addressText, parseAddress, type Address } from './address';
-import { CurvesPanel } from './curves_panel';
+import { CurvesPanel, RESULT_CURVES, STREAM_CURVES } from './curves_panel';
 import { button } from './dom';
 import { ExportPanel } from './export_panel';
 import { FilesPanel } from './files_panel';
@@ -19,7 +19,7 @@ import { TimePanel } from './time_panel';
 
 const TOKEN_KEY = 'partiemc-token';
 
-/** The page: which streams are on the stage, and what the controls do to them. */
+/** The page: connects the controls with the tracks on the stage. */
 export class App {
   private readonly gateway = new Gateway(new URL(location.origin));
   private readonly status = new StatusLine();
@@ -30,10 +30,10 @@ export class App {
   private readonly time: TimePanel;
   private readonly curves: CurvesPanel;
   private ownAddress = '';
-  /** Before, the address is that of the link and must not be written. */
+  /** False while the address of the link is read, which must not be overwritten. */
   private isReady = false;
-  /** Of the link that the page was opened by, until it is shown. */
-  private wantedFrame: number | null = null;
+  /** Frame of the link, until it is shown. */
+  private linkedFrame: number | null = null;
 
   constructor() {
     this.gateway.token = sessionStorage.getItem(TOKEN_KEY) ?? '';
@@ -44,18 +44,18 @@ export class App {
     });
     this.settings = new SettingsPanel((settings) => this.settingsChanged(settings));
     this.time = new TimePanel(() => this.track, () => {
-      this.wantedFrame = null;
+      this.linkedFrame = null;
       this.writeAddress();
     });
-    this.curves = new CurvesPanel((sequence) => this.goTo(sequence));
+    this.curves = new CurvesPanel([...RESULT_CURVES, ...STREAM_CURVES], false, (sequence) => this.goTo(sequence));
     new Theme((dark) => {
       this.look.setDark(dark);
       this.curves.setDark(dark);
     });
     new ExportPanel(() => this.stage.chosen, () => this.look.look,
-                    (words, isError) => this.status.say(words, isError));
+                    (text, isError) => this.status.report(text, isError));
     new FilesPanel((source) => this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED })),
-                   (words, isError) => this.status.say(words, isError));
+                   (text, isError) => this.status.report(text, isError));
     button('side-by-side').addEventListener('click', () => this.addBeside());
     button('fit').addEventListener('click', () => this.fit());
     this.listenForKeys();
@@ -79,7 +79,7 @@ export class App {
         const only = streams.length === 1 ? streams[0].streamName : null;
         if (only !== null && this.stage.panes.length === 0) this.watch(only);
       },
-      failed: (words) => { this.status.server = words; },
+      failed: (text) => { this.status.server = text; },
       token: (token) => this.useToken(token),
     });
   }
@@ -102,10 +102,10 @@ export class App {
     for (const pane of this.stage.panes.filter((one) => one.track === old)) this.stage.replace(pane, track);
   }
 
-  /** A track of a stream that is already on the stage, or a new one. */
+  /** The track of a stream on the stage, or a new one. */
   private watchTrack(stream: string): Track {
-    const there = this.stage.tracks.find((track) => track.kind === 'watch' && track.title === stream);
-    return there ?? new WatchTrack(this.gateway, stream);
+    const present = this.stage.tracks.find((track) => track.kind === 'watch' && track.title === stream);
+    return present ?? new WatchTrack(this.gateway, stream);
   }
 
   private watch(stream: string): void {
@@ -116,12 +116,12 @@ export class App {
   }
 
   private watchBeside(stream: string): void {
-    if (this.stage.isFull) this.status.say('Four pictures are the most. Close one of them.', true);
+    if (this.stage.isFull) this.status.report('The page shows at most four pictures. Close one of them.', true);
     else this.stage.add(this.watchTrack(stream), { ...AS_STREAMED });
     this.writeAddress();
   }
 
-  /** In the chosen pane, or in the first one. */
+  /** Shows a track in the chosen pane, or in a new first one. */
   private show(track: Track): void {
     const pane = this.stage.chosen;
     if (!pane) {
@@ -136,8 +136,8 @@ export class App {
 
   private addBeside(): void {
     const pane = this.stage.chosen;
-    if (!pane) this.status.say('There is no picture yet. Choose a stream, or drop files.', true);
-    else if (this.stage.isFull) this.status.say('Four pictures are the most. Close one of them.', true);
+    if (!pane) this.status.report('No picture yet. Choose a stream or drop files.', true);
+    else if (this.stage.isFull) this.status.report('The page shows at most four pictures. Close one of them.', true);
     else this.stage.add(pane.track, { ...pane.settings });
     this.writeAddress();
   }
@@ -145,8 +145,8 @@ export class App {
   private settingsChanged(settings: Settings): void {
     const pane = this.stage.chosen;
     if (!pane) return;
-    this.status.say('', false);
-    // The first picture of dropped files is their stream itself; others are single frames of it.
+    this.status.report('', false);
+    // The first picture of dropped files shows their stream. Others show single frames of it.
     const isFirst = this.stage.panes.find(({ track }) => track === pane.track) === pane;
     if (isFirst) pane.track.reopen?.(settings);
     pane.setSettings(settings);
@@ -155,8 +155,8 @@ export class App {
 
   private chosenChanged(): void {
     const pane = this.stage.chosen;
-    const place = pane ? this.stage.panes.indexOf(pane) + 1 : 0;
-    const name = this.stage.panes.length > 1 ? `of picture ${place}` : '';
+    const number = pane ? this.stage.panes.indexOf(pane) + 1 : 0;
+    const name = this.stage.panes.length > 1 ? `of picture ${number}` : '';
     this.settings.show(pane?.settings ?? AS_STREAMED, name);
     this.time.refresh();
     this.streams?.setShown(this.stage.tracks.filter(({ kind }) => kind === 'watch').map(({ title }) => title));
@@ -169,19 +169,17 @@ export class App {
   }
 
   private fit(): void {
-    const pane = this.stage.chosen;
-    if (!pane) return;
-    pane.fit();
+    this.stage.chosen?.fit();
   }
 
   private goTo(sequence: number): void {
-    this.wantedFrame = null;
+    this.linkedFrame = null;
     this.track?.player.seek(sequence);
     this.writeAddress();
   }
 
   private listenForKeys(): void {
-    const acts: Record<string, () => void> = {
+    const actions: Record<string, () => void> = {
       ' ': () => this.time.toggle(),
       ',': () => this.time.step(-1),
       '.': () => this.time.step(1),
@@ -193,10 +191,10 @@ export class App {
       const isControl = /^(INPUT|SELECT|BUTTON|TEXTAREA|SUMMARY)$/.test(target.tagName);
       const isScrub = target.id === 'scrub' && event.key !== ' ';
       if ((isControl && !isScrub) || event.ctrlKey || event.metaKey || event.altKey) return;
-      const act = acts[event.key];
-      if (!act) return;
+      const action = actions[event.key];
+      if (!action) return;
       event.preventDefault();
-      act();
+      action();
     });
   }
 
@@ -210,13 +208,13 @@ export class App {
       if (address.view) pane.setView(address.view);
     }
     this.stage.choose(this.stage.panes[0]);
-    this.wantedFrame = address.frame;
+    this.linkedFrame = address.frame;
     const track = this.stage.panes[0].track;
-    if (address.frame !== null && track instanceof WatchTrack) track.want(address.frame);
+    if (address.frame !== null && track instanceof WatchTrack) track.request(address.frame);
   }
 
   private writeAddress(): void {
-    if (!this.isReady || this.wantedFrame !== null) return;
+    if (!this.isReady || this.linkedFrame !== null) return;
     const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch');
     const first = panes[0];
     const player = first?.track.player;
@@ -235,17 +233,17 @@ export class App {
     }
   }
 
-  /** Goes to the frame that the link names, as soon as it is here. */
+  /** Goes to the frame of the link once it has arrived. */
   private followLink(): void {
-    const wanted = this.wantedFrame;
+    const linked = this.linkedFrame;
     const track = this.stage.panes[0]?.track;
-    if (wanted === null || !track) return;
-    if (track.history.get(wanted)) {
-      track.player.seek(wanted);
-      this.wantedFrame = null;
-    } else if (track instanceof WatchTrack && track.isGone(wanted)) {
-      this.status.say(`Frame ${wanted} is no longer held by the server.`, true);
-      this.wantedFrame = null;
+    if (linked === null || !track) return;
+    if (track.history.get(linked)) {
+      track.player.seek(linked);
+      this.linkedFrame = null;
+    } else if (track instanceof WatchTrack && track.isGone(linked)) {
+      this.status.report(`The server no longer holds frame ${linked}.`, true);
+      this.linkedFrame = null;
     }
   }
 
@@ -253,7 +251,7 @@ export class App {
     for (const track of this.stage.tracks) {
       const before = track.player.mode;
       track.player.tick(now);
-      track.moved();
+      track.refresh();
       if (track.player.mode !== before) this.writeAddress();
     }
     this.followLink();

@@ -6,10 +6,17 @@ import { byId, make } from './dom';
 import { number } from './format';
 
 interface Line { name: string; value(summary: Summary): number }
-/** `total`: told instead of each line's number, where there are many. */
-interface Curve { title: string; lines: Line[]; isWide?: boolean; total?(summary: Summary): number }
 
-const CURVES: Curve[] = [
+interface Curve {
+  title: string;
+  lines: Line[];
+  isWide?: boolean;
+  /** Draws the lines as bands on top of each other, and shows this sum. */
+  total?(summary: Summary): number;
+}
+
+/** Curves of results. */
+export const RESULT_CURVES: Curve[] = [
   { title: 'Area', lines: [{ name: 'area', value: (s) => s.area }] },
   { title: 'Rings', lines: [{ name: 'rings', value: (s) => s.rings }] },
   { title: 'Triangles', lines: [
@@ -22,6 +29,10 @@ const CURVES: Curve[] = [
     isWide: true,
     total: (s) => s.milliseconds,
   },
+];
+
+/** Curves of a stream through the server. */
+export const STREAM_CURVES: Curve[] = [
   { title: 'Frames', isWide: true, lines: [
     { name: 'received', value: (s) => s.received },
     { name: 'drawn', value: (s) => s.drawn },
@@ -30,35 +41,58 @@ const CURVES: Curve[] = [
   { title: 'Latency, ms', lines: [{ name: 'latency', value: (s) => s.latency }] },
 ];
 
-/** Distinct in both themes, the first is the accent. */
+/** Distinct in both themes. The first is the accent. */
 const COLOURS = {
-  light: ['#0b5cad', '#c2410c', '#15803d', '#7e22ce', '#a16207', '#be185d', '#0f766e', '#525b6b'],
-  dark: ['#6bb5ff', '#fb923c', '#4ade80', '#c084fc', '#facc15', '#f472b6', '#2dd4bf', '#aab4c4'],
+  light: ['#0b5cad', '#c2410c', '#15803d', '#7e22ce', '#a16207', '#be185d', '#0f766e', '#525b6b', '#4d7c0f'],
+  dark: ['#6bb5ff', '#fb923c', '#4ade80', '#c084fc', '#facc15', '#f472b6', '#2dd4bf', '#aab4c4', '#a3e635'],
 };
-/** More points than a curve has pixels show nothing more. */
+/** About one point per pixel. */
 const MOST_POINTS = 600;
 const REFRESH_MS = 300;
 
-/** At most MOST_POINTS entries, evenly taken. */
-function sample(track: Track): Entry[] {
-  const { history } = track;
+/** At most MOST_POINTS entries, in equal steps. */
+function sample({ history }: Track): Entry[] {
   const count = Math.min(history.size, MOST_POINTS);
   return Array.from({ length: count }, (_, k) =>
     history.entry(Math.round(k * (history.size - 1) / Math.max(1, count - 1))));
 }
 
-/** Curves over the frames that a track holds; a click in one goes to that frame. */
+/** Values of the lines at each entry; null for gaps. Bands are sums from the top band down. */
+function valuesOf({ lines, total }: Curve, entries: Entry[]): (number | null)[][] {
+  const values = lines.map((line) => entries.map(({ summary }) => line.value(summary)));
+  if (total) {
+    for (let k = 1; k < values.length; ++k) values[k] = values[k].map((value, i) => value + values[k - 1][i]);
+    values.reverse();
+  }
+  return values.map((row) => row.map((value) => (Number.isFinite(value) ? value : null)));
+}
+
+/** The upper limit of bands: without the slowest 3 % if these would flatten the rest. */
+function topOf(values: (number | null | undefined)[]): number {
+  const sorted = values.filter((value) => typeof value === 'number').sort((a, b) => a - b);
+  const peak = sorted[sorted.length - 1] ?? 1;
+  const usual = 1.3 * (sorted[Math.floor(0.97 * (sorted.length - 1))] ?? 1);
+  return sorted.length > 10 && peak > 2 * usual ? usual : 1.05 * peak;
+}
+
+/** Curves over the frames of a track. A click goes to a frame. */
 export class CurvesPanel {
   private plots: uPlot[] = [];
   private readonly captions: HTMLElement[] = [];
   private readonly holders: HTMLElement[] = [];
+  private entries: Entry[] = [];
+  private track: Track | null = null;
   private lastRefresh = -Infinity;
-  private place = NaN;
+  private position = NaN;
+  /** Index of the entry under the pointer. */
+  private hovered: number | null = null;
   private colours = COLOURS.light;
 
-  constructor(private readonly goTo: (sequence: number) => void) {
+  /** `isDetailed`: captions have the value of every band. */
+  constructor(private readonly curves: Curve[], private readonly isDetailed: boolean,
+              private readonly goTo: (sequence: number) => void) {
     const panel = byId('curves', HTMLElement);
-    for (const { title, isWide } of CURVES) {
+    for (const { title, isWide } of curves) {
       const caption = make('figcaption', {}, title);
       const holder = make('div', { class: 'plot' });
       this.captions.push(caption);
@@ -71,34 +105,30 @@ export class CurvesPanel {
   setDark(dark: boolean): void {
     for (const plot of this.plots) plot.destroy();
     this.colours = dark ? COLOURS.dark : COLOURS.light;
-    this.plots = CURVES.map((curve, k) => this.makePlot(curve, this.holders[k]));
+    this.plots = this.curves.map((curve, k) => this.makePlot(curve, this.holders[k]));
     this.lastRefresh = -Infinity;
   }
 
   refresh(track: Track | null, now: number): void {
-    const place = track?.player.sequence ?? NaN;
     if (now - this.lastRefresh < REFRESH_MS) return;
     this.lastRefresh = now;
-    this.place = place;
-    const entries = track ? sample(track) : [];
-    const x = entries.map((entry) => entry.sequence);
-    CURVES.forEach((curve, k) => {
-      const values = curve.lines.map((line) => entries.map(({ summary }) => {
-        const value = line.value(summary);
-        return Number.isFinite(value) ? value : null;
-      }));
-      this.plots[k]?.setData([x, ...values]);
-    });
-    this.caption(track?.entryAt(place)?.summary ?? null);
+    this.track = track;
+    this.position = track?.player.sequence ?? NaN;
+    this.entries = track ? sample(track) : [];
+    const x = this.entries.map(({ sequence }) => Number(track?.labelOf(sequence)));
+    this.curves.forEach((curve, k) => this.plots[k]?.setData([x, ...valuesOf(curve, this.entries)]));
+    this.showCaptions();
   }
 
-  /** The numbers where the picture is, each in the colour of its line. */
-  private caption(summary: Summary | null): void {
-    CURVES.forEach(({ title, lines, isWide, total }, k) => {
+  /** The values at the pointer, or else at the current frame, in the colours of the lines. */
+  private showCaptions(): void {
+    const entry = this.hovered === null ? this.track?.entryAt(this.position) : this.entries[this.hovered];
+    const summary = entry?.summary ?? null;
+    this.curves.forEach(({ title, lines, isWide, total }, k) => {
       const parts: (Node | string)[] = [title];
       if (total && summary) parts.push(' ', make('b', {}, number(total(summary), 3)));
       lines.forEach((line, i) => {
-        const value = summary && !total ? number(line.value(summary)) : '';
+        const value = summary && (!total || this.isDetailed) ? number(line.value(summary), total ? 3 : 5) : '';
         const text = isWide ? `${line.name} ${value}` : value;
         parts.push(' ', make('b', { style: `color: ${this.colours[i]}`, title: line.name }, text));
       });
@@ -113,32 +143,44 @@ export class CurvesPanel {
     const axis: uPlot.Axis = {
       stroke: quiet, font: '10px system-ui', grid: { stroke: line, width: 0.5 }, ticks: { show: false },
     };
+    const series = curve.lines.map(({ name }, k): uPlot.Series => ({
+      label: name, stroke: this.colours[k], width: 1.25, points: { show: false }, spanGaps: false,
+      ...curve.total && { fill: this.colours[k], width: 0 },
+    }));
     const plot = new uPlot({
       width: Math.max(60, holder.clientWidth),
       height: Math.max(40, holder.clientHeight),
       legend: { show: false },
       cursor: { y: false, points: { show: false }, drag: { x: false, y: false } },
-      scales: { x: { time: false } },
+      scales: {
+        x: { time: false },
+        ...curve.total && { y: { range: (self: uPlot) => [0, topOf([...self.data[1] ?? []])] as [number, number] } },
+      },
       axes: [
         { ...axis, size: 16, gap: 1, space: 60 },
         { ...axis, size: 42, gap: 2, space: 24, values: (_, ticks) => ticks.map((tick) => number(tick, 3)) },
       ],
-      series: [{}, ...curve.lines.map(({ name }, k) => ({
-        label: name, stroke: this.colours[k], width: 1.25, points: { show: false }, spanGaps: false,
-      }))],
-      hooks: { draw: [(self) => this.drawPlace(self)] },
+      series: [{}, ...curve.total ? series.reverse() : series],
+      hooks: { draw: [(self) => this.drawPosition(self)], setCursor: [(self) => this.hover(self.cursor.idx)] },
     }, [[], ...curve.lines.map(() => [])], holder);
     plot.over.addEventListener('click', (event) => {
-      const sequence = plot.posToVal(event.offsetX, 'x');
-      if (Number.isFinite(sequence)) this.goTo(sequence);
+      const label = plot.posToVal(event.offsetX, 'x');
+      if (this.track && Number.isFinite(label)) this.goTo(this.track.sequenceOf(label));
     });
     return plot;
   }
 
-  /** A line where the picture is. */
-  private drawPlace(plot: uPlot): void {
-    if (!Number.isFinite(this.place) || plot.data[0].length === 0) return;
-    const x = Math.round(plot.valToPos(this.place, 'x', true)) + 0.5;
+  private hover(index: number | null | undefined): void {
+    if ((index ?? null) === this.hovered) return;
+    this.hovered = index ?? null;
+    this.showCaptions();
+  }
+
+  /** Draws a line at the current frame. */
+  private drawPosition(plot: uPlot): void {
+    if (!Number.isFinite(this.position) || plot.data[0].length === 0) return;
+    const label = Number(this.track?.labelOf(this.position));
+    const x = Math.round(plot.valToPos(label, 'x', true)) + 0.5;
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.strokeStyle = this.colours[0];

@@ -1,4 +1,4 @@
-/** The element of the page with this id. Throws where the page has none of this kind. */
+/** The element of this id and type. Throws if it does not exist. */
 export function byId<T extends HTMLElement>(id: string, type: new () => T): T {
   const element = document.getElementById(id);
   if (!(element instanceof type)) throw new Error(`the page has no ${type.name} #${id}`);
@@ -19,7 +19,7 @@ export function make<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** Sets text only where it changes, so that nothing is laid out again and nothing is read twice. */
+/** Sets text only if it differs, to avoid a new layout and repeated screen reader output. */
 export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }

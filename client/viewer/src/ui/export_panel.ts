@@ -3,12 +3,12 @@ import { clip, download, geojson, png, svg } from '../export';
 import { button, setText } from './dom';
 import type { Pane } from './pane';
 
-/** Files of what is seen in the chosen pane, and a link to it. */
+/** Exports the picture of the chosen pane, and a link to it. */
 export class ExportPanel {
   private recording: ReturnType<typeof clip> | null = null;
 
   constructor(private readonly pane: () => Pane | null, private readonly look: () => Look,
-              private readonly told: (words: string, isError: boolean) => void) {
+              private readonly report: (text: string, isError: boolean) => void) {
     this.on('export-png', async (shown) => download(this.name(shown, 'png'), await png(shown.scene)));
     this.on('export-svg', async (shown) => {
       if (!shown.frame) return;
@@ -23,7 +23,7 @@ export class ExportPanel {
     this.on('export-clip', (shown) => this.toggleClip(shown));
     this.on('copy-link', async () => {
       await navigator.clipboard.writeText(location.href);
-      this.told('The link is in the clipboard.', false);
+      this.report('Link copied.', false);
     });
   }
 
@@ -31,11 +31,11 @@ export class ExportPanel {
     button(id).addEventListener('click', () => {
       const pane = this.pane();
       if (!pane?.frame) {
-        this.told('There is no picture yet. Choose a stream, or drop files.', true);
+        this.report('No picture yet. Choose a stream or drop files.', true);
         return;
       }
       act(pane).catch((error: unknown) => {
-        this.told(error instanceof Error ? error.message : String(error), true);
+        this.report(error instanceof Error ? error.message : String(error), true);
       });
     });
   }

@@ -2,10 +2,10 @@ import { filesOfDrop, openDropped } from '../input/drop';
 import { InputError, type FrameSource } from '../input/source';
 import { button, input } from './dom';
 
-/** Files from this machine: dropped anywhere on the page, or chosen. */
+/** Opens local files: dropped anywhere on the page, or chosen. */
 export class FilesPanel {
   constructor(private readonly opened: (source: FrameSource) => void,
-              private readonly told: (words: string, isError: boolean) => void) {
+              private readonly report: (text: string, isError: boolean) => void) {
     button('choose-files').addEventListener('click', () => input('files').click());
     button('choose-folder').addEventListener('click', () => input('folder').click());
     for (const id of ['files', 'folder']) {
@@ -38,14 +38,14 @@ export class FilesPanel {
 
   private async open(files: File[]): Promise<void> {
     if (files.length === 0) return;
-    this.told('Reading …', false);
+    this.report('Reading files', false);
     try {
       const source = await openDropped(files);
-      this.told('', false);
+      this.report('', false);
       this.opened(source);
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
-      this.told(error.message, true);
+      this.report(error.message, true);
     }
   }
 }

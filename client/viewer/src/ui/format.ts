@@ -1,4 +1,4 @@
-/** A number for a person: `digits` significant ones, without trailing zeros. */
+/** A number with `digits` significant digits, without trailing zeros. */
 export function number(value: number, digits = 5): string {
   if (!Number.isFinite(value)) return '–';
   if (value === 0) return '0';
@@ -9,7 +9,7 @@ export function number(value: number, digits = 5): string {
 
 const thousands = new Intl.NumberFormat('en', { useGrouping: true });
 
-/** A count for a person: 12,345. */
+/** A count with separators: 12,345. */
 export function count(value: number): string {
   return thousands.format(value);
 }

@@ -4,11 +4,12 @@ import { number } from './format';
 
 const SWITCHES = {
   outline: 'outline', fill: 'fill-look', edges: 'edges', particles: 'particles', normals: 'normals',
+  isolines: 'isolines',
 } as const;
-type Switch = keyof typeof SWITCHES;
+export type Switch = keyof typeof SWITCHES;
 const NAMES = Object.keys(SWITCHES) as Switch[];
 
-/** What is drawn, and how. */
+/** Controls of the look. */
 export class LookPanel {
   private chosen: Look = { ...DEFAULT_LOOK };
 
@@ -29,17 +30,26 @@ export class LookPanel {
 
   setDark(dark: boolean): void { this.set({ dark }); }
 
-  /** Names of what rings can be coloured by. */
+  /** Sets the names of the frame's attributes. */
   setAttributes(names: string[]): void {
     const colour = select('colour');
-    const wanted = ['plain', 'identity', ...names];
-    const there = [...colour.options].map((option) => option.value);
-    if (wanted.join('\n') === there.join('\n')) return;
+    const values = ['plain', 'identity', ...names];
+    const current = [...colour.options].map((option) => option.value);
+    if (values.join('\n') === current.join('\n')) return;
     while (colour.options.length > 2) colour.remove(2);
     for (const name of names) colour.add(new Option(`by ${name}`, name));
-    if (!wanted.includes(this.chosen.colour)) this.set({ colour: 'plain' });
+    if (!values.includes(this.chosen.colour)) this.set({ colour: 'plain' });
     colour.value = this.chosen.colour;
   }
+
+  /** Offers the switch of isolines, which few frames have. */
+  offerIsolines(): void {
+    input('isolines').parentElement?.removeAttribute('hidden');
+  }
+
+  toggle(name: Switch): void { this.set({ [name]: !this.chosen[name] }); }
+
+  setColour(colour: string): void { this.set({ colour }); }
 
   setLegend(legend: Legend | null): void {
     byId('legend', HTMLElement).hidden = legend === null;
@@ -51,14 +61,14 @@ export class LookPanel {
     bar.setAttribute('aria-label', `${this.chosen.colour}, from left to right`);
   }
 
-  /** For the page's address: empty where nothing was changed. */
+  /** The look in the page's address; empty if it is the default. */
   get text(): string {
     const { colour, lineWidth } = this.chosen;
     const text = [...NAMES.filter((name) => this.chosen[name]), `colour:${colour}`,
       `width:${lineWidth}`].join(',');
-    const plain = [...NAMES.filter((name) => DEFAULT_LOOK[name]), `colour:${DEFAULT_LOOK.colour}`,
+    const normal = [...NAMES.filter((name) => DEFAULT_LOOK[name]), `colour:${DEFAULT_LOOK.colour}`,
       `width:${DEFAULT_LOOK.lineWidth}`].join(',');
-    return text === plain ? '' : text;
+    return text === normal ? '' : text;
   }
 
   set text(text: string) {

@@ -1,57 +1,69 @@
-import { Fill, Placement } from '@proto/v1/reconstruction_pb';
 import { digestText } from '../protocol/digest';
-import { NO_RING, type Frame } from '../protocol/frame';
-import { FILLS, nameOf, PLACEMENTS } from '../stream/settings';
+import { NO_RING, type Frame, type Statistics } from '../protocol/frame';
+import type { Method } from '../stream/track';
 import { make, setText } from './dom';
 import { count, number } from './format';
 
-/** Of how the frame was made. */
-export interface Method { placement: Placement; fill: Fill }
+/** A figure of a frame. `text` is empty for a figure that does not apply. */
+interface Row { key: string; title: string; text(shown: Shown): string; isWide?: boolean; isAlert?: boolean }
+interface Shown { frame: Frame; label: string; method: Method | null; statistics: Statistics }
 
-const ROWS: [string, string][] = [
-  ['frame', 'Frame'], ['time', 'Time'], ['placement', 'Placement'], ['fill', 'Fill'],
-  ['particles', 'Particles'], ['triangles', 'Triangles'], ['grid', 'Unmerged'], ['rings', 'Rings, holes'],
-  ['area', 'Area'], ['perimeter', 'Perimeter'], ['spacing', 'Spacing'], ['ms', 'Time, ms'],
-  ['rings-digest', 'Rings digest'], ['mesh-digest', 'Mesh digest'],
+function ringCounts({ rings: { outerOf } }: Frame): string {
+  const outer = outerOf.reduce((sum, of) => sum + (of === NO_RING ? 1 : 0), 0);
+  return `${count(outer)}, ${count(outerOf.length - outer)}`;
+}
+
+function reduction({ triangles, trianglesGrid }: Statistics): string {
+  return trianglesGrid > 0 ? `${(100 * (1 - triangles / trianglesGrid)).toFixed(1)} %` : '–';
+}
+
+const unlessZero = (value: number) => (value > 0 ? count(value) : '');
+
+const ROWS: Row[] = [
+  { key: 'frame', title: 'Frame', text: ({ label }) => label },
+  { key: 'time', title: 'Time', text: ({ frame }) => number(frame.time, 6) },
+  { key: 'placement', title: 'Placement', text: ({ method }) => method?.placement || '–', isWide: true },
+  { key: 'fill', title: 'Fill', text: ({ method }) => method?.fill || '–' },
+  { key: 'particles', title: 'Particles', text: ({ statistics }) => count(statistics.particles) },
+  { key: 'rings', title: 'Rings, holes', text: ({ frame }) => ringCounts(frame) },
+  { key: 'vertices', title: 'Vertices', text: ({ frame }) => count(frame.rings.points.length / 2) },
+  { key: 'triangles', title: 'Triangles', text: ({ statistics }) => count(statistics.triangles) },
+  { key: 'grid', title: 'Unmerged', text: ({ statistics }) => count(statistics.trianglesGrid) },
+  { key: 'reduction', title: 'Reduction', text: ({ statistics }) => reduction(statistics) },
+  { key: 'area', title: 'Area', text: ({ statistics }) => number(statistics.area, 7) },
+  { key: 'perimeter', title: 'Perimeter', text: ({ statistics }) => number(statistics.perimeter, 7) },
+  { key: 'spacing', title: 'Spacing', text: ({ statistics }) => number(statistics.spacing) },
+  { key: 'ms', title: 'Milliseconds', text: ({ statistics }) => number(statistics.milliseconds, 3) },
+  { key: 'holes', title: 'Dropped holes', text: ({ statistics }) => unlessZero(statistics.droppedHoles) },
+  { key: 'components', title: 'Dropped components',
+    text: ({ statistics }) => unlessZero(statistics.droppedComponents), isWide: true },
+  { key: 'spray', title: 'Dropped spray', text: ({ statistics }) => unlessZero(statistics.droppedSpray) },
+  { key: 'intersections', title: 'Self-intersections',
+    text: ({ statistics }) => unlessZero(statistics.selfIntersections), isAlert: true },
+  { key: 'folded', title: 'Folded triangles',
+    text: ({ statistics }) => unlessZero(statistics.foldedTriangles), isAlert: true },
+  { key: 'rings-digest', title: 'Rings digest', text: ({ frame }) => digestText(frame.ringsDigest), isWide: true },
+  { key: 'mesh-digest', title: 'Mesh digest', text: ({ frame }) => digestText(frame.meshDigest), isWide: true },
 ];
 
-/** The numbers of the frame that a pane shows. */
+/** The figures of a pane's frame. */
 export class Numbers {
   readonly element = make('dl', { class: 'numbers' });
-  private readonly values = new Map<string, HTMLElement>();
+  private readonly values = ROWS.map((row) => {
+    const value = make('dd', { 'data-key': row.key }, '–');
+    const kind = [row.isWide && 'wide', row.isAlert && 'alert'].filter(Boolean).join(' ');
+    this.element.append(make('div', { class: kind }, make('dt', {}, row.title), value));
+    return value;
+  });
 
-  constructor() {
-    for (const [key, title] of ROWS) {
-      const value = make('dd', { 'data-key': key }, '–');
-      this.values.set(key, value);
-      const width = key.endsWith('digest') || key === 'placement' ? 'wide' : '';
-      this.element.append(make('div', { class: width }, make('dt', {}, title), value));
-    }
-  }
-
-  show(frame: Frame, method: Method | null): void {
-    const { statistics, rings } = frame;
-    const outer = rings.outerOf.reduce((sum, of) => sum + (of === NO_RING ? 1 : 0), 0);
-    this.set('frame', String(frame.sequence));
-    this.set('time', number(frame.time, 6));
-    this.set('placement', method ? nameOf(PLACEMENTS, method.placement) : '–');
-    this.set('fill', method ? nameOf(FILLS, method.fill) : '–');
-    this.set('particles', count(statistics.particles));
-    this.set('triangles', count(statistics.triangles));
-    this.set('grid', count(statistics.trianglesGrid));
-    this.set('rings', `${count(outer)}, ${count(rings.outerOf.length - outer)}`);
-    this.set('area', number(statistics.area, 7));
-    this.set('perimeter', number(statistics.perimeter, 7));
-    this.set('spacing', number(statistics.spacing));
-    this.set('ms', number(statistics.milliseconds, 3));
-    this.set('rings-digest', digestText(frame.ringsDigest));
-    this.set('mesh-digest', digestText(frame.meshDigest));
-  }
-
-  private set(key: string, text: string): void {
-    const value = this.values.get(key);
-    if (!value) return;
-    setText(value, text);
-    if (value.title !== text) value.title = text;
+  show(frame: Frame, label: string, method: Method | null): void {
+    const shown = { frame, label, method, statistics: frame.statistics };
+    ROWS.forEach((row, k) => {
+      const text = row.text(shown);
+      const value = this.values[k];
+      value.parentElement?.toggleAttribute('hidden', text === '');
+      setText(value, text);
+      if (value.title !== text) value.title = text;
+    });
   }
 }

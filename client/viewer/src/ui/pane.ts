@@ -1,31 +1,31 @@
-import { attachNavigation, Scene, type Look } from '../draw';
-import { boundsOf, fitBounds, type Bounds } from '../draw/view';
-import { decodeFrame } from '../protocol/decode';
+import { attachNavigation, Scene, type Look, type Picked } from '../draw';
+import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
-import { relativePositions } from '../protocol/positions';
-import type { Gateway } from '../stream/gateway';
 import type { Entry } from '../stream/history';
-import { isAsStreamed, settingsText, type Settings } from '../stream/settings';
-import type { Track } from '../stream/track';
-import { Variant, type VariantResult } from '../stream/variant';
+import {
+  FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
+} from '../stream/settings';
+import type { Method, Track } from '../stream/track';
+import type { Variant } from '../stream/variant';
 import { make, setText } from './dom';
 import { count, number } from './format';
-import { Numbers, type Method } from './numbers';
+import { Numbers } from './numbers';
+import { ScaleBar } from './scale_bar';
 
 export interface PaneEvents {
-  /** The pane is the one that settings and time are for. */
+  /** The user chose the pane: settings and time apply to it. */
   chosen(pane: Pane): void;
   closed(pane: Pane): void;
-  /** The view is another one, by somebody's hand or as the picture has grown. */
+  /** The view changed, by the user or because the picture has grown. */
   moved(pane: Pane): void;
 }
 
-/** One picture: the frame that a track shows, as it was streamed or with settings of its own. */
+/** One picture: the current frame of a track, as streamed or with other settings. */
 export class Pane {
   readonly element: HTMLElement;
   readonly scene: Scene;
   frame: Frame | null = null;
-  /** The view is the page's own, which keeps everything in it; false once somebody chose one. */
+  /** Whether the view follows the content. False once the user has moved it. */
   isFree = true;
 
   private readonly canvas = make('canvas', {
@@ -33,26 +33,29 @@ export class Pane {
   });
   private readonly readout = make('div', { class: 'readout' });
   private readonly name = make('span', { class: 'name' });
-  private readonly how = make('span', { class: 'quiet' });
+  private readonly subtitle = make('span', { class: 'quiet' });
   private readonly closeButton = make('button', { type: 'button', class: 'icon' }, '✕');
   private readonly numbers = new Numbers();
-  private readonly variant: Variant;
+  private readonly scaleBar = new ScaleBar();
+  private readonly variant: Variant | null;
   private readonly detach: () => void;
   private readonly observer: ResizeObserver;
-  private shown: Entry | VariantResult | null = null;
-  /** All that was shown since the view was left to the page. */
+  private shown: Entry | Frame | null = null;
+  /** Bounds of all frames shown since the view follows the content. */
   private extent: Bounds | null = null;
   private dirty = true;
   private look: Look | null = null;
   private pointer: [number, number] | null = null;
+  private picked: Picked | null = null;
   private selected: bigint | null = null;
 
-  constructor(gateway: Gateway, public track: Track, public settings: Settings,
-              private readonly events: PaneEvents) {
+  /** `newVariant`: for other settings than those of the track; null if they are not offered. */
+  constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
+              newVariant: ((changed: () => void) => Variant) | null) {
     this.element = make('section', { class: 'pane' },
-      make('header', {}, this.name, this.how, this.closeButton),
-      make('div', { class: 'picture' }, this.canvas, this.readout), this.numbers.element);
-    this.variant = new Variant(gateway, () => { this.dirty = true; });
+      make('header', {}, this.name, this.subtitle, this.closeButton),
+      make('div', { class: 'picture' }, this.canvas, this.scaleBar.element, this.readout), this.numbers.element);
+    this.variant = newVariant?.(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
     this.element.addEventListener('pointerdown', () => events.chosen(this));
     this.element.addEventListener('focusin', () => events.chosen(this));
@@ -61,20 +64,20 @@ export class Pane {
       this.isFree = false;
       this.dirty = true;
       events.moved(this);
-    });
+    }, track.kind === 'report');
     this.listenForRings();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
   }
 
-  /** Which pane of how many this is, for names. */
-  setPlace(place: number, of: number, active: boolean): void {
-    const label = of > 1 ? `Picture ${place + 1}` : 'Picture';
+  /** Updates names for pane `index` of `count`. */
+  setIndex(index: number, count: number, active: boolean): void {
+    const label = count > 1 ? `Picture ${index + 1}` : 'Picture';
     this.element.setAttribute('aria-label', label);
     this.element.classList.toggle('active', active);
     this.canvas.setAttribute('aria-label', `${label}: outline of ${this.track.title}`);
     this.closeButton.setAttribute('aria-label', `Close ${label.toLowerCase()}`);
-    this.closeButton.hidden = of === 1;
+    this.closeButton.hidden = count === 1;
   }
 
   showTrack(track: Track): void {
@@ -82,25 +85,25 @@ export class Pane {
     this.shown = null;
     this.isFree = true;
     this.extent = null;
-    this.variant.reset();
+    this.variant?.reset();
     this.select(null);
   }
 
   setSettings(settings: Settings): void {
     this.settings = settings;
-    this.variant.reset();
+    this.variant?.reset();
     this.shown = null;
   }
 
   setLook(look: Look): void {
     this.scene.setLook(look);
-    const wantsParticles = look.particles && !this.look?.particles;
+    const isNew = look.particles && !this.look?.particles;
     this.look = look;
     this.dirty = true;
-    if (wantsParticles && this.frame) void this.addParticles(this.frame);
+    if (isNew && this.frame) void this.addParticles(this.frame);
   }
 
-  /** All of the picture, also of what is still to come. */
+  /** Lets the view follow the content again. */
   fit(): void {
     this.isFree = true;
     this.extent = null;
@@ -114,21 +117,24 @@ export class Pane {
     this.dirty = true;
   }
 
-  /** What speaks against what is shown; empty: nothing. */
+  /** Error or doubts of the frame; empty if there are none. */
   get problem(): string {
-    if (this.variant.problem) return this.variant.problem;
-    return this.frame?.statistics.doubts.join(' ') ?? '';
+    if (this.variant?.problem) return this.variant.problem;
+    const doubts = this.frame?.statistics.doubts ?? [];
+    return doubts.map((doubt) => this.track.doubtText(doubt)).join(' ');
   }
 
-  /** Takes over the frame that is due and draws where something has changed. */
+  /** Shows the current frame, and draws if anything has changed. */
   refresh(now: number): void {
     const sequence = this.track.player.sequence;
     if (sequence !== null) this.update(sequence, now);
     setText(this.name, this.track.title);
-    setText(this.how, this.description());
+    setText(this.subtitle, this.description());
     if (!this.dirty) return;
     this.dirty = false;
+    this.pick();
     this.scene.draw();
+    this.scaleBar.show(this.scene.view);
     this.updateReadout();
   }
 
@@ -153,31 +159,31 @@ export class Pane {
         entry.summary.latency = now - entry.receivedAt;
         this.track.counts.drawn++;
       }
-      this.show(entry, decodeFrame(entry.parse(), entry.bytes, entry.receivedAt, this.track.plane));
+      this.show(entry, entry.frame());
       return;
     }
     const isFailed = this.track.state.kind === 'failed';
-    if (!this.isVariant && (this.track.kind === 'watch' || isFailed)) return;
-    this.variant.want(this.track, sequence, this.settings);
+    if (!this.variant || (!this.isVariant && (this.track.kind === 'watch' || isFailed))) return;
+    this.variant.request(this.track, sequence, this.settings);
     const result = this.variant.result;
     if (!result || result === this.shown) return;
-    this.show(result, decodeFrame(result.frame, result.bytes, now, this.track.plane));
+    this.show(result, result);
   }
 
-  private show(what: Entry | VariantResult, frame: Frame): void {
-    this.shown = what;
+  private show(source: Entry | Frame, frame: Frame): void {
+    this.shown = source;
     this.frame = frame;
     this.scene.show(frame);
     this.keepInView();
-    this.numbers.show(frame, this.method());
+    this.numbers.show(frame, this.track.labelOf(Number(frame.sequence)), this.method());
     this.dirty = true;
     if (this.look?.particles) void this.addParticles(frame);
   }
 
-  /** Until somebody chooses a view, the picture grows with what is in it. */
+  /** While the view follows the content, it grows to include each frame. */
   private keepInView(): void {
     if (!this.isFree || !this.frame) return;
-    const bounds = boundsOf(this.frame.rings.points, this.frame.origin);
+    const bounds = this.track.bounds ?? boundsOf(this.frame.rings.points, this.frame.origin);
     if (!bounds) return;
     const extent = this.extent ? union(this.extent, bounds) : bounds;
     if (this.extent && sameBounds(extent, this.extent)) return;
@@ -186,31 +192,28 @@ export class Pane {
     this.events.moved(this);
   }
 
-  /** A producer's own results come without its particles. */
   private async addParticles(frame: Frame): Promise<void> {
-    if (frame.particles || this.track.kind !== 'file') return;
-    const particles = await this.track.particlesOf(Number(frame.sequence));
-    if (!particles || frame !== this.frame) return;
-    frame.particles = relativePositions(particles.positionFormat, particles.positions,
-                                        this.track.plane, frame.origin);
+    if (frame.particles || !this.track.drawnParticles) return;
+    const particles = await this.track.drawnParticles(Number(frame.sequence), frame.origin);
+    if (frame !== this.frame) return;
+    frame.particles = particles;
     this.scene.show(frame);
     this.dirty = true;
   }
 
   private method(): Method | null {
-    const parameters = this.track.parameters;
-    if (!parameters) return null;
-    return {
-      placement: this.settings.placement || parameters.placement,
-      fill: this.settings.fill || parameters.fill,
+    const { method } = this.track;
+    return method && {
+      placement: nameOf(PLACEMENTS, this.settings.placement) || method.placement,
+      fill: nameOf(FILLS, this.settings.fill) || method.fill,
     };
   }
 
   private description(): string {
     const settings = settingsText(this.settings);
-    const words = settings ? settings.replaceAll(';', ', ').replaceAll(':', ' ') : 'as streamed';
-    const alone = this.shown !== null && 'frame' in this.shown;
-    return alone ? `${words} (this frame by itself)` : words;
+    const text = settings ? settings.replaceAll(';', ', ').replaceAll(':', ' ') : 'as streamed';
+    const isAlone = this.shown !== null && this.shown === this.variant?.result;
+    return isAlone ? `${text} (this frame alone)` : text;
   }
 
   private resize(): void {
@@ -258,10 +261,15 @@ export class Pane {
     this.dirty = true;
   }
 
+  private pick(): void {
+    this.picked = this.pointer && this.frame ? this.scene.pick(...this.pointer) : null;
+    this.scene.hovered = this.picked?.ring ?? null;
+  }
+
   private updateReadout(): void {
     const lines: string[] = [];
-    if (this.pointer && this.frame) {
-      const { x, y, ring } = this.scene.pick(...this.pointer);
+    if (this.picked) {
+      const { x, y, ring } = this.picked;
       lines.push(`x ${number(x)}, y ${number(y)}`);
       if (ring !== null) lines.push(this.ringText(ring));
     }
@@ -278,17 +286,12 @@ export class Pane {
     if (!rings) return '';
     const identity = rings.identities[ring];
     const kind = rings.area[ring] < 0 ? 'hole' : 'ring';
-    const who = identity ? `${kind} ${identity}` : `${kind} without identity`;
-    return `${who}: area ${number(Math.abs(rings.area[ring]))}, perimeter ` +
-      `${number(rings.perimeter[ring])}, particles ${count(rings.particles[ring])}`;
+    const name = identity ? `${kind} ${identity}` : `${kind} without identity`;
+    const parents = rings.parents[ring].filter((parent) => parent !== identity);
+    return `${name}: area ${number(Math.abs(rings.area[ring]))}, perimeter ` +
+      `${number(rings.perimeter[ring])}, particles ${count(rings.particles[ring])}` +
+      (parents.length > 0 ? `, from ${rings.parents[ring].join(', ')}` : '');
   }
-}
-
-function union(a: Bounds, b: Bounds): Bounds {
-  return {
-    left: Math.min(a.left, b.left), bottom: Math.min(a.bottom, b.bottom),
-    right: Math.max(a.right, b.right), top: Math.max(a.top, b.top),
-  };
 }
 
 function sameBounds(a: Bounds, b: Bounds): boolean {

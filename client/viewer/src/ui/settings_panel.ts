@@ -7,7 +7,7 @@ const NUMBERS = {
 } as const;
 type NumberName = keyof typeof NUMBERS;
 
-/** The paper's switches, of the pane that is chosen. */
+/** Settings of the chosen pane. */
 export class SettingsPanel {
   constructor(private readonly changed: (settings: Settings) => void) {
     for (const name of Object.keys(PLACEMENTS)) select('placement').add(new Option(name, name));
@@ -51,7 +51,7 @@ export class SettingsPanel {
     });
   }
 
-  /** The offset is a length of one placement only. */
+  /** The surface offset applies to one placement only. */
   private offerOffset(): void {
     input('offset').disabled = PLACEMENTS[select('placement').value] !== Placement.FARTHEST_PARTICLE;
   }

@@ -2,13 +2,14 @@ import type { Look } from '../draw';
 import type { Gateway } from '../stream/gateway';
 import type { Settings } from '../stream/settings';
 import type { Track } from '../stream/track';
+import { Variant } from '../stream/variant';
 import { byId } from './dom';
 import { Pane } from './pane';
 
-/** More pictures than this are too small to compare. */
+/** More pictures would be too small to compare. */
 const MOST_PANES = 4;
 
-/** The pictures, one to four side by side, and which of them is chosen. */
+/** One to four panes side by side. One of them is chosen. */
 export class Stage {
   readonly panes: Pane[] = [];
   chosen: Pane | null = null;
@@ -24,11 +25,11 @@ export class Stage {
   get tracks(): Track[] { return [...new Set(this.panes.map(({ track }) => track))]; }
 
   add(track: Track, settings: Settings): Pane {
-    const pane = new Pane(this.gateway, track, settings, {
+    const pane = new Pane(track, settings, {
       chosen: (chosen) => this.choose(chosen),
       closed: (closed) => this.close(closed),
       moved: (moved) => this.linkViews(moved),
-    });
+    }, (changed) => new Variant(this.gateway, changed));
     pane.setLook(this.look);
     this.panes.push(pane);
     this.element.append(pane.element);
@@ -46,7 +47,7 @@ export class Stage {
     this.choose(this.panes[Math.max(0, at - 1)] ?? null);
   }
 
-  /** Gives a pane another track; the old one ends where nobody shows it. */
+  /** Replaces the track of a pane. Closes the old track if no other pane shows it. */
   replace(pane: Pane, track: Track): void {
     const old = pane.track;
     pane.showTrack(track);
@@ -59,7 +60,7 @@ export class Stage {
     this.chosen = pane;
     this.element.dataset.panes = String(this.panes.length);
     byId('welcome', HTMLElement).hidden = this.panes.length > 0;
-    this.panes.forEach((one, k) => one.setPlace(k, this.panes.length, one === pane));
+    this.panes.forEach((one, k) => one.setIndex(k, this.panes.length, one === pane));
     if (isOther) this.events.chosen();
   }
 
@@ -68,7 +69,7 @@ export class Stage {
     for (const pane of this.panes) pane.setLook(look);
   }
 
-  /** Pictures of the same frames are looked at from the same place. */
+  /** Panes of the same track share their view. */
   linkViews(moved: Pane): void {
     for (const pane of this.panes) {
       if (pane !== moved && pane.track === moved.track) pane.setView(moved.scene.view);

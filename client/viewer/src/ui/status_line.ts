@@ -2,48 +2,48 @@ import type { Mode } from '../stream/player';
 import type { Track, TrackState } from '../stream/track';
 import { byId, setText } from './dom';
 
-/** Words that stay this long where nothing is wrong, in milliseconds. */
-const SHORTLY = 4000;
+/** Duration of a message that is not an error, in milliseconds. */
+const MESSAGE_MS = 4000;
 
-/** How a stream that runs is looked at. */
+/** Texts of a healthy stream. */
 const MODES: Record<Mode, string> = {
-  live: 'Live', playing: 'Playing, behind the newest frame', paused: 'Paused. The stream goes on.',
+  live: 'Live', playing: 'Playing behind the newest frame', paused: 'Paused. The stream continues.',
 };
 
-/** One line in words: what is wrong and what to do, else how the stream does. */
+/** The status line: an error with its remedy, or else the state of the stream. */
 export class StatusLine {
   private readonly element = byId('status', HTMLElement);
-  /** Of something that a person did. */
-  private said = '';
-  private saidUntil = 0;
-  private saidKind: TrackState['kind'] = 'well';
-  /** Of the server, while it does not answer. */
+  /** Response to an action of the user. */
+  private message = '';
+  private messageUntil = 0;
+  private messageKind: TrackState['kind'] = 'well';
+  /** Error of the server, or empty. */
   server = '';
 
-  say(words: string, isError: boolean): void {
-    this.said = words;
-    this.saidKind = isError ? 'failed' : 'well';
-    this.saidUntil = isError ? Infinity : performance.now() + SHORTLY;
+  report(text: string, isError: boolean): void {
+    this.message = text;
+    this.messageKind = isError ? 'failed' : 'well';
+    this.messageUntil = isError ? Infinity : performance.now() + MESSAGE_MS;
   }
 
-  /** `problem`: of the picture that is shown. */
+  /** `problem`: of the chosen pane. */
   refresh(track: Track | null, problem: string, now: number): void {
     const state = track?.state;
-    if (this.said && now < this.saidUntil) this.show(this.saidKind, this.said);
-    else if (state && state.kind !== 'well') this.show(state.kind, state.words);
+    if (this.message && now < this.messageUntil) this.show(this.messageKind, this.message);
+    else if (state && state.kind !== 'well') this.show(state.kind, state.text);
     else if (this.server) this.show('lost', this.server);
     else if (problem) this.show('failed', problem);
-    else this.show('well', wellWords(track));
+    else this.show('well', wellText(track));
   }
 
-  private show(kind: TrackState['kind'], words: string): void {
+  private show(kind: TrackState['kind'], text: string): void {
     this.element.dataset.kind = kind;
-    setText(this.element, words);
+    setText(this.element, text);
   }
 }
 
-function wellWords(track: Track | null): string {
+function wellText(track: Track | null): string {
   if (!track) return 'Ready';
-  const { words } = track.state;
-  return words === MODES.live ? MODES[track.player.mode] : words;
+  const { text } = track.state;
+  return text === MODES.live ? MODES[track.player.mode] : text;
 }

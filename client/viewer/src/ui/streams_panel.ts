@@ -9,22 +9,22 @@ const POLL_MS = 1500;
 export interface StreamsEvents {
   watch(stream: string): void;
   beside(stream: string): void;
-  /** There is a stream for the first time. */
+  /** The first list with streams. */
   first(streams: StreamSummary[]): void;
-  failed(words: string): void;
+  failed(text: string): void;
   token(token: string): void;
 }
 
 interface Item { element: HTMLLIElement; details: HTMLElement; watch: HTMLButtonElement }
 
-/** The streams that are live, asked for again and again. */
+/** The list of live streams, polled. */
 export class StreamsPanel {
   private readonly items = new Map<string, Item>();
   private shown: string[] = [];
   private isFirst = true;
   private timer: ReturnType<typeof setTimeout> | null = null;
 
-  /** `isOwn`: of a stream's id, whether this page produces it. */
+  /** `isOwn`: whether this page produces the stream with this id. */
   constructor(private readonly gateway: Gateway, private readonly isOwn: (id: string) => boolean,
               private readonly events: StreamsEvents) {
     byId('token-form', HTMLFormElement).addEventListener('submit', (event) => {
@@ -35,7 +35,7 @@ export class StreamsPanel {
     void this.poll();
   }
 
-  /** Names of the streams that are on the stage. */
+  /** Sets the names of the streams on the stage. */
   setShown(shown: string[]): void {
     this.shown = shown;
     for (const [name, item] of this.items) this.mark(name, item);
@@ -44,7 +44,7 @@ export class StreamsPanel {
   private async poll(): Promise<void> {
     if (this.timer !== null) clearTimeout(this.timer);
     try {
-      await this.ask();
+      await this.update();
     } catch (error) {
       if (!(error instanceof CallError)) throw error;
       if (error.status.reason.startsWith('TOKEN')) byId('access', HTMLDetailsElement).open = true;
@@ -53,7 +53,7 @@ export class StreamsPanel {
     this.timer = setTimeout(() => void this.poll(), POLL_MS);
   }
 
-  private async ask(): Promise<void> {
+  private async update(): Promise<void> {
     const { streams } = await this.gateway.call(
       '/v1/streams', ListStreamsRequestSchema, ListStreamsResponseSchema, { pageSize: 200 });
     this.show(streams.filter(({ streamId }) => !this.isOwn(streamId)));
@@ -84,7 +84,7 @@ export class StreamsPanel {
     const details = make('small');
     const watch = make('button', { type: 'button', class: 'watch', 'aria-label': `Watch ${name}` }, name, details);
     const beside = make('button', { type: 'button', 'aria-label': `Watch ${name} beside` }, '+');
-    beside.title = 'Beside what is there';
+    beside.title = 'Watch beside the current pictures';
     watch.addEventListener('click', () => this.events.watch(name));
     beside.addEventListener('click', () => this.events.beside(name));
     const item = { element: make('li', {}, watch, beside), details, watch };

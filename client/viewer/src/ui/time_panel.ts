@@ -2,12 +2,12 @@ import type { Track } from '../stream/track';
 import { button, byId, input, select, setText } from './dom';
 import { number } from './format';
 
-/** Where in time the chosen pane is: follow, pause, step, scrub, speed. */
+/** Time controls of the chosen pane: follow, pause, step, scrub, speed. */
 export class TimePanel {
   private readonly scrub = input('scrub');
   private scrubbing = false;
 
-  /** `track`: of the chosen pane; `moved`: somebody went to another place. */
+  /** `track`: of the chosen pane; `moved`: called after the user changed the position. */
   constructor(private readonly track: () => Track | null, private readonly moved: () => void) {
     button('live').addEventListener('click', () => this.act((track) => track.player.follow()));
     button('play').addEventListener('click', () => this.toggle());
@@ -28,12 +28,20 @@ export class TimePanel {
     });
   }
 
-  /** Pauses at what is seen, or goes on from where it was paused. */
+  /** Pauses at the visible frame, or plays from there. */
   toggle(): void {
     this.act((track) => {
       const { player } = track;
       if (player.mode === 'paused') player.play();
-      else player.pause(this.seen(track));
+      else player.pause(this.visible(track));
+    });
+  }
+
+  /** Pauses at the first (-1) or last (1) frame. */
+  jump(to: 1 | -1): void {
+    this.act((track) => {
+      const range = track.range();
+      if (range) track.player.seek(to < 0 ? range.first : range.last);
     });
   }
 
@@ -41,7 +49,7 @@ export class TimePanel {
     this.act((track) => track.player.follow());
   }
 
-  /** To the next frame that there is, back or forward. */
+  /** Steps to the previous (-1) or next (1) available frame. */
   step(by: 1 | -1): void {
     this.act(({ player, history, kind }) => {
       const at = player.sequence;
@@ -51,7 +59,7 @@ export class TimePanel {
     });
   }
 
-  /** Shows what the track does now. */
+  /** Updates the controls. */
   refresh(): void {
     const track = this.track();
     const range = track?.range() ?? null;
@@ -65,7 +73,7 @@ export class TimePanel {
     for (const name of ['live', 'play', 'back', 'forward']) button(name).disabled = !track;
     this.scrub.disabled = !range;
     if (!range || !player) {
-      setText(byId('place', HTMLElement), '–');
+      setText(byId('position', HTMLElement), '–');
       return;
     }
     if (!this.scrubbing) {
@@ -73,10 +81,10 @@ export class TimePanel {
     }
     select('speed').value = String(player.speed);
     input('loop').checked = player.loop;
-    setText(byId('place', HTMLElement), `${at ?? '–'} of ${range.last}`);
+    setText(byId('position', HTMLElement), `${at ?? '–'} of ${range.last}`);
   }
 
-  private seen(track: Track): number | null {
+  private visible(track: Track): number | null {
     const at = track.player.sequence;
     return at === null ? null : track.entryAt(at)?.sequence ?? at;
   }
@@ -87,16 +95,17 @@ export class TimePanel {
     if (this.scrub.max !== max) this.scrub.max = max;
     if (this.scrub.value !== value) this.scrub.value = value;
     const time = this.track()?.entryAt(at)?.time;
-    const words = time === undefined ? `frame ${at}` : `frame ${at}, time ${number(time)}`;
-    if (this.scrub.getAttribute('aria-valuetext') !== words) {
-      this.scrub.setAttribute('aria-valuetext', words);
+    const label = this.track()?.labelOf(at) ?? '';
+    const text = time === undefined ? `frame ${label}` : `frame ${label}, time ${number(time)}`;
+    if (this.scrub.getAttribute('aria-valuetext') !== text) {
+      this.scrub.setAttribute('aria-valuetext', text);
     }
   }
 
-  private act(what: (track: Track) => void): void {
+  private act(action: (track: Track) => void): void {
     const track = this.track();
     if (!track) return;
-    what(track);
+    action(track);
     this.moved();
     this.refresh();
   }

@@ -5,8 +5,8 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { CHROMIUM_FLAGS } from './support.mjs';
 
-/** Chromium by itself, asked over a pipe: Playwright copies every WebSocket frame, which makes them
- * ten times slower. */
+/** Controls Chromium over a pipe. Playwright copies every WebSocket frame, which makes them ten times
+ * slower. */
 export class BareChromium {
   #profile = mkdtempSync(path.join(tmpdir(), 'partiemc-chromium-'));
   #pending = new Map();
@@ -32,7 +32,7 @@ export class BareChromium {
     await this.send('Page.navigate', { url });
   }
 
-  /** What a function gives in the page; `argument` goes along as JSON. */
+  /** Calls a function in the page, with `argument` as JSON. */
   async evaluate(run, argument = null) {
     const { result, exceptionDetails } = await this.send('Runtime.evaluate', {
       expression: `(${run})(${JSON.stringify(argument)})`, awaitPromise: true, returnByValue: true,

@@ -19,7 +19,7 @@ const { values: options } = parseArgs({
 });
 const [WIDTH, HEIGHT] = [900, 600];
 
-/** Places of the frame that `makeFrame` makes when nothing else is said. */
+/** Positions in the default frame of `makeFrame`. */
 const IN_BODY = [10.1, 4.9];
 const IN_HOLE = [5.1, 4.6];
 const IN_DROP = [13.3, 8.3];
@@ -55,7 +55,7 @@ after(async () => {
   assert.deepEqual(errors, [], 'errors in the console');
 });
 
-/** A new page with `bench` of draw_entry.ts in it; `work` gets it and is then done with it. */
+/** Opens a page with `bench` of draw_entry.ts for the duration of `work`. */
 async function inPage(work, ratio = 1) {
   const page = await browser.newPage({
     viewport: { width: WIDTH, height: HEIGHT }, deviceScaleFactor: ratio,
@@ -72,7 +72,7 @@ async function inPage(work, ratio = 1) {
   }
 }
 
-/** Colours of places in one look; `lacking` names parts of the frame that are left out. */
+/** Colours at positions in one look; `lacking`: parts to remove from the frame. */
 function coloursOf(page, look, places, lacking = []) {
   return page.evaluate(([one, at, without]) => {
     const frame = bench.makeFrame();
@@ -92,14 +92,14 @@ function assertNear(actual, expected, tolerance, what) {
     Math.abs(part - expected[k]) <= tolerance, `${what}: ${actual} and not ${expected}`));
 }
 
-test('Band, merged interior, holes and outline have their colours in dark and light', () =>
+test('parts have their colours in dark and light', () =>
   inPage(async (page) => {
     for (const dark of [false, true]) {
       const theme = await themeOf(page, dark);
       const { line, band } = await page.evaluate(() => {
         const { rings, mesh } = bench.makeFrame();
         const k = rings.offsets[rings.outerOf.indexOf(0xffffffff)];
-        // The middle of the largest triangle of the band.
+        // Centre of the largest triangle of the band.
         let best = { area: 0, place: [0, 0] };
         for (let t = 0; t < mesh.classes.length; ++t) {
           if (mesh.classes[t] !== 0) continue;
@@ -120,14 +120,14 @@ test('Band, merged interior, holes and outline have their colours in dark and li
     }
   }));
 
-test('Rings without a mesh are filled, holes are not', () => inPage(async (page) => {
+test('rings without a mesh are filled, holes are not', () => inPage(async (page) => {
   const theme = await themeOf(page, false);
   const colours = await coloursOf(page, {}, [IN_BODY, IN_HOLE, IN_DROP, OUTSIDE], ['mesh']);
   [theme.band, theme.background, theme.band, theme.background].forEach((expected, k) =>
     assertNear(colours[k], expected, 2, `place ${k}`));
 }));
 
-test('Body and drop differ by identity, and an identity has one hue', () => inPage(async (page) => {
+test('identities differ in hue', () => inPage(async (page) => {
   const [body, elsewhere, drop, hole] = await coloursOf(
     page, { colour: 'identity' }, [IN_BODY, [8.1, 2.6], [2.2, 9.3], IN_HOLE]);
   assert.deepEqual(body, elsewhere);
@@ -135,7 +135,7 @@ test('Body and drop differ by identity, and an identity has one hue', () => inPa
   assertNear(hole, (await themeOf(page, false)).background, 2, 'hole');
 }));
 
-test('Wherever the arrays of a message begin, the picture is the same', () =>
+test('the alignment of arrays does not change the picture', () =>
   inPage(async (page) => {
     const differing = await page.evaluate(() => {
       const look = { edges: true, colour: 'identity' };
@@ -150,7 +150,7 @@ test('Wherever the arrays of a message begin, the picture is the same', () =>
   }));
 
 for (const ratio of [1, 2]) {
-  test(`Lines have their width in device pixels at ${ratio} pixels per CSS pixel`, () =>
+  test(`line width in device pixels at ratio ${ratio}`, () =>
     inPage(async (page) => {
       for (const lineWidth of [0.5, 1, 2, 3.5]) {
         const { ink, expected } = await page.evaluate((width) => {
@@ -165,7 +165,7 @@ for (const ratio of [1, 2]) {
     }, ratio));
 }
 
-test('Where many points share a pixel, none is covered twice', () => inPage(async (page) => {
+test('dense vertices do not cover a pixel twice', () => inPage(async (page) => {
   const { ink, expected } = await page.evaluate(() => {
     const corners = Array.from({ length: 40000 }, (_, k) => {
       const angle = (2 * Math.PI * k) / 40000;
@@ -180,7 +180,7 @@ test('Where many points share a pixel, none is covered twice', () => inPage(asyn
   assert.ok(Math.abs(ink / expected - 1) < 0.03, `${ink} of ${expected}`);
 }));
 
-test('An attribute colours the outline from one end of its legend to the other', () =>
+test('an attribute colours the outline over its legend', () =>
   inPage(async (page) => {
     const { colours, legend, stops } = await page.evaluate(() => {
       const frame = bench.polygon([[0, 0], [10, 0], [10, 6], [0, 6]]);
@@ -199,7 +199,7 @@ test('An attribute colours the outline from one end of its legend to the other',
     assertNear(colours[2], stops[(stops.length - 1) / 2], 6, 'middle');
   }));
 
-test('Particles, normals and edges add to the picture', () => inPage(async (page) => {
+test('particles, normals and edges add to the picture', () => inPage(async (page) => {
   const covered = (look) => page.evaluate((one) => {
     bench.picture({ fill: false, outline: false, ...one });
     const background = bench.theme(false).background.map((part) => Math.round(255 * part));
@@ -214,7 +214,7 @@ test('Particles, normals and edges add to the picture', () => inPage(async (page
   }
 }));
 
-test('A selected ring stands out, others stay as they were', () => inPage(async (page) => {
+test('only the selected ring is highlighted', () => inPage(async (page) => {
   const { accent } = await themeOf(page, false);
   const { before: plain, after: marked, rings } = await page.evaluate(() => {
     const { rings: { points, offsets, identities } } = bench.makeFrame();
@@ -229,7 +229,7 @@ test('A selected ring stands out, others stay as they were', () => inPage(async 
   assertNear(marked[1], accent, 2, 'selected');
 }));
 
-test('The pointer moves, magnifies and asks; a drag is no click', () => inPage(async (page) => {
+test('the pointer pans, zooms and picks', () => inPage(async (page) => {
   await page.evaluate(() => bench.picture({}));
   const pick = (x, y) => page.evaluate(([one, other]) => bench.scene.pick(one, other), [x, y]);
   const held = await pick(300, 200);
@@ -251,7 +251,7 @@ test('The pointer moves, magnifies and asks; a drag is no click', () => inPage(a
   assert.ok(Math.hypot(held.x - again.x, held.y - again.y) < 1e-6, 'fits again');
 }));
 
-test('After the graphics context was lost, the picture comes back by itself', () =>
+test('the picture returns after a lost context', () =>
   inPage(async (page) => {
     const same = await page.evaluate(async () => {
       bench.picture({ edges: true, particles: true, normals: true });
@@ -263,7 +263,7 @@ test('After the graphics context was lost, the picture comes back by itself', ()
     assert.ok(same);
   }));
 
-test('PNG and clip are what their names say', () => inPage(async (page) => {
+test('PNG and clip have their file types', () => inPage(async (page) => {
   const { picture, film } = await page.evaluate(async () => {
     bench.picture({});
     return { picture: await bench.head(bench.png()), film: await bench.head(bench.film(30)) };
@@ -276,7 +276,7 @@ test('PNG and clip are what their names say', () => inPage(async (page) => {
   assert.ok(film.size > 5000, `${film.size} bytes`);
 }));
 
-test('Pictures to look at', { skip: !options.pictures }, () => inPage(async (page) => {
+test('pictures for inspection', { skip: !options.pictures }, () => inPage(async (page) => {
   mkdirSync(options.pictures, { recursive: true });
   for (const dark of [false, true]) {
     for (const [name, look] of Object.entries({
@@ -296,7 +296,7 @@ test('Pictures to look at', { skip: !options.pictures }, () => inPage(async (pag
   }
 }, 2));
 
-test('Main-thread time of a mesh with 100,000 vertices', (context) => inPage(async (page) => {
+test('main-thread time of a mesh of 100,000 vertices', (context) => inPage(async (page) => {
   for (const [name, look] of Object.entries({
     'fill and outline': {}, 'with edges': { edges: true }, 'by identity': { colour: 'identity' },
   })) {

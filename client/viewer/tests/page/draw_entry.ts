@@ -12,7 +12,7 @@ import { decodeFrame } from '../../src/protocol/decode';
 import { type Frame, NO_RING } from '../../src/protocol/frame';
 import { blobs, makeFrame, type FrameOptions } from '../draw_frames';
 
-/** What draw.mjs calls in the page. */
+/** Functions for draw.mjs. */
 const canvas = document.querySelector('canvas') as HTMLCanvasElement;
 const scene = new Scene(canvas);
 let changes = 0;
@@ -20,7 +20,7 @@ let clicks = 0;
 attachNavigation(canvas, scene, () => ++changes);
 canvas.addEventListener('click', () => ++clicks);
 
-/** Draws a frame in one look, all of it seen. */
+/** Draws a whole frame in one look. */
 function picture(look: Partial<Look>, frame: Frame = makeFrame()): void {
   scene.resize();
   scene.setLook({ ...DEFAULT_LOOK, ...look });
@@ -29,7 +29,7 @@ function picture(look: Partial<Look>, frame: Frame = makeFrame()): void {
   scene.draw();
 }
 
-/** Red, green, blue, alpha of every pixel, the lowest row first, of what is drawn now. */
+/** RGBA of every pixel, the lowest row first. */
 function pixels(): Uint8Array {
   const gl = canvas.getContext('webgl2') as WebGL2RenderingContext;
   scene.draw();
@@ -38,7 +38,7 @@ function pixels(): Uint8Array {
   return read;
 }
 
-/** The colours of places in the world, as they are drawn now. */
+/** Drawn colours at world positions. */
 function coloursAt(places: [number, number][]): number[][] {
   const read = pixels();
   const ratio = canvas.width / scene.size.width;
@@ -51,11 +51,11 @@ function coloursAt(places: [number, number][]): number[][] {
   });
 }
 
-/** How much of the picture is covered by a colour on the ground, in device pixels. */
+/** Area covered by a colour on the background, in device pixels. */
 function ink(colour: readonly number[], dark = false): number {
   const read = pixels();
   const ground = theme(dark).background.map((part) => 255 * part);
-  // The part of the colour that differs most from the ground tells the cover best.
+  // Uses the channel with the largest difference from the background.
   const apart = colour.map((part, k) => Math.abs(part - ground[k]));
   const k = apart.indexOf(Math.max(...apart));
   let sum = 0;
@@ -63,7 +63,7 @@ function ink(colour: readonly number[], dark = false): number {
   return sum / (colour[k] - ground[k]);
 }
 
-/** A ring of corners, without a mesh. */
+/** A frame of one ring without a mesh. */
 function polygon(corners: [number, number][]): Frame {
   const frame = makeFrame({ cell: 1 });
   const perimeter = corners.reduce((sum, [x, y], k) => {
@@ -89,7 +89,7 @@ function polygon(corners: [number, number][]): Frame {
   };
 }
 
-/** The frame as the server sends it to who watches. */
+/** The message of a frame to a watcher. */
 function message(frame: Frame): Uint8Array {
   const { rings, mesh } = frame;
   return toBinary(WatchStreamResponseSchema, create(WatchStreamResponseSchema, {
@@ -127,7 +127,7 @@ function decoded(bytes: Uint8Array): Frame {
   return decodeFrame(response.value.frame, bytes.length, performance.now(), Plane.XY);
 }
 
-/** The frame after a message whose first byte lies so far into its buffer. */
+/** Decodes a message that starts at an offset in its buffer. */
 function sent(frame: Frame, shift: number): Frame {
   const bytes = message(frame);
   const buffer = new Uint8Array(bytes.length + shift);
@@ -135,7 +135,7 @@ function sent(frame: Frame, shift: number): Frame {
   return decoded(buffer.subarray(shift));
 }
 
-/** What a mesh is and how long it takes, milliseconds of the main thread by frame. */
+/** Size of a mesh, and main-thread milliseconds per frame. */
 interface Times {
   points: number;
   triangles: number;
@@ -173,14 +173,14 @@ async function times(look: Partial<Look>, options: FrameOptions, count: number):
   return result;
 }
 
-/** The first bytes of what is exported. */
+/** Type, size and first bytes of an export. */
 async function head(blob: Promise<Blob>): Promise<{ type: string; size: number; bytes: number[] }> {
   const one = await blob;
   const bytes = new Uint8Array(await one.slice(0, 4).arrayBuffer());
   return { type: one.type, size: one.size, bytes: Array.from(bytes) };
 }
 
-/** A film of some refreshes of the screen, in each of which the view moves on. */
+/** Records a clip of a moving view. */
 async function film(refreshes: number): Promise<Blob> {
   const recording = clip(canvas);
   recording.start();
@@ -192,7 +192,7 @@ async function film(refreshes: number): Promise<Blob> {
   return recording.stop();
 }
 
-/** The drawing context is lost, as when a graphics driver restarts, and comes back. */
+/** Loses and restores the drawing context. */
 async function loseContext(): Promise<void> {
   const gl = canvas.getContext('webgl2') as WebGL2RenderingContext;
   const extension = gl.getExtension('WEBGL_lose_context');
@@ -204,7 +204,7 @@ async function loseContext(): Promise<void> {
   scene.show(makeFrame());
   scene.draw();
   const restored = event('webglcontextrestored');
-  // Only once the event of the loss has been handled may it be given back.
+  // The context can be restored only after the event of the loss.
   setTimeout(() => extension?.restoreContext());
   await restored;
 }

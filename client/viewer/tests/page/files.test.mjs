@@ -1,4 +1,4 @@
-// Files that are dropped on the page.
+// Dropped files.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
@@ -8,7 +8,7 @@ import { launch, recording, until, Viewer, World } from './support.mjs';
 const FRAMES = 12;
 let world, browser, viewer, folder;
 
-/** Two drops of particles that move towards each other. */
+/** Two approaching drops of particles. */
 function drops(frame) {
   const lines = ['id,x,y,pressure'];
   const spacing = 0.05;
@@ -48,7 +48,7 @@ afterEach(async () => {
   assert.deepEqual(errors, [], 'the console has no errors');
 });
 
-/** Lets go of files and folders over the page, as a hand does. */
+/** Drops files and folders on the page. */
 async function drop(...paths) {
   const session = await viewer.page.context().newCDPSession(viewer.page);
   const data = { items: [], files: paths, dragOperationsMask: 1 };
@@ -57,9 +57,9 @@ async function drop(...paths) {
   }
 }
 
-const isAll = () => until('all frames are here', async () => await viewer.status() === 'All frames are here');
+const isAll = () => until('all frames are here', async () => await viewer.status() === 'All frames received');
 
-test('a folder of CSV files plays, with the numbers of the command line', async () => {
+test('a CSV folder has the numbers of the command line', async () => {
   const truth = await world.statistics(folder);
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
@@ -78,7 +78,7 @@ test('a folder of CSV files plays, with the numbers of the command line', async 
   assert.equal(colours.includes('by pressure'), capabilities.includes('attributes'));
 });
 
-test('it plays to its end and stands there, and begins anew', async () => {
+test('files play to the end, and again on request', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
   await until('the end', async () => await viewer.frame() === FRAMES && await viewer.button('Play').count() === 1);
@@ -86,7 +86,7 @@ test('it plays to its end and stands there, and begins anew', async () => {
   await until('anew', async () => await viewer.frame() < FRAMES);
 });
 
-test('another placement streams the files again; the numbers are those of the command line', async () => {
+test('another placement streams the files again', async () => {
   const truth = await world.statistics(folder, '--placement', 'qef', '--fill', 'conforming');
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
@@ -100,7 +100,7 @@ test('another placement streams the files again; the numbers are those of the co
   assert.equal(await viewer.frame(), 7);
 });
 
-test('two settings stand side by side on the files', async () => {
+test('two settings of files are compared side by side', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
   await isAll();
@@ -142,7 +142,7 @@ test('a LAMMPS dump plays', async () => {
   assert.equal(await viewer.value('rings-digest'), truth[2].rings_digest);
 });
 
-test('what cannot be read is told in words', async () => {
+test('unreadable files are reported', async () => {
   const bad = path.join(world.folder, 'water.vtp');
   writeFileSync(bad, '<VTKFile/>');
   viewer = await Viewer.open(browser, world.url);

@@ -1,4 +1,4 @@
-// A stream that runs, in the page: seen, gone back in, paused, compared.
+// A live stream in the page: history, pause, settings, export.
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
 import { launch, recording, until, Viewer, World } from './support.mjs';
@@ -6,7 +6,7 @@ import { launch, recording, until, Viewer, World } from './support.mjs';
 let world, browser, viewer, truth;
 
 before(async () => {
-  // A minute of the stream: what each page fetches when it opens.
+  // A minute of the stream, which each page fetches when it opens.
   world = await World.start('--history-bytes', '24MiB');
   browser = await launch();
   truth = await world.statistics(recording);
@@ -26,8 +26,8 @@ afterEach(async () => {
 const open = async (hash = '#stream=dam') => { viewer = await Viewer.open(browser, world.url, { hash }); };
 
 let streams = 0;
-/** The page with a stream of its own, whose first 75 frames are those of the recording. */
-async function openAnew() {
+/** Opens the page with a new stream, whose first 75 frames are the recording. */
+async function openNew() {
   const name = `dam_${++streams}`;
   const producer = world.loop(name);
   await open(`#stream=${name}`);
@@ -38,7 +38,7 @@ async function openAnew() {
   return producer;
 }
 
-/** What the page tells of a frame against what the command line tells of the same. */
+/** Compares the page's numbers of a frame with the command line's. */
 async function agrees(sequence) {
   const row = truth[sequence - 1];
   const numbers = await viewer.numbers();
@@ -52,7 +52,7 @@ async function agrees(sequence) {
   assert.equal(Number(numbers.perimeter), Number(row.perimeter.toPrecision(7)));
 }
 
-test('the only stream is shown at once, and its picture moves', async () => {
+test('the only stream is shown at once and moves', async () => {
   await open('');
   const first = await viewer.shows();
   const picture = await viewer.picture();
@@ -62,8 +62,8 @@ test('the only stream is shown at once, and its picture moves', async () => {
   assert.equal(await viewer.button('Live').getAttribute('aria-pressed'), 'true');
 });
 
-test('who comes late can go back to the beginning, and its numbers are those of the command line', async () => {
-  const producer = await openAnew();
+test('a late viewer can go back to the first frame', async () => {
+  const producer = await openNew();
   for (const sequence of [1, 40, 75]) {
     await viewer.scrubTo(sequence);
     await agrees(sequence);
@@ -71,13 +71,13 @@ test('who comes late can go back to the beginning, and its numbers are those of 
   await producer.stop();
 });
 
-test('a stream that is paused stands still, goes on where it was paused, and catches up', async () => {
+test('a paused stream resumes at its frame and catches up', async () => {
   await open();
   await viewer.shows(20);
   await viewer.button('Pause').click();
   const at = await viewer.frame();
   const picture = await viewer.picture();
-  const last = viewer.page.locator('#place');
+  const last = viewer.page.locator('#position');
   await until('the stream goes on behind', async () =>
     Number((await last.textContent()).split(' of ')[1]) > at + 30);
   assert.equal(await viewer.frame(), at);
@@ -94,7 +94,7 @@ test('a stream that is paused stands still, goes on where it was paused, and cat
   });
 });
 
-/** The frames that are shown until fifteen more have been. */
+/** The next eight frames shown. */
 function watchFrames() {
   return viewer.page.evaluate(() => new Promise((resolve) => {
     const cell = document.querySelector('[data-key="frame"]');
@@ -109,22 +109,22 @@ function watchFrames() {
   }));
 }
 
-test('steps go to the next frame and back, by button and by key', async () => {
+test('buttons and keys step by one frame', async () => {
   await open();
   await viewer.shows(20);
   await viewer.button('Pause').click();
   const at = await viewer.frame();
-  await viewer.button('A frame back').click();
+  await viewer.button('Previous frame').click();
   await until('one back', async () => await viewer.frame() === at - 1);
-  await viewer.button('A frame forward').click();
+  await viewer.button('Next frame').click();
   await until('one forward', async () => await viewer.frame() === at);
   await viewer.page.locator('canvas').first().focus();
   await viewer.page.keyboard.press(',');
   await until('one back by key', async () => await viewer.frame() === at - 1);
 });
 
-test('every switch changes picture and numbers of a paused frame', async () => {
-  const producer = await openAnew();
+test('every setting changes picture and numbers', async () => {
+  const producer = await openNew();
   await viewer.scrubTo(60);
   await viewer.page.getByLabel('Mesh edges').check();
   const set = async (label, value) => {
@@ -163,7 +163,7 @@ test('every switch changes picture and numbers of a paused frame', async () => {
   await producer.stop();
 });
 
-test('two placements stand side by side on the same frame, with their numbers', async () => {
+test('two placements are compared side by side', async () => {
   await open();
   await viewer.shows(20);
   await viewer.button('Pause').click();
@@ -187,7 +187,7 @@ test('two placements stand side by side on the same frame, with their numbers', 
 });
 
 test('a link shows the same frame, view and settings', async () => {
-  const producer = await openAnew();
+  const producer = await openNew();
   await viewer.button('Pause').click();
   await viewer.page.getByLabel('Placement', { exact: true }).selectOption('qef');
   await viewer.page.locator('canvas').first().focus();
@@ -207,7 +207,7 @@ test('a link shows the same frame, view and settings', async () => {
   await producer.stop();
 });
 
-test('the ring under the pointer is told, and one that is clicked stays selected', async () => {
+test('the readout shows the ring; a click selects it', async () => {
   await open();
   await viewer.shows(5);
   await viewer.button('Pause').click();
@@ -245,13 +245,13 @@ test('a click in a curve goes to that moment', async () => {
   const box = await plot.boundingBox();
   await viewer.page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
   await until('it stands in the middle', async () => {
-    const [place, newest] = (await viewer.page.locator('#place').textContent()).split(' of ').map(Number);
+    const [place, newest] = (await viewer.page.locator('#position').textContent()).split(' of ').map(Number);
     const shown = await viewer.frame();
     return await viewer.button('Play').count() === 1 && shown === place && newest - place > 20;
   });
 });
 
-test('what is seen is exported as PNG, SVG and GeoJSON', async () => {
+test('the picture is exported as PNG, SVG and GeoJSON', async () => {
   await open();
   await viewer.shows(20);
   await viewer.button('Pause').click();

@@ -1,13 +1,11 @@
-// How the page looks, and whether everybody can use it: no violation of level serious or above, in
-// dark and light, wide and narrow. Screenshots are left in build/screenshots to be looked at.
+// Accessibility of the page: no serious violation, in dark and light, wide and narrow. Leaves
+// screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { mkdirSync, readFileSync } from 'node:fs';
-import { createRequire } from 'node:module';
+import { mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, World } from './support.mjs';
+import { launch, screenshots, until, Viewer, violations, World } from './support.mjs';
 
-const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 let world, browser;
 
 before(async () => {
@@ -21,18 +19,9 @@ after(async () => {
   await world?.close();
 });
 
-/** Serious and critical violations, one line each. */
-async function violations(page) {
-  await page.evaluate(axe);
-  const results = await page.evaluate(
-    () => window.axe.run(document, { resultTypes: ['violations'] }));
-  return results.violations.filter(({ impact }) => impact === 'serious' || impact === 'critical')
-    .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' | ')}`);
-}
-
 for (const colorScheme of ['light', 'dark']) {
   for (const width of [1600, 800]) {
-    test(`${colorScheme}, ${width} pixels wide: usable by everybody, nothing cut off`, async () => {
+    test(`${colorScheme}, ${width} pixels wide: accessible, nothing cut off`, async () => {
       const viewer = await Viewer.open(browser, world.url, { colorScheme, width, height: width === 800 ? 720 : 900 });
       const shot = (name) => viewer.page.screenshot({
         path: path.join(screenshots, `${name}_${colorScheme}_${width}.png`),
@@ -65,7 +54,7 @@ for (const colorScheme of ['light', 'dark']) {
   }
 }
 
-test('the first page, before there is any stream', async () => {
+test('the page before any stream', async () => {
   const empty = await World.start();
   const viewer = await Viewer.open(browser, empty.url, { colorScheme: 'light' });
   try {

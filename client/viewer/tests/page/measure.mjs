@@ -1,6 +1,6 @@
-// Measures the page and the gateway; prints figures and what is wanted of them. Not a test: what it
-// says depends on the machine and on what else it does.
-//   node tests/page/measure.mjs [--minutes N]     N: of watching the heap, 20 by default
+// Measures the page and the gateway, and prints figures with their targets. Not a test: figures depend
+// on the machine and its load.
+//   node tests/page/measure.mjs [--minutes N]     duration of the heap measurement, default 20
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
@@ -11,7 +11,7 @@ import { until, World } from './support.mjs';
 const { values: options } = parseArgs({ options: { minutes: { type: 'string', default: '20' } } });
 const say = (what, figure, wanted) => console.log(`${what}: ${figure} (wanted: ${wanted})`);
 
-/** CSV files of a disc of about `particles` that breathes. */
+/** CSV files of a pulsating disc of about `particles`. */
 function writeFrames(folder, particles, frames) {
   mkdirSync(folder, { recursive: true });
   const radius = Math.sqrt(particles / Math.PI);
@@ -36,7 +36,7 @@ async function recordingOf(world, particles) {
   return file;
 }
 
-/** In the page: the first time that a frame is shown, in milliseconds from the opening. */
+/** In the page: milliseconds from opening to the first frame. */
 const firstFrame = () => new Promise((resolve) => {
   const look = () => {
     const frame = Number(document.querySelector('[data-key="frame"]')?.textContent);
@@ -46,7 +46,7 @@ const firstFrame = () => new Promise((resolve) => {
   look();
 });
 
-/** In the page: milliseconds of going to `count` places of history, until each is shown. */
+/** In the page: milliseconds until a frame of the history is shown, for `count` frames. */
 const scrub = async (count) => {
   const slider = document.querySelector('#scrub');
   const cell = document.querySelector('[data-key="frame"]');
@@ -67,7 +67,7 @@ const scrub = async (count) => {
   return { p50: times[count >> 1], most: times[count - 1] };
 };
 
-/** In the page: reads the history of a stream for some seconds, and tells how fast it came. */
+/** In the page: reads the history of a stream for some seconds, and returns the rate. */
 const drain = async (stream) => {
   const socket = new WebSocket(location.origin.replace('http', 'ws') + '/v1/watch', ['partiemc.v1']);
   socket.binaryType = 'arraybuffer';
@@ -110,7 +110,7 @@ async function measureMessages() {
       const file = await recordingOf(world, particles);
       const producer = world.replayOf(file, 'many', '--loop', '--rate', 'max', '--fill', fill, '--echo-particles');
       await sleep(8000);
-      producer.rest();  // What the server holds is read, as fast as it comes.
+      producer.rest();  // Reads the server's history at full speed.
       await withPage(world, 'icon.svg', async (browser) => {
         await sleep(500);
         const { size, messages, perSecond, rate } = await browser.evaluate(drain, 'many');
@@ -132,7 +132,7 @@ async function measureThroughput() {
     await sleep(2000);
     await withPage(world, '#stream=fast', async (browser) => {
       await sleep(10_000);
-      say('frames drawn', await browser.evaluate(() => document.querySelector('#place').textContent), 'goes on');
+      say('frames drawn', await browser.evaluate(() => document.querySelector('#position').textContent), 'goes on');
     });
     await until('the watch is logged', () => /watch closed/.test(world.log.join('')));
     const watches = world.log.join('').match(/watch closed.*/g)

@@ -1,4 +1,4 @@
-// What the page does when things go wrong.
+// Recovery of the page from failures.
 import assert from 'node:assert/strict';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -11,10 +11,10 @@ let browser;
 before(async () => { browser = await launch(); });
 after(async () => { await browser?.close(); });
 
-/** What Chromium itself writes about connections that do not come about. */
+/** Chromium's own messages on failed connections. */
 const isConnection = (text) => /net::ERR_|WebSocket connection to|Failed to load resource/.test(text);
 
-test('a server that is killed and started again leads back to a live picture without a reload', async (t) => {
+test('the page recovers from a server restart without a reload', async (t) => {
   const world = await World.start();
   const viewer = await Viewer.open(browser, world.url);
   try {
@@ -39,7 +39,7 @@ test('a server that is killed and started again leads back to a live picture wit
   }
 });
 
-test('a stream that ends is told, and seen again when it comes back', async () => {
+test('the page reports the end of a stream and its return', async () => {
   const world = await World.start();
   const viewer = await Viewer.open(browser, world.url);
   try {
@@ -59,7 +59,7 @@ test('a stream that ends is told, and seen again when it comes back', async () =
   }
 });
 
-test('a server that wants a token is told it once', async () => {
+test('a token is entered once', async () => {
   const folder = mkdtempSync(path.join(tmpdir(), 'partiemc-token-'));
   const file = path.join(folder, 'token');
   writeFileSync(file, `${TOKEN}\n`);

@@ -1,8 +1,9 @@
-// What the tests of the page share: a server, streams, Chromium, and the page in it.
+// Common parts of the page's tests: a server, streams, Chromium, and the page.
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
+import { createRequire } from 'node:module';
 import path from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
@@ -12,21 +13,21 @@ export const viewer = path.resolve(path.dirname(fileURLToPath(import.meta.url)),
 export const root = path.resolve(viewer, '../..');
 export const recording = path.join(root, 'client/recordings/dam_break.pemc');
 export const screenshots = path.join(viewer, 'build/screenshots');
-/** Where partiemc and partiemc-server are. */
+/** Folder of partiemc and partiemc-server. */
 const bin = path.resolve(process.env.PARTIEMC_BIN ?? path.join(root, 'build/release/bin'));
 const chromiumPath = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
-/** Drawing without a graphics card, as Chromium does it where there is none: WebGL by SwiftShader, the
- * page itself by its own software, which is four times faster at it. */
+/** Draws without a graphics card: WebGL by SwiftShader, the page by Chromium's own software renderer,
+ * which is four times faster for it. */
 export const CHROMIUM_FLAGS = [
   '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
   '--disable-gpu-compositing',
 ];
 
-/** How long something may take that takes a moment: long, as tests share their machine. */
+/** Timeout of short operations. Long, because tests share their machine. */
 export const PATIENCE_MS = 60_000;
 
-/** Waits until `value()` is truthy and gives it. */
+/** Waits until `value()` is truthy, and returns it. */
 export async function until(what, value, patienceMs = PATIENCE_MS) {
   const end = Date.now() + patienceMs;
   while (true) {
@@ -49,11 +50,11 @@ function start(program, args, log) {
 async function stop(child, signal = 'SIGTERM') {
   if (!child || child.exitCode !== null || child.signalCode !== null) return;
   child.kill(signal);
-  child.kill('SIGCONT');  // It may be at rest.
+  child.kill('SIGCONT');  // It may be stopped.
   await once(child, 'exit');
 }
 
-/** A server with its page, and what streams to it. */
+/** A server with its page and its producers. */
 export class World {
   folder = mkdtempSync(path.join(tmpdir(), 'partiemc-page-'));
   log = [];
@@ -74,7 +75,7 @@ export class World {
   /** The page's address. */
   get url() { return `http://${this.#web}/`; }
 
-  /** Starts the server; again at the same addresses, where it has been there before. */
+  /** Starts the server; a restart uses the same addresses. */
   async startServer() {
     const file = (name) => path.join(this.folder, name);
     rmSync(file('address'), { force: true });
@@ -104,31 +105,27 @@ export class World {
     return { stop: () => stop(child), rest: () => child.kill('SIGSTOP') };
   }
 
-  /** The bundled dam break over and over, as a live stream; slowly, as browser and server may share two cores. */
+  /** Streams the bundled dam break in a loop. Slowly, because browser and server may share two cores. */
   loop(name, ...options) {
     const rate = options.includes('--rate') ? [] : ['--rate', '15'];
     return this.replayOf(recording, name, '--loop', ...rate, '--echo-particles', ...options);
   }
 
-  /** Makes a recording of other files. */
+  /** Converts files to a recording. */
   async convert(input, output, ...options) {
     const child = start('partiemc', ['convert', input, output, '--quiet', ...options], this.log);
     const [code] = await once(child, 'exit');
     if (code !== 0) throw new Error(`partiemc convert: ${this.log.join('')}`);
   }
 
-  /** Numbers of every frame, as `partiemc replay --stats` has them. */
+  /** Numbers of every frame, from `partiemc replay --stats`. */
   async statistics(input, ...options) {
     const file = path.join(this.folder, 'statistics.json');
-    const child = start('partiemc', [
-      'replay', input, '--local', '--quiet', '--stats', file, ...options,
-    ], this.log);
-    const [code] = await once(child, 'exit');
-    if (code !== 0) throw new Error(`partiemc replay: ${this.log.join('')}`);
+    await replay(input, '--stats', file, ...options);
     return JSON.parse(readFileSync(file, 'utf8'));
   }
 
-  /** What the server says of itself. */
+  /** Information on the server. */
   async information() {
     const child = start('partiemc', ['info', '--server', this.#address, '--json'], this.log);
     let text = '';
@@ -144,11 +141,19 @@ export class World {
   }
 }
 
-export const launch = () => chromium.launch({ executablePath: chromiumPath, args: CHROMIUM_FLAGS });
+export const launch = (flags = CHROMIUM_FLAGS) => chromium.launch({ executablePath: chromiumPath, args: flags });
 
-/** The page in a tab of its own, and what a person does with it. */
+/** Runs `partiemc replay --local` to its end. */
+export async function replay(input, ...options) {
+  const log = [];
+  const child = start('partiemc', ['replay', input, '--local', '--quiet', ...options], log);
+  const [code] = await once(child, 'exit');
+  if (code !== 0) throw new Error(`partiemc replay: ${log.join('')}`);
+}
+
+/** The page in a new tab, and actions of a user. */
 export class Viewer {
-  /** Errors of the console, and those that nobody caught. */
+  /** Console errors and uncaught exceptions. */
   errors = [];
 
   static async open(browser, url, options = {}) {
@@ -170,7 +175,7 @@ export class Viewer {
   pane(k = 0) { return this.page.locator('.pane').nth(k); }
   button(name) { return this.page.getByRole('button', { name, exact: true }); }
 
-  /** A number under a picture, as it is written there. */
+  /** Text of a number under a picture. */
   async value(key, k = 0) {
     const cell = this.pane(k).locator(`[data-key="${key}"]`);
     return await cell.count() ? (await cell.textContent()).trim() : '';
@@ -184,7 +189,7 @@ export class Viewer {
     return Object.fromEntries(cells);
   }
 
-  /** The pixels of a picture, as one string. */
+  /** Pixels of a picture, as a string. */
   async picture(k = 0) {
     const image = await this.pane(k).locator('.picture').screenshot();
     return image.toString('base64');
@@ -192,7 +197,7 @@ export class Viewer {
 
   status() { return this.page.getByRole('status').textContent(); }
 
-  /** Until a frame above `sequence` is shown. */
+  /** Waits until a frame after `sequence` is shown. */
   async shows(sequence = 0, k = 0) {
     return until(`a frame above ${sequence} is shown`, async () => {
       const frame = await this.frame(k);
@@ -209,4 +214,15 @@ export class Viewer {
   }
 
   async close() { await this.page.context().close(); }
+}
+
+const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+
+/** Serious and critical violations, one line each. */
+export async function violations(page) {
+  await page.evaluate(axe);
+  const results = await page.evaluate(
+    () => window.axe.run(document, { resultTypes: ['violations'] }));
+  return results.violations.filter(({ impact }) => impact === 'serious' || impact === 'critical')
+    .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' | ')}`);
 }

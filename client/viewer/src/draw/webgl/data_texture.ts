@@ -1,10 +1,10 @@
-/** Texels of a row: as many as every WebGL2 has. The shaders' `at` knows the logarithm. */
+/** Texels per row, which every WebGL2 supports. `at` in the shaders uses its logarithm. */
 const WIDTH = 2048;
 
-/** Rows made for each that is needed, so that a growing stream rarely makes a new texture. */
+/** Factor of spare rows, so that a growing stream rarely reallocates. */
 const GROWTH = 1.25;
 
-/** What a texel of an array is: enumerators of WebGL2, and bytes of a texel. */
+/** Format of a texel: names of WebGL2 constants, and bytes per texel. */
 interface TexelFormat {
   internal: 'RG32F' | 'R32F' | 'R32UI' | 'R8UI' | 'RGBA32UI';
   format: 'RG' | 'RED' | 'RED_INTEGER' | 'RGBA_INTEGER';
@@ -21,8 +21,8 @@ export const TEXELS = {
 } as const satisfies Record<string, TexelFormat>;
 
 /**
- * An array that shaders read by index (`texelFetch(name, at(index), 0)`). Arrays of a message go
- * into it as they are: nothing is rearranged on the main thread. It grows and never shrinks.
+ * An array that shaders read by index (`texelFetch(name, at(index), 0)`). Arrays of a message are
+ * uploaded without rearrangement on the main thread. It grows and never shrinks.
  */
 export class DataTexture {
   private texture: WebGLTexture | null = null;
@@ -36,8 +36,8 @@ export class DataTexture {
   ) {}
 
   /**
-   * Replaces the content by numbers, or by their bytes, which need not be aligned. Throws a
-   * RangeError where the graphics card has no room for so many.
+   * Replaces the content by numbers or by their bytes, in any alignment. Throws a RangeError if the
+   * array exceeds the largest texture.
    */
   upload(data: Float32Array | Uint32Array | Uint8Array): void {
     const { gl } = this;
@@ -58,7 +58,7 @@ export class DataTexture {
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
   }
 
-  /** Makes it the texture of the unit. */
+  /** Binds the texture to a unit. */
   bind(unit: number): void {
     this.gl.activeTexture(this.gl.TEXTURE0 + unit);
     if (!this.texture) this.reserve(1);
@@ -75,7 +75,7 @@ export class DataTexture {
     this.staged = 0;
   }
 
-  /** Through a buffer, as a texture takes numbers only where they are aligned. */
+  /** Copies to a buffer, because a texture requires aligned numbers. */
   private stage(data: ArrayBufferView): void {
     const { gl } = this;
     this.staging ??= gl.createBuffer();
@@ -93,8 +93,8 @@ export class DataTexture {
     const most = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
     if (rows > most) {
       throw new RangeError(
-        `The frame has ${rows * WIDTH} points or indices; this graphics card takes ` +
-        `${most * WIDTH}. Choose another fill, or a larger cell size.`);
+        `The frame has ${rows * WIDTH} points or indices. The limit of this graphics card is ` +
+        `${most * WIDTH}. Choose another fill or a larger cell size.`);
     }
     gl.deleteTexture(this.texture);
     this.texture = gl.createTexture();

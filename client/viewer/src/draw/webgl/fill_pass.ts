@@ -2,7 +2,7 @@ import { theme } from '../colours';
 import type { FrameTextures } from './frame_textures';
 import type { Look } from '../look';
 import { fillTones } from '../look_colours';
-import { type Camera, Program } from './program';
+import { type AttributeStyle, type Camera, Program } from './program';
 import { BAND_TINT, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT } from '../style';
 
 const VERTEX = `
@@ -10,12 +10,16 @@ uniform sampler2D points;
 uniform usampler2D triangles;
 uniform usampler2D classes;
 uniform usampler2D tints;
+uniform sampler2D numbers;
+uniform bool byAttribute;
+uniform vec2 range;       // Smallest number, and 1 / (largest - smallest).
 uniform bool tinted, edged;
 uniform vec4 ground, band, interior, edge;
-uniform vec3 tintShares;  // Of band, interior, edges.
+uniform vec3 tintShares;  // Band, interior, edges.
 flat out vec4 inside;
 flat out vec4 edgeColour;
 out vec3 heights;  // Distances to the three edges, device pixels.
+out float value;
 
 void main() {
   int triangle = gl_VertexID / 3;
@@ -33,6 +37,8 @@ void main() {
     edgeColour.rgb = mix(ground, tint, tintShares.z).rgb;
   }
 
+  value = byAttribute ? (texelFetch(numbers, at(vertex), 0).r - range.x) * range.y : 0.0;
+
   heights = vec3(0.0);
   if (!edged) return;
   int second = int(texelFetch(triangles, at(3 * triangle + (corner + 1) % 3), 0).r);
@@ -42,8 +48,7 @@ void main() {
   float doubled = abs(b.x * c.y - b.y * c.x);
   float opposite = distance(b, c);
   heights[corner] = doubled / max(opposite, 1e-6);
-  // Where triangles are hardly wider than their edges, the edges would cover all: they fade by the
-  // radius of the inscribed circle.
+  // Edges of tiny triangles would cover everything. They fade with the radius of the inscribed circle.
   edgeColour.a *= smoothstep(0.4, 3.0, doubled / max(opposite + length(b) + length(c), 1e-6));
 }
 `;
@@ -54,20 +59,22 @@ uniform float halfWidth;  // Device pixels.
 flat in vec4 inside;
 flat in vec4 edgeColour;
 in vec3 heights;
+in float value;
 out vec4 colour;
 
 void main() {
-  colour = inside;
+  vec4 base = byAttribute ? attributeColour(value) : inside;
+  colour = base;
   if (!edged) return;
   float near = min(heights.x, min(heights.y, heights.z));
   float cover = edgeColour.a * clamp(halfWidth + 0.5 - near, 0.0, 1.0);
-  colour = mix(inside, vec4(edgeColour.rgb, 1.0), cover);
+  colour = mix(base, vec4(edgeColour.rgb, 1.0), cover);
 }
 `;
 
 /**
- * The triangles of the mesh and their edges in one draw: each edge is drawn half by either of its
- * triangles, by the distance from it.
+ * The triangles of the mesh and their edges in one draw. Each of two triangles draws half of their
+ * common edge, by the distance to it.
  */
 export class FillPass {
   private readonly program: Program;
@@ -76,16 +83,21 @@ export class FillPass {
     this.program = new Program(gl, VERTEX, FRAGMENT);
   }
 
-  draw(textures: FrameTextures, camera: Camera, look: Look, ratio: number): void {
+  draw(
+    textures: FrameTextures, camera: Camera, look: Look, attribute: AttributeStyle | null,
+    ratio: number,
+  ): void {
     const { program } = this;
     const colours = theme(look.dark);
     const { band, interior } = fillTones(look);
     const opacity = look.fill ? 1 : 0;
     program.use(camera);
-    program.texture('points', textures.points);
+    program.texture('points', textures.outline.points);
     program.texture('triangles', textures.triangles);
     program.texture('classes', textures.classes);
     program.texture('tints', textures.tints);
+    program.attribute(
+      textures.isMeshColoured ? attribute : null, textures.attribute, textures.ramp);
     program.integer('tinted', look.colour === 'identity' ? 1 : 0);
     program.vector3('tintShares', [BAND_TINT, INTERIOR_TINT, EDGE_TINT]);
     program.integer('edged', look.edges ? 1 : 0);

@@ -1,4 +1,4 @@
-import type { Frame } from '../../protocol/frame';
+import type { Frame, Rings } from '../../protocol/frame';
 import { DataTexture, TEXELS } from './data_texture';
 import { attributeOf, type Look } from '../look';
 import { pieceTints } from '../pieces';
@@ -8,15 +8,18 @@ import { RingTable } from './ring_table';
 
 const RAMP_TEXELS = 256;
 
-/** Colours of the attribute from its smallest to its largest number, for smooth look-ups. */
+/** Colours of an attribute from its smallest to its largest number, filtered linearly. */
 class RampTexture {
   private readonly texture: WebGLTexture;
+  private isDark: boolean | null = null;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
     this.texture = gl.createTexture();
   }
 
   upload(dark: boolean): void {
+    if (this.isDark === dark) return;
+    this.isDark = dark;
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, RAMP_TEXELS, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE,
@@ -36,37 +39,57 @@ class RampTexture {
   }
 }
 
-/**
- * A frame on the graphics card: what the look needs of it, and no more. Where the look comes to
- * need more, that part is uploaded then.
- */
-export class FrameTextures {
+/** Rings on the graphics card, for the passes that draw lines and fill rings. */
+export class RingTextures {
   readonly points: DataTexture;
-  readonly triangles: DataTexture;
-  readonly classes: DataTexture;
-  /** A colour per point of the mesh; filled where triangles are coloured by identity. */
-  readonly tints: DataTexture;
   readonly ringOf: DataTexture;
   readonly rings: DataTexture;
+  readonly table = new RingTable();
+  count = 0;
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.points = new DataTexture(gl, TEXELS.float2);
+    this.ringOf = new DataTexture(gl, TEXELS.uint32);
+    this.rings = new DataTexture(gl, TEXELS.uint32x4);
+  }
+
+  /** Uploads everything but the points. */
+  upload(rings: Rings): void {
+    this.ringOf.upload(this.table.ringOf(rings));
+    this.count = rings.points.length / 2;
+  }
+
+  destroy(): void {
+    for (const texture of [this.points, this.ringOf, this.rings]) texture.destroy();
+  }
+}
+
+/** A frame on the graphics card. Uploads only the parts that the look needs, once per frame. */
+export class FrameTextures {
+  readonly outline: RingTextures;
+  readonly isolines: RingTextures;
+  readonly triangles: DataTexture;
+  readonly classes: DataTexture;
+  /** A colour per point of the mesh, filled if triangles are coloured by identity. */
+  readonly tints: DataTexture;
   readonly normals: DataTexture;
+  /** A number per vertex of the rings, or per point of the mesh if `isMeshColoured`. */
   readonly attribute: DataTexture;
   readonly particles: DataTexture;
   readonly ramp: RampTexture;
+  isMeshColoured = false;
 
   private frame: Frame | null = null;
-  /** What is there of the frame: a part, and what it depends on beside the frame. */
-  private readonly there = new Map<string, unknown>();
-  private readonly table = new RingTable();
-  private rampDark: boolean | null = null;
+  /** Uploaded parts of the frame, with the part of the look that they depend on. */
+  private readonly uploaded = new Map<string, unknown>();
 
   constructor(gl: WebGL2RenderingContext) {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    this.points = new DataTexture(gl, TEXELS.float2);
+    this.outline = new RingTextures(gl);
+    this.isolines = new RingTextures(gl);
     this.triangles = new DataTexture(gl, TEXELS.uint32);
     this.classes = new DataTexture(gl, TEXELS.uint8);
     this.tints = new DataTexture(gl, TEXELS.uint32);
-    this.ringOf = new DataTexture(gl, TEXELS.uint32);
-    this.rings = new DataTexture(gl, TEXELS.uint32x4);
     this.normals = new DataTexture(gl, TEXELS.float2);
     this.attribute = new DataTexture(gl, TEXELS.float);
     this.particles = new DataTexture(gl, TEXELS.float2);
@@ -77,32 +100,23 @@ export class FrameTextures {
     return this.frame?.mesh?.classes.length ?? 0;
   }
 
-  /** Uploads what the look needs of the frame and is not there yet. */
   prepare(frame: Frame, look: Look): void {
     if (frame !== this.frame) {
       this.frame = frame;
-      this.there.clear();
+      this.uploaded.clear();
     }
-    const { rings, mesh, particles } = frame;
-    const meshed = mesh !== null && (look.fill || look.edges);
-    // The first points of a mesh are those of the rings.
-    if (meshed) this.once('points', 'mesh', () => this.points.upload(mesh.bytes.points));
-    else if (!this.there.has('points')) {
-      this.once('points', 'rings', () => this.points.upload(rings.points));
-    }
-    this.once('ringOf', true, () => this.ringOf.upload(this.table.ringOf(rings)));
     const colours = `${look.colour === 'identity'} ${look.dark}`;
-    this.once('rings', colours, () => this.rings.upload(this.table.styles(rings, look)));
-    if (meshed) {
-      this.once('triangles', true, () => {
-        this.triangles.upload(mesh.bytes.triangles);
-        this.classes.upload(mesh.classes);
+    const isMeshed = frame.mesh !== null && (look.fill || look.edges);
+    this.prepareRings(frame, look, colours, isMeshed);
+    if (isMeshed) this.prepareMesh(frame, look, colours);
+    this.prepareAttribute(frame, look);
+    const { rings, isolines, particles } = frame;
+    if (look.isolines && isolines) {
+      this.once('isolines', true, () => {
+        this.isolines.points.upload(isolines.points);
+        this.isolines.upload(isolines);
+        this.isolines.rings.upload(this.isolines.table.styles(isolines, look));
       });
-      if (look.fill && look.colour === 'identity') {
-        this.once('tints', colours, () => {
-          this.tints.upload(pieceTints(mesh, rings, ringColours(rings, look)));
-        });
-      }
     }
     if (look.normals && rings.normals) {
       const { normals } = rings;
@@ -111,27 +125,56 @@ export class FrameTextures {
     if (look.particles && particles) {
       this.once('particles', true, () => this.particles.upload(particles));
     }
-    const name = attributeOf(look);
-    const values = name === null ? undefined : rings.attributes.get(name);
-    if (values) this.once('attribute', name, () => this.attribute.upload(values));
-    if (this.rampDark !== look.dark) {
-      this.rampDark = look.dark;
-      this.ramp.upload(look.dark);
-    }
+    this.ramp.upload(look.dark);
   }
 
   destroy(): void {
     for (const texture of [
-      this.points, this.triangles, this.classes, this.tints, this.ringOf, this.rings, this.normals,
+      this.outline, this.isolines, this.triangles, this.classes, this.tints, this.normals,
       this.attribute, this.particles, this.ramp,
     ]) {
       texture.destroy();
     }
   }
 
+  private prepareRings(frame: Frame, look: Look, colours: string, isMeshed: boolean): void {
+    const { rings, mesh } = frame;
+    const { outline } = this;
+    if (isMeshed && mesh) {
+      this.once('points', 'mesh', () => outline.points.upload(mesh.bytes.points));
+    } else if (!this.uploaded.has('points')) {
+      this.once('points', 'rings', () => outline.points.upload(rings.points));
+    }
+    this.once('ringOf', true, () => outline.upload(rings));
+    this.once('rings', colours, () => outline.rings.upload(outline.table.styles(rings, look)));
+  }
+
+  private prepareMesh({ rings, mesh }: Frame, look: Look, colours: string): void {
+    if (!mesh) return;
+    this.once('triangles', true, () => {
+      this.triangles.upload(mesh.bytes.triangles);
+      this.classes.upload(mesh.classes);
+    });
+    if (look.fill && look.colour === 'identity') {
+      this.once('tints', colours, () => {
+        this.tints.upload(pieceTints(mesh, rings, ringColours(rings, look)));
+      });
+    }
+  }
+
+  private prepareAttribute({ rings, mesh }: Frame, look: Look): void {
+    const name = attributeOf(look);
+    this.once('attribute', `${name} ${look.fill}`, () => {
+      const ofMesh = name !== null && look.fill ? mesh?.attribute(name) : undefined;
+      const values = ofMesh ?? (name === null ? undefined : rings.attributes.get(name));
+      this.isMeshColoured = ofMesh !== undefined;
+      if (values) this.attribute.upload(values);
+    });
+  }
+
   private once(part: string, dependsOn: unknown, upload: () => void): void {
-    if (this.there.has(part) && this.there.get(part) === dependsOn) return;
+    if (this.uploaded.has(part) && this.uploaded.get(part) === dependsOn) return;
     upload();
-    this.there.set(part, dependsOn);
+    this.uploaded.set(part, dependsOn);
   }
 }

@@ -1,24 +1,24 @@
 import type { Rgb } from '../colours';
-import type { FrameTextures } from './frame_textures';
-import { type Camera, Program } from './program';
+import type { FrameTextures, RingTextures } from './frame_textures';
+import { type AttributeStyle, type Camera, Program } from './program';
 
 const VERTEX = `
 uniform sampler2D points;
 uniform usampler2D ringOf;
-uniform usampler2D rings;     // First point, point after the last, colour, unused.
+uniform usampler2D rings;     // First vertex, end vertex, colour, unused.
 uniform sampler2D numbers;
 uniform bool byAttribute;
-uniform vec2 range;           // Smallest attribute, and 1 / (largest - smallest).
-uniform vec4 single;          // The colour of all, where its alpha is 1.
+uniform vec2 range;           // Smallest number, and 1 / (largest - smallest).
+uniform vec4 single;          // One colour for all, if its alpha is 1.
 uniform float halfWidth;      // Device pixels.
 flat out vec2 along;          // From the first to the second end of the segment.
 flat out vec2 firstSplit;     // Tangents of the outline at both ends.
 flat out vec2 secondSplit;
 flat out vec4 ringColour;
-flat out vec2 values;         // Of the attribute at both ends, 0 to 1.
+flat out vec2 values;         // The attribute at both ends, 0 to 1.
 flat out vec2 begin;          // The first end, from the canvas's lower left corner.
 
-// The direction of the line that halves the corner; its own where the outline turns back.
+// Tangent at a corner: the sum of both directions, or own if the outline turns back.
 vec2 tangent(vec2 before, vec2 after, vec2 own) {
   vec2 sum = before + after;
   return dot(sum, sum) > 1e-4 ? sum : own;
@@ -63,9 +63,6 @@ void main() {
 `;
 
 const FRAGMENT = `
-uniform bool byAttribute;
-uniform sampler2D ramp;
-uniform vec4 missing;
 uniform float halfWidth;
 uniform float opacity;
 flat in vec2 along;
@@ -77,38 +74,34 @@ flat in vec2 begin;
 out vec4 colour;
 
 void main() {
-  // Not interpolated: corners of triangles are rounded to parts of a pixel before they are filled.
-  vec2 place = gl_FragCoord.xy - begin;  // From the first end.
-  // Each pixel near a corner belongs to one of its two segments, so that none is covered twice.
-  if (dot(place, firstSplit) < 0.0 || dot(place - along, secondSplit) >= 0.0) discard;
-  float share = clamp(dot(place, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
-  float away = distance(place, along * share);
+  // gl_FragCoord instead of an interpolated position: triangle corners are rounded before filling.
+  vec2 offset = gl_FragCoord.xy - begin;  // From the first end.
+  // Each pixel near a corner belongs to one of its two segments, so none is covered twice.
+  if (dot(offset, firstSplit) < 0.0 || dot(offset - along, secondSplit) >= 0.0) discard;
+  float share = clamp(dot(offset, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
+  float away = distance(offset, along * share);
   // A line thinner than a pixel is a pixel wide and lighter.
   float cover = clamp(max(halfWidth, 0.5) + 0.5 - away, 0.0, 1.0) * min(2.0 * halfWidth, 1.0);
   vec4 base = ringColour;
-  if (byAttribute) {
-    float value = mix(values.x, values.y, share);
-    bool known = value == value && abs(value) < 1e30;
-    base = known ? texture(ramp, vec2(value * (255.0 / 256.0) + 0.5 / 256.0, 0.5)) : missing;
-  }
+  if (byAttribute) base = attributeColour(mix(values.x, values.y, share));
   float alpha = opacity * cover;
   colour = vec4(base.rgb * alpha, alpha);
 }
 `;
 
-/** How the outline, or a part of it, is drawn. */
+/** Style of the outline, or of a part of it. */
 export interface LineStyle {
   /** Device pixels. */
   width: number;
-  /** One colour for all; null: each ring its own, or by the attribute. */
+  /** One colour for all. Null: the colour of each ring, or of the attribute. */
   colour: Rgb | null;
   opacity: number;
-  attribute: { min: number; max: number; missing: Rgb } | null;
+  attribute: AttributeStyle | null;
 }
 
 /**
- * The rings as lines with round joins. Coverage comes from the distance to the segment, thus lines
- * are smooth without multisampling, at any width and on any screen.
+ * The rings as lines with round joins. Coverage is computed from the distance to the segment, so
+ * lines are smooth without multisampling, at any width and on any screen.
  */
 export class LinePass {
   private readonly program: Program;
@@ -117,26 +110,20 @@ export class LinePass {
     this.program = new Program(gl, VERTEX, FRAGMENT);
   }
 
-  /** Draws the segments that begin at the points [first, end) of the rings. */
+  /** Draws the segments that begin at the vertices [first, end) of the rings. */
   draw(
-    textures: FrameTextures, camera: Camera, style: LineStyle, first: number, end: number,
+    rings: RingTextures, textures: FrameTextures, camera: Camera, style: LineStyle,
+    [first, end]: readonly [number, number] = [0, rings.count],
   ): void {
     const { program } = this;
     program.use(camera);
-    program.texture('points', textures.points);
-    program.texture('ringOf', textures.ringOf);
-    program.texture('rings', textures.rings);
-    program.texture('numbers', textures.attribute);
-    program.texture('ramp', textures.ramp);
+    program.texture('points', rings.points);
+    program.texture('ringOf', rings.ringOf);
+    program.texture('rings', rings.rings);
+    program.attribute(style.attribute, textures.attribute, textures.ramp);
     program.colour('single', style.colour ?? [0, 0, 0], style.colour ? 1 : 0);
     program.number('opacity', style.opacity);
     program.number('halfWidth', style.width / 2);
-    program.integer('byAttribute', style.attribute ? 1 : 0);
-    if (style.attribute) {
-      const { min, max, missing } = style.attribute;
-      program.vector2('range', [min, max > min ? 1 / (max - min) : 0]);
-      program.colour('missing', missing);
-    }
     this.gl.drawArrays(this.gl.TRIANGLES, 6 * first, 6 * (end - first));
   }
 

@@ -10,7 +10,7 @@ uniform int stride;
 uniform float reach;      // Length of a normal, device pixels.
 uniform float halfWidth;  // Device pixels.
 flat out vec2 along;
-out vec2 place;
+out vec2 offset;
 
 void main() {
   int index = gl_VertexID / 6;
@@ -20,8 +20,8 @@ void main() {
   int which = corner < 3 ? corner : corner == 3 ? 2 : corner == 4 ? 1 : 3;
   float margin = halfWidth + 1.0;
   vec2 side = vec2(-normal.y, normal.x) * ((which & 1) == 1 ? -margin : margin);
-  place = (which >= 2 ? along + normal * margin : -normal * margin) + side;
-  gl_Position = position(pixel(texelFetch(points, at(index * stride), 0).rg) + place);
+  offset = (which >= 2 ? along + normal * margin : -normal * margin) + side;
+  gl_Position = position(pixel(texelFetch(points, at(index * stride), 0).rg) + offset);
 }
 `;
 
@@ -29,19 +29,19 @@ const FRAGMENT = `
 uniform vec4 line;
 uniform float halfWidth;
 flat in vec2 along;
-in vec2 place;
+in vec2 offset;
 out vec4 colour;
 
 void main() {
-  float share = clamp(dot(place, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
-  // Thinner towards the end, which tells the direction.
+  float share = clamp(dot(offset, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
+  // The line tapers towards the end, which shows the direction.
   float inner = halfWidth * (1.0 - 0.6 * share);
-  float cover = clamp(inner + 0.5 - distance(place, along * share), 0.0, 1.0);
+  float cover = clamp(inner + 0.5 - distance(offset, along * share), 0.0, 1.0);
   colour = vec4(line.rgb * cover, cover);
 }
 `;
 
-/** Normals as short lines outward from the vertices; every n-th where vertices lie too close. */
+/** Normals as short lines from the vertices; every n-th if vertices are dense. */
 export class NormalPass {
   private readonly program: Program;
 
@@ -49,7 +49,7 @@ export class NormalPass {
     this.program = new Program(gl, VERTEX, FRAGMENT);
   }
 
-  /** `count` normals; `spacing` is of the particles and `gap` of the vertices, in CSS pixels. */
+  /** Draws `count` normals. `spacing` of particles and `gap` between vertices in CSS pixels. */
   draw(
     textures: FrameTextures, camera: Camera, count: number, spacing: number, gap: number,
     dark: boolean, ratio: number,
@@ -57,7 +57,7 @@ export class NormalPass {
     const { program } = this;
     const stride = normalStride(gap, count);
     program.use(camera);
-    program.texture('points', textures.points);
+    program.texture('points', textures.outline.points);
     program.texture('normals', textures.normals);
     program.integer('stride', stride);
     program.number('reach', ratio * normalLength(spacing));

@@ -25,7 +25,7 @@ void main() {
 }
 `;
 
-/** Particles as round dots, as large as their spacing allows. */
+/** Particles as round dots. */
 export class ParticlePass {
   private readonly program: Program;
 

@@ -1,7 +1,7 @@
 import type { Rgb } from '../colours';
 import type { DataTexture } from './data_texture';
 
-/** What the shaders of all passes have in common. */
+/** Common part of all shaders. */
 const COMMON = `#version 300 es
 precision highp float;
 precision highp int;
@@ -10,14 +10,14 @@ precision highp usampler2D;
 `;
 
 const COMMON_VERTEX = `${COMMON}
-uniform vec2 centre;  // World coordinates of the canvas's middle, relative to the origin.
+uniform vec2 centre;  // World coordinates of the canvas centre, relative to the origin.
 uniform float scale;  // Device pixels per unit of length.
-uniform vec2 size;    // Of the canvas in device pixels.
+uniform vec2 size;    // The canvas in device pixels.
 
-// Where an array's element stands in its texture, whose rows have 2048.
+// Texel of an array element, in rows of 2048.
 ivec2 at(int index) { return ivec2(index & 2047, index >> 11); }
 
-// Device pixels right of and above the middle of the canvas.
+// Device pixels to the right and above the canvas centre.
 vec2 pixel(vec2 point) { return (point - centre) * scale; }
 
 vec4 position(vec2 pixels) { return vec4(2.0 * pixels / size, 0.0, 1.0); }
@@ -27,7 +27,23 @@ vec4 unpacked(uint colour) {
 }
 `;
 
-/** A view as the shaders take it. */
+/** The attribute's colour in fragment shaders; see `Program.attribute`. */
+const COMMON_FRAGMENT = `${COMMON}
+uniform bool byAttribute;
+uniform sampler2D ramp;
+uniform vec4 missing;
+
+// value is 0 to 1. NaN and huge numbers, which an interpolated infinity gives, are missing.
+vec4 attributeColour(float value) {
+  bool known = value == value && abs(value) < 1e30;
+  return known ? texture(ramp, vec2(value * (255.0 / 256.0) + 0.5 / 256.0, 0.5)) : missing;
+}
+`;
+
+/** An attribute's range, and the colour of points without a number. */
+export interface AttributeStyle { min: number; max: number; missing: Rgb }
+
+/** Camera of the shaders. */
 export interface Camera {
   /** World coordinates relative to the frame's origin. */
   centre: [number, number];
@@ -38,20 +54,20 @@ export interface Camera {
   height: number;
 }
 
-/** A vertex and a fragment shader with their uniforms, found by name once. */
+/** A vertex and a fragment shader with their uniforms. Caches uniform locations. */
 export class Program {
   private readonly program: WebGLProgram;
   private readonly locations = new Map<string, WebGLUniformLocation | null>();
   private readonly units = new Map<string, number>();
 
-  /** Throws where a shader does not compile: a mistake of ours, or a context that is lost. */
+  /** Throws if a shader does not compile: an internal error, or a lost context. */
   constructor(
     private readonly gl: WebGL2RenderingContext, vertex: string, fragment: string,
   ) {
     this.program = gl.createProgram();
     const shaders = [
       this.attach(gl.VERTEX_SHADER, COMMON_VERTEX + vertex),
-      this.attach(gl.FRAGMENT_SHADER, COMMON + fragment),
+      this.attach(gl.FRAGMENT_SHADER, COMMON_FRAGMENT + fragment),
     ];
     gl.linkProgram(this.program);
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
@@ -61,7 +77,7 @@ export class Program {
     for (const shader of shaders) gl.deleteShader(shader);
   }
 
-  /** Makes it the program of the draws that follow, seen through the camera. */
+  /** Selects the program for the draws that follow, and sets the camera. */
   use(camera: Camera): void {
     this.gl.useProgram(this.program);
     this.vector2('centre', camera.centre);
@@ -89,7 +105,7 @@ export class Program {
     this.gl.uniform4f(this.location(name), value[0], value[1], value[2], alpha);
   }
 
-  /** The array that the sampler of this name reads. */
+  /** Binds an array to the sampler of this name. */
   texture(name: string, texture: Pick<DataTexture, 'bind'>): void {
     let unit = this.units.get(name);
     if (unit === undefined) {
@@ -98,6 +114,19 @@ export class Program {
       this.integer(name, unit);
     }
     texture.bind(unit);
+  }
+
+  /** Sets `numbers`, `range` and the colours of an attribute; null switches it off. */
+  attribute(
+    style: AttributeStyle | null, numbers: Pick<DataTexture, 'bind'>, ramp: Pick<DataTexture, 'bind'>,
+  ): void {
+    this.texture('numbers', numbers);
+    this.texture('ramp', ramp);
+    this.integer('byAttribute', style ? 1 : 0);
+    if (!style) return;
+    const { min, max, missing } = style;
+    this.vector2('range', [min, max > min ? 1 / (max - min) : 0]);
+    this.colour('missing', missing);
   }
 
   destroy(): void {

@@ -7,34 +7,44 @@ import type { Look } from '../look';
 import { fillTones } from '../look_colours';
 import { NormalPass } from './normal_pass';
 import { ParticlePass } from './particle_pass';
-import type { Camera } from './program';
+import type { AttributeStyle, Camera } from './program';
 import { RingFillPass } from './ring_fill_pass';
 import type { Range } from '../ramp';
-import { BAND_TINT, dotDiameter } from '../style';
+import { BAND_TINT, dotDiameter, ISOLINE_WIDTH } from '../style';
 import type { View } from '../view';
 
-/** Around the line of a selected ring, in CSS pixels on either side. */
+/** Width of the halo on either side of a selected ring, in CSS pixels. */
 const HALO = 4;
 const HALO_ALPHA = 0.28;
-/** Around what is filled and has no outline, in CSS pixels. */
+/** Width of the border of a filled area without an outline, in CSS pixels. */
 const BORDER = 1.25;
 
-/** What one picture shows. */
+/** Content of one drawing. */
 export interface Picture {
   frame: Frame | null;
   look: Look;
   view: View;
   /** Device pixels per CSS pixel. */
   ratio: number;
-  /** Of the attribute that the look colours by; null where the frame has none of that name. */
+  /** Range of the attribute that the look colours by; null if the frame lacks it. */
   range: Range | null;
-  /** Rings that stand out. */
+  /** Rings to highlight. */
   selected: readonly number[];
+  /** Ring under the pointer. */
+  hovered: number | null;
 }
 
-/** All that lives on the graphics card, hence all that is lost with a context. */
-export class Renderer {
-  readonly textures: FrameTextures;
+/** Draws pictures on a canvas. */
+export interface Drawing {
+  /** Uploads what the look needs. Throws a RangeError if the frame is too large. */
+  prepare(frame: Frame, look: Look): void;
+  draw(picture: Picture): void;
+  destroy(): void;
+}
+
+/** Draws by WebGL2. Owns everything that is lost with the context. */
+export class Renderer implements Drawing {
+  private readonly textures: FrameTextures;
   private readonly fills: FillPass;
   private readonly ringFills: RingFillPass;
   private readonly lines: LinePass;
@@ -53,8 +63,13 @@ export class Renderer {
     this.particles = new ParticlePass(gl);
   }
 
+  prepare(frame: Frame, look: Look): void {
+    if (!this.gl.isContextLost()) this.textures.prepare(frame, look);
+  }
+
   draw(picture: Picture): void {
     const { gl } = this;
+    if (gl.isContextLost()) return;
     const { frame, look, view, ratio } = picture;
     const [red, green, blue] = theme(look.dark).background;
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
@@ -68,11 +83,11 @@ export class Renderer {
       width: gl.drawingBufferWidth,
       height: gl.drawingBufferHeight,
     };
+    const attribute = picture.range && { ...picture.range, missing: theme(look.dark).missing };
     if (frame.mesh && (look.fill || look.edges)) {
-      this.fills.draw(this.textures, camera, look, ratio);
+      this.fills.draw(this.textures, camera, look, attribute, ratio);
     } else if (look.fill) {
-      const count = frame.rings.points.length / 2;
-      this.ringFills.draw(this.textures, camera, count, fillTones(look).band);
+      this.ringFills.draw(this.textures.outline, camera, fillTones(look).band);
     }
     if (look.particles && frame.particles) {
       const diameter = ratio * dotDiameter(frame.statistics.spacing * view.scale);
@@ -80,8 +95,12 @@ export class Renderer {
         this.textures, camera, frame.particles.length / 2, diameter, look.dark);
     }
     if (look.normals && frame.rings.normals) this.drawNormals(picture, frame, camera);
-    if (look.outline) this.drawOutline(picture, frame, camera);
-    else if (look.fill) this.smoothBorder(picture, frame, camera);
+    if (look.outline) this.drawOutline(picture, attribute, camera);
+    else if (look.fill) this.smoothBorder(picture, attribute, camera);
+    if (look.isolines && frame.isolines) {
+      this.lines.draw(this.textures.isolines, this.textures, camera,
+        solid(theme(look.dark).isoline, 1, ISOLINE_WIDTH * ratio));
+    }
     this.drawSelected(picture, frame, camera);
   }
 
@@ -101,45 +120,38 @@ export class Renderer {
       (view.scale * frame.statistics.perimeter) / Math.max(count, 1), look.dark, ratio);
   }
 
-  private drawOutline(picture: Picture, frame: Frame, camera: Camera): void {
-    const { look, range } = picture;
-    const attribute = range && { ...range, missing: theme(look.dark).missing };
-    this.line(frame, camera, {
-      width: look.lineWidth * picture.ratio, colour: null, opacity: 1, attribute,
-    });
+  private drawOutline({ look, ratio }: Picture, attribute: AttributeStyle | null, camera: Camera): void {
+    this.line(camera, { width: look.lineWidth * ratio, colour: null, opacity: 1, attribute });
   }
 
-  /** Triangles end in steps, which a thin line in their colour hides. */
-  private smoothBorder(picture: Picture, frame: Frame, camera: Camera): void {
-    const { look, ratio } = picture;
-    const tinted = look.colour === 'identity';
-    this.line(frame, camera, {
+  /** Hides the jagged border of triangles under a thin line of their colour. */
+  private smoothBorder({ look, ratio }: Picture, attribute: AttributeStyle | null, camera: Camera): void {
+    const isTinted = look.colour === 'identity';
+    const isColoured = attribute !== null && this.textures.isMeshColoured;
+    this.line(camera, {
       width: BORDER * ratio,
-      colour: tinted ? null : fillTones(look).band,
-      opacity: tinted ? BAND_TINT : 1,
-      attribute: null,
+      colour: isTinted || isColoured ? null : fillTones(look).band,
+      opacity: isTinted ? BAND_TINT : 1,
+      attribute: isColoured ? attribute : null,
     });
   }
 
-  private drawSelected(picture: Picture, frame: Frame, camera: Camera): void {
-    const { look, ratio } = picture;
+  private drawSelected({ look, ratio, selected, hovered }: Picture, frame: Frame, camera: Camera): void {
     const { accent } = theme(look.dark);
     const width = Math.max(look.lineWidth, 1) + 0.5;
-    const styles = [
-      solid(accent, HALO_ALPHA, ratio * (width + 2 * HALO)),
-      solid(accent, 1, ratio * width),
-    ];
-    for (const style of styles) {
-      for (const ring of picture.selected) this.line(frame, camera, style, ring);
-    }
+    const halo = solid(accent, HALO_ALPHA, ratio * (width + 2 * HALO));
+    const line = solid(accent, 1, ratio * width);
+    const { offsets } = frame.rings;
+    const draw = (style: LineStyle, ring: number) =>
+      this.line(camera, style, [offsets[ring], offsets[ring + 1]]);
+    for (const ring of selected) draw(halo, ring);
+    for (const ring of selected) draw(line, ring);
+    if (hovered !== null && !selected.includes(hovered)) draw(line, hovered);
   }
 
-  /** One ring, or all. */
-  private line(frame: Frame, camera: Camera, style: LineStyle, ring?: number): void {
-    const { offsets } = frame.rings;
-    const first = ring === undefined ? 0 : offsets[ring];
-    const end = ring === undefined ? frame.rings.points.length / 2 : offsets[ring + 1];
-    this.lines.draw(this.textures, camera, style, first, end);
+  /** Draws a range of vertices of the rings, or all. */
+  private line(camera: Camera, style: LineStyle, range?: readonly [number, number]): void {
+    this.lines.draw(this.textures.outline, this.textures, camera, style, range);
   }
 }
 

@@ -1,5 +1,5 @@
 import type { Rgb } from '../colours';
-import type { FrameTextures } from './frame_textures';
+import type { RingTextures } from './frame_textures';
 import { type Camera, Program } from './program';
 
 const FAN_VERTEX = `
@@ -30,8 +30,8 @@ void main() { colour = tone; }
 `;
 
 /**
- * The inside of the rings where there is no mesh. A fan of triangles for each ring flips the
- * stencil, which is then set where a place lies in an odd number of rings; there the colour goes.
+ * The inside of the rings of a frame without a mesh. A fan of triangles for each ring flips the
+ * stencil, which is then set at pixels inside an odd number of rings. These pixels get the colour.
  */
 export class RingFillPass {
   private readonly fans: Program;
@@ -42,8 +42,7 @@ export class RingFillPass {
     this.cover = new Program(gl, COVER_VERTEX, FRAGMENT);
   }
 
-  /** `count` points of all rings. */
-  draw(textures: FrameTextures, camera: Camera, count: number, tone: Rgb): void {
+  draw(rings: RingTextures, camera: Camera, tone: Rgb): void {
     const { gl, fans, cover } = this;
     gl.enable(gl.STENCIL_TEST);
     gl.clear(gl.STENCIL_BUFFER_BIT);
@@ -51,10 +50,10 @@ export class RingFillPass {
     gl.stencilFunc(gl.ALWAYS, 0, 1);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INVERT);
     fans.use(camera);
-    fans.texture('points', textures.points);
-    fans.texture('ringOf', textures.ringOf);
-    fans.texture('rings', textures.rings);
-    gl.drawArrays(gl.TRIANGLES, 0, 3 * count);
+    fans.texture('points', rings.points);
+    fans.texture('ringOf', rings.ringOf);
+    fans.texture('rings', rings.rings);
+    gl.drawArrays(gl.TRIANGLES, 0, 3 * rings.count);
 
     gl.colorMask(true, true, true, true);
     gl.stencilFunc(gl.EQUAL, 1, 1);

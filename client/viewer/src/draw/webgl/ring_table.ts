@@ -2,15 +2,15 @@ import type { Rings } from '../../protocol/frame';
 import type { Look } from '../look';
 import { ringColours } from '../look_colours';
 
-/** Numbers that the shaders read of a ring: first point, point after the last, colour, unused. */
+/** Numbers per ring: first vertex, end vertex, colour, unused. */
 const ROW = 4;
 
-/** What the shaders want to know of rings, in buffers that are kept from frame to frame. */
+/** Arrays of rings for the shaders, in buffers that are reused from frame to frame. */
 export class RingTable {
   private ringOfPoint = new Uint32Array(0);
   private rows = new Uint32Array(0);
 
-  /** The ring of every point. Valid until the next call. */
+  /** The ring of every vertex. Valid until the next call. */
   ringOf(rings: Rings): Uint32Array {
     const count = rings.points.length / 2;
     if (this.ringOfPoint.length < count) this.ringOfPoint = new Uint32Array(2 * count);
@@ -21,7 +21,7 @@ export class RingTable {
     return this.ringOfPoint.subarray(0, count);
   }
 
-  /** Four numbers a ring. Valid until the next call. */
+  /** ROW numbers per ring. Valid until the next call. */
   styles(rings: Rings, look: Look): Uint32Array {
     const count = rings.offsets.length - 1;
     if (this.rows.length < ROW * count) this.rows = new Uint32Array(2 * ROW * count);

@@ -1,0 +1,248 @@
+"""Methods over sequences, in this process: rows of metrics. Methods are not given ids: no outline depends on them."""
+
+from __future__ import annotations
+
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence as Seq, Union
+
+import numpy as np
+import partiemc
+from partiemc import _native
+
+from .advection import Advection
+from .geometry import Curve, Outline
+from .metrics import ABSENT, Deviation, carried, compare, find_defects, jitter, known_jitter
+from .recordings import wall_roughness
+from .scenes import Frame, Recipe, Sequence, make_scene
+
+BASELINE, PAPER, DEFAULT = "marching-squares", "farthest-particle", "virtual-plane"
+PLACEMENTS = (BASELINE, "qef", PAPER, DEFAULT)
+
+# Numbers of a row, each the mean over frames unless said otherwise; absent ones are NaN.
+METRICS = {
+    "hausdorff": "to the true boundary, spacings",
+    "mean_deviation": "to the true boundary, spacings",
+    "bias": "size of the mean of area_error",
+    "area_deviation": "Eq. 29-30 on area / true area, mean over the frames after the first",
+    "hausdorff_jitter": "from the outline before, carried along; mean over pairs of frames, spacings",
+    "mean_jitter": "the same",
+    "known_hausdorff_jitter": "where particles determine the motion; recordings, weighted by known_share",
+    "known_mean_jitter": "the same",
+    "known_share": "of the samples that these two use",
+    "area_error_size": "size of area_error",
+    "wall_roughness": "standard deviation of the distance from straight walls, spacings",
+    "area_error": "area / true area - 1",
+    "center_hausdorff": "to the curve through the outermost centres, where it is defined, spacings",
+    "center_mean": "the same",
+    "triangles": "of the mesh",
+    "triangle_deviation": "standard deviation of triangles over the frames",
+    "self_intersections": "pairs of segments that cross",
+    "folds": "triangles that are clockwise or degenerate",
+    "spurious_components": "outer rings without a particle",
+    "component_error": "difference of the number of outer rings from the truth's",
+    "hole_error": "the same of holes",
+    "wrong_normals": "share of vertices whose normal is more than a right angle off",
+    "vertices": "of the rings",
+    "milliseconds": "all stages, wall clock, one thread"}
+
+
+@dataclass(frozen=True)
+class Method:
+    """Keyword arguments of partiemc.Reconstructor under a name. is_step: the default with something switched off or
+    changed, for a table of its own. needs_spacing: left out where no spacing is given, because it is the same as
+    another method there."""
+    name: str
+    parameters: Dict[str, Any]
+    remark: str = ""
+    is_step: bool = False
+    needs_spacing: bool = False
+
+
+def all_methods(steps: bool = False, sensitivity: bool = False) -> List[Method]:
+    """The baseline first, then the other placements and two variants; on request the default without each of its
+    steps, and with each of its constants times 0.7 and 1.4."""
+    def changed(name: str, remark: str, kind: str, value: Dict[str, Any], is_step: bool = True) -> Method:
+        return Method(f"{DEFAULT}-{name}", {"placement": DEFAULT, "_research": {kind: value}}, remark, is_step,
+                      value == {"area": False})
+    methods = [
+        Method(BASELINE, {"placement": BASELINE}, "linear interpolation, its own calibration"),
+        Method(f"{BASELINE}-clean", {"placement": BASELINE, "clean": True}, "with the default's cleaning"),
+        Method("qef", {"placement": "qef"}, "the paper's EMC baseline"),
+        Method(PAPER, {"placement": PAPER}, "the paper's method, section 3.5 to the letter"),
+        Method(DEFAULT, {"placement": DEFAULT}, "the default"),
+        changed("no-volumes", "the default without its area step", "steps", {"area": False}, False)]
+    knobs = _native._research()
+    if steps:
+        methods += [changed(f"without-{name}", f"without the step {name}", "steps", {name: False})
+                    for name in knobs["steps"]]
+    if sensitivity:
+        methods += [changed(f"{factor}-{name}", f"{factor} times {name}", "constants", {name: factor * value})
+                    for name, value in knobs["constants"].items() for factor in (0.7, 1.4)]
+    return methods
+
+
+@dataclass
+class Row:
+    """One method on one sequence. told: what it was given, "spacing", "volumes" or "nothing". values: by metric. frames:
+    the same by frame."""
+    sequence: str
+    group: str
+    shape: str
+    sampler: str
+    judged: bool
+    method: str
+    told: str
+    values: Dict[str, float]
+    frames: List[Dict[str, float]] = field(repr=False)
+
+    def __getitem__(self, metric: str) -> float:
+        return self.values[metric]
+
+
+def reconstruct(sequence: Sequence, parameters: Dict[str, Any], told: str = "spacing") -> Iterator[Any]:
+    """The result of each frame, a partiemc.Result, one thread. Raises partiemc.Error that names the sequence and the
+    frame."""
+    spacing = None if told == "nothing" else sequence.spacing
+    stream = partiemc.Reconstructor(spacing=spacing, threads=1, **parameters)
+    for t, frame in enumerate(sequence.frames):
+        try:
+            yield stream.reconstruct(frame.positions, frame.time,
+                                     volumes=frame.volumes if told == "volumes" else None)
+        except partiemc.Error as error:
+            error.args = (f"{sequence.name}, frame {t}: {error}",)
+            raise
+
+
+def outline_of(result: Any) -> Outline:
+    """The rings of a partiemc.Result, copied."""
+    return Outline(np.array(result.rings.points), result.rings.offsets.astype(np.int64))
+
+
+@dataclass
+class _Reference:
+    """The truth of one frame, ready for comparisons: the boundary, the curve through the outermost centres, and,
+    where the truth does not follow the motion, the truth of the frame before, carried along."""
+    truth: Optional[Curve] = None
+    centers: Optional[Curve] = None
+    before: Optional[Curve] = None
+
+
+class Evaluator:
+    """A sequence with its truth prepared, so that several methods share that work. centers: compare with the curve
+    through the outermost centres, too."""
+
+    def __init__(self, sequence: Sequence, centers: bool = True) -> None:
+        self.sequence = sequence
+        self._references = [self._reference(t, frame, centers) for t, frame in enumerate(sequence.frames)]
+        self._advections = [] if sequence.motion else [
+            Advection.between(before, after, sequence.spacing)
+            for before, after in zip(sequence.frames, sequence.frames[1:])]
+
+    def _reference(self, t: int, frame: Frame, centers: bool) -> _Reference:
+        sequence, h = self.sequence, self.sequence.spacing
+        if not frame.truth:
+            return _Reference()
+        inner, before = frame.truth.eroded(h / 2) if centers else Outline(), None
+        if t > 0 and sequence.motion and not sequence.truth_follows_motion:
+            last = sequence.frames[t - 1].truth
+            before = Curve(last.moved(sequence.motion.carry(t - 1, last.points)), h)
+        return _Reference(Curve(frame.truth, h), Curve(inner, h) if inner else None, before)
+
+    def run(self, method: Method, told: str = "spacing") -> Row:
+        sequence, before = self.sequence, Outline()
+        frames: List[Dict[str, float]] = []
+        for t, result in enumerate(reconstruct(sequence, method.parameters, told)):
+            curve = Curve(outline_of(result), sequence.spacing)
+            frames.append({**self._measure(t, result, curve), **(self._jitter(t, before, curve) if t else {})})
+            before = curve.outline
+        return Row(sequence.name, sequence.group, sequence.shape, sequence.sampler, sequence.judged, method.name,
+                   told, _summary(frames), frames)
+
+    def _measure(self, t: int, result: Any, curve: Curve) -> Dict[str, float]:
+        sequence, frame, h, reference = (self.sequence, self.sequence.frames[t], self.sequence.spacing,
+                                         self._references[t])
+        area = frame.area or len(frame.positions) * h * h
+        truth = compare(curve, reference.truth, h) if reference.truth else Deviation()
+        centers = compare(curve, reference.centers, h) if reference.centers else Deviation()
+        return {"hausdorff": truth.hausdorff, "mean_deviation": truth.mean,
+                "center_hausdorff": centers.hausdorff, "center_mean": centers.mean,
+                "area_error": result.area / area - 1 if sequence.whole else ABSENT,
+                "wall_roughness": wall_roughness(curve.outline, frame.positions, sequence.walls, h),
+                "triangles": len(result.mesh), "vertices": len(result.rings.points),
+                "milliseconds": result.times["total"], **find_defects(result, reference.truth)}
+
+    def _jitter(self, t: int, before: Outline, curve: Curve) -> Dict[str, float]:
+        motion, h, reference = self.sequence.motion, self.sequence.spacing, self._references[t]
+        numbers: Dict[str, float] = {}
+        if motion:
+            deviation = jitter(carried(before, motion, t - 1, h), curve, h, reference.before, reference.truth)
+        else:
+            advection = self._advections[t - 1]
+            if advection is None:
+                return numbers
+            deviation = compare(Curve(advection.carry(before), h), curve, h)
+            known, share = known_jitter(Curve(before, h), curve, advection, h)
+            numbers.update(known_hausdorff_jitter=known.hausdorff, known_mean_jitter=known.mean,
+                           known_share=share)
+        return {**numbers, "hausdorff_jitter": deviation.hausdorff, "mean_jitter": deviation.mean}
+
+
+def mean_of(values: Any, weights: Any = 1.0) -> float:
+    """Of the values that are not NaN; ABSENT if none is."""
+    values, weights = np.broadcast_arrays(np.asarray(values, float), weights)
+    there = ~np.isnan(values)
+    total = weights[there].sum()
+    return float((weights[there] * values[there]).sum() / total) if total > 0 else ABSENT
+
+
+def _summary(frames: List[Dict[str, float]]) -> Dict[str, float]:
+    columns = {metric: np.array([frame.get(metric, ABSENT) for frame in frames]) for metric in METRICS}
+    values = {metric: mean_of(column) for metric, column in columns.items()}
+    share = 1 + columns["area_error"]
+    values["bias"] = abs(values["area_error"])
+    values["area_error_size"] = mean_of(np.abs(columns["area_error"]))
+    # Without an area in the first frame: as if all of it came and went.
+    values["area_deviation"] = 1.0 if share[0] <= 0 else mean_of(np.abs(share[1:] / share[0] - 1))
+    values["triangle_deviation"] = float(columns["triangles"].std())
+    for metric in ("known_hausdorff_jitter", "known_mean_jitter"):
+        # Pairs of frames count by the share of their samples that is used.
+        values[metric] = mean_of(columns[metric], columns["known_share"])
+    return values
+
+
+@dataclass
+class Study:
+    """All rows, by sequence, then method, then what was told; recordings last."""
+    methods: List[Method]
+    told: List[str]
+    rows: List[Row]
+
+    def of(self, method: str, told: str, recordings: bool = False) -> List[Row]:
+        return [row for row in self.rows if row.method == method and row.told == told
+                and (row.group == "recording") == recordings]
+
+
+def _run_all(methods: List[Method], told: List[str], source: Union[Recipe, Sequence]) -> List[Row]:
+    evaluator = Evaluator(make_scene(source) if isinstance(source, Recipe) else source)
+    return [evaluator.run(method, given) for method in methods for given in told
+            if given != "nothing" or not method.needs_spacing]
+
+
+def run_study(sources: Seq[Union[Recipe, Sequence]], methods: List[Method], told: List[str], jobs: int = 1,
+              progress: Callable[[int], None] = lambda done: None) -> Study:
+    """Every method on every sequence. The rows are the same for any number of jobs, except times. jobs: processes
+    that each take one sequence at a time. progress: called with the number of sequences done."""
+    run, rows = partial(_run_all, methods, told), []
+    # Spawned: the native module has threads, which a fork would lose.
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) if jobs > 1 else None
+    try:
+        for k, of_sequence in enumerate(pool.map(run, sources) if pool else map(run, sources)):
+            rows += of_sequence
+            progress(k + 1)
+    finally:
+        if pool:
+            pool.shutdown(cancel_futures=True)
+    return Study(methods, told, rows)

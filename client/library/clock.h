@@ -1,0 +1,34 @@
+// Time and chance of this library, passed in so that tests decide about both.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+namespace partiemc::client {
+
+/// Thread-safe.
+class Clock {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  virtual ~Clock() = default;
+  virtual TimePoint Now() const = 0;
+};
+
+/// Thread-safe.
+class RandomSource {
+ public:
+  virtual ~RandomSource() = default;
+  virtual std::uint64_t Next() = 0;
+};
+
+/// Those of the machine.
+Clock& SystemClock();
+RandomSource& SystemRandom();
+
+struct TimeAndChance {
+  const Clock* clock = &SystemClock();
+  RandomSource* random = &SystemRandom();
+};
+
+}  // namespace partiemc::client

@@ -1,0 +1,148 @@
+import { bytesOf } from '../protocol/arrays';
+import { bareRings, type Mesh, NO_RING, type Rings } from '../protocol/frame';
+
+/** Geometry of a frame in a report. The format is described in client/output/report_geometry.h. */
+export interface Geometry {
+  origin: [number, number];
+  rings: Rings;
+  isolines: Rings | null;
+  mesh: Mesh | null;
+  particles: Float32Array;
+}
+
+/** Reads varints and quantised points from the bytes of a frame. */
+class Reader {
+  private readonly bytes: Uint8Array;
+  private readonly view: DataView;
+  private next = 0;
+  private step = 1;
+  private x = 0;
+  private y = 0;
+
+  constructor(base64: string) {
+    this.bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    this.view = new DataView(this.bytes.buffer);
+  }
+
+  origin(): [number, number] {
+    const origin: [number, number] = [this.float64(), this.float64()];
+    this.step = this.float64();
+    return origin;
+  }
+
+  count(): number {
+    let value = 0;
+    for (let shift = 0; ; shift += 7) {
+      const byte = this.bytes[this.next++];
+      value |= (byte & 0x7f) << shift;
+      if (byte < 0x80) return value >>> 0;
+    }
+  }
+
+  signed(): number {
+    const value = this.count();
+    return (value >>> 1) ^ -(value & 1);
+  }
+
+  /** x, y of `count` points, relative to the origin. */
+  points(count: number): Float32Array {
+    const points = new Float32Array(2 * count);
+    for (let k = 0; k < 2 * count; k += 2) {
+      points[k] = this.step * (this.x += this.signed());
+      points[k + 1] = this.step * (this.y += this.signed());
+    }
+    return points;
+  }
+
+  byteArray(): Uint8Array {
+    const count = this.count();
+    this.next += count;
+    return this.bytes.subarray(this.next - count, this.next);
+  }
+
+  private float64(): number {
+    this.next += 8;
+    return this.view.getFloat64(this.next - 8, true);
+  }
+}
+
+/** Decodes the geometry of a frame. `color`: name and range of the attribute, if there is one. */
+export function decodeGeometry(
+  base64: string, color: { name: string; range: readonly [number, number] } | null,
+): Geometry {
+  const reader = new Reader(base64);
+  const origin = reader.origin();
+  const rings = decodeRings(reader);
+  const mesh = decodeMesh(reader, rings.points);
+  const particles = reader.points(reader.count());
+  const isolines = decodeIsolines(reader);
+  const shares = reader.byteArray();
+  if (color && shares.length > 0) {
+    const [low, high] = color.range;
+    const values = Float32Array.from(shares, (byte) => low + (byte / 255) * (high - low));
+    rings.attributes.set(color.name, values.subarray(0, rings.points.length / 2));
+    if (mesh && values.length === mesh.points.length / 2) mesh.attributes.set(color.name, values);
+  }
+  return { origin, rings, isolines, mesh, particles };
+}
+
+function decodeRings(reader: Reader): Rings {
+  const count = reader.count();
+  const offsets = new Uint32Array(count + 1);
+  const outerOf = new Uint32Array(count);
+  for (let ring = 0; ring < count; ++ring) {
+    offsets[ring + 1] = offsets[ring] + reader.count();
+    const outer = reader.count();
+    outerOf[ring] = outer === 0 ? NO_RING : outer - 1;
+  }
+  const rings = bareRings(reader.points(offsets[count]), offsets);
+  const turns = reader.byteArray();
+  const normals = new Float32Array(2 * turns.length);
+  turns.forEach((turn, k) => {
+    normals[2 * k] = Math.cos((turn / 128) * Math.PI);
+    normals[2 * k + 1] = Math.sin((turn / 128) * Math.PI);
+  });
+  return { ...rings, outerOf, normals: turns.length > 0 ? normals : null };
+}
+
+class ReportMesh implements Mesh {
+  readonly attributes = new Map<string, Float32Array>();
+  readonly bytes: Mesh['bytes'];
+
+  constructor(readonly points: Float32Array, readonly triangles: Uint32Array,
+              readonly classes: Uint8Array) {
+    this.bytes = { points: bytesOf(points), triangles: bytesOf(triangles) };
+  }
+
+  attribute(name: string): Float32Array | undefined { return this.attributes.get(name); }
+}
+
+/** Points of the mesh follow those of the rings, even if the mesh does not share them. */
+function decodeMesh(reader: Reader, ringPoints: Float32Array): ReportMesh | null {
+  const ownPoints = reader.points(reader.count());
+  const isShared = reader.count() === 1;
+  const count = reader.count();
+  const points = new Float32Array(ringPoints.length + ownPoints.length);
+  points.set(ringPoints);
+  points.set(ownPoints, ringPoints.length);
+  const triangles = new Uint32Array(3 * count);
+  const classes = new Uint8Array(count);
+  let a = isShared ? 0 : ringPoints.length / 2;
+  for (let k = 0; k < count; ++k) {
+    const packed = reader.signed();
+    a += packed >> 1;
+    classes[k] = packed & 1;
+    triangles[3 * k] = a;
+    triangles[3 * k + 1] = a + reader.signed();
+    triangles[3 * k + 2] = a + reader.signed();
+  }
+  return count > 0 ? new ReportMesh(points, triangles, classes) : null;
+}
+
+function decodeIsolines(reader: Reader): Rings | null {
+  const count = reader.count();
+  const offsets = new Uint32Array(count + 1);
+  for (let ring = 0; ring < count; ++ring) offsets[ring + 1] = offsets[ring] + reader.count();
+  const points = reader.points(offsets[count]);
+  return count > 0 ? bareRings(points, offsets) : null;
+}

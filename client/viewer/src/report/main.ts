@@ -1,0 +1,162 @@
+// The script of `partiemc replay --report`: the frames in the document, drawn by the page's parts.
+import 'uplot/dist/uPlot.min.css';
+import './report.css';
+import { applyKey } from '../draw/navigation';
+import { AS_STREAMED } from '../stream/settings';
+import { addressText, parseAddress } from '../ui/address';
+import { CurvesPanel, RESULT_CURVES } from '../ui/curves_panel';
+import { button, byId, setText } from '../ui/dom';
+import { LookPanel, type Switch } from '../ui/look_panel';
+import { Pane } from '../ui/pane';
+import { StatusLine } from '../ui/status_line';
+import { Theme } from '../ui/theme';
+import { TimePanel } from '../ui/time_panel';
+import { ReportTrack } from './track';
+
+/** Keys that switch a part of the picture. */
+const LAYER_KEYS: Record<string, Switch> = {
+  o: 'outline', m: 'edges', p: 'particles', n: 'normals', i: 'isolines',
+};
+
+/** Names in links to reports of earlier versions: `#layers=outline,mesh`. */
+const FORMER_LAYERS: Record<string, string> = { mesh: 'edges', colors: '' };
+
+/** Reads the frames that client/output/report.cc has written into the document. */
+function trackOfDocument(): ReportTrack {
+  const scripts = (name: string) => [...document.querySelectorAll(`script.${name}`)];
+  const geometries = scripts('frame-geometry');
+  const rows = [...document.querySelectorAll<HTMLTableRowElement>('table.parameters tr')];
+  const parameter = (name: string) =>
+    rows.find((row) => row.cells[0].textContent === name)?.cells[1].textContent ?? '';
+  return new ReportTrack(
+    document.querySelector('h1')?.textContent ?? '',
+    { placement: parameter('placement'), fill: parameter('fill') },
+    document.body.dataset.color ?? '',
+    scripts('frame-numbers').map((script) => JSON.parse(script.textContent ?? '')),
+    (index) => geometries[index].textContent ?? '');
+}
+
+class Report {
+  private readonly track = trackOfDocument();
+  private readonly look = new LookPanel(() => this.lookChanged());
+  private readonly pane: Pane;
+  private readonly time: TimePanel;
+  private readonly curves: CurvesPanel;
+  private readonly status = new StatusLine();
+  private ownAddress = '';
+  /** False until the address has been read, which must not be overwritten before. */
+  private isReady = false;
+
+  constructor() {
+    this.pane = new Pane(this.track, { ...AS_STREAMED }, {
+      chosen: () => {}, closed: () => {}, moved: () => this.writeAddress(),
+    }, null);
+    this.pane.setIndex(0, 1, true);
+    this.pane.scene.fixedRange = this.track.colorRange;
+    byId('stage', HTMLElement).append(this.pane.element);
+    this.time = new TimePanel(() => this.track, () => this.writeAddress());
+    this.curves = new CurvesPanel(RESULT_CURVES, true, (sequence) => {
+      this.track.player.seek(sequence);
+      this.writeAddress();
+    });
+    new Theme((dark) => {
+      this.look.setDark(dark);
+      this.curves.setDark(dark);
+    });
+    if (this.track.hasIsolines) this.look.offerIsolines();
+    this.look.setAttributes(this.track.colorRange ? [this.track.color] : []);
+    this.look.setColour(this.track.colorRange ? this.track.color : 'plain');
+    this.look.toggle('edges');
+    this.listen();
+    this.readAddress();
+    this.isReady = true;
+    addEventListener('hashchange', () => {
+      if (location.hash !== this.ownAddress) this.readAddress();
+    });
+    requestAnimationFrame((now) => this.refresh(now));
+  }
+
+  private listen(): void {
+    const zoom = (key: string) => {
+      applyKey(this.pane.scene, key, false);
+      this.pane.setView(this.pane.scene.view);
+      this.writeAddress();
+    };
+    button('zoom-in').addEventListener('click', () => zoom('+'));
+    button('zoom-out').addEventListener('click', () => zoom('-'));
+    button('fit').addEventListener('click', () => this.pane.fit());
+    addEventListener('beforeprint', () => this.pane.scene.draw());
+    const actions: Record<string, () => void> = {
+      ' ': () => this.time.toggle(),
+      ',': () => this.time.step(-1), ArrowLeft: () => this.time.step(-1),
+      '.': () => this.time.step(1), ArrowRight: () => this.time.step(1),
+      Home: () => this.time.jump(-1), End: () => this.time.jump(1),
+      f: () => this.pane.fit(), 0: () => this.pane.fit(),
+      '+': () => zoom('+'), '=': () => zoom('+'), '-': () => zoom('-'),
+      c: () => this.toggleColour(),
+      ...Object.fromEntries(Object.entries(LAYER_KEYS).map(([key, name]) => [key, () => this.look.toggle(name)])),
+    };
+    // Captures the event, so that arrows step instead of panning the focused picture.
+    addEventListener('keydown', (event) => {
+      const isControl = /^(INPUT|SELECT|BUTTON|SUMMARY)$/.test((event.target as HTMLElement).tagName);
+      const isTyped = isControl && (event.key === ' ' || event.key.startsWith('Arrow'));
+      if (isTyped || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey) return;
+      const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+      if (!action) return;
+      event.preventDefault();
+      event.stopPropagation();
+      action();
+    }, { capture: true });
+  }
+
+  private toggleColour(): void {
+    const { color, colorRange } = this.track;
+    if (colorRange) this.look.setColour(this.look.look.colour === color ? 'plain' : color);
+  }
+
+  private lookChanged(): void {
+    this.pane?.setLook(this.look.look);
+    this.writeAddress();
+  }
+
+  /** Reads `#frame=12&view=1,2,300&look=...`. `play=1` starts playing. */
+  private readAddress(): void {
+    const address = parseAddress(location.hash);
+    const values = new URLSearchParams(location.hash.slice(1));
+    const layers = values.get('layers')?.split(',').map((name) => FORMER_LAYERS[name] ?? name);
+    this.look.text = layers ? [...layers, 'fill', `colour:${this.look.look.colour}`].join(',') : address.look;
+    if (address.view) this.pane.setView(address.view);
+    const { player } = this.track;
+    player.seek(address.frame === null ? player.sequence ?? 1 : this.track.sequenceOf(address.frame));
+    if (values.get('play') === '1') player.play();
+  }
+
+  private writeAddress(): void {
+    const { player } = this.track;
+    if (!this.isReady || player.mode !== 'paused' || player.sequence === null) return;
+    this.ownAddress = addressText({
+      panes: [], frame: Number(this.track.labelOf(player.sequence)),
+      view: this.pane.isFree ? null : this.pane.scene.view, look: this.look.text,
+    });
+    try {
+      history.replaceState(null, '', this.ownAddress);
+    } catch {
+      // Some browsers refuse this for files. The report works without.
+    }
+  }
+
+  private refresh(now: number): void {
+    const { player } = this.track;
+    player.tick(now);
+    this.pane.refresh(now);
+    this.time.refresh();
+    this.curves.refresh(this.track, now);
+    this.look.setLegend(this.pane.scene.legend());
+    this.status.refresh(this.track, this.pane.problem, now);
+    setText(byId('omissions', HTMLElement), this.track.omissions(player.sequence ?? 0));
+    document.body.dataset.frame = this.track.labelOf(player.sequence ?? 0);
+    requestAnimationFrame((next) => this.refresh(next));
+  }
+}
+
+new Report();

@@ -1,0 +1,69 @@
+// Input that is not what it seems, and outputs that cannot be written.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zstd.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// Three frames of 900 particles with their times, of which a notice tells.
+void WriteFrames(const support::TemporaryFolder& directory) {
+  for (int k = 0; k < 3; ++k) {
+    std::ofstream file(directory.Path("frame_" + std::to_string(k) + ".csv"));
+    file << "x,y\n";
+    for (int row = 0; row < 30; ++row) {
+      for (int column = 0; column < 30; ++column) file << column << "," << row + 0.01 * k << "\n";
+    }
+  }
+  std::ofstream(directory.Path("times.csv")) << "frame,t\n0,0\n1,1\n2,2\n";
+}
+
+TEST(FullDisk, EndsWithTheErrorInTheLastLine) {
+  const support::TemporaryFolder input, output;
+  WriteFrames(input);
+  const std::string frames = input.path().string();
+  const std::vector<std::vector<std::string>> commands = {
+      {"replay", frames, "--local", "--output-dir", output.Path("frames")},
+      {"replay", frames, "--local", "--report", output.Path("report.html")},
+      {"convert", frames, output.Path("frames.pemc")}};
+  for (const auto& command : commands) {
+    const Ran ran = RunPartiemcOnFullDisk(1, command);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_THAT(ran.error, HasSubstr("times of the frames from"));
+    EXPECT_THAT(LastLine(ran.error),
+                AllOf(StartsWith("partiemc: " + output.path().string()), HasSubstr("too large")));
+  }
+}
+
+// What zstd makes of many equal lines is a ten-thousandth of them.
+TEST(PackedInput, IsRefusedWhenItExpandsTooMuch) {
+  const support::TemporaryFolder directory;
+  std::string table = "x,y\n";
+  while (table.size() < std::size_t{100} << 20) table += "#" + std::string(4094, '-') + "\n";
+  table += "1,2\n3,4\n";
+  std::string packed(ZSTD_compressBound(table.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), table.data(), table.size(), 1));
+  const std::string path = directory.Path("bomb.csv.zst");
+  std::ofstream(path, std::ios::binary) << packed;
+  const std::vector<std::string> convert = {"convert", path, directory.Path("out.pemc")};
+  const Ran refused = RunPartiemc(convert);
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(LastLine(refused.error), AllOf(HasSubstr(path), HasSubstr("--max-expansion")));
+  EXPECT_THAT(RunPartiemc({"convert", "--help"}).out, HasSubstr("--max-expansion RATIO"));
+  std::vector<std::string> trusting = convert;
+  trusting.insert(trusting.end(), {"--max-expansion", "1e6"});
+  EXPECT_EQ(RunPartiemc(trusting).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace partiemc::client
