@@ -231,13 +231,21 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
   app.add_option("--memory-budget", raw.line.server.limits.memory_budget,
                  "Bytes that requests, answers and histories of all streams hold, units as in 2GB "
-                 "allowed; "
-                 "beyond it a stream has one frame in flight (default: half of the memory that "
-                 "this machine or container has)")
+                 "allowed; beyond it a stream has one frame in flight, and only in its turn "
+                 "(default: half of the memory that this machine or container has)")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::PositiveNumber)
       ->type_name("BYTES")
       ->envname("PARTIEMC_MEMORY_BUDGET")
+      ->group(kGroup);
+  app.add_option(
+         "--streams-beyond-budget", limits.streams_beyond_budget,
+         "Streams that may have a frame beyond --memory-budget at the same time; the others "
+         "wait to be read. More memory, and less waiting where frames are large")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_STREAMS_BEYOND_BUDGET")
       ->group(kGroup);
   app.add_option("--idle-timeout", raw.idle_seconds,
                  "End a stream that has had no frame for this time; 0: never")

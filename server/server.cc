@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/base/listening.h"
+#include "server/base/received_bytes.h"
 #include "server/calls/methods.h"
 #include "server/compute/heap.h"
 #include "server/compute/worker_memory.h"
@@ -30,9 +31,6 @@ namespace {
 
 // What clients may do to find out that a connection is dead; gRPC's own 5 minutes are too long.
 constexpr int kShortestPingIntervalMs = 500;
-
-// Of one call, in its connection.
-constexpr int kUnreadBytes = 256 << 10;
 
 // A connection that does not get as far as HTTP/2 (and TLS) ends after this.
 constexpr int kHandshakeTimeoutMs = 10'000;
@@ -69,21 +67,28 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 }
 
 // How the process is watched. It may hold what it has begun with, its workers and the budget, of
-// which histories have a part. Frames of streams may be taken beyond that, and results that
-// watchers have not taken are outside of it: for either a sixteenth of the budget more, so that
-// they turn nobody away at once.
+// which histories have a part. Beyond that it may hold what the budget counts beyond its size, and
+// results that watchers have not taken: a sixteenth of the budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const WatchRegistry& watchers) {
   const std::uint64_t outside =
       ResidentBytes() + options.threads * kWorkerBytes + options.limits.AllHistoryBytes();
-  const std::uint64_t planned = budget.bytes(), more = planned / kPartsOfBudgetBeyond;
+  const std::uint64_t room = budget.bytes(), more = room / kPartsOfBudgetBeyond;
+  const std::uint64_t most =
+      room + options.limits.ReadBytesBeyond() + options.limits.WorkerBytesBeyond();
   return {.resident_bytes = ResidentBytes,
-          .most_bytes =
-              [outside, planned, more, &budget] {
-                return outside + std::clamp(budget.held(), planned, planned + more);
-              },
+          .most_bytes = [outside, room, most,
+                         &budget] { return outside + std::clamp(budget.planned(), room, most); },
           .more_bytes = [more, &watchers] { return std::min(watchers.held_bytes(), more); },
-          .give_back_freed = GiveBackFreedMemory};
+          .give_back_freed = GiveBackFreedMemory,
+          .limit_bytes = outside + most,
+          .received_bytes = ReceivedBytesOfConnections};
+}
+
+BeyondBudget BeyondOf(const ServerLimits& limits) {
+  return {.reads = {.streams_beyond = limits.streams_beyond_budget,
+                    .message_bytes = limits.MaxMessageBytes()},
+          .worker_bytes = limits.WorkerBytesBeyond()};
 }
 
 // Of a stream of another replica the newest result is kept whatever its size: to fetch it again
@@ -116,10 +121,10 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                                                       RelayLimits(options.limits, history_),
                                                       options.advertised_address)),
       calls_(options.limits.max_streams),
-      budget_(options.limits.FrameBudget()),
+      budget_(options.limits.FrameBudget(), BeyondOf(options.limits)),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_)),
+      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_), &budget_.reads()),
       methods_(std::make_unique<Methods>(options_.limits, authentication_, opening_, registry_,
                                          calls_, budget_, pool_, watchers_, dispatcher_, history_,
                                          checkpoint_keys_, *metrics_, relay_.get())),
@@ -280,7 +285,7 @@ absl::Status Server::Listen() {
   // gRPC's do by itself, let a hundred bodies that nobody will read hold 70 MiB. A read that goes
   // on has all of its message let in, so that large frames come as fast, but for one round trip.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, static_cast<int>(kUnreadBytes));
   // A caller has no more calls, in however many connections, unless its token says otherwise: then
   // those beyond them wait in the client, or go by another connection.
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,

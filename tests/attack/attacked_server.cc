@@ -68,7 +68,8 @@ std::string HttpGet(const std::string& address, const std::string& path) {
 
 }  // namespace
 
-AttackedServer::AttackedServer(std::vector<std::string> arguments) {
+AttackedServer::AttackedServer(std::vector<std::string> arguments,
+                               const server::Surroundings& surroundings) {
   if (std::find(arguments.begin(), arguments.end(), "--threads") == arguments.end()) {
     arguments.insert(arguments.end(), {"--threads", "2"});
   }
@@ -89,7 +90,7 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments) {
     auto all = arguments;
     all.insert(all.end(), {"--metrics", metrics_address_});
     try {
-      serving_ = std::make_unique<server::ServingProcess>(all);
+      serving_ = std::make_unique<server::ServingProcess>(all, surroundings);
     } catch (const std::runtime_error&) {
       if (attempt == 2) throw;
     }
