@@ -248,6 +248,46 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
 }
 
+void AddConnections(CLI::App& app, Raw& raw) {
+  ConnectionLimits& limits = raw.line.server.connections;
+  const char* const kGroup = "Connections of --address";
+  app.add_option("--max-connections", limits.connections,
+                 "Connections at once, at most half of the file descriptors; when there is one too "
+                 "many, one without a call ends; if all have calls, the new one may only check "
+                 "the health")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_CONNECTIONS")
+      ->group(kGroup);
+  app.add_option("--connections-per-address", limits.of_address,
+                 "Connections of one address at once, health checks apart; 0: not limited, for a "
+                 "server behind a proxy")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_CONNECTIONS_PER_ADDRESS")
+      ->group(kGroup);
+  app.add_option("--new-connections-per-address", limits.new_of_address,
+                 "New connections of one address in a second, twice as many at once, health checks "
+                 "apart; 0: not limited, for a server behind a proxy")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_NEW_CONNECTIONS_PER_ADDRESS")
+      ->group(kGroup);
+  app.add_option("--unaccounted-bytes", raw.line.server.unaccounted_bytes,
+                 "Bytes of a TCP connection that no call and no message accounts for, units as in "
+                 "512KiB allowed; a connection with more is cut, and its address may only check "
+                 "the health for ten seconds; 0: not limited")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 40))
+      ->capture_default_str()
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_UNACCOUNTED_BYTES")
+      ->group(kGroup);
+}
+
 void AddMetrics(CLI::App& app, Raw& raw) {
   app.add_option(
          "--metrics", raw.metrics,
@@ -418,6 +458,7 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   AddServingOptions(app, raw);
   AddSecurity(app, raw);
   AddLimits(app, raw);
+  AddConnections(app, raw);
   AddWeb(app, raw);
   AddMetrics(app, raw);
   AddLogging(app, raw);

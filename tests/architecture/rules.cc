@@ -182,7 +182,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         {"frame_lengths", "reconstructor", "workspace", "workspace_bytes"}},
        {"server/",
         "",
-        {"base", "telemetry", "security", "compute", "watch", "stream", "relay", "calls", "web",
+        {"base", "telemetry", "security", "connections", "compute", "watch", "stream", "relay", "calls", "web",
          "rpc"},
         {"main", "options", "server"}},
        {"client/",
