@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "attack/http2_client.h"
+#include "attack/options.h"
 
 namespace partiemc::attack {
 namespace {
@@ -89,7 +90,8 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments) {
     auto all = arguments;
     all.insert(all.end(), {"--metrics", metrics_address_});
     try {
-      serving_ = std::make_unique<server::ServingProcess>(all);
+      serving_ = std::make_unique<server::ServingProcess>(
+          all, server::Surroundings{.program = GetOptions().server});
     } catch (const std::runtime_error&) {
       if (attempt == 2) throw;
     }
