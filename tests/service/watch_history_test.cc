@@ -308,7 +308,8 @@ TEST_P(WatchHistory, ThePartiemcProgramGoesBack) {
   EXPECT_THAT(frames("58", 3),
               ElementsAre("frame_000057.geojson", "frame_000058.geojson", "frame_000059.geojson"));
   EXPECT_EQ(frames("1", held), all);
-  EXPECT_THAT(error_, HasSubstr("frames before " + std::to_string(oldest) + " are no longer held"));
+  EXPECT_THAT(error_, HasSubstr("frames before " + std::to_string(oldest) +
+                                " are no longer in the history"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, WatchHistory,
