@@ -231,13 +231,21 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
   app.add_option("--memory-budget", raw.line.server.limits.memory_budget,
                  "Bytes that requests, answers and histories of all streams hold, units as in 2GB "
-                 "allowed; "
-                 "beyond it a stream has one frame in flight (default: half of the memory that "
-                 "this machine or container has)")
+                 "allowed; beyond it a stream has one frame in flight, and only in its turn "
+                 "(default: half of the memory that this machine or container has)")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::PositiveNumber)
       ->type_name("BYTES")
       ->envname("PARTIEMC_MEMORY_BUDGET")
+      ->group(kGroup);
+  app.add_option(
+         "--streams-beyond-budget", limits.streams_beyond_budget,
+         "Streams that may have a frame beyond --memory-budget at the same time; the others "
+         "wait to be read. More memory, and less waiting where frames are large")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_STREAMS_BEYOND_BUDGET")
       ->group(kGroup);
   app.add_option("--idle-timeout", raw.idle_seconds,
                  "End a stream that has had no frame for this time; 0: never")
@@ -245,6 +253,46 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->capture_default_str()
       ->type_name("SECONDS")
       ->envname("PARTIEMC_IDLE_TIMEOUT")
+      ->group(kGroup);
+}
+
+void AddConnections(CLI::App& app, Raw& raw) {
+  ConnectionLimits& limits = raw.line.server.connections;
+  const char* const kGroup = "Connections of --address";
+  app.add_option("--max-connections", limits.connections,
+                 "Connections at once, at most half of the file descriptors; when there is one too "
+                 "many, one without a call ends; if all have calls, the new one may only check "
+                 "the health")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_CONNECTIONS")
+      ->group(kGroup);
+  app.add_option("--connections-per-address", limits.of_address,
+                 "Connections of one address at once, health checks apart; 0: not limited, for a "
+                 "server behind a proxy")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_CONNECTIONS_PER_ADDRESS")
+      ->group(kGroup);
+  app.add_option("--new-connections-per-address", limits.new_of_address,
+                 "New connections of one address in a second, twice as many at once, health checks "
+                 "apart; 0: not limited, for a server behind a proxy")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_NEW_CONNECTIONS_PER_ADDRESS")
+      ->group(kGroup);
+  app.add_option("--unaccounted-bytes", raw.line.server.unaccounted_bytes,
+                 "Bytes of a TCP connection that no call and no message accounts for, units as in "
+                 "512KiB allowed; a connection with more is cut, and its address may only check "
+                 "the health for ten seconds; 0: not limited")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 40))
+      ->capture_default_str()
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_UNACCOUNTED_BYTES")
       ->group(kGroup);
 }
 
@@ -418,6 +466,7 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   AddServingOptions(app, raw);
   AddSecurity(app, raw);
   AddLimits(app, raw);
+  AddConnections(app, raw);
   AddWeb(app, raw);
   AddMetrics(app, raw);
   AddLogging(app, raw);

@@ -12,6 +12,9 @@
 #include "common/address.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
+#include "server/connections/acceptor.h"
+#include "server/connections/connection_table.h"
+#include "server/connections/connection_watch.h"
 #include "server/security/authentication.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/security/file_reloader.h"
@@ -33,6 +36,9 @@ namespace grpc {
 class Channel;
 class Server;
 class ServerCredentials;
+namespace experimental {
+class ExternalConnectionAcceptor;
+}
 }  // namespace grpc
 
 namespace partiemc::server {
@@ -78,6 +84,10 @@ struct ServerOptions {
   /// Threads that compute, all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
+  /// Connections of `address`, in number and in what they may send.
+  ConnectionLimits connections;
+  /// The bytes of a connection that no call and no message accounts for; 0: not limited.
+  std::uint64_t unaccounted_bytes = ConnectionRules{}.unaccounted_bytes;
   Keepalive keepalive;
 };
 
@@ -122,6 +132,7 @@ class Server {
   absl::Status OpenGateway();
   void AddGauges();
   void AddRelayMetrics();
+  void AddConnectionMetrics();
   void StopBeingReady();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
@@ -144,10 +155,15 @@ class Server {
   IdleTimer idle_timer_;
   IntakeGuard intake_guard_;
   std::unique_ptr<Methods> methods_;
+  ConnectionTable connections_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<HealthService> health_;
   std::atomic<bool> leaves_ = false;  // As the gateway's health says.
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> hand_over_;
+  std::unique_ptr<StreamCounter> streams_;
   std::unique_ptr<grpc::Server> server_;
+  ConnectionWatch watch_;
+  std::unique_ptr<Acceptor> acceptor_;  // Stops before what it gives connections to.
   std::unique_ptr<WebGateway> web_;
   // The last two stop before what they load into and read from goes.
   FileReloader reloader_;

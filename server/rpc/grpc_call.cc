@@ -6,8 +6,24 @@
 
 namespace partiemc::server {
 
-GrpcCall::GrpcCall(grpc::CallbackServerContext& context, const Make& make)
-    : context_(context), call_(make(*this, OriginOf(context))) {}
+GrpcCall::GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections,
+                   CallKind kind, const Make& make)
+    : context_(context),
+      tally_(connections.BeginCall(context.peer(), kind)),
+      call_(make(*this, OriginOf(context))) {}
+
+void GrpcCall::StartRead(grpc::ByteBuffer* message) {
+  tally_.OnReadBegun();
+  message_ = message;
+  Reactor::StartRead(message);
+}
+
+void GrpcCall::OnReadDone(bool ok) {
+  // A read that fails with its call leaves a part of a message on the way. The tally then ends with
+  // this read open, which allows those bytes.
+  if (ok || !(finished_ || context_.IsCancelled())) tally_.OnReadDone(ok ? message_->Length() : 0);
+  call_->OnReadDone(ok);
+}
 
 void GrpcCall::OnDone() {
   call_->OnDone();
@@ -15,6 +31,7 @@ void GrpcCall::OnDone() {
 }
 
 void GrpcCall::Finish(const absl::Status& status) {
+  finished_ = true;
   Reactor::Finish(ToGrpcStatus(status, context_));
 }
 

@@ -67,7 +67,13 @@ void StreamStateMachine::ReadDone(RequestKind kind, std::uint64_t bytes) {
     reading_ = false;
     counts_.last_activity = std::chrono::steady_clock::now();
     TakeRequest(kind, bytes);
-    surplus_ += std::exchange(set_aside_, 0);  // Now it is known what there is.
+    if (std::exchange(read_permit_, ReadPermit::kNone) == ReadPermit::kGiven) {
+      absl::Status room = budget_.reads().Came(*this, bytes);
+      const bool is_frame = kind == RequestKind::kFrame && phase_ == Phase::kStreaming;
+      if (!room.ok() && is_frame && handler_.DropFrame((read_ - 1) % window_, room)) {
+        SetSlotBytes(read_ - 1, 0);
+      }
+    }
     open = opening_;
   });
   if (!open) return;
@@ -138,6 +144,21 @@ void StreamStateMachine::Granted(std::uint64_t bytes) {
     // What comes after the machine has gone on without it goes back at once.
     (waiting_ ? set_aside_ : surplus_) += bytes;
     waiting_ = false;
+  });
+}
+
+void StreamStateMachine::ReadPermitted() {
+  On([&] {
+    if (read_permit_ == ReadPermit::kWaiting) read_permit_ = ReadPermit::kGiven;
+  });
+}
+
+// The read brings what nothing has room for: it ends with the stream.
+void StreamStateMachine::ReadRevoked(const absl::Status& status) {
+  On([&] {
+    if (!reading_ || phase_ != Phase::kStreaming) return;
+    Abandon(status);
+    owes_cut_ = writing_;
   });
 }
 
@@ -268,6 +289,7 @@ StreamStateMachine::Actions StreamStateMachine::Decide() {
   if (answers && MayCompute()) {
     computing_ = true;
     actions.compute = computed_ % window_;
+    actions.compute_bytes = handler_.ComputedBytes(*actions.compute, slot_bytes_[*actions.compute]);
   }
   if (answers && !writing_) DecideWrite(actions);
   // Once finished there may be no transport any more.
@@ -298,23 +320,57 @@ bool StreamStateMachine::MayRead(Actions& actions) {
   if (phase_ != Phase::kStreaming || read_ - written_ >= window_) return false;
   if (read_ == written_) {
     actions.stop_waiting = std::exchange(waiting_, false);
+    return HasReadPermit();
+  }
+  if (set_aside_ > 0) {
+    PlanReadAhead();
     return true;
   }
-  if (set_aside_ > 0) return true;
   if (waiting_) return false;
+  // Something is in flight, hence `last_bytes_` is known.
   if (budget_.TakeOrWait(last_bytes_, shared_from_this(), caller_.get())) {
     set_aside_ = last_bytes_;
+    PlanReadAhead();
     return true;
   }
   waiting_ = true;
   return false;
 }
 
+// What was set aside is planned from now on, like all that reads can bring.
+void StreamStateMachine::PlanReadAhead() {
+  surplus_ += std::exchange(set_aside_, 0);
+  budget_.reads().BeginNow(shared_from_this(), NextRead());
+  read_permit_ = ReadPermit::kGiven;
+}
+
+bool StreamStateMachine::HasReadPermit() {
+  if (read_permit_ == ReadPermit::kNone) {
+    const bool given = budget_.reads().Begin(shared_from_this(), NextRead());
+    read_permit_ = given ? ReadPermit::kGiven : ReadPermit::kWaiting;
+  }
+  return read_permit_ == ReadPermit::kGiven;
+}
+
+// A frame may be somewhat larger than the one before.
+ReadPermits::Read StreamStateMachine::NextRead() const {
+  const void* const assembly = handler_.Assembly();
+  return {.stream = assembly != nullptr ? assembly : this,
+          .expected_bytes = last_bytes_ + last_bytes_ / 8,
+          .caller = caller_.get(),
+          .peer = transport_.peer()};
+}
+
 // Room is set aside for a read only while the stream has something else in flight: what an idle
-// stream reads next costs nothing until it comes.
+// stream reads next is planned only, and counted when it comes.
 void StreamStateMachine::DecideMemory(Actions& actions) {
   if (phase_ != Phase::kStreaming && std::exchange(waiting_, false)) actions.stop_waiting = true;
   if (phase_ != Phase::kStreaming || read_ == written_) surplus_ += std::exchange(set_aside_, 0);
+  const bool waits = phase_ != Phase::kStreaming && read_permit_ == ReadPermit::kWaiting;
+  if (waits || phase_ == Phase::kFinished) {
+    budget_.reads().End(*this);
+    read_permit_ = ReadPermit::kNone;
+  }
   if (phase_ == Phase::kFinished) {
     for (std::uint64_t& bytes : slot_bytes_) surplus_ += std::exchange(bytes, 0);
   }
@@ -344,9 +400,10 @@ void StreamStateMachine::Perform(Actions actions) {
     // Before anything that may end the stream elsewhere: it ends with nothing held.
     if (actions.stop_waiting) budget_.StopWaiting(self);
     if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
+    budget_.reads().Serve();
     if (actions.compute) {
       pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
-                   [self] { self->Computed(); }, &busy_mark_, caller_.get());
+                   [self] { self->Computed(); }, &busy_mark_, caller_.get(), actions.compute_bytes);
     }
     if (actions.write) transport_.StartWrite(*actions.write, actions.write_slot);
     if (actions.cut) transport_.Cut();

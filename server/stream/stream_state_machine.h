@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -61,6 +62,8 @@ class StreamTransport {
   /// The last call that the transport gets; a read may still be going on, nothing else. OK, or why
   /// the stream ended.
   virtual void Finish(const absl::Status& status) = 0;
+  /// As CallChannel::peer. Called with the stream's lock held.
+  virtual std::string peer() const { return {}; }
 };
 
 /// What the messages of a stream are, and the session behind them.
@@ -81,6 +84,18 @@ class StreamHandler {
   virtual bool MayAnswer(std::size_t /*slot*/) { return true; }
   /// 0: nothing waits for anything but LookAgain.
   virtual std::chrono::milliseconds LookEvery() const { return std::chrono::milliseconds(0); }
+  /// The bytes of which the frame in `slot` is computed; `bytes` of them came with it. 0: nothing
+  /// is computed. Called with the stream's lock held.
+  virtual std::uint64_t ComputedBytes(std::size_t /*slot*/, std::uint64_t bytes) const {
+    return bytes;
+  }
+  /// The frame in `slot` has brought more than the server has room for. Returns whether its bytes
+  /// were dropped, and it will be answered by `why`. Called with the stream's lock held, before
+  /// MayAnswer.
+  virtual bool DropFrame(std::size_t /*slot*/, const absl::Status& /*why*/) { return false; }
+  /// Where frames come in parts: the same address for all calls that send parts of one stream.
+  /// Called with the stream's lock held.
+  virtual const void* Assembly() const { return nullptr; }
 };
 
 /// For how long a client may let a stream wait for it; 0: for ever.
@@ -115,9 +130,10 @@ struct StreamCounts {
 /// Memory: the bytes of requests that were read, `open` among them, and of answers that are not
 /// written count against the budget of all streams. While something of a stream is in flight,
 /// another frame is read only when the budget has room for one of the size of the last. A stream of
-/// which nothing is in flight always reads one frame, so that none stands still for the sake of
-/// another.
+/// which nothing is in flight reads one frame when it has a permit (ReadPermits), which every
+/// stream gets in its turn.
 class StreamStateMachine final : public MemoryBudget::Waiter,
+                                 public ReadPermits::Reader,
                                  public AssemblyMember,
                                  public std::enable_shared_from_this<StreamStateMachine> {
  public:
@@ -159,15 +175,20 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
   const std::atomic<bool>& cancelled() const { return cancelled_; }
 
   void Granted(std::uint64_t bytes) override;
+  void ReadPermitted() override;
+  void ReadRevoked(const absl::Status& status) override;
   void LookAgain() override;
   void LeftOut(const absl::Status& status) override;
 
  private:
   enum class Phase { kOpening, kStreaming, kEnding, kAbandoned, kFinished };
+  // For the read that goes on, or is to begin while nothing is in flight.
+  enum class ReadPermit { kNone, kWaiting, kGiven };
 
   // What to do once the lock is released; the flags of what is going on are set already.
   struct Actions {
     std::optional<std::size_t> read, compute;  // Into or of this slot.
+    std::uint64_t compute_bytes = 0;           // Of the frame, with its other parts.
     std::optional<Outgoing> write;
     std::size_t write_slot = 0;
     std::optional<absl::Status> finish;
@@ -180,6 +201,9 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
   bool MayCompute();
   bool IsAllSaid();
   bool MayRead(Actions& actions);
+  bool HasReadPermit();
+  void PlanReadAhead();
+  ReadPermits::Read NextRead() const;
   void DecideWrite(Actions& actions);
   void DecideMemory(Actions& actions);
   void TakeRequest(RequestKind kind, std::uint64_t bytes);
@@ -218,12 +242,13 @@ class StreamStateMachine final : public MemoryBudget::Waiter,
   bool owes_opened_ = false, owes_notice_ = false;
   bool waits_for_none_ = false;             // Frames that still lack something are not answered.
   Outgoing in_flight_ = Outgoing::kAnswer;  // What is being written.
-  // Of the budget: what each slot holds, what has been set aside for the next read, what is to be
-  // given back once the lock is released.
+  // Of the budget: what each slot holds, what has been set aside for a read that may begin, what
+  // is to be given back once the lock is released.
   std::vector<std::uint64_t> slot_bytes_;
   std::uint64_t set_aside_ = 0, surplus_ = 0;
-  std::uint64_t last_bytes_ = 1;  // Of the last frame, at least 1: what the next one may need.
+  std::uint64_t last_bytes_ = 0;  // Of the last frame, at least 1: what the next one may need.
   bool waiting_ = false;          // For `last_bytes_` of the budget.
+  ReadPermit read_permit_ = ReadPermit::kNone;
   StreamCounts counts_;
 };
 

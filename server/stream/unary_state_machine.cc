@@ -22,12 +22,7 @@ absl::Status NoRequest() {
 absl::Status NoRoom(FairShare::Fit fit, std::string field, std::uint64_t bytes,
                     std::uint64_t budget) {
   if (fit == FairShare::Fit::kMoreThanShare) return TooManyBytesOfCaller(bytes);
-  return ViolationError(
-      absl::StatusCode::kResourceExhausted,
-      {std::string(kReasonMemoryBudget), std::move(field), absl::StrCat(bytes, " bytes"),
-       absl::StrCat("must fit with what is being worked on into ", budget,
-                    " bytes; try again later, or start the server with a larger "
-                    "--memory-budget")});
+  return NoRoomInBudget(std::move(field), bytes, budget);
 }
 
 }  // namespace
@@ -149,7 +144,10 @@ void UnaryStateMachine::Abandon(absl::Status status) {
 UnaryStateMachine::Actions UnaryStateMachine::Decide() {
   Actions actions;
   if (std::exchange(owes_read_, false)) actions.read = calling_ = true;
-  if (std::exchange(owes_answer_, false)) actions.answer = working_ = true;
+  if (std::exchange(owes_answer_, false)) {
+    actions.answer = working_ = true;
+    actions.answer_bytes = held_bytes_;
+  }
   if (std::exchange(owes_write_, false) && phase_ == Phase::kWriting) {
     actions.write = writing_ = true;
   }
@@ -173,7 +171,7 @@ void UnaryStateMachine::Perform(Actions actions) {
         Answer(nullptr);
       } else {
         pool_->Submit([self](Worker& worker) { self->Answer(&worker); }, [] {}, nullptr,
-                      caller_.get());
+                      caller_.get(), actions.answer_bytes);
       }
     }
     if (actions.write) transport_.StartWrite();

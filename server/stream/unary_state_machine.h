@@ -98,6 +98,7 @@ class UnaryStateMachine final : public std::enable_shared_from_this<UnaryStateMa
   // What to do once the lock is released; the flags of what is going on are set already.
   struct Actions {
     bool read = false, answer = false, write = false, cut = false;
+    std::uint64_t answer_bytes = 0;  // Of the request.
     std::optional<absl::Status> finish;
     std::uint64_t give_back = 0;  // Bytes.
   };

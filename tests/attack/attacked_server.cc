@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "attack/http2_client.h"
+#include "attack/options.h"
 
 namespace partiemc::attack {
 namespace {
@@ -68,7 +69,8 @@ std::string HttpGet(const std::string& address, const std::string& path) {
 
 }  // namespace
 
-AttackedServer::AttackedServer(std::vector<std::string> arguments) {
+AttackedServer::AttackedServer(std::vector<std::string> arguments,
+                               const server::Surroundings& surroundings) {
   if (std::find(arguments.begin(), arguments.end(), "--threads") == arguments.end()) {
     arguments.insert(arguments.end(), {"--threads", "2"});
   }
@@ -89,7 +91,9 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments) {
     auto all = arguments;
     all.insert(all.end(), {"--metrics", metrics_address_});
     try {
-      serving_ = std::make_unique<server::ServingProcess>(all);
+      server::Surroundings around = surroundings;
+      if (!GetOptions().server.empty()) around.program = GetOptions().server;
+      serving_ = std::make_unique<server::ServingProcess>(all, around);
     } catch (const std::runtime_error&) {
       if (attempt == 2) throw;
     }

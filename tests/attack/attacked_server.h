@@ -15,7 +15,8 @@ namespace partiemc::attack {
 class AttackedServer {
  public:
   /// With metrics; unless `arguments` say otherwise, its log off, two threads, 20 s to drain.
-  explicit AttackedServer(std::vector<std::string> arguments = {});
+  explicit AttackedServer(std::vector<std::string> arguments = {},
+                          const server::Surroundings& surroundings = {});
 
   const std::string& address() const { return serving_->address(); }
   server::ServerProcess& process() { return serving_->process(); }

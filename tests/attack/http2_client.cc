@@ -89,6 +89,12 @@ Http2Client::Http2Client(const std::string& address, const Options& options) {
   to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(colon + 1))));
   inet_pton(AF_INET, address.substr(0, colon).c_str(), &to.sin_addr);
   socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (socket_ >= 0 && !options.source.empty()) {
+    sockaddr_in from{};
+    from.sin_family = AF_INET;
+    inet_pton(AF_INET, options.source.c_str(), &from.sin_addr);
+    ::bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof from);
+  }
   if (socket_ < 0 || ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
     const std::string reason = std::strerror(errno);
     if (socket_ >= 0) ::close(socket_);

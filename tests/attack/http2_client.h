@@ -75,6 +75,8 @@ class Http2Client {
     std::uint32_t stream_window = 0x7fffffff;
     /// Whether the connection's preface and settings are queued.
     bool greet = true;
+    /// The address that the client connects from; empty: any.
+    std::string source = {};
   };
 
   /// Connects to "127.0.0.1:PORT". Throws std::runtime_error where that fails.

@@ -136,9 +136,10 @@ TEST_F(Known, ABombOfReferences) {
 }
 
 // 300,000 frames behind the headers of a call. Answers are not read, so that they would queue up.
+// The attacker has an address of its own, as the server refuses the address of a flood.
 template <typename Queue>
 void Flood(const std::string& address, const Queue& queue) {
-  Http2Client client(address);
+  Http2Client client(address, {.source = "127.0.0.2"});
   const auto call = client.Call(CallHeaders(kReconstruct));
   client.Flush(kPatience, false);
   for (int k = 0; k < 300'000 && !client.closed(); ++k) {

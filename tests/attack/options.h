@@ -14,6 +14,7 @@ struct Options {
   /// --elsewhere: all attacks hit another server of this machine, so that what the honest streams
   /// lose is what they lose to the attackers' use of its processors.
   bool elsewhere = false;
+  std::string server;      ///< --server: attack this program; empty: the one built with the tests.
   std::uint64_t seed = 1;  ///< --seed: of what is random.
   /// --slowdown: the honest streams' p99, of that of the undisturbed run, and --beside: memory
   /// beyond the budget. 2 and 64 are the aim, which is not reached (tests/PROMISES.md); the

@@ -22,7 +22,9 @@ Attack AttackFrames;        // Frames of hostile coordinates, every guarantee of
 Attack AttackLammpsDump;    // The readers of client/input, each with the bytes as its file.
 Attack AttackNpy;
 Attack AttackNpz;
-Attack AttackPacked;          // gzip, zstd and deflate, and what reads lines from them.
+Attack AttackPacked;  // gzip, zstd and deflate, and what reads lines from them.
+// Parts of frames from several connections; the model is tests/server/parts_model.h.
+Attack AttackPartsOverConnections;
 Attack AttackRecording;       // A .pemc file, as it is or with its blocks packed as they should be.
 Attack AttackRelayMessages;   // What a replica hears of the stream of another one.
 Attack AttackRelayPeers;      // What several replicas send to one, through its queues.

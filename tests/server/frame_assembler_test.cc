@@ -63,7 +63,7 @@ class FrameAssemblerTest : public ::testing::Test {
   }
   absl::Status Offer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10) {
     return assembler_->Offer(seats_[part], sequence, bytes,
-                             std::make_shared<NumberedPart>(part, sequence));
+                             std::make_shared<NumberedPart>(part, sequence), begin_);
   }
   std::string Refusal(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10) {
     return ReasonOf(Offer(part, sequence, bytes));
@@ -144,7 +144,8 @@ TEST_F(FrameAssemblerTest, AMissingPartIsNamedOnceItsTimeIsOverAndTheNextFrameGo
   EXPECT_FALSE(IsReady(1, milliseconds(99)));
   EXPECT_TRUE(IsReady(1, milliseconds(100)));
   const auto taken = assembler_->Take();
-  EXPECT_EQ(taken.status().message(), "parts: 1, 3; must come within 100 ms of part 0");
+  EXPECT_EQ(taken.status().message(),
+            "parts: 1, 3; must come within 100 ms of the first part of their frame");
   EXPECT_EQ(ReasonOf(taken.status()), kReasonPartsMissing);
   EXPECT_EQ(Refusal(1, 1), kReasonPartLate);  // Not answered yet, but too late.
   assembler_->Answered(2, false);
@@ -210,15 +211,49 @@ TEST_F(FrameAssemblerTest, ACallTakesOverAPartFromAnotherWhichThenCannotTakeItAw
   EXPECT_TRUE(second->left.empty());
 }
 
+TEST_F(FrameAssemblerTest, TheTimeoutBeginsWithTheFirstPartThatIsHeld) {
+  Begin(3);
+  ASSERT_TRUE(Offer(1, 1).ok());
+  const auto later = begin_ + milliseconds(60);  // Part 0 comes.
+  assembler_->LeaderSent(1);
+  EXPECT_FALSE(assembler_->IsReady(1, later, begin_ + milliseconds(99)));
+  EXPECT_TRUE(assembler_->IsReady(1, later, begin_ + milliseconds(100)));
+}
+
+TEST_F(FrameAssemblerTest, PartsAreNotHeldForAPart0ThatDoesNotCome) {
+  Begin(3);
+  ASSERT_TRUE(Offer(1, 1, 900).ok());
+  EXPECT_FALSE(assembler_->IsOver(1, begin_ + milliseconds(99)));
+  EXPECT_TRUE(assembler_->IsOver(1, begin_ + milliseconds(100)));
+  EXPECT_EQ(assembler_->BytesOfNext(), 0u);
+  EXPECT_EQ(ReasonOf(assembler_->OutcomeOf(1)), kReasonPartsMissing);
+  EXPECT_EQ(FindViolation(assembler_->OutcomeOf(1))->value, "0, 1, 2");
+  EXPECT_EQ(Refusal(2, 1), kReasonPartLate);
+  EXPECT_EQ(Refusal(1, 2), "") << "the next frame is another one";
+  // Part 0 comes too late.
+  assembler_->LeaderSent(1);
+  EXPECT_TRUE(IsReady(1));
+  EXPECT_EQ(ReasonOf(assembler_->Take().status()), kReasonPartsMissing);
+}
+
+TEST_F(FrameAssemblerTest, APartThatIsWithdrawnCanComeAgain) {
+  Begin(2);
+  ASSERT_TRUE(Offer(1, 1).ok());
+  assembler_->Withdraw(seats_[1], 1);
+  EXPECT_FALSE(IsReady(1));
+  EXPECT_EQ(Refusal(1, 1), "");
+  EXPECT_TRUE(IsReady(1));
+}
+
 TEST_F(FrameAssemblerTest, MembersAreToldOfAnswersAndOfTheEnd) {
   Begin(3);
-  EXPECT_FALSE(assembler_->IsOver(1));
+  EXPECT_FALSE(assembler_->IsOver(1, begin_));
   ASSERT_TRUE(Offer(1, 1).ok());
   ASSERT_TRUE(Offer(2, 1).ok());
   ExpectWhole(1);
   assembler_->TellMembers();
   EXPECT_EQ(members_[1]->looks, 1);
-  EXPECT_TRUE(assembler_->IsOver(1));
+  EXPECT_TRUE(assembler_->IsOver(1, begin_));
   EXPECT_TRUE(assembler_->OutcomeOf(1).ok());
   ASSERT_TRUE(Offer(1, 2).ok());
   assembler_->End(absl::OkStatus());

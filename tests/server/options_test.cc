@@ -59,8 +59,10 @@ TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
   EXPECT_THAT(early->text, HasSubstr("      48 MiB  3 compute threads"));
   EXPECT_THAT(early->text, HasSubstr("       8 MiB  results for who goes back"));
   EXPECT_THAT(early->text, HasSubstr("    1016 MiB  requests and answers"));
-  // 24 + 48 + 8 + 1016 + 2 x 63.5 + 64
-  EXPECT_THAT(early->text, HasSubstr("    1287 MiB  in all"));
+  EXPECT_THAT(early->text, HasSubstr("     640 MiB  frames of 2 streams beyond that"));
+  EXPECT_THAT(early->text, HasSubstr("     305 MiB  computing one frame beyond that"));
+  // 24 + 48 + 8 + 1016 + 640 + 305 + 63.5 + 64 + 66
+  EXPECT_THAT(early->text, HasSubstr("    2235 MiB  in all"));
 }
 
 TEST(CommandLineOptions, WhatIsAdvertisedIsAnAddressThatOthersReach) {

@@ -3,7 +3,10 @@
 // time. Ten servers are drained under load by default, `--drains 100` for more.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -314,6 +317,43 @@ TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
   ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
   Terminate();
   ExpectGoodEnd();
+}
+
+// Peers that send SETTINGS and do not read the acknowledgements, so that gRPC cannot write any
+// more.
+TEST_F(Drain, PeersThatReadNoAcknowledgementsAreNotWaitedFor) {
+  Serve("4");
+  const std::string address = server_->address();
+  const auto port = static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
+  std::atomic<bool> stop = false;
+  std::vector<std::thread> peers;
+  for (int i = 0; i < 3; ++i) {
+    peers.emplace_back([&] {
+      const std::string header("\0\0\6\4\0\0\0\0\0", 9), setting("\0\3\0\0\0\x64", 6);
+      std::string all = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + std::string("\0\0\0\4\0\0\0\0\0", 9);
+      for (int k = 0; k < 200'000; ++k) all += header + setting;
+      const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+      const int little = 4096;
+      setsockopt(file, SOL_SOCKET, SO_RCVBUF, &little, sizeof(little));
+      sockaddr_in to{};
+      to.sin_family = AF_INET;
+      to.sin_port = htons(port);
+      to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      connect(file, reinterpret_cast<const sockaddr*>(&to), sizeof(to));
+      for (std::size_t sent = 0; !stop;) {
+        const auto count =
+            send(file, all.data() + sent, all.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (count > 0) sent += static_cast<std::size_t>(count);
+        if (count <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+      close(file);
+    });
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  Terminate();
+  ExpectGoodEnd();
+  stop = true;
+  for (auto& peer : peers) peer.join();
 }
 
 TEST_F(Drain, CallsOfOneFrameThatGoOnAreAnswered) {

@@ -35,6 +35,8 @@ std::string FileText(const std::string& path) {
   return text.str();
 }
 
+std::string ServerProgram() { return PARTIEMC_SERVER; }
+
 ServerProcess::ServerProcess(std::vector<std::string> arguments, const Surroundings& surroundings)
     : folder_(std::make_unique<support::TemporaryFolder>()) {
   const std::string output = folder_->Path("output");

@@ -17,6 +17,9 @@ namespace partiemc::server {
 
 std::string FileText(const std::string& path);
 
+/// The path of the server that was built with the tests.
+std::string ServerProgram();
+
 /// What a server is started with beside its arguments.
 struct Surroundings {
   std::vector<std::string> environment = {};  ///< NAME=VALUE, beside this process's own.
