@@ -101,9 +101,8 @@ std::uint64_t MemoryBudget::TakeForWorker(std::uint64_t bytes, const void* worke
     TellShortage();
     if (worker_beyond_ == nullptr || worker_beyond_ == worker) {
       bytes = std::min(bytes, most_of_worker_ - bytes_of_worker_beyond_);
-      worker_beyond_ = worker;
-      bytes_of_worker_beyond_ += bytes;
-      break;
+      TakeBeyond(bytes, worker);
+      return bytes;
     }
     may_compute_.wait(lock);
   }
@@ -116,11 +115,16 @@ bool MemoryBudget::TryTakeBeyond(std::uint64_t bytes, const void* worker) {
   const std::lock_guard lock(mutex_);
   if (worker_beyond_ != nullptr && worker_beyond_ != worker) return false;
   if (bytes > most_of_worker_ - bytes_of_worker_beyond_) return false;
+  TakeBeyond(bytes, worker);
+  return true;
+}
+
+void MemoryBudget::TakeBeyond(std::uint64_t bytes, const void* worker) {
   worker_beyond_ = worker;
   bytes_of_worker_beyond_ += bytes;
+  share_.AddBeyond(bytes);
   share_.Take(nullptr, bytes);
   held_ += bytes;
-  return true;
 }
 
 bool MemoryBudget::IsBeyond(const void* worker) const {
@@ -133,7 +137,7 @@ void MemoryBudget::GiveBackOfWorker(std::uint64_t bytes, const void* worker) {
     const std::lock_guard lock(mutex_);
     if (worker_beyond_ == worker) {
       worker_beyond_ = nullptr;
-      bytes_of_worker_beyond_ = 0;
+      share_.RemoveBeyond(std::exchange(bytes_of_worker_beyond_, 0));
     }
   }
   GiveBack(bytes);
@@ -209,14 +213,20 @@ absl::Status MemoryBudget::CheckHeld(std::uint64_t bytes, const CallerAccount* c
   const std::uint64_t most = MostOf(caller);
   const std::lock_guard lock(mutex_);
   if (caller != nullptr && share_.held_by(caller) > most) return TooManyBytesOfCaller(bytes);
-  if (share_.held() <= share_.room()) return absl::OkStatus();
+  if (share_.Fits(nullptr, 0) == Fit::kYes) return absl::OkStatus();
   return NoRoomInBudget("frame", bytes, share_.room());
 }
 
-bool MemoryBudget::FitsAlready(const CallerAccount* caller) const {
+void MemoryBudget::ChangeBeyond(std::uint64_t before, std::uint64_t after) {
+  const std::lock_guard lock(mutex_);
+  share_.RemoveBeyond(before);
+  share_.AddBeyond(after);
+}
+
+bool MemoryBudget::FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const {
   const std::uint64_t most = MostOf(caller);
   const std::lock_guard lock(mutex_);
-  return share_.Fits(caller, 0, most) == Fit::kYes;
+  return share_.FitsWithout(beyond, caller, most);
 }
 
 std::uint64_t MemoryBudget::PlannedBy(const CallerAccount* caller) const {

@@ -105,13 +105,17 @@ class MemoryBudget {
   }
   FairShare::Fit FitsNow(const Claim& claim) const;
   void TellShortage() const;
+  void TakeBeyond(std::uint64_t bytes, const void* worker);
   // Without:
   void Grant();
   // Of ReadPermits, with its lock held:
   void Plan(std::uint64_t bytes, const CallerAccount* caller);
   bool TryPlan(std::uint64_t bytes, const CallerAccount* caller);
   void Unplan(std::uint64_t bytes, const CallerAccount* caller);
-  bool FitsAlready(const CallerAccount* caller) const;
+  // Permits `after` bytes beyond the room instead of `before`.
+  void ChangeBeyond(std::uint64_t before, std::uint64_t after);
+  // Whether what the caller holds fits with `beyond` bytes less beyond the room.
+  bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const;
   // Whether `bytes` that are counted already fit into the budget and its caller's quota.
   absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const;
   std::uint64_t PlannedBy(const CallerAccount* caller) const;

@@ -82,6 +82,7 @@ absl::Status ReadPermits::Came(const Reader& reader, std::uint64_t bytes) {
   Slot& slot = slots_.at(permit.read.stream);
   slot.reading = false;
   slot.bytes += bytes;
+  SetBeyond(permit, std::min(bytes, terms_.message_bytes));
   return absl::OkStatus();
 }
 
@@ -96,6 +97,10 @@ void ReadPermits::End(const Reader& reader) {
 void ReadPermits::Unplan(Permit& permit) {
   budget_.Unplan(std::exchange(permit.planned, 0), permit.read.caller);
   changed_ = true;
+}
+
+void ReadPermits::SetBeyond(Permit& permit, std::uint64_t bytes) {
+  budget_.ChangeBeyond(std::exchange(permit.beyond, bytes), bytes);
 }
 
 // What the permit was for is over.
@@ -119,6 +124,7 @@ bool ReadPermits::TryPermit(Permits::value_type& item, bool may_open_slot) {
     slot->reading = permit.has_slot = true;
     slot->used.insert(item.first);
     slot->open.insert(item.first);
+    SetBeyond(permit, expected);
     budget_.Plan(expected, permit.read.caller);
   }
   permit.planned = expected;
@@ -144,12 +150,15 @@ ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool m
 // Frames that fit into the budget and the share of their caller by now are not beyond them.
 void ReadPermits::FreeSlots() {
   for (auto& [reader, permit] : permits_) {
-    if (permit.has_slot && budget_.FitsAlready(permit.read.caller)) LeaveSlot(reader, permit);
+    if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
+      LeaveSlot(reader, permit);
+    }
   }
 }
 
 void ReadPermits::LeaveSlot(const Reader* reader, Permit& permit) {
   if (!std::exchange(permit.has_slot, false)) return;
+  SetBeyond(permit, 0);
   const auto slot = slots_.find(permit.read.stream);
   if (permit.state == State::kReading) slot->second.reading = false;
   slot->second.open.erase(reader);

@@ -39,6 +39,7 @@ struct ReadTerms {
 ///    streams have a frame beyond the budget. Such a stream keeps its slot until the frame is
 ///    answered. The connections of a stream whose frames come in parts have one slot together: they
 ///    are read from one after the other, once each, and not after they have brought one message.
+///    Its bytes are counted beside the budget, so that it takes no room from others.
 /// 3. Slots go to the caller that holds the least, and of one caller to the read that has waited
 ///    longest.
 /// 4. While others wait, a permit lapses if its connection brings next to nothing: then the read
@@ -118,6 +119,7 @@ class ReadPermits {
     State state = State::kWaiting;
     std::uint64_t number = 0;   // Rises in the order in which reads were requested.
     std::uint64_t planned = 0;  // Bytes in the budget's plan.
+    std::uint64_t beyond = 0;   // Bytes in its slot, planned or held.
     bool has_slot = false, has_lapsed = false;
     // Of its connection, since the first look at it.
     std::optional<std::uint64_t> received;
@@ -139,6 +141,7 @@ class ReadPermits {
   bool TryPermit(Permits::value_type& item, bool may_open_slot);
   Slot* FindSlot(const Permits::value_type& item, bool may_open_slot);
   void Unplan(Permit& permit);
+  void SetBeyond(Permit& permit, std::uint64_t bytes);
   void Finish(Permits::value_type& item);
   void FreeSlots();
   void LeaveSlot(const Reader* reader, Permit& permit);

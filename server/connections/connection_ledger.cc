@@ -16,6 +16,9 @@ constexpr std::uint64_t kMessageOverhead = 256;
 constexpr std::uint64_t kCallOverhead = 1'024;
 // A client acknowledges what it receives by WINDOW_UPDATE: usually a thousandth of it.
 constexpr std::uint64_t kReplyPart = 16;
+// A message that is too large is received in full, so that its sender is told by how much: up to
+// twice what one may have, and at least this many bytes. Beyond that the connection is cut.
+constexpr std::uint64_t kLeastReadAllowance = std::uint64_t{64} << 20;
 // PINGs and SETTINGS, which are nobody's.
 constexpr double kBytesPerSecond = 16 * 1'024;
 // Bytes that a call may have under way unread: its window and that of the connection.
@@ -59,7 +62,7 @@ void ConnectionLedger::OnCallBegun() {
 }
 
 void ConnectionLedger::OnReadDone(std::uint64_t bytes) {
-  if (bytes > 0) credit_.fetch_add(OnTheWire(bytes), std::memory_order_relaxed);
+  credit_.fetch_add(OnTheWire(bytes), std::memory_order_relaxed);
   reads_open_.fetch_sub(1, std::memory_order_relaxed);
 }
 
@@ -78,7 +81,8 @@ ConnectionLedger::Counts ConnectionLedger::Take() const {
 }
 
 std::uint64_t ConnectionLedger::ReadAllowance() const {
-  return OnTheWire(rules_.max_message_bytes);
+  if (rules_.max_message_bytes == 0) return OnTheWire(0);
+  return OnTheWire(std::max(2 * rules_.max_message_bytes, kLeastReadAllowance));
 }
 
 std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,

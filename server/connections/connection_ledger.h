@@ -59,7 +59,7 @@ class ConnectionLedger {
 
   void OnCallBegun();
   void OnReadBegun() { reads_open_.fetch_add(1, std::memory_order_relaxed); }
-  /// A read is over; `bytes` of its message, 0 where none came.
+  /// A read has brought a message of `bytes`.
   void OnReadDone(std::uint64_t bytes);
   /// `reading`: a read that was begun is not over.
   void OnCallEnded(bool reading);

@@ -38,7 +38,7 @@ class CallTally {
   CallTally& operator=(const CallTally&) = delete;
 
   void OnReadBegun();
-  /// `bytes` of the message, 0 where none came.
+  /// The read has brought a message of `bytes`. A read that fails stays open until the call ends.
   void OnReadDone(std::uint64_t bytes);
 
  private:

@@ -19,9 +19,9 @@ void GrpcCall::StartRead(grpc::ByteBuffer* message) {
 }
 
 void GrpcCall::OnReadDone(bool ok) {
-  // A read that fails with its call leaves a part of a message on the way. The tally then ends with
-  // this read open, which allows those bytes.
-  if (ok || !(finished_ || context_.IsCancelled())) tally_.OnReadDone(ok ? message_->Length() : 0);
+  // A read that fails may leave a part of a message on the way, or one that is too large. It stays
+  // open in the tally, which allows those bytes.
+  if (ok) tally_.OnReadDone(message_->Length());
   call_->OnReadDone(ok);
 }
 
@@ -31,7 +31,6 @@ void GrpcCall::OnDone() {
 }
 
 void GrpcCall::Finish(const absl::Status& status) {
-  finished_ = true;
   Reactor::Finish(ToGrpcStatus(status, context_));
 }
 

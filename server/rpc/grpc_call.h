@@ -46,7 +46,6 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
   grpc::CallbackServerContext& context_;
   CallTally tally_;
   grpc::ByteBuffer* message_ = nullptr;  // Of the read that goes on.
-  std::atomic<bool> finished_ = false;
   // gRPC calls nothing before the constructor has returned.
   std::unique_ptr<ByteCall> call_;
 };

@@ -51,6 +51,21 @@ TEST_F(Room, GreedyCallersLeaveSomeForTheNextWhoeverCameFirst) {
   }
 }
 
+TEST_F(Room, BytesBeyondTheRoomTakeNoneFromOthers) {
+  room_.AddBeyond(100);
+  room_.Take(&callers_[0], 100);
+  EXPECT_EQ(room_.Fits(&callers_[1], 120), Fit::kYes);
+  EXPECT_EQ(room_.Fits(&callers_[1], 121), Fit::kNoRoom);
+  EXPECT_EQ(room_.Fits(&callers_[0], 11), Fit::kMoreThanShare) << "they are the caller's own";
+  EXPECT_TRUE(room_.FitsWithout(20, &callers_[0], FairShare::kNoLimit));
+  EXPECT_FALSE(room_.FitsWithout(21, &callers_[0], FairShare::kNoLimit));
+  room_.Take(&callers_[1], 1);
+  room_.RemoveBeyond(100);
+  EXPECT_EQ(room_.Fits(&callers_[1], 20), Fit::kMoreThanShare);
+  EXPECT_EQ(room_.Fits(&callers_[2], 19), Fit::kYes);
+  EXPECT_EQ(room_.Fits(&callers_[2], 20), Fit::kNoRoom);
+}
+
 TEST_F(Room, WhoHoldsNothingGetsWhatFits) {
   EXPECT_EQ(room_.Fits(&callers_[0], 120), Fit::kYes);
   EXPECT_EQ(room_.Fits(&callers_[0], 121), Fit::kNoRoom);

@@ -48,7 +48,8 @@ TEST(WorkerMemory, GrantsWhatParticlesNeedHoweverSmallTheBudgetIs) {
   const std::uint64_t most = kWorkerBytes + kWorkerBytesPerParticle * kParticles;
   EXPECT_TRUE(memory.Reserve(most, kParticles));
   EXPECT_EQ(budget.held(), most - kWorkerBytes) << "it counts all the same";
-  EXPECT_FALSE(memory.Reserve(most + 1, kParticles));
+  EXPECT_TRUE(memory.Reserve(most + 1, kParticles)) << "the budget's byte is still free";
+  EXPECT_FALSE(memory.Reserve(most + 2, kParticles));
 }
 
 TEST(WorkerMemory, WithoutABudgetGrantsEverything) {

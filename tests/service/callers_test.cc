@@ -2,9 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -47,6 +50,13 @@ struct Bidi {
     return ReasonOf(*context);
   }
 };
+
+// Calls of one connection do not begin in the order in which their client made them.
+template <typename Call>
+std::ptrdiff_t CountEnded(std::vector<Call>& calls, std::string_view reason) {
+  return std::ranges::count(calls, reason, [](Call& call) { return call.EndReason(); });
+}
+
 using Stream = Bidi<v1::ReconstructRequest, v1::ReconstructResponse>;
 using Watch = Bidi<v1::WatchStreamRequest, v1::WatchStreamResponse>;
 
@@ -63,10 +73,10 @@ class Callers : public ::testing::Test {
     SetDeadline(context);
     context.AddMetadata("authorization", std::string("Bearer ") + token);
   }
-  Stream BeginStream(const char* token) {
+  Stream BeginStream(const char* token, v1::ReconstructionService::Stub* stub = nullptr) {
     Stream stream;
     Identify(*stream.context, token);
-    stream.rpc = stub_->Reconstruct(stream.context.get());
+    stream.rpc = (stub == nullptr ? stub_.get() : stub)->Reconstruct(stream.context.get());
     return stream;
   }
   Watch BeginWatch(const char* token) {
@@ -113,7 +123,7 @@ TEST_F(Callers, MuteStreamsOfOneKeepNobodyOut) {
   for (int i = 0; i < kMany; ++i) mute.push_back(BeginStream(kMallory));
   Stream stream = BeginStream(kAlice);
   EXPECT_TRUE(stream.Ask(OpenRequest()).has_opened()) << stream.EndReason();
-  EXPECT_EQ(mute[0].EndReason(), "TOO_MANY_OPENING");
+  EXPECT_GE(CountEnded(mute, "TOO_MANY_OPENING"), 1);
   // Nor others of the same caller, as all are behind a proxy.
   Stream own = BeginStream(kMallory);
   EXPECT_TRUE(own.Ask(OpenRequest()).has_opened()) << own.EndReason();
@@ -127,7 +137,7 @@ TEST_F(Callers, MuteWatchersOfOneKeepNobodyOut) {
   for (int i = 0; i < kMany; ++i) mute.push_back(BeginWatch(kMallory));
   Watch watch = BeginWatch(kAlice);
   EXPECT_TRUE(watch.Ask(OpenWatch("tank")).has_opened()) << watch.EndReason();
-  EXPECT_EQ(mute[0].EndReason(), "TOO_MANY_OPENING");
+  EXPECT_GE(CountEnded(mute, "TOO_MANY_OPENING"), 1);
 }
 
 TEST_F(Callers, StreamsThatTakeNoAnswersLeaveMemoryForOthers) {
@@ -200,7 +210,9 @@ TEST_F(Callers, WhoHearsOfAnEndHasThePlaceAgainAtOnce) {
 TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
   options_.limits.memory_budget = std::uint64_t{160} << 20;
   Serve("alice", "mallory");
-  Stream stream = BeginStream(kAlice);
+  // A connection whose messages are far too large is cut, so the producer has another one.
+  const auto alices = v1::ReconstructionService::NewStub(Connect(*server_, Transport::kTcp));
+  Stream stream = BeginStream(kAlice, alices.get());
   ASSERT_TRUE(stream.Ask(OpenRequest("tank")).has_opened());
   std::vector<Watch> watches;
   for (int i = 0; i < 4; ++i) {
@@ -222,6 +234,17 @@ TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
   for (std::thread& sender : senders) sender.join();
   EXPECT_GE(gave_way, 1);
   EXPECT_TRUE(stream.Ask(BlobRequest(1, 1, 0)).has_frame());
+}
+
+TEST_F(Callers, HearWhenAMessageIsTooLarge) {
+  Serve("alice", "mallory");
+  Stream stream = BeginStream(kAlice), other = BeginStream(kAlice);
+  ASSERT_TRUE(stream.Ask(OpenRequest()).has_opened() && other.Ask(OpenRequest()).has_opened());
+  v1::ReconstructRequest large = BlobRequest(1, 1, 0);
+  large.mutable_frame()->mutable_positions()->resize(60 << 20);
+  EXPECT_EQ(stream.Ask(large).response_case(), v1::ReconstructResponse::RESPONSE_NOT_SET);
+  EXPECT_EQ(stream.rpc->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(other.Ask(BlobRequest(1, 1, 0)).has_frame()) << "its connection is not cut";
 }
 
 TEST_F(Callers, MayDoAndSeeWhatTheirLineSays) {
