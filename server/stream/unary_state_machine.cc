@@ -63,7 +63,7 @@ void UnaryStateMachine::ReadEnded() {
 
 // What the call holds from now on.
 absl::Status UnaryStateMachine::TakeBytes(std::string field, std::uint64_t bytes) {
-  if (kind_ == UnaryKind::kInformation) {
+  if (kind_ != UnaryKind::kFrame) {
     budget_.Take(bytes, caller_.get());
   } else if (const auto fit = budget_.TryTake(bytes, caller_.get()); fit != FairShare::Fit::kYes) {
     return NoRoom(fit, std::move(field), bytes, budget_.bytes());

@@ -22,7 +22,7 @@ namespace partiemc::server {
 /// What a call is for. Frames never keep a call for information out, a probe say: each kind has
 /// places of its own, and information, which is small, takes its memory whether there is room or
 /// not.
-enum class UnaryKind { kFrame, kInformation };
+enum class UnaryKind { kFrame, kInformation, kProbe };
 
 /// Where a call's request comes in and its answer goes out. UnaryStateMachine never calls it with a
 /// lock held.
