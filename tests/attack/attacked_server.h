@@ -50,13 +50,15 @@ class AttackedServer {
 /// out of scope.
 class Proxy {
  public:
-  /// Serves when it returns. A missing program fails the test.
-  explicit Proxy(const std::string& server);
+  /// Serves when it returns. A missing program fails the test. `certificate`: the file NAME.crt,
+  /// beside NAME.key, of a proxy with TLS.
+  explicit Proxy(const std::string& server, const std::string& certificate = "");
   ~Proxy();
   Proxy(const Proxy&) = delete;
   Proxy& operator=(const Proxy&) = delete;
 
   const std::string& address() const { return address_; }
+  pid_t process() const { return process_; }
 
  private:
   std::string address_;

@@ -14,8 +14,9 @@ namespace partiemc::attack {
 struct Flood {
   const char* name;
   const char* what;
-  /// Queues what comes first in a connection; the stream that the flood then uses, or 0.
-  std::uint32_t (*begin)(Http2Client&);
+  /// Queues the first frames of a connection. Its calls have the headers `more`. Returns the stream
+  /// that the flood then uses, or 0.
+  std::uint32_t (*begin)(Http2Client&, const Headers& more);
   /// Queues some tens of kilobytes of the flood.
   void (*queue)(Http2Client&, std::uint32_t stream);
 };
@@ -27,10 +28,15 @@ struct FloodSettings {
   std::string address;
   /// The attacker's own address, so that limits of an address do not meet the honest clients.
   std::string source = "127.0.0.2";
+  std::string token;  ///< Of calls that come first in a connection; empty: none.
+  bool tls = false;
   std::chrono::milliseconds time{4'000};
   double bytes_per_second = 0;  ///< 0: as fast as the server takes them.
   std::uint64_t most_bytes = std::uint64_t{2} << 30;
   std::size_t connections = 1;  ///< Threads, each with a connection of its own.
+  /// Attackers use the processors only while the server, the proxy and honest clients do not. In
+  /// reality they have processors of their own.
+  bool yield_processors = false;
 };
 
 struct FloodOutcome {
@@ -38,6 +44,9 @@ struct FloodOutcome {
   std::uint64_t connections = 0;  ///< Opened, one after the other whenever the server ended one.
   std::uint64_t refused = 0;      ///< Attempts that found no server.
 };
+
+/// From now on the calling thread runs only on processors that are idle (SCHED_IDLE).
+void YieldProcessors();
 
 /// Floods until the time or the bytes are used up. A new connection follows each one that ends.
 FloodOutcome RunFlood(const Flood& flood, const FloodSettings& settings);
