@@ -97,6 +97,10 @@ void Try(const Case& tried, FloodSettings settings, AttackedServer& server, Hone
   honest.Stop();
   EXPECT_TRUE(server.Lives()) << server.Output();
   EXPECT_EQ(server.GaugesNotAtZero(std::chrono::seconds(30)), "");
+  std::printf("  cut: %.0f for bytes, %.0f for streams, %.0f for headers\n",
+              server.Gauge("partiemc_connections_cut_unaccounted_total"),
+              server.Gauge("partiemc_connections_cut_streams_total"),
+              server.Gauge("partiemc_connections_cut_headers_total"));
   EXPECT_EQ(server.Terminate(), 0) << server.Output();
 }
 
