@@ -119,7 +119,7 @@ TEST(Ranks, OthersEndWithinTheirTimeWhenPartZeroIsKilled) {
   WaitForLines(*programs[0], 3);
   programs[0]->Signal(SIGKILL);
   EXPECT_EQ(programs[1]->Wait(), 1);  // After ReconnectPolicy::give_up_after.
-  EXPECT_NE(programs[1]->Error().find("could not go on"), std::string::npos)
+  EXPECT_NE(programs[1]->Error().find("could not continue"), std::string::npos)
       << programs[1]->Error();
 }
 

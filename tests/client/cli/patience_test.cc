@@ -63,7 +63,7 @@ TEST_F(StoppedServer, IsWaitedForWithALineOfProgress) {
 TEST_F(StoppedServer, IsGivenUpWithAnErrorInTheLastLine) {
   const auto replay = ReplayAndStop("1");
   EXPECT_EQ(replay->Wait(), 4);
-  EXPECT_THAT(LastLine(replay->Error()), StartsWith("partiemc: the stream could not go on"));
+  EXPECT_THAT(LastLine(replay->Error()), StartsWith("partiemc: the stream could not continue"));
   EXPECT_THAT(LastLine(replay->Error()), HasSubstr("1 s"));
 }
 

@@ -230,7 +230,7 @@ TEST(Resume, AStreamGoesWhereTheDrainingServerSaysButNotWithATokenInTheClear) {
   ASSERT_TRUE((*stream)->Receive(event).ok());
   ASSERT_EQ(event.kind, Event::Kind::kReconnected);
   // Nowhere else in between.
-  EXPECT_THAT(event.message, HasSubstr("went on at " + second.address()));
+  EXPECT_THAT(event.message, HasSubstr("continued at " + second.address()));
   ASSERT_TRUE((*stream)->Receive(event).ok());
   EXPECT_EQ(event.sequence, 2u);
 }
@@ -251,7 +251,7 @@ TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
   Event event;
   ASSERT_EQ(*(*stream)->Receive(event), Received::kEvent);
   EXPECT_EQ(event.kind, Event::Kind::kReconnected);
-  EXPECT_THAT(event.message, HasSubstr("went on at " + server.address()));
+  EXPECT_THAT(event.message, HasSubstr("continued at " + server.address()));
   ASSERT_EQ(*(*stream)->Receive(event), Received::kEvent);
   EXPECT_EQ(event.sequence, 1u);
 }
@@ -304,7 +304,8 @@ TEST(Resume, GivesUpInTimeWithTheLastError) {
   Event event;
   const auto received = (*stream)->Receive(event);
   EXPECT_EQ(received.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_THAT(std::string(received.status().message()), HasSubstr("could not go on within 0.2 s"));
+  EXPECT_THAT(std::string(received.status().message()),
+              HasSubstr("could not continue within 0.2 s"));
   EXPECT_EQ((*stream)->Send(kFrame, 1).status().code(), absl::StatusCode::kUnavailable);
 }
 

@@ -140,7 +140,7 @@ TEST_F(RetryLoopTest, TellsItsStoryAlsoOnceItHasRecovered) {
   ASSERT_TRUE(loop.Run(attempts, {}).ok());
   loop.Recovered();
   EXPECT_FALSE(loop.lost());
-  EXPECT_THAT(loop.Story(), HasSubstr("lost a (cut), went on at b after 0"));
+  EXPECT_THAT(loop.LossDescription(), HasSubstr("lost a (cut), continued at b after 0"));
 }
 
 TEST_F(RetryLoopTest, TriesTheSameAddressWhereItIsToldTo) {
