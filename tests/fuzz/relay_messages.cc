@@ -164,9 +164,9 @@ void AttackRelayMessages(Bytes bytes) {
       default:
         stream.FetchAgain(now);
     }
-    if (message.has_result()) stream.Came(*message.mutable_result(), now);
-    if (message.has_fetch_end()) stream.Came(message.fetch_end(), now);
-    if (message.has_stream_end()) stream.Came(message.stream_end(), now);
+    if (message.has_result()) stream.OnMessage(*message.mutable_result(), now);
+    if (message.has_fetch_end()) stream.OnMessage(message.fetch_end(), now);
+    if (message.has_stream_end()) stream.OnMessage(message.stream_end(), now);
     if (message.has_announcement()) {
       (void)directory.Announced("one", message.announcement(), now);
     }

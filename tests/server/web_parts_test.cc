@@ -152,21 +152,21 @@ TEST(SignsOfLife, AsksAfterTheIntervalAndGivesUpAfterTheTimeout) {
   const SignsOfLife::TimePoint start{};
   const auto at = [&](int ms) { return start + milliseconds(ms); };
   SignsOfLife signs({milliseconds(100), milliseconds(50)}, milliseconds(1000), start);
-  EXPECT_EQ(signs.Look(at(99), true, false, 0), Next::kWait);
-  EXPECT_EQ(signs.Look(at(100), true, false, 0), Next::kPing);
-  EXPECT_EQ(signs.Look(at(149), true, false, 0), Next::kWait);
-  EXPECT_EQ(signs.Look(at(150), true, false, 0), Next::kGiveUp);
-  signs.Heard(at(140));
-  EXPECT_EQ(signs.Look(at(239), true, false, 0), Next::kWait);
-  EXPECT_EQ(signs.Look(at(240), true, false, 0), Next::kPing);
+  EXPECT_EQ(signs.Check(at(99), true, false, 0), Next::kWait);
+  EXPECT_EQ(signs.Check(at(100), true, false, 0), Next::kPing);
+  EXPECT_EQ(signs.Check(at(149), true, false, 0), Next::kWait);
+  EXPECT_EQ(signs.Check(at(150), true, false, 0), Next::kGiveUp);
+  signs.OnSign(at(140));
+  EXPECT_EQ(signs.Check(at(239), true, false, 0), Next::kWait);
+  EXPECT_EQ(signs.Check(at(240), true, false, 0), Next::kPing);
   // Whoever takes what was sent is there, and whoever is not read from cannot be heard.
-  EXPECT_EQ(signs.Look(at(280), true, false, 500), Next::kWait);
-  EXPECT_EQ(signs.Look(at(400), false, false, 500), Next::kWait);
-  EXPECT_EQ(signs.Look(at(499), true, false, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(280), true, false, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(400), false, false, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(499), true, false, 500), Next::kWait);
   // One that takes a message has more time, but no more than that.
   signs.WriteBegan(at(500));
-  EXPECT_EQ(signs.Look(at(1500), true, true, 500), Next::kWait);
-  EXPECT_EQ(signs.Look(at(1501), true, true, 500), Next::kGiveUp);
+  EXPECT_EQ(signs.Check(at(1500), true, true, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(1501), true, true, 500), Next::kGiveUp);
 }
 
 TEST(GatheredMessage, IsWhatCameAndTakesMemoryAsItComes) {
