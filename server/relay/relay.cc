@@ -292,7 +292,7 @@ void Relay::Lost(const std::string& replica) {
   for (Import& import : imports_) {
     if (import.stream->stream().replica != replica) continue;
     import.stream->Lost(
-        {std::string(kReasonProducerLost), "the server that had the stream is gone", {}},
+        {std::string(kReasonProducerLost), "the server of the stream was lost", {}},
         Clock::now());
   }
 }
