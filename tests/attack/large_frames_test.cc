@@ -247,7 +247,7 @@ TEST_F(LargeFrames, IdleStreamsKeepNobodyFromBeingReadFrom) {
 }
 
 // Part 0 of twelve streams sends nothing, and four others send all that a frame may have.
-TEST_F(LargeFrames, PartsWithoutPart0AreHeldWithinThePlanAndTheQuotaAndNotForLong) {
+TEST_F(LargeFrames, PartsWithoutPart0StayWithinPlanAndQuotaUntilTheTimeout) {
   const support::TemporaryFolder folder;
   Serve({"--token-file", folder.Write("tokens", std::string(kToken) + " large bytes=64MB\n" +
                                                     kOther + " other\n")});

@@ -93,7 +93,7 @@ TEST(Cleaning, AComponentWithoutAParticleIsDroppedWithItsHoles) {
   EXPECT_TRUE(Validate(clean.result).ok()) << Validate(clean.result);
 }
 
-TEST(Cleaning, AnIslandInADroppedHoleGoesWithItAndItsParticlesCountForTheBody) {
+TEST(Cleaning, AnIslandInADroppedHoleIsDroppedAndCountsForTheBody) {
   // A single inside node in the middle of a small hole.
   const auto island = [](int x, int y) {
     return x == 32 && y == 32 ? -1.0 : Holed{32, 32, 1.36}(x, y);

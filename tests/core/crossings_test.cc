@@ -79,7 +79,7 @@ std::array<double, 4> CornersOf(unsigned inside) {
   return corners;
 }
 
-TEST(Crossings, EachOfTheFourteenActiveCasesHasTheSegmentsThatKeepTheInsideOnTheirLeft) {
+TEST(Crossings, SegmentsOfAllFourteenCasesHaveTheInsideOnTheLeft) {
   // Drawn by hand: '#' inside, 'o' outside, lower row second.
   const std::map<unsigned, std::pair<int, int>> expected = {
       {1, {kBottom, kLeft}},    // oo / #o

@@ -210,7 +210,7 @@ std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   return all;
 }
 
-TEST(LevelSetSampler, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAtOnce) {
+TEST(LevelSetSampler, SamplesHaveTheSameBitsForEveryInstructionSetAndBatch) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);

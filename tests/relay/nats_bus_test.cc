@@ -49,7 +49,7 @@ struct Heard {
   }
 };
 
-TEST(NatsBus, MessagesOfASenderKeepTheirOrderAcrossSubjectsAndDoNotComeBack) {
+TEST(NatsBus, KeepsASendersOrderAcrossSubjectsWithoutEchoes) {
   const NatsProcess nats;
   const auto one = Connect(nats.url()), other = Connect(nats.url());
   Heard heard, echoes;

@@ -99,7 +99,7 @@ TEST_F(Chaos, ASlowAndLateNetworkOnlyTakesLonger) {
   ExpectAll(outcome, "delayed by 40 ms, 1 MB/s");
 }
 
-TEST_F(Chaos, AConnectionThatIsSilentlyDeadIsNoticedAndTheStreamTakesOverFromItself) {
+TEST_F(Chaos, DetectsASilentlyDeadConnectionAndTakesOverTheStream) {
   const auto outcome = Stream(Blob(), 20, [&] {
     std::this_thread::sleep_for(milliseconds(300));
     proxy_->HalfOpen();

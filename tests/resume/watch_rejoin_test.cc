@@ -26,7 +26,7 @@ std::vector<std::string> Others(const std::vector<std::string>& addresses) {
   return {addresses.begin() + 1, addresses.end()};
 }
 
-TEST(WatchRejoin, WatchersOfAStreamWhoseServersAreKilledSeeEachFrameOnceOrAreToldOfAGap) {
+TEST(WatchRejoin, KilledServersShowEachFrameOnceOrReportAGap) {
   constexpr std::size_t kServers = 3;
   constexpr double kRate = 40;
   std::printf("seed %llu\n", static_cast<unsigned long long>(GetOptions().seed));
@@ -123,7 +123,7 @@ class WatchTakenOver : public testing::Test {
   std::shared_ptr<grpc::Channel> channel_ = server::Connect(*server_, server::Transport::kTcp);
 };
 
-TEST_F(WatchTakenOver, AStreamThatBeginsAgainAfterAResumeShowsWhatIsNewAndNothingTwice) {
+TEST_F(WatchTakenOver, AStreamRestartedAfterAResumeShowsNoFrameTwice) {
   auto open = server::OpenRequest("tank");
   server::StreamClient first(channel_), second(channel_);
   const auto opened = first.SendAndReceive(open).opened();

@@ -376,7 +376,7 @@ std::optional<std::size_t> KeptWhileTheyTakeTurns(std::size_t streams, std::size
 
 class WorkersOfStreams : public ::testing::TestWithParam<std::size_t> {};
 
-TEST_P(WorkersOfStreams, StayAsTheyAreUsedAndAsManyAsMayBeNeededAtOnceThoughNoFramesMeet) {
+TEST_P(WorkersOfStreams, KeepsAsManyWorkersAsStreamsMayNeedAtOnce) {
   const std::size_t expected = std::max<std::size_t>(GetParam(), 1);
   const TimePoint give_up = WarmSize::Clock::now() + kLongEnough;
   std::optional<std::size_t> kept;

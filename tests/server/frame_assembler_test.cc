@@ -272,7 +272,7 @@ TEST_F(FrameAssemblerTest, MembersOfALeaderThatIsLostAreToldToComeBack) {
   EXPECT_TRUE(absl::IsUnavailable(members_[1]->left[0]));
 }
 
-TEST_F(FrameAssemblerTest, PartsAreGivenUpOnceTheCheckpointThatCoversThemHasSurelyArrived) {
+TEST_F(FrameAssemblerTest, DropsPartsWhenACheckpointThatCoversThemHasArrived) {
   Begin(1, {.has_checkpoints = true});
   EXPECT_EQ(assembler_->resume_sequence(), 1u);
   for (std::uint64_t sequence = 1; sequence <= 4; ++sequence) {

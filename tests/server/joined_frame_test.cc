@@ -80,7 +80,7 @@ v1::ParticleFrame Join(const std::vector<Particle>& particles, std::size_t count
   return frame;
 }
 
-TEST(JoinParts, ParticlesWithIdsMakeTheSameFrameHoweverTheyAreSpreadOverParts) {
+TEST(JoinParts, ParticlesWithIdsMakeTheSameFrameForAnyDistribution) {
   for (const std::uint64_t mask :
        {std::uint64_t{0xffff}, std::uint64_t{0xff00ff0000000000}, ~std::uint64_t{0}}) {
     auto particles = RandomParticles(5000, mask);

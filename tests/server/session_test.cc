@@ -91,7 +91,7 @@ TEST(Session, RefusesParametersThatTheCoreRefuses) {
   EXPECT_EQ(FindViolation(session.status())->field, "parameters.kernel_radius");
 }
 
-TEST(Session, ABadFrameIsRefusedAndTheNextOneIsReconstructedAsIfItHadNeverCome) {
+TEST(Session, ARefusedFrameDoesNotChangeTheNextResult) {
   Stream undisturbed, spoiled;
   std::vector<double> nan = MovingBlob(kSeed, 1);
   nan[7] = std::numeric_limits<double>::quiet_NaN();
@@ -188,7 +188,7 @@ std::vector<double> CornersOfTiles(int side) {
   return positions;
 }
 
-TEST(Session, TilesThatTheBudgetHasNoRoomForAreAnErrorOfTheFrameAndTheStreamGoesOn) {
+TEST(Session, TilesBeyondTheBudgetRefuseTheFrameOnly) {
   MemoryBudget budget(std::uint64_t{20} << 20);
   Worker worker(nullptr, &budget);
   Session session =

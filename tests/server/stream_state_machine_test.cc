@@ -93,7 +93,7 @@ TEST(StreamStateMachine, ReadsNoFurtherAheadThanTheWindowWhenTheClientDoesNotRec
   }
 }
 
-TEST(StreamStateMachine, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeverCome) {
+TEST(StreamStateMachine, SpoiledFramesDoNotChangeTheOtherResults) {
   ComputePool pool(2);
   const auto undisturbed = RunStream(pool, 5, 20);
   MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
@@ -183,7 +183,7 @@ TEST(StreamStateMachine, ParametersThatAreRefusedEndTheStreamWithTheirReason) {
   EXPECT_EQ(FindViolation(transport.status())->reason, kReasonOutOfRange);
 }
 
-TEST(StreamStateMachine, ASecondOpenAndAnEmptyRequestEndTheStreamOnceWhatCameBeforeIsAnswered) {
+TEST(StreamStateMachine, ASecondOpenOrEmptyRequestEndsTheStreamAfterItsAnswers) {
   ComputePool pool(2);
   for (const RequestKind kind : {RequestKind::kOpen, RequestKind::kEmpty}) {
     MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);

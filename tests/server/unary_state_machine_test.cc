@@ -138,7 +138,7 @@ TEST(UnaryStateMachine, ARequestForInformationNeedsNoRoom) {
   EXPECT_EQ(budget.held(), kBudget);
 }
 
-TEST(UnaryStateMachine, OneThatIsNotLetInReadsNothingAndEndsOnceAlthoughItIsCancelled) {
+TEST(UnaryStateMachine, ARefusedCallReadsNothingAndEndsOnceDespiteACancel) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr, DrainingError());
   EXPECT_FALSE(call.reading);

@@ -227,7 +227,7 @@ TEST_P(WatchBack, OthersGetAllWhileOneReadsSlowly) {
   EXPECT_LE(room_.held(), 10 * kCost);
 }
 
-TEST_P(WatchBack, WatchersComeAndGoBackAndDawdleAndMissNothingThatTheyAreNotToldOf) {
+TEST_P(WatchBack, RandomWatchersMissNoFrameThatIsNotReported) {
   constexpr std::uint64_t kFrames = 20'000;
   std::atomic<std::uint64_t> published = 0, went_back = 0;
   std::atomic<bool> over = false;

@@ -262,7 +262,7 @@ TEST_F(WatchTest, ASilentOneGivesWayAndOneThatHasOpenedDoesNot) {
   EXPECT_TRUE(open.status.has_value());
 }
 
-TEST_F(WatchTest, WhereMemoryIsShortAnOpenOneEndsWithoutItsFramesAndOneThatIsWrittenToIsCut) {
+TEST_F(WatchTest, WithoutMemoryEndsOpenWatchesAndCutsThoseBeingWritten) {
   StepTransport idle({broadcaster_, WatchMode::kEvery, 1}),
       writing({broadcaster_, WatchMode::kEvery, 1}), silent({broadcaster_, WatchMode::kLatest, 1});
   std::vector<std::shared_ptr<WatchStateMachine>> machines;

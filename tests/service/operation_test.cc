@@ -188,7 +188,7 @@ TEST_F(Operation, ReflectionListsTheService) {
   queue.Shutdown();
 }
 
-TEST_F(Operation, DrainingDeliversFinishedFramesTellsEveryStreamAndRefusesNewOnes) {
+TEST_F(Operation, DrainingDeliversFramesNotifiesStreamsAndRefusesNewOnes) {
   constexpr int kStreams = 6;
   const auto expected = LocalDigests(2, 400);
   std::vector<std::thread> clients;

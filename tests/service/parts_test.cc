@@ -31,7 +31,7 @@ class Parts : public ::testing::Test {
   const std::vector<Digests> expected_ = LocalDigests(1, 12);
 };
 
-TEST_F(Parts, DigestsAreThoseOfWholeFramesForAnyNumberOfPartsInAnyOrderOfComing) {
+TEST_F(Parts, DigestsEqualWholeFramesForAnyPartsInAnyOrder) {
   std::mt19937 random(11);
   for (const bool ids : {true, false}) {
     for (const std::uint32_t parts : {1u, 4u, 16u, 64u}) {
@@ -84,7 +84,7 @@ TEST_F(Parts, ALostPartIsOneErrorAndTheStreamGoesOn) {
   EXPECT_EQ(answer.frame().statistics().particles(), MovingBlob(1, 1).size() / 2);
 }
 
-TEST_F(Parts, ADoubledPartALateOneAndOneOfAnotherFrameAreRefusedAndTheStreamGoesOn) {
+TEST_F(Parts, RefusesDoubledLateAndForeignPartsAndContinues) {
   Ranks ranks(*server_, "tank", 2, 1000);
   ranks.Send(1, 1);
   ranks.Send(1, 1);
@@ -130,7 +130,7 @@ TEST_F(Parts, ARankThatDiesCostsOneErrorAFrameUntilItComesBack) {
   EXPECT_TRUE(ranks[0].Receive().has_frame());
 }
 
-TEST_F(Parts, ARankThatComesBackInTimeSendsItsPartsAgainAndNothingIsMissing) {
+TEST_F(Parts, AReconnectedRankResendsItsParts) {
   Ranks ranks(*server_, "tank", 3);
   ranks.Send(2, 1);
   ranks.Send(2, 2);
@@ -155,7 +155,7 @@ TEST_F(Parts, ARankTakesItsPartOverFromACallThatNobodyKnowsToBeDead) {
   EXPECT_EQ(answer.frame().rings_digest(), expected_[0].rings);
 }
 
-TEST_F(Parts, WhenPartZeroDiesTheOthersComeBackAndGoOnWithTheStreamThatItResumes) {
+TEST_F(Parts, WhenPartZeroDiesTheOthersRejoinTheStreamItResumes) {
   Ranks ranks(*server_, "tank", 3, 0, 2);
   v1::ResumeStream resume;
   resume.set_stream_token(ranks.opened().stream_token());

@@ -251,7 +251,7 @@ TEST_P(ResumeProtocol, ServersWithOneKeyTakeEachOthersCheckpointsAndNoOthers) {
       << "the beginning of a stream has no signature";
 }
 
-TEST_P(ResumeProtocol, AKeyFileThatIsBrokenIsAnErrorAtTheStartAndKeepsTheOldKeysLater) {
+TEST_P(ResumeProtocol, ABrokenKeyFileFailsTheStartAndLaterKeepsTheOldKeys) {
   const support::TemporaryFolder folder;
   const auto write = [&](const std::string& keys) {  // Whole or not at all.
     std::filesystem::rename(folder.Write("next", keys), folder.Path("keys"));
@@ -284,7 +284,7 @@ TEST_P(ResumeProtocol, AKeyFileThatIsBrokenIsAnErrorAtTheStartAndKeepsTheOldKeys
   EXPECT_EQ(log.Count("secret"), 0u) << log.Text();
 }
 
-TEST_P(ResumeProtocol, ACheckpointThatWouldBeTooLargeIsNotSentAndOneThatIsIsRefusedUnread) {
+TEST_P(ResumeProtocol, TooLargeACheckpointIsNeitherSentNorRead) {
   ServerOptions options = TestOptions();
   options.limits.max_frame_bytes = 10'000;
   server_ = StartServer(options);

@@ -119,7 +119,7 @@ TEST_P(Streams, AttributesComeAsTheCoreMakesThem) {
   }
 }
 
-TEST_P(Streams, RelativeCoordinatesThatWouldBeTooCoarseRefuseTheFrameAndLeaveTheStateAlone) {
+TEST_P(Streams, TooCoarseRelativeCoordinatesRefuseTheFrame) {
   StreamClient client(channel_);
   auto open = OpenRequest();
   open.mutable_open()->mutable_outputs()->set_rings(true);
@@ -188,7 +188,7 @@ void ExpectError(StreamClient& client, const v1::ReconstructRequest& request,
   EXPECT_FALSE(answer.error().rule().empty());
 }
 
-TEST_P(Streams, EveryFifthFrameSpoiledIsAnsweredByItsErrorAndTheOthersAsIfItHadNeverCome) {
+TEST_P(Streams, SpoiledFramesDoNotChangeTheOtherResults) {
   StreamClient client(channel_);
   ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
   const auto expected = LocalDigests(4, 30);

@@ -59,7 +59,7 @@ TEST_F(Security, AClientNeedsACertificateOfTheAuthorityWhereOneIsAskedFor) {
             grpc::StatusCode::UNAVAILABLE);
 }
 
-TEST_F(Security, TheHealthCheckOfTheProgramPassesOverTlsAndShowsACertificateWhereAskedTo) {
+TEST_F(Security, TheHealthCheckWorksOverTlsWithAClientCertificate) {
   WriteIdentity(authority_.Issue("server"));
   Write("clients.pem", authority_.certificate());
   server_ = StartServer(Options(true, true, false));

@@ -151,7 +151,7 @@ TEST_P(WatchHistory, OneFromBeyondTheNewestGetsWhatIsLiveAlone) {
   EXPECT_EQ(Sequences(Frames(*far, 1)), From(7, 7));
 }
 
-TEST_P(WatchHistory, TheOldestAreDroppedAndWhoAsksForThemHearsOfItAndBeginsWithTheOldestLeft) {
+TEST_P(WatchHistory, DropsTheOldestAndReportsThemToAWatcherThatAsks) {
   Serve(100'000);
   ProduceUntil(100);
   const auto watcher = Watch(kMany, 3);

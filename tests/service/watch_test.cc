@@ -69,7 +69,7 @@ std::string WithoutTimes(v1::ReconstructedFrame frame) {
   return frame.SerializeAsString();
 }
 
-TEST_P(Watch, EveryGetsEachResultBitForBitAsItsProducerDoesAndThenHearsTheEnd) {
+TEST_P(Watch, EveryReceivesTheProducersBytesThenTheEnd) {
   OpenProducer();
   WatchClient watcher(channel_);
   watcher.Open("tank", v1::WATCH_MODE_EVERY, 3);
@@ -143,7 +143,7 @@ TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
   EXPECT_TRUE(watcher.Finish().ok());
 }
 
-TEST_P(Watch, TheLastFrameIsStillShownWhenItsCreditComesAfterTheEndOfTheStream) {
+TEST_P(Watch, ShowsTheLastFrameIfItsCreditComesAfterTheEnd) {
   OpenProducer();
   WatchClient watcher(channel_);
   watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
@@ -162,7 +162,7 @@ TEST_P(Watch, TheLastFrameIsStillShownWhenItsCreditComesAfterTheEndOfTheStream) 
   EXPECT_TRUE(watcher.Finish().ok());
 }
 
-TEST_P(Watch, ParticlesAreEchoedToWatchersAsTheyWereSentAndNotToTheProducer) {
+TEST_P(Watch, EchoesParticlesToWatchersButNotToTheProducer) {
   OpenProducer(/*echo_particles=*/true);
   WatchClient watcher(channel_);
   watcher.Open("tank", v1::WATCH_MODE_EVERY, 9);
@@ -288,7 +288,7 @@ TEST_P(Watch, ACallThatNeverOpensGivesUpItsPlace) {
   ExpectRefused(next, grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM", "tonk");
 }
 
-TEST_P(Watch, OneWatcherTooManyIsRefusedAtOnceAndThePlaceIsFreeWhenOneLeaves) {
+TEST_P(Watch, RefusesOneWatcherTooManyUntilASlotIsFree) {
   OpenProducer();
   std::vector<std::unique_ptr<WatchClient>> watchers;
   for (int k = 0; k < 4; ++k) {

@@ -88,7 +88,7 @@ absl::Status OfferFrame(LatestSender& sender, int k) {
   return sender.Offer({.positions = std::span<const float>(positions), .volumes = volumes}, k);
 }
 
-TEST(LatestSender, SendsTheNewestOfThoseThatCameMeanwhileAndTellsOfTheOthersInOrder) {
+TEST(LatestSender, SendsTheNewestFrameAndReportsSkippedOnesInOrder) {
   GatedStream stream;
   std::string told;
   const auto tell = [&](char what) {

@@ -197,7 +197,7 @@ TEST(Resume, ADrainingServerIsLeftWithoutAWordToTheCaller) {
   EXPECT_THAT(Exchange(**stream, 4), ElementsAre(1, 2, 3, 4));
 }
 
-TEST(Resume, AStreamGoesWhereTheDrainingServerSaysButNotWithATokenInTheClear) {
+TEST(Resume, GoesWhereTheDrainingServerSaysWithoutATokenInClearText) {
   FakeServer second([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
     EXPECT_EQ(context.client_metadata().count("authorization"), 1u);
     AcceptResumable(rpc, 1);
@@ -444,7 +444,7 @@ TEST(Resume, AnotherAddressServesWhereTheFirstHasNobody) {
   EXPECT_TRUE(stream.ok()) << stream.status();
 }
 
-TEST(Backoff, TriesEachAddressAtOnceThenPausesLongerAndLongerButNeverTooLong) {
+TEST(Backoff, TriesEachAddressAtOnceThenDoublesThePauseToALimit) {
   const ReconnectPolicy policy{.first_pause = milliseconds(100),
                                .longest_pause = milliseconds(1000)};
   Backoff backoff(policy, 3, 42);

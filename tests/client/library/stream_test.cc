@@ -142,7 +142,7 @@ TEST(Stream, ARefusedFrameIsAnEventAndTheStreamGoesOn) {
               ElementsAre(Event::Kind::kResult, Event::Kind::kRefusal, Event::Kind::kResult));
 }
 
-TEST(Stream, AFrameOverTheServersLimitIsRefusedBeforeItIsSentAndUsesUpNoNumber) {
+TEST(Stream, RefusesAFrameAboveTheServersLimitBeforeSending) {
   FakeServer server([](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     Accept(rpc, 2, /*max_frame_bytes=*/100);
     v1::ParticleFrame frame;

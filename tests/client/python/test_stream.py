@@ -258,7 +258,7 @@ class Streams(unittest.TestCase):
         _, error = waiting.communicate(timeout=60)
         self.assertIn("KeyboardInterrupt", error)
 
-    def test_the_script_of_the_readme_draws_and_gives_the_digests_of_replay(self):
+    def test_readme_script_draws_and_gives_the_digests_of_replay(self):
         script = readme()
         self.assertLessEqual(len(script.split("\n\n")[1].splitlines()), 10)
         frames = [block(0.3 * k) for k in range(6)]
