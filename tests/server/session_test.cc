@@ -1,4 +1,4 @@
-// A session: which frame may come next, and what a refused frame leaves behind.
+// A session: which frame may come next, and that a refused frame changes nothing.
 #include "server/stream/session.h"
 
 #include <absl/base/config.h>
@@ -23,8 +23,7 @@ namespace {
 
 constexpr unsigned kSeed = 20;
 
-// Sessions know no threads, so their tests need none; stream_state_machine_test has those of the
-// pool.
+// Sessions are single-threaded; stream_state_machine_test tests them in a pool.
 const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_allowed_parallelism,
                                              1);
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
@@ -37,7 +36,7 @@ Frame FrameOf(const std::vector<double>& positions) {
   return frame;
 }
 
-// A session with what a test asks of it.
+// A session with helpers.
 class Stream {
  public:
   Stream() : session_(*Session::Open(BlobParameters(), kLimits)) {}
@@ -52,7 +51,7 @@ class Stream {
   absl::Status Answer(std::uint64_t sequence, const std::vector<double>& positions) {
     return Answer(sequence, FrameOf(positions));
   }
-  // Reconstructs frame `index` of the sequence under the number that comes next.
+  // Reconstructs frame `index` of the sequence under the next number.
   Digests Good(std::uint64_t index) {
     const auto status = Answer(session_.next_sequence(), MovingBlob(kSeed, index));
     EXPECT_TRUE(status.ok()) << status;
@@ -178,7 +177,7 @@ TEST(Session, MemoryThatRunsOutIsAnErrorOfTheFrameAndTheStreamGoesOn) {
   EXPECT_EQ(stream.Good(1), undisturbed.Good(1));
 }
 
-// Particles in four tiles each, of which none is shared.
+// Particles at corners of tiles, each in four tiles that no other particle uses.
 std::vector<double> CornersOfTiles(int side) {
   std::vector<double> positions;
   for (int k = 0; k < side * side; ++k) {
@@ -246,7 +245,7 @@ TEST(Session, TheWorkerThatComputesMakesNoDifference) {
     const Digests expected = one.Good(i);
     const std::vector<double> positions = MovingBlob(kSeed, i);
     Digests digests;
-    // Each worker has seen other frames than the other.
+    // The workers have computed different frames.
     const auto status =
         two.Answer(i + 1, FrameOf(positions), workers[i % 2], [&](const Result& result, auto&) {
           digests = {DigestRings(result.rings), DigestMesh(result.mesh)};
@@ -257,10 +256,10 @@ TEST(Session, TheWorkerThatComputesMakesNoDifference) {
   }
 }
 
-// Sanitizers have a malloc of their own, of which mallinfo2 knows nothing.
+// Sanitizers replace malloc, so mallinfo2 reports nothing.
 #if !defined(ABSL_HAVE_ADDRESS_SANITIZER) && !defined(ABSL_HAVE_THREAD_SANITIZER)
 
-// Bytes that malloc has given out.
+// Bytes allocated by malloc.
 std::size_t HeldBytes() {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
@@ -270,7 +269,7 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
   constexpr std::size_t kSessions = 20, kMaxBytesEach = 100 << 10;
   constexpr FrameLimits kLarge{.max_particles = 5000, .max_tiles = 5000};
   std::vector<double> spray, pair = {0, 0, kBlobSpacing, 0};
-  for (int k = 0; k < 4000; ++k) {  // Each with an outline of its own.
+  for (int k = 0; k < 4000; ++k) {  // Each with its own outline.
     spray.push_back(k % 64 * 10 * kBlobSpacing);
     spray.push_back(k / 64 * 10 * kBlobSpacing);
   }
@@ -283,7 +282,7 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
   Session large = *Session::Open(BlobParameters(), kLarge);
   std::size_t before = 0;
   for (std::size_t k = 0; k <= kSessions; ++k) {
-    if (k == 1) before = HeldBytes();  // All is warm.
+    if (k == 1) before = HeldBytes();  // Warm from now on.
     ASSERT_TRUE(large.Answer(k + 1, FrameOf(spray), worker, ignore).ok());
     ASSERT_TRUE(small[k].Answer(1, FrameOf(pair), worker, ignore).ok());
   }

@@ -1,5 +1,5 @@
-// Frames that come in parts over gRPC: the same digests for any number of parts in any order, and
-// ranks that lose, double, delay, mistake and die.
+// Frames in parts over gRPC: the same digests for any number of parts in any order, and ranks that
+// lose, repeat, delay or confuse parts, or die.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ TEST_F(Parts, DigestsEqualWholeFramesForAnyPartsInAnyOrder) {
     for (const std::uint32_t parts : {1u, 4u, 16u, 64u}) {
       SCOPED_TRACE(testing::Message() << parts << " parts, ids " << ids);
       Ranks ranks(*server_, "tank", parts);
-      // Each rank sends its parts in order; ranks take turns at random, up to the window ahead.
+      // Each rank sends its parts in order; ranks take turns at random, up to a window ahead.
       std::vector<std::uint32_t> turns;
       for (std::uint32_t part = 0; part < parts; ++part) turns.insert(turns.end(), 4, part);
       std::ranges::shuffle(turns, random);
@@ -166,7 +166,7 @@ TEST_F(Parts, WhenPartZeroDiesTheOthersRejoinTheStreamItResumes) {
     if (!answer.checkpoint().empty()) resume.set_checkpoint(answer.checkpoint());
     for (const std::uint32_t part : {1u, 2u}) {
       const auto taken = ranks[part].Receive();
-      // Of the window of 4: what was sent with frame 6 tells that the answer to frame 2 was there.
+      // With a window of 4, sending frame 6 implies that the answer to frame 2 was received.
       EXPECT_EQ(taken.part().resume_sequence(), sequence < 6 ? 1u : 3u);
     }
   }
