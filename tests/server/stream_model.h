@@ -28,8 +28,7 @@ class StreamModel {
   StreamModel(std::size_t window, bool may_open, const std::vector<Digests>& results);
 
   // Events in the order in which they take effect.
-  // `fault`: the reason for which the frame would be refused with any number; empty: none.
-  /// `fault`: the reason for which the frame would be refused whatever its number; empty: none.
+  /// `fault`: the reason for which the frame would be refused with any number; empty: none.
   void RequestCame(const MemoryRequest& request, const std::string& fault);
   void OpeningDone();
   void ReadsEnded();

@@ -26,7 +26,7 @@ using ::testing::Not;
 
 constexpr char kToken[] = "alice-secret-0123456789";
 constexpr std::chrono::milliseconds kDeadline{60'000};
-// For connections that do not come about.
+// For connections that fail.
 constexpr std::chrono::milliseconds kShortDeadline{500};
 
 class ClientCredentials : public ::testing::Test {
@@ -164,7 +164,7 @@ TEST_F(ClientCredentials, ATokenLeavesThisMachineOverTlsOnly) {
   }
 }
 
-// Variables of the environment, gone at the end.
+// Sets environment variables during a test.
 class Environment {
  public:
   void Set(const char* name, const std::string& value) {
