@@ -1,4 +1,4 @@
-"""Recordings mapped over the workers of a cluster of Dask."""
+"""Recordings mapped over the workers of a Dask cluster."""
 
 import pathlib
 import sys
@@ -30,7 +30,7 @@ def read(path):
 
 
 def worst_bend(result):
-    """Not all of a result's numbers are scalars."""
+    """Some of a result's numbers are arrays."""
     return result.rings.area.copy()
 
 

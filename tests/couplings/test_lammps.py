@@ -1,4 +1,4 @@
-"""LAMMPS, from Python and as a library of a C++ program, live through a server that is killed."""
+"""LAMMPS, from Python and as a library of a C++ program, streams while the server is killed."""
 
 import os
 import pathlib
@@ -42,7 +42,7 @@ def expected():
 
 
 def digests_of_dump(path):
-    """Of the frames that LAMMPS has written, each sorted by id."""
+    """Digests of the frames that LAMMPS has written, each sorted by id."""
     frames = re.split("ITEM: ATOMS id x y *\n", pathlib.Path(path).read_text())[1:]
     sequence = partiemc.Reconstructor(spacing=1.0)
     found = []
