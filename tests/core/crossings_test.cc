@@ -115,7 +115,7 @@ TEST(Crossings, BothSaddlesAreJoinedOrPartedByTheSignOfTheirStationaryValue) {
       {{-1, 3, -1, 3}, {{kBottom, kLeft}, {kTop, kRight}}},
       {{1, -3, 1, -3}, {{kRight, kTop}, {kLeft, kBottom}}},
       {{3, -1, 3, -1}, {{kRight, kBottom}, {kLeft, kTop}}},
-      // Stationary value of exactly 0: outside, hence parted.
+      // A stationary value of exactly 0 counts as outside, so the corners are separated.
       {{-1, 1, -1, 1}, {{kBottom, kLeft}, {kTop, kRight}}},
       {{1, -1, 1, -1}, {{kRight, kBottom}, {kLeft, kTop}}},
       // Lopsided: -2 * -1 against 1 * 1.9 and 1 * 2.1.
