@@ -44,13 +44,13 @@ class Cluster(unittest.TestCase):
         cls.paths = [str(pathlib.Path(folder.name, f"{k}.npz")) for k in range(20)]
         for seed, path in enumerate(cls.paths):
             recording(path, seed)
-        # Workers are processes of their own, as they are on other machines.
+        # Workers are separate processes, as on other machines.
         cls.cluster = dask.distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=folder.name)
         cls.addClassCleanup(cls.cluster.close)
         cls.client = dask.distributed.Client(cls.cluster)
         cls.addClassCleanup(cls.client.close)
-        # They know this file only by what is sent to them.
+        # They get the functions of this file as sent objects only.
         import cloudpickle
         cloudpickle.register_pickle_by_value(sys.modules[__name__])
 

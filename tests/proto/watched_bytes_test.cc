@@ -1,4 +1,4 @@
-// What watchers receive from a producer's response: its frame, byte for byte, and nothing else.
+// Watchers receive the frame of a producer's response, byte for byte, and nothing else.
 #include "wire/watched_bytes.h"
 
 #include <google/protobuf/unknown_field_set.h>

@@ -72,8 +72,8 @@ struct FrameParts {
   /// Secret shared by all parts, at most 128 bytes of printable ASCII. Empty: any caller that may
   /// produce a stream of this name may send its parts.
   std::string token = {};
-  /// A frame is refused (PARTS_MISSING) if a part is missing this long after part 0 arrived. Below
-  /// `deadline`, at most ten minutes; the value of part 0 applies.
+  /// A frame is refused (PARTS_MISSING) if a part is missing this long after its first part
+  /// arrived. Below `deadline`, at most ten minutes; the value of part 0 applies.
   std::chrono::milliseconds timeout{10000};
 };
 
