@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from .comparisons import compare_rows
+from .comparisons import compare_rows, match
 from .geometry import Outline
 from .paper import FINDINGS, SHARES, SUBJECTS, Claim, PaperRuns, Shot, thinned_values
 from .study import BASELINE, DEFAULT, PAPER, Study
@@ -104,21 +104,24 @@ def shots_figure(shots: Seq[Shot], columns: int) -> Figure:
 
 
 def ratio_figure(study: Study, given: str, recordings: bool) -> Figure:
-    """Geometric means of ratios to marching squares with their intervals, a group for each metric."""
-    metrics, baseline = judged_metrics(recordings), study.of(BASELINE, given, recordings)
+    """Geometric means of ratios to marching squares with their intervals, a group for each metric that is there."""
+    baseline = study.of(BASELINE, given, recordings)
+    metrics = [metric for metric in judged_metrics(recordings) if len(match(baseline, baseline, metric))]
     methods = [m.name for m in study.methods[1:] if not m.is_step and study.of(m.name, given, recordings)]
     figure, axis = plt.subplots(figsize=(9, 0.9 + 0.55 * len(metrics)))
     for k, method in enumerate(methods):
         rows = study.of(method, given, recordings)
-        values = np.array([compare_rows(rows, baseline, metric).ratio for metric in metrics], float)
+        values = np.array([compare_rows(rows, baseline, metric).ratio for metric in metrics], float).reshape(-1, 3)
         axis.errorbar(values[:, 0], np.arange(len(metrics)) + 0.7 * (k + 0.5) / len(methods) - 0.35,
                       xerr=np.abs(values[:, 1:] - values[:, :1]).T, fmt="o", markersize=4, linewidth=1.2,
                       color=_COLORS.get(method), label=method)
     axis.axvline(1, color="#8a8f98", linewidth=0.8)
     axis.set(yticks=range(len(metrics)), yticklabels=[m.replace("_", " ") for m in metrics], xscale="log",
-             xlabel="ratio to marching squares, 95 % interval; below 1 is better")
-    axis.invert_yaxis()
-    axis.legend(fontsize=7)
+             ylim=(len(metrics) - 0.5, -0.5), xlabel="ratio to marching squares, 95 % interval; below 1 is better",
+             title=f"{'Recordings' if recordings else 'Synthetic sequences'}, {given} given")
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(lambda x, _: f"{x:.1g}" if f"{x:.1g}"[-1] in "25" else "")
+    axis.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
     return figure
 
 
@@ -194,8 +197,8 @@ def as_html(evaluation: Evaluation) -> str:
     """One page that needs nothing else, no script either."""
     study, sections = evaluation.study, []
     if evaluation.claims:
-        count = ", ".join(f"{sum(c.finding == f for c in evaluation.claims)} {f}" for f in FINDINGS)
-        sections.append(_section("What of the paper reproduces", f"{count}.", _claim_list(evaluation.claims)))
+        count = ", ".join(f"{f}: {sum(c.finding == f for c in evaluation.claims)}" for f in FINDINGS)
+        sections.append(_section("The paper's claims", f"{count}.", _claim_list(evaluation.claims)))
     pictures = "".join(_picture(ratio_figure(study, given, recordings), f"Ratios to marching squares, {given} given")
                        for recordings in (False, True) for given in study.given if study.of(BASELINE, given, recordings))
     shown = [method.name for method in study.methods[1:] if not method.is_step]

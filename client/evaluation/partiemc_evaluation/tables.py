@@ -109,7 +109,7 @@ def part_table(study: Study, given: str, recordings: bool, method: str, what: st
     if losses:
         parts = [part for part in parts
                  if any(ratio.value > LOSS_RATIO for m, ratio in part.ratios.items() if m != "bias")]
-    for part in parts + compare_parts(rows, baseline, metrics, worst, lambda row: "all"):
+    for part in parts and parts + compare_parts(rows, baseline, metrics, worst, lambda row: "all"):
         table.rows.append((part.name, [*map(_ratio, part.ratios.values()), str(part.sequences)]))
         if part.sequences > 1:
             table.rows.append(("  95 % interval", [*map(_interval, part.ratios.values()), ""]))
