@@ -33,8 +33,8 @@ constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Names each part, so that a new one does not compile until it is bound, too.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
-               surface_offset, normal_memory, clean, min_component_area, min_component_particles,
-               plane, slice, isovalue, sections] = parameters;
+               surface_offset, attribute_tolerance, normal_memory, clean, min_component_area,
+               min_component_particles, plane, slice, isovalue, sections] = parameters;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
   const auto put_optional = [&](std::optional<double> value) {
@@ -66,7 +66,10 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     for (const double value : plane_of.normal) PutNumber(value, bytes);
   };
   if (slice) put_slice(*slice);
-  // Nothing where there are none: checkpoints of before there were any stay good.
+  // Nothing for defaults: checkpoints of servers without these parameters stay valid.
+  if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
+    PutNumber(attribute_tolerance, bytes);
+  }
   if (isovalue) PutNumber(*isovalue, bytes);
   for (const Section& section : sections) {
     put_small(section.slice.has_value());

@@ -48,6 +48,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         bodies and 0.5 on flat boundaries, instead of the body's outline.
     sections: a list of at most 16 dicts of slice, isovalue or both: more outlines of the particles
         (Result.sections), with all other parameters: [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
+    attribute_tolerance: how far values across triangles of fill "greedy" may be off, as a fraction
+        of an attribute's range, in [0, 1]: 0.01 unless given; 1 gives the fewest triangles.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 
