@@ -4,10 +4,9 @@
 
 namespace partiemc::server {
 
-ByteCall::ByteCall(CallChannel& channel, const MethodMeters* meters,
-                   absl::StatusOr<AdmittedCall> admission)
-    : channel_(channel), meters_(meters), admission_(admission.status()) {
-  if (admission.ok()) call_ = *std::move(admission);
+ByteCall::ByteCall(ArrivedCall call)
+    : channel_(call.channel), meters_(call.meters), admission_(call.admission.status()) {
+  if (call.admission.ok()) call_ = *std::move(call.admission);
   if (meters_ != nullptr) meters_->Started();
 }
 

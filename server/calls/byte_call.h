@@ -1,6 +1,6 @@
-// The server's end of a call, whatever carries its messages. Every method is served as a stream of
-// bytes, those of one request and one answer too: the caller is known before anything of a request
-// is read, and nothing is parsed before its size is known and counted.
+// The server's end of a call, over any channel. Every method is served as a stream of bytes, unary
+// ones included: the server knows the caller before it reads a request, and the size of a message
+// before it parses it.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -20,26 +20,31 @@
 
 namespace partiemc::server {
 
+/// Channel and meters outlive the call.
+struct ArrivedCall {
+  CallChannel& channel;
+  const MethodMeters* meters = nullptr;  ///< Null: the call is not counted.
+  absl::StatusOr<AdmittedCall> admission;
+};
+
 /// Translates between a CallChannel and a state machine (StreamStateMachine, WatchStateMachine,
-/// UnaryStateMachine), which keeps the channel's rules, whatever the client does. No function of it
-/// blocks.
+/// UnaryStateMachine), which keeps the channel's rules. Never blocks.
 class ByteCall {
  public:
-  /// The channel and the meters live longer. `admission`: the caller and its place, or why it is
-  /// not let in. Without meters the call is not counted.
-  ByteCall(CallChannel& channel, const MethodMeters* meters,
-           absl::StatusOr<AdmittedCall> admission);
+  explicit ByteCall(ArrivedCall call);
   virtual ~ByteCall() = default;
   ByteCall(const ByteCall&) = delete;
   ByteCall& operator=(const ByteCall&) = delete;
 
-  /// Of the channel: the read has brought a message, or none will come any more.
+  // Called by the channel:
+
+  /// The read has returned a message, or none will come.
   void OnReadDone(bool ok);
-  /// Of the channel: the write is over, and what it wrote may be freed.
+  /// The write has ended, and its message may be freed.
   void OnWriteDone(bool ok);
-  /// Of the channel: nobody is there any more. At any time until OnDone.
+  /// The client has disconnected. At any time until OnDone.
   virtual void OnCancel() = 0;
-  /// Of the channel: it calls nothing else after this, and the call may be deleted.
+  /// The last call; this may be deleted.
   virtual void OnDone() = 0;
 
  protected:
@@ -48,22 +53,21 @@ class ByteCall {
 
   CallChannel& channel() { return channel_; }
   const CallChannel& channel() const { return channel_; }
-  /// Ends the call; the only place that does. A second end is a bug of a state machine: it is
-  /// logged and changes nothing.
+  /// Ends the call. A second end is a bug of a state machine: it is logged and has no effect.
   void End(const absl::Status& status);
 
-  /// Whether the caller was let in.
+  /// Whether the caller was admitted.
   const absl::Status& admission() const { return admission_; }
-  /// Of one who was not let in: nobody in particular.
+  /// Anonymous if the caller was not admitted.
   const Caller& caller() const { return call_.caller; }
 
-  /// From here until RequestCame the call gives way to others if need be: `machine->GiveWay` ends
-  /// it. To be called before the machine begins.
+  /// Until RequestCame the server may evict the call by `machine->GiveWay`. Called before the
+  /// machine starts.
   template <typename Machine>
   void MayGiveWay(OpeningCalls& opening, const std::shared_ptr<Machine>& machine) {
     opening_ = opening.Enter(*caller().account(), Ending<Machine>(machine, &Machine::GiveWay));
   }
-  /// The same of a watcher that is about to read another request: `machine->GiveUp` ends it.
+  /// Until RequestCame the server may evict this watcher by `machine->GiveUp`.
   template <typename Machine>
   void MayGiveUp(OpeningCalls& opening, const std::shared_ptr<Machine>& machine) {
     opening_ =

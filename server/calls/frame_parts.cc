@@ -42,7 +42,7 @@ std::chrono::milliseconds TimeoutOf(const v1::OpenStream& open) {
   return std::chrono::milliseconds(asked == 0 ? kDefaultTimeoutMs : asked);
 }
 
-// Often enough that a frame waits for its parts for hardly longer than the timeout.
+// Short against the timeout.
 std::chrono::milliseconds LookEveryOf(std::chrono::milliseconds timeout) {
   return std::clamp(timeout / 20, std::chrono::milliseconds(5), std::chrono::milliseconds(500));
 }
@@ -100,7 +100,7 @@ PartZero::PartZero(const v1::OpenStream& open, const ServerLimits& limits,
                                 .next_sequence = next_sequence})),
       slots_(limits.frames_in_flight) {}
 
-void PartZero::Came(std::size_t slot, grpc::ByteBuffer& request) {
+void PartZero::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   slots_[slot] = {.sequence = wire::SequenceOf(request), .came = FrameAssembler::Clock::now()};
   if (slots_[slot].sequence) assembler_->LeaderSent(*slots_[slot].sequence);
 }
@@ -113,9 +113,25 @@ bool PartZero::MayAnswer(std::size_t slot) const {
 
 std::chrono::milliseconds PartZero::LookEvery() const { return LookEveryOf(timeout_); }
 
-absl::Status PartZero::Join(std::size_t slot, std::span<const std::string> attributes,
+std::uint64_t PartZero::ComputedBytes(std::uint64_t bytes) const {
+  return bytes + assembler_->BytesOfNext();
+}
+
+void PartZero::OnAnswered(std::uint64_t next_sequence, bool with_checkpoint) {
+  assembler_->Answered(next_sequence, with_checkpoint);
+}
+
+absl::Status PartZero::Complete(std::size_t slot, const wire::Outputs& outputs,
+                                v1::ReconstructRequest& request, grpc::ByteBuffer& bytes) {
+  if (slots_[slot].sequence == assembler_->next_wanted()) {
+    if (auto status = Join(outputs.attributes, request); !status.ok()) return status;
+  }
+  if (outputs.echo_particles) bytes = wire::ToBytes(request);
+  return absl::OkStatus();
+}
+
+absl::Status PartZero::Join(std::span<const std::string> attributes,
                             v1::ReconstructRequest& request) {
-  if (slots_[slot].sequence != assembler_->next_wanted()) return absl::OkStatus();
   const auto taken = assembler_->Take();
   if (!taken.ok()) return taken.status();
   try {
@@ -136,7 +152,7 @@ absl::Status PartZero::Join(std::size_t slot, std::span<const std::string> attri
 OtherPart::OtherPart(JoinedPart joined, std::size_t window)
     : joined_(std::move(joined)), slots_(window) {}
 
-void OtherPart::Came(std::size_t slot, grpc::ByteBuffer& request) {
+void OtherPart::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   const auto sequence = wire::SequenceOf(request);
   slots_[slot] = {.sequence = sequence.value_or(0), .refusal = absl::OkStatus()};
   if (!sequence) {
@@ -146,7 +162,7 @@ void OtherPart::Came(std::size_t slot, grpc::ByteBuffer& request) {
   auto status = joined_.assembler->Offer(joined_.seat, *sequence, request.Length(),
                                          std::make_shared<PartMessage>(request),
                                          FrameAssembler::Clock::now());
-  // What this call sends after it has left the assembly is told with its end.
+  // The end of this call reports parts that come after it has left the assembly.
   if (!absl::IsCancelled(status)) slots_[slot].refusal = std::move(status);
 }
 
@@ -159,14 +175,15 @@ std::chrono::milliseconds OtherPart::LookEvery() const {
   return LookEveryOf(joined_.assembler->timeout());
 }
 
-void OtherPart::Refuse(std::size_t slot, absl::Status why) {
+bool OtherPart::Drop(std::size_t slot, const absl::Status& why) {
   Slot& part = slots_[slot];
-  if (!part.refusal.ok()) return;
+  if (!part.refusal.ok()) return true;
   joined_.assembler->Withdraw(joined_.seat, part.sequence);
-  part.refusal = std::move(why);
+  part.refusal = why;
+  return true;
 }
 
-v1::ReconstructResponse OtherPart::Answer(std::size_t slot, absl::Status& refusal) {
+std::optional<v1::ReconstructResponse> OtherPart::Respond(std::size_t slot, absl::Status& refusal) {
   const Slot part = std::exchange(slots_[slot], {});
   refusal = part.refusal.ok() ? joined_.assembler->OutcomeOf(part.sequence) : part.refusal;
   v1::ReconstructResponse response;

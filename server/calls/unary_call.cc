@@ -6,17 +6,16 @@
 
 namespace partiemc::server {
 
-UnaryCall::UnaryCall(CallChannel& channel, const MethodMeters* meters,
-                     absl::StatusOr<AdmittedCall> admission, UnaryKind kind, OpeningCalls& opening,
-                     UnaryRegistry& calls, MemoryBudget& budget, ComputePool* pool, Method method)
-    : ByteCall(channel, meters, std::move(admission)),
-      calls_(calls),
+UnaryCall::UnaryCall(ArrivedCall call, const ServerContext& context, UnaryKind kind, Method method)
+    : ByteCall(std::move(call)),
+      calls_(context.unary_calls),
       method_(std::move(method)),
-      machine_(std::make_shared<UnaryStateMachine>(static_cast<UnaryTransport&>(*this), budget,
-                                                   pool, caller().account(), kind)) {
+      machine_(std::make_shared<UnaryStateMachine>(
+          static_cast<UnaryTransport&>(*this), context.budget,
+          kind == UnaryKind::kFrame ? &context.pool : nullptr, caller().account(), kind)) {
   absl::Status status = this->admission();
   if (status.ok()) status = calls_.Enter(machine_, kind);
-  if (status.ok()) MayGiveWay(opening, machine_);
+  if (status.ok()) MayGiveWay(context.opening, machine_);
   machine_->Start(std::move(status));
 }
 
@@ -27,7 +26,7 @@ void UnaryCall::ReadDone(bool ok) {
     }
     machine_->ReadDone(request_.Length());
   } else {
-    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
+    // A read ends at a half-close and at a disconnect; OnCancel may come later.
     if (channel().IsCancelled()) machine_->Cancelled();
     machine_->ReadEnded();
   }
@@ -57,8 +56,8 @@ void UnaryCall::StartWrite() { channel().StartWrite(&answer_); }
 void UnaryCall::Cut() { channel().Cancel(); }
 
 void UnaryCall::Finish(const absl::Status& status) {
-  answer_.Clear();                  // One that was not sent.
-  calls_.GiveBackPlace(*machine_);  // Who hears of the end may come again at once.
+  answer_.Clear();
+  calls_.GiveBackPlace(*machine_);  // First: a client that sees the end may call again at once.
   if (!status.ok() && !absl::IsCancelled(status))
     LogRefusal("call refused", channel().peer(), status);
   End(status);

@@ -1,4 +1,4 @@
-// A call of one request and one answer: translates between its channel and a UnaryStateMachine.
+// A call of one request and one response, over any channel.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/calls/byte_call.h"
+#include "server/calls/server_context.h"
 #include "server/stream/unary_registry.h"
 #include "server/stream/unary_state_machine.h"
 
@@ -18,15 +19,12 @@ namespace partiemc::server {
 
 class UnaryCall final : public ByteCall, private UnaryTransport {
  public:
-  /// Turns a request into an answer, as UnaryTransport::Answer, unless `cancelled`. The request may
-  /// be cleared.
+  /// Turns a request into a response, unless `cancelled`. May clear the request. A call for
+  /// information has no worker.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
 
-  /// The references outlive the call; without a pool the method is run by the channel's own thread.
-  UnaryCall(CallChannel& channel, const MethodMeters* meters,
-            absl::StatusOr<AdmittedCall> admission, UnaryKind kind, OpeningCalls& opening,
-            UnaryRegistry& calls, MemoryBudget& budget, ComputePool* pool, Method method);
+  UnaryCall(ArrivedCall call, const ServerContext& context, UnaryKind kind, Method method);
 
   void OnCancel() override;
   void OnDone() override;
