@@ -1,4 +1,4 @@
-// A session: which frame may come next, and what a refused frame leaves behind.
+// A session accepts frames in order, and a refused frame leaves no trace in it.
 #include "server/stream/session.h"
 
 #include <absl/base/config.h>
@@ -23,8 +23,7 @@ namespace {
 
 constexpr unsigned kSeed = 20;
 
-// Sessions know no threads, so their tests need none; stream_state_machine_test has those of the
-// pool.
+// A session starts no thread. stream_state_machine_test tests the threads of the pool.
 const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_allowed_parallelism,
                                              1);
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
@@ -37,7 +36,7 @@ Frame FrameOf(const std::vector<double>& positions) {
   return frame;
 }
 
-// A session with what a test asks of it.
+// A session, its worker and its last result.
 class Stream {
  public:
   Stream() : session_(*Session::Open(BlobParameters(), kLimits)) {}
@@ -257,10 +256,10 @@ TEST(Session, TheWorkerThatComputesMakesNoDifference) {
   }
 }
 
-// Sanitizers have a malloc of their own, of which mallinfo2 knows nothing.
+// A sanitizer replaces malloc, and mallinfo2 then returns 0.
 #if !defined(ABSL_HAVE_ADDRESS_SANITIZER) && !defined(ABSL_HAVE_THREAD_SANITIZER)
 
-// Bytes that malloc has given out.
+// Bytes that are allocated.
 std::size_t HeldBytes() {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
@@ -270,7 +269,7 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
   constexpr std::size_t kSessions = 20, kMaxBytesEach = 100 << 10;
   constexpr FrameLimits kLarge{.max_particles = 5000, .max_tiles = 5000};
   std::vector<double> spray, pair = {0, 0, kBlobSpacing, 0};
-  for (int k = 0; k < 4000; ++k) {  // Each with an outline of its own.
+  for (int k = 0; k < 4000; ++k) {  // Particles too far apart to share an outline.
     spray.push_back(k % 64 * 10 * kBlobSpacing);
     spray.push_back(k / 64 * 10 * kBlobSpacing);
   }
@@ -288,6 +287,7 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
     ASSERT_TRUE(small[k].Answer(1, FrameOf(pair), worker, ignore).ok());
   }
   const std::size_t after = HeldBytes();
+  ASSERT_GT(before, 0u) << "mallinfo2 counts nothing";
   ASSERT_GT(large.MakeCheckpoint({}, nullptr, ~0ull).size(), 4 * kMaxBytesEach);
   EXPECT_LE(after, before + kSessions * kMaxBytesEach);
 }
