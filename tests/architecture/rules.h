@@ -20,8 +20,8 @@ Violations CoreIsPlain(const SourceTree& tree);
 Violations TasksStartInOneFile(const SourceTree& tree);
 
 /// Every file of core/src, server and client lies in one of their rooms, or is one of the few
-/// beside them that put the rooms together; so do those of client/input and client/evaluation,
-/// which have rooms of their own. A file includes its own room and rooms above it, by its path.
+/// beside them that put the rooms together. The same holds for client/input, which has rooms, too.
+/// A file includes its own room and rooms above it, by its path.
 Violations FilesKeepTheirRooms(const SourceTree& tree);
 
 /// No folder of core, proto, server and client has more than 18 stems.

@@ -1,4 +1,4 @@
-// Input that is not what it seems, and outputs that cannot be written.
+// Malformed input, and outputs that cannot be written.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zstd.h>

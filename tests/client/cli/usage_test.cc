@@ -23,7 +23,7 @@ void ExpectOneLine(const Ran& ran) {
 TEST(Usage, HelpTeachesEveryVerbByExamples) {
   const Ran help = RunPartiemc({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"replay", "watch", "streams", "info", "load", "evaluate", "convert"}) {
+  for (const char* verb : {"replay", "watch", "streams", "info", "load", "convert"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     const Ran verb_help = RunPartiemc({verb, "--help"});
     EXPECT_EQ(verb_help.exit_code, 0);
