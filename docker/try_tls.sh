@@ -1,7 +1,7 @@
 #!/bin/bash
-# Makes what docker/compose.tls.yaml mounts, to try it: ca.pem, an authority whose key is not kept;
-# server.pem and server.key, a certificate for the hosts `server` and `localhost`, good for 30 days;
-# tokens, with one random token, which the client sends and the server knows.
+# Creates the files that docker/compose.tls.yaml mounts. ca.pem: an authority, whose key is deleted.
+# server.pem and server.key: a certificate for the hosts `server` and `localhost`, valid for 30
+# days. tokens: one random token, which the client sends and the server knows.
 set -euo pipefail
 
 if (($# != 1)) || [[ $1 == -* ]]; then
@@ -27,7 +27,7 @@ new_key=(openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -noenc)
 }
 openssl rand -hex 32 >"$directory/tokens"
 
-# The image's user has to read them, and nobody else where that can be had.
+# Readable by the image's user only, if this script can set the owner.
 if (($(id -u) == 0)); then
   chown "$image_user" "$directory"/{server.key,tokens}
   chmod 600 "$directory"/{server.key,tokens}

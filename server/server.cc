@@ -31,24 +31,24 @@
 namespace partiemc::server {
 namespace {
 
-// Size of one read of a connection.
+// Size of one read from a connection.
 constexpr int kReadBytes = 32 << 10;
 
-// A connection that does not get as far as HTTP/2 (and TLS) ends after this.
+// Time limit for the handshakes of HTTP/2 and TLS.
 constexpr int kHandshakeTimeoutMs = 10'000;
 constexpr int kReflectionThreads = 16;
 
-// Descriptors of the gateway, files and threads.
+// Descriptors for the gateway, files and threads.
 constexpr std::uint64_t kOtherDescriptors = 512;
 
-// Streams of a connection that have ended and are not gone yet.
+// Streams of a connection that have ended but are not destroyed yet.
 constexpr std::uint64_t kStreamsThatEnd = 64;
 
 constexpr std::chrono::milliseconds kTimeToCut(250);
-// For the last words to arrive, and connections to close in the orderly way. gRPC itself waits
-// until each client has answered, which one that has no call looks at every few seconds only.
+// Time for the last statuses to arrive and for connections to close cleanly. gRPC itself waits for
+// each client's reply, and an idle client reads only every few seconds.
 constexpr std::chrono::milliseconds kTimeToClose(500);
-// Several times as long as a call takes to come in.
+// Several times as long as a new call takes to arrive.
 constexpr std::chrono::milliseconds kQuiet(50);
 
 absl::Status CheckSecurity(const ServerOptions& options, const Address& address) {
@@ -60,7 +60,7 @@ absl::Status CheckSecurity(const ServerOptions& options, const Address& address)
       "--insecure if the network is trusted"));
 }
 
-// What `parse` makes of the file that `flag` names.
+// Parses the file of `flag` by `parse`.
 template <typename Parse>
 auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
     -> decltype(parse(std::string())) {
@@ -74,9 +74,9 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
   return secrets;
 }
 
-// How the process is watched. It may hold what it has begun with, its workers and the budget, of
-// which histories have a part. Beyond that it may hold what the budget counts beyond its size, and
-// results that watchers have not taken: a sixteenth of the budget.
+// Limits for the process's memory: its memory at the start, the workers, and the budget, which
+// includes histories. Outside the budget: frames above it, and undelivered results of watchers, up
+// to a sixteenth of the budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const WatchRegistry& watchers) {
   const std::uint64_t outside =
@@ -99,7 +99,7 @@ BeyondBudget BeyondOf(const ServerLimits& limits) {
           .worker_bytes = limits.WorkerBytesBeyond()};
 }
 
-// Each connection takes two descriptors.
+// Each connection uses two descriptors.
 ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   ConnectionLimits limits = options.connections;
   rlimit descriptors{};
@@ -111,7 +111,7 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   return limits;
 }
 
-// Callers that are not beyond their limits have fewer streams.
+// Callers within their limits have fewer streams.
 ConnectionRules RulesOfConnections(const ServerOptions& options) {
   return {.unaccounted_bytes = options.unaccounted_bytes,
           .max_message_bytes = options.limits.MaxMessageBytes(),
@@ -120,8 +120,8 @@ ConnectionRules RulesOfConnections(const ServerOptions& options) {
                              : options.limits.CallsOfOneCaller() + kStreamsThatEnd};
 }
 
-// Of a stream of another replica the newest result is kept whatever its size: to fetch it again
-// would take a moment.
+// Keeps the newest result of another replica's stream whatever its size, because fetching it again
+// takes a moment.
 Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
   return {.broadcaster = {.mailbox_bytes = limits.max_watcher_bytes,
                           .kept_bytes = limits.max_watcher_bytes},
@@ -130,7 +130,7 @@ Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
           .watches = limits.max_watchers};
 }
 
-// For watchers to be told that the server drains; one that does not read is cut then.
+// Time for watchers to receive the notice of the drain. A watcher that does not read is then cut.
 constexpr std::chrono::milliseconds kWatchPatience(500);
 
 }  // namespace
@@ -323,31 +323,30 @@ absl::Status Server::Listen() {
   builder.RegisterService(service_.get());
   builder.RegisterService(health_.get());
   builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.MaxMessageBytes()));
-  // ConnectionWatch counts PINGs with the other bytes. gRPC itself would take 64 MiB for the errors
-  // of a flood of them.
+  // Disables gRPC's limit: ConnectionWatch counts PINGs with the other bytes. gRPC would need 64
+  // MiB for the errors of a flood of PINGs.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  // What has left without a word (a frozen program, a cut cable) would hold its stream for hours.
+  // Detects lost clients (a frozen program, a cut cable), which would hold their streams for hours.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS,
                              static_cast<int>(options_.keepalive.interval.count()));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
                              static_cast<int>(options_.keepalive.timeout.count()));
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // As many as it takes.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // No limit.
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
-  // What a client may send before it is read: windows that grow with the connection's speed, as
-  // gRPC's do by itself, let a hundred bodies that nobody will read hold 70 MiB. A read that goes
-  // on has all of its message let in, so that large frames come as fast, but for one round trip.
+  // Fixes the window of bytes that a client may send before they are read. gRPC's growing windows
+  // would let a hundred unread bodies hold 70 MiB. A pending read opens the window for its whole
+  // message, so large frames only lose one round trip.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, static_cast<int>(kUnreadBytes));
-  // A caller has no more calls, in however many connections, unless its token says otherwise: then
-  // those beyond them wait in the client, or go by another connection.
+  // The limit of one connection equals a caller's default limit of calls. Further calls wait in the
+  // client or use another connection.
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(options_.limits.CallsOfOneCaller()));
-  // gRPC parses what one read has brought, whatever happens to the connection. In 32 KiB there are
-  // are 4,000 calls, 40 MiB of memory; in the 4 MiB that it reads otherwise there is more than 1
-  // GiB.
+  // gRPC parses all of one read, whatever happens to the connection. 32 KiB can contain 4,000
+  // calls, which take 40 MiB; gRPC's default of 4 MiB would take more than 1 GiB.
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
-  // Reflection alone is not ours: each of its calls has a thread for as long as it goes on.
+  // Bounds the threads of reflection, the only service that uses a thread for each call.
   grpc::ResourceQuota quota;
   quota.SetMaxThreads(kReflectionThreads);
   builder.SetResourceQuota(quota);
@@ -388,9 +387,9 @@ std::optional<Address> Server::web_address() const {
 }
 
 Server::~Server() {
-  // No watch waits for its stream any more.
+  // Watches stop waiting for their streams.
   if (relay_ != nullptr) relay_->Drain();
-  // All of its calls end while what they use is there.
+  // Ends all its calls while the objects they use exist.
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now());
   if (server_ == nullptr) return;
   acceptor_->StopListening();
@@ -400,8 +399,8 @@ Server::~Server() {
   acceptor_.reset();
 }
 
-// A call that comes while gRPC shuts down is cut without a word, so clients that look for a server
-// are told to look elsewhere until no more of them come.
+// Waits until no new calls arrive. A call that arrives during gRPC's shutdown is cut without a
+// reason, so they are refused before, with a reason to try elsewhere.
 void Server::WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const {
   std::uint64_t before = 0;
   do {
@@ -427,22 +426,23 @@ void Server::StopBeingReady() {
 void Server::SendAway(std::chrono::milliseconds delay) {
   StopBeingReady();
   std::this_thread::sleep_for(delay / 2);
-  if (relay_ != nullptr) registry_.SetElsewhere(relay_->Addresses());  // Others may drain as well.
+  if (relay_ != nullptr)
+    registry_.SetElsewhere(relay_->Addresses());  // Addresses of replicas that do not drain.
   registry_.SendAway(delay - delay / 2);
 }
 
 void Server::Drain(std::chrono::milliseconds grace) {
-  // Cutting those who do not take their answers takes a moment of the grace time too.
+  // Reserves part of the grace time for cutting clients that do not read their responses.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
   StopBeingReady();
   registry_.Drain();
   calls_.Drain();
-  // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
-  // to the last word: a connection that closes with requests unread takes back what was just
+  // gRPC's Shutdown sends nothing to streams: it waits, then cuts. Streams therefore end first,
+  // including their status: closing a connection with unread requests discards the bytes just
   // written.
   registry_.WaitUntilEmpty(deadline);
   calls_.WaitForFrames(deadline);
-  dispatcher_.Flush();  // So that watchers hear of the last results before they are sent home.
+  dispatcher_.Flush();  // Delivers the last results before the watches end.
   if (relay_ != nullptr) relay_->Drain();
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
@@ -452,11 +452,11 @@ void Server::Drain(std::chrono::milliseconds grace) {
   const auto closed = std::chrono::system_clock::now() + left;
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + left);
   acceptor_->StopListening();
-  // A peer that does not answer would hold up the end.
+  // A client that does not respond would delay the end.
   watch_.EndAllAt(std::chrono::steady_clock::now() + left);
   server_->Shutdown(closed);
   server_->Wait();
-  metrics_endpoint_.reset();  // Last, so that the drain can be watched.
+  metrics_endpoint_.reset();  // Last, so that metrics cover the drain.
 }
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// What this process's connections have received.
+// Bytes that this process's connections have received.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 
 namespace partiemc::server {
 
-/// The bytes that each TCP connection of this process has received, by its peer as gRPC writes it:
-/// "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234". Empty where the system does not report
-/// them. Costs two system calls for each open descriptor.
+/// Bytes received by each TCP connection of this process. The key is the peer in gRPC's format:
+/// "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234". Empty if the system does not report
+/// them. Cost: two system calls per open descriptor.
 std::map<std::string, std::uint64_t> ReceivedBytesOfConnections();
 
 }  // namespace partiemc::server

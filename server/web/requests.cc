@@ -36,7 +36,7 @@ WebAnswer RefusedAs(WebRefusal refusal, unsigned status, std::string rule, std::
   return {.what = WebRefused{refusal, status, std::move(rule), std::move(allow)}};
 }
 
-// Only the first of several would be seen by some.
+// Readers differ in which repeated header they use, so only a single one is accepted.
 std::optional<std::string> OnlyOne(const std::vector<std::string_view>& values) {
   if (values.size() != 1) return std::nullopt;
   return std::string(values.front());
@@ -71,7 +71,7 @@ bool IsFileCharacter(char c) {
          std::string_view("-_.~+@").find(c) != std::string_view::npos;
 }
 
-// "Host" or what stands behind "://" of an origin, without the port that is usual.
+// Normalizes "Host", or the part of an origin after "://", without the default port.
 std::optional<std::string> NormalHost(std::string_view text, std::string_view usual_port) {
   std::string host = Lower(text);
   if (host.empty() || host.size() > 300) return std::nullopt;
@@ -99,7 +99,7 @@ std::optional<std::string> NormalHost(std::string_view text, std::string_view us
 
 std::string_view UsualPort(std::string_view scheme) { return scheme == "https" ? "443" : "80"; }
 
-// Of a normal host, without its port; of a number in brackets with these.
+// The host without its port; an IPv6 address keeps its brackets.
 std::string_view NameOf(std::string_view host) {
   return host.substr(0, host.front() == '[' ? host.find(']') + 1 : host.find(':'));
 }
@@ -258,7 +258,7 @@ std::optional<std::string> FilePathOf(std::string_view target) {
   if (target == "/") return "index.html";
   auto path = DecodePercent(target.substr(1));
   if (!path) return std::nullopt;
-  // Names are split after decoding, so that an encoded '/' or '..' is one like any other.
+  // Names are split after decoding, so an encoded '/' or '..' is treated like any other.
   for (const std::string_view name : Split(*path, '/', /*blanks=*/"")) {
     if (name.empty() || name.front() == '.' || !std::ranges::all_of(name, IsFileCharacter)) {
       return std::nullopt;
@@ -295,7 +295,7 @@ bool AcceptsGzip(std::string_view accept_encoding) {
     const auto parts = Split(item, ';', kSpace);
     if (Lower(parts.front()) != "gzip") continue;
     if (parts.size() == 1) return true;
-    // "q=0", "q=0.000".
+    // False for "q=0" and "q=0.000".
     return parts[1].find_first_of("123456789") != std::string_view::npos;
   }
   return false;

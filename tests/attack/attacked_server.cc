@@ -21,7 +21,7 @@
 namespace partiemc::attack {
 namespace {
 
-// A port of loopback that nobody has at the moment.
+// A free loopback port.
 std::uint16_t FreePort() {
   const int file = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
@@ -77,15 +77,15 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments,
   if (std::find(arguments.begin(), arguments.end(), "--log-level") == arguments.end()) {
     arguments.insert(arguments.end(), {"--log-level", "off"});
   }
-  // What honest streams hold for their watchers would hide what attackers take.
+  // Histories of honest streams would hide the attackers' memory.
   if (std::find(arguments.begin(), arguments.end(), "--history-bytes") == arguments.end()) {
     arguments.insert(arguments.end(), {"--history-bytes", "1MB"});
   }
-  // On a busy machine four seconds may not be enough for what an attacker has left behind.
+  // On a busy machine, releasing an attack's resources may take more than four seconds.
   if (std::find(arguments.begin(), arguments.end(), "--grace-seconds") == arguments.end()) {
     arguments.insert(arguments.end(), {"--grace-seconds", "20"});
   }
-  // Somebody else may take the port before the server does.
+  // Another process may take the port before the server does.
   for (int attempt = 0; serving_ == nullptr; ++attempt) {
     metrics_address_ = "127.0.0.1:" + std::to_string(FreePort());
     auto all = arguments;

@@ -27,7 +27,7 @@ void QueueBatch(Http2Client& client, const Queue& queue) {
 std::uint32_t NoCall(Http2Client&) { return 0; }
 std::uint32_t OneCall(Http2Client& client) { return client.Call(CallHeaders(kReconstruct)); }
 
-// A stream that is open, so that its frames have a reader.
+// An open stream, so that its frames are read.
 std::uint32_t OpenCall(Http2Client& client) {
   const auto call = OneCall(client);
   client.Data(call, Prefixed(Open().SerializeAsString()));
@@ -82,7 +82,7 @@ void ResetCalls(Http2Client& client, std::uint32_t) {
   QueueBatch(client, [&] { client.Reset(client.CallBlock(block)); });
 }
 
-// The headers are in the connection's table, so that a call takes 40 bytes.
+// The headers are in the connection's table, so a call takes 40 bytes.
 std::uint32_t IndexHeaders(Http2Client& client) {
   std::string block;
   for (const auto& [name, value] : CallHeaders(kGetServerInfo)) {
@@ -162,7 +162,7 @@ struct Counts {
   std::atomic<std::uint64_t> bytes = 0, connections = 0, refused = 0;
 };
 
-// One attacker, which follows each connection that ends by another one.
+// One attacker, which reconnects after each lost connection.
 void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
   const auto began = Clock::now(), end = began + settings.time;
   const std::uint64_t most = settings.most_bytes / settings.connections;
@@ -189,7 +189,7 @@ void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
       const std::chrono::duration<double> due(static_cast<double>(sent + queued) / rate);
       std::this_thread::sleep_until(began + std::chrono::duration_cast<Clock::duration>(due));
     }
-    // Answers are not read, so that they pile up where they can.
+    // Leaves responses unread, so that they accumulate.
     client->Flush(milliseconds(300), /*read=*/false);
     sent += queued - client->queued();
     counts.bytes += queued - client->queued();

@@ -1,4 +1,4 @@
-// Floods of HTTP/2 frames below the level of calls: what a stranger needs no token for.
+// Floods of HTTP/2 frames below the level of calls, which need no token.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@ namespace partiemc::attack {
 struct Flood {
   const char* name;
   const char* what;
-  /// Queues what comes first in a connection; the stream that the flood then uses, or 0.
+  /// Queues the first bytes of a connection; returns the stream that the flood then uses, or 0.
   std::uint32_t (*begin)(Http2Client&);
   /// Queues some tens of kilobytes of the flood.
   void (*queue)(Http2Client&, std::uint32_t stream);
@@ -25,21 +25,22 @@ std::span<const Flood> Floods();
 
 struct FloodSettings {
   std::string address;
-  /// The attacker's own address, so that limits of an address do not meet the honest clients.
+  /// The attacker's address, different from the honest clients', so that limits per address do not
+  /// affect them.
   std::string source = "127.0.0.2";
   std::chrono::milliseconds time{4'000};
-  double bytes_per_second = 0;  ///< 0: as fast as the server takes them.
+  double bytes_per_second = 0;  ///< 0: no limit.
   std::uint64_t most_bytes = std::uint64_t{2} << 30;
-  std::size_t connections = 1;  ///< Threads, each with a connection of its own.
+  std::size_t connections = 1;  ///< Threads with one connection each.
 };
 
 struct FloodOutcome {
-  std::uint64_t bytes = 0;        ///< Handed to the kernel.
-  std::uint64_t connections = 0;  ///< Opened, one after the other whenever the server ended one.
-  std::uint64_t refused = 0;      ///< Attempts that found no server.
+  std::uint64_t bytes = 0;        ///< Passed to the kernel.
+  std::uint64_t connections = 0;  ///< Opened connections; each lost one is replaced.
+  std::uint64_t refused = 0;      ///< Refused attempts to connect.
 };
 
-/// Floods until the time or the bytes are used up. A new connection follows each one that ends.
+/// Floods until the time or the bytes are used up. Replaces each lost connection.
 FloodOutcome RunFlood(const Flood& flood, const FloodSettings& settings);
 
 }  // namespace partiemc::attack

@@ -1,5 +1,5 @@
-// Each flood of tests/attack/floods.h against a server of its own, beside an honest stream and
-// beside health checks from the honest address. On demand
+// Each flood of tests/attack/floods.h against its own server, beside an honest stream and health
+// checks from the honest address. On demand
 //   attack_test --gtest_filter='*Flood*' --server PATH   attacks another build.
 #include "attack/floods.h"
 
@@ -42,8 +42,8 @@ std::string NameOf(const testing::TestParamInfo<Case>& info) {
   return name;
 }
 
-// Sixteen attacking threads on the processors of the server starve it. They are tried on demand, on
-// a quiet machine, and longer: PARTIEMC_ALL_FLOODS=1.
+// Sixteen attacking threads starve the server of processors. PARTIEMC_ALL_FLOODS=1 runs these
+// cases, longer, for a quiet machine.
 bool AllFloods() { return std::getenv("PARTIEMC_ALL_FLOODS") != nullptr; }
 
 std::vector<Case> Cases() {
@@ -87,14 +87,14 @@ TEST_P(FloodTest, TakesLittleMemoryAndOthersAreServed) {
 
 INSTANTIATE_TEST_SUITE_P(All, FloodTest, testing::ValuesIn(Cases()), NameOf);
 
-// Forty streams share one connection, each with large frames under way, and none is cut.
+// Forty streams share one connection; each has large frames on the way, and none is cut.
 TEST(LegalUpload, FortyStreamsOfLargeFramesAreNotCut) {
   constexpr int kStreams = 40, kFrames = 2;
   constexpr std::size_t kParticles = 1'000'000;
   AttackedServer server({"--memory-budget", "2GB", "--max-streams", "40"});
   const auto channel = grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials());
   const auto stub = v1::ReconstructionService::NewStub(channel);
-  // Lone particles in rows; the answer of each frame is what counts here.
+  // Lone particles in rows, so that the response is large.
   v1::ReconstructRequest frame;
   frame.mutable_frame()->set_positions(std::string(kParticles * 16, '\0'));
   std::atomic<int> answers = 0;

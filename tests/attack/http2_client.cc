@@ -180,7 +180,7 @@ std::int64_t Http2Client::WindowOf(std::uint32_t stream) const {
   return std::min(window_, first_window_ + (found == windows_.end() ? 0 : found->second));
 }
 
-// What of `events` is ready; 0 after the deadline.
+// The ready events among `events`; 0 after the deadline.
 short Http2Client::Wait(short events, Clock::time_point deadline) const {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
   pollfd ready{socket_, events, 0};

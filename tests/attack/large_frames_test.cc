@@ -1,5 +1,5 @@
-// Frames as large as the server allows, in more streams than it has memory for: whole, in parts,
-// and from connections that were idle. The server stays within the memory that it prints.
+// Frames of the maximum size, in more streams than the server has memory for: whole, in parts, and
+// from idle connections. The server stays within the memory that it prints.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,11 +26,11 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kPatience(120);
-// What clients take for a lost connection.
+// Codes that clients treat as a lost connection.
 constexpr int kCancelled = 1, kUnavailable = 14;
 constexpr char kToken[] = "large-frames-0123456789", kOther[] = "another-0123456789abcde";
 
-// A square of particles, each of which carries as much as makes the frame `bytes` large.
+// A square of particles with attributes that make the frame `bytes` large.
 std::string SquareFrame(std::uint64_t sequence, std::size_t side, std::size_t bytes) {
   v1::ReconstructRequest request;
   v1::ParticleFrame& frame = *request.mutable_frame();
@@ -56,7 +56,7 @@ struct PartOf {
   std::uint32_t part = 0, parts = 0, timeout_ms = 0;
 };
 
-// One call of Reconstruct over a connection of its own.
+// One Reconstruct call over a new connection.
 class Sender {
  public:
   explicit Sender(const std::string& address, const std::string& token = "") : client_(address) {
@@ -80,7 +80,7 @@ class Sender {
     }
     return client_.Read(kPatience, [this] { return bytes_ > 0 || ended_; }) && !ended_;
   }
-  /// Sends a message as the server reads it. False where the call has ended.
+  /// Sends a message as fast as the server reads it. False if the call has ended.
   bool Send(const std::string& message, bool last, milliseconds time = kPatience) {
     before_ = bytes_;
     const std::string whole = Prefixed(message);
@@ -96,11 +96,11 @@ class Sender {
     }
     return true;
   }
-  /// Whether an answer to the last message has begun to come.
+  /// True if an answer to the last message has begun to arrive.
   bool IsAnswered(milliseconds time = kPatience) {
     return client_.Read(time, [this] { return bytes_ > before_ || ended_; }) && bytes_ > before_;
   }
-  /// The status of the call; -1 where it has not ended in time.
+  /// The status of the call; -1 if it has not ended in time.
   int End() {
     client_.Read(kPatience, [this] { return ended_; });
     return ended_ ? status_ : -1;
@@ -114,7 +114,7 @@ class Sender {
   bool ended_ = false;
 };
 
-// What partiemc-server prints as its sum, in MiB.
+// The sum printed by partiemc-server, in MiB.
 double PlannedMib(std::vector<std::string> arguments) {
   arguments.push_back("--print-memory-plan");
   std::string plan;
@@ -123,14 +123,14 @@ double PlannedMib(std::vector<std::string> arguments) {
   return std::stod(plan.substr(line));
 }
 
-// A server with 256 MB for frames, in a group as large as it prints, where groups can be made.
+// A server with 256 MB for frames, in a cgroup of the printed size, if cgroups can be created.
 class LargeFrames : public ::testing::Test {
  protected:
   void Serve(std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {"--memory-budget", "256MB", "--threads", "2"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     planned_ = PlannedMib(arguments);
-    // The plan is of what is resident. What the kernel holds of a process beside that is little.
+    // The plan covers resident memory; the kernel's own memory for the process is small.
     group_ = std::make_unique<MemoryGroup>(static_cast<std::uint64_t>(planned_) << 20);
     server_ = std::make_unique<AttackedServer>(arguments, group_->Around());
   }
@@ -148,8 +148,8 @@ class LargeFrames : public ::testing::Test {
   const std::string& address() const { return server_->address(); }
 
   // Opens streams, waits for `pause`, and lets each send these frames at the same time, each after
-  // the answer to the one before. A stream that is lost begins again, as clients do.
-  // Returns how many have ended well.
+  // the previous answer. A lost stream restarts, as in clients. Returns the number of streams that
+  // ended well.
   int SendFromAll(int streams, const std::vector<std::string>& frames,
                   milliseconds pause = milliseconds(0)) {
     std::vector<std::unique_ptr<Sender>> senders;
@@ -219,8 +219,8 @@ TEST_F(LargeFrames, OfEverySizeAreAnsweredWithinThePlan) {
   EXPECT_EQ(SendFromAll(20, frames), 20);
 }
 
-// Of streams that were idle while others waited, nothing is planned any more. If all of them send
-// at once, some end and have to connect again; the server bears it.
+// Nothing is reserved for streams that were idle while others waited. If all send at once, some end
+// and reconnect; the server survives.
 TEST_F(LargeFrames, OfIdleStreamsStayWithinThePlan) {
   Serve();
   EXPECT_EQ(SendFromAll(31, {SquareFrame(1, 400, kLarge)}, seconds(4)), 31);
@@ -246,8 +246,8 @@ TEST_F(LargeFrames, IdleStreamsKeepNobodyFromBeingReadFrom) {
   }
 }
 
-// Part 0 of twelve streams sends nothing, and four others send all that a frame may have.
-TEST_F(LargeFrames, PartsWithoutPart0AreHeldWithinThePlanAndTheQuotaAndNotForLong) {
+// Part 0 of twelve streams sends nothing, and four other parts send full frames.
+TEST_F(LargeFrames, PartsWithoutPart0StayWithinPlanAndQuotaUntilTheTimeout) {
   const support::TemporaryFolder folder;
   Serve({"--token-file", folder.Write("tokens", std::string(kToken) + " large bytes=64MB\n" +
                                                     kOther + " other\n")});
@@ -275,7 +275,7 @@ TEST_F(LargeFrames, PartsWithoutPart0AreHeldWithinThePlanAndTheQuotaAndNotForLon
     threads.emplace_back([&] { part->Send(frame, false, seconds(8)); });
   }
   std::this_thread::sleep_for(seconds(1));
-  // Meanwhile another caller is served.
+  // Another caller is served at the same time.
   Sender other(address(), kOther);
   EXPECT_TRUE(other.Open());
   EXPECT_TRUE(other.Send(SquareFrame(1, 100, 1'000'000), true));
@@ -284,9 +284,9 @@ TEST_F(LargeFrames, PartsWithoutPart0AreHeldWithinThePlanAndTheQuotaAndNotForLon
   done = true;
   watch.join();
   std::printf("parts: at most %.0f MB held\n", most_held / 1e6);
-  // 64 MB, and a frame beyond that in each of two slots; the other caller's frame.
+  // 64 MB, and a frame beyond it in each of two slots, and the other caller's frame.
   EXPECT_LE(most_held, 64e6 + 4 * 41.95e6 + 2e6);
-  // All that was held is refused after two seconds.
+  // All held parts are refused after two seconds.
   EXPECT_TRUE(parts.front()->IsAnswered());
   const auto give_up = std::chrono::steady_clock::now() + seconds(20);
   while (server_->Gauge("partiemc_memory_held_bytes") > 0) {

@@ -23,7 +23,7 @@ bool MemoryGroup::Make(const std::string& folder, const std::string& limit_file,
                        std::uint64_t limit_bytes) {
   if (::mkdir(folder.c_str(), 0755) != 0) return false;
   const std::string path = folder + "/" + limit_file;
-  // A folder that the kernel has put nothing into is no group.
+  // A folder without the kernel's files is not a cgroup.
   const bool is_group = std::filesystem::exists(path);
   if (is_group && (std::ofstream(path) << limit_bytes).flush().good()) {
     folder_ = folder;
@@ -35,7 +35,7 @@ bool MemoryGroup::Make(const std::string& folder, const std::string& limit_file,
 
 MemoryGroup::~MemoryGroup() {
   if (folder_.empty()) return;
-  // The kernel lets a process that has ended go a moment later.
+  // The kernel releases an ended process a moment later.
   for (int attempt = 0; attempt < 200 && ::rmdir(folder_.c_str()) != 0; ++attempt) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

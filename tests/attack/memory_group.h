@@ -1,4 +1,4 @@
-// A cgroup with a limit of memory, as a container has it.
+// A cgroup with a memory limit, like a container.
 #pragma once
 
 #include <cstdint>
@@ -9,26 +9,26 @@
 
 namespace partiemc::attack {
 
-/// Removed when it goes out of scope; no process may be in it then.
+/// Removed by the destructor; it must then contain no process.
 class MemoryGroup {
  public:
-  /// Makes a group of either version. Not available where this process may not make one.
+  /// Creates a cgroup of version 1 or 2. Unavailable if this process lacks the permission.
   explicit MemoryGroup(std::uint64_t limit_bytes);
   ~MemoryGroup();
   MemoryGroup(const MemoryGroup&) = delete;
   MemoryGroup& operator=(const MemoryGroup&) = delete;
 
   bool available() const { return !folder_.empty(); }
-  /// Starts the server in the group, if it is available.
+  /// Environment that starts a server in the cgroup, if available.
   server::Surroundings Around() const;
-  /// The most that the group has held, in MiB; 0 where the kernel does not report it.
+  /// Maximum memory of the cgroup in MiB; 0 if the kernel does not report it.
   double PeakMib() const;
 
  private:
   bool Make(const std::string& folder, const std::string& limit_file, std::uint64_t limit_bytes);
 
-  std::string folder_;     // Of the group; empty: not available.
-  std::string peak_file_;  // In it.
+  std::string folder_;     // Folder of the cgroup; empty: unavailable.
+  std::string peak_file_;  // File with the maximum.
   const support::TemporaryFolder scripts_;
 };
 

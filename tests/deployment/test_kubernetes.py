@@ -1,4 +1,4 @@
-"""The manifests of docker/kubernetes: that they agree with each other and with the server."""
+"""Checks that the manifests of docker/kubernetes agree with each other and with the server."""
 
 import copy
 import os
@@ -44,7 +44,7 @@ def merged(below, above):
 
 
 class Manifests:
-    """What kustomize makes of a folder: objects by kind and name, settings, and the files read."""
+    """The output of kustomize for a folder: objects by kind and name, settings, and the files read."""
 
     def __init__(self, folder):
         self.objects, self.settings, self.files = {}, {}, set()
@@ -89,7 +89,7 @@ def server_variables():
 
 
 def planned_mib(settings, memory_budget, threads):
-    """What the server itself says that it may take."""
+    """The memory that the server reports as its maximum."""
     text = subprocess.run(
         [PROGRAM, "--print-memory-plan", "--memory-budget", str(memory_budget), "--threads",
          str(threads)], env={**os.environ, **settings}, capture_output=True, text=True,
@@ -102,7 +102,7 @@ def port_of(address):
 
 
 def problems(manifests):
-    """What is wrong, a line each."""
+    """Errors, one line each."""
     found = [f"{path.name} is not listed" for path in manifests.files - manifests.listed]
     for (kind, name), one in manifests.objects.items():
         if VERSIONS.get(kind) != one["apiVersion"]:

@@ -1,4 +1,4 @@
-// Parts of frames from several connections of several streams, in an order of the fuzzer's.
+// Parts of frames from several connections of several streams, in an order chosen by the fuzzer.
 #include <algorithm>
 #include <string>
 

@@ -23,7 +23,7 @@ constexpr std::uint64_t kMiB = 1 << 20;
 constexpr ConnectionRules kRules{
     .unaccounted_bytes = kMiB, .max_message_bytes = 40 * kMiB, .max_streams = 100};
 
-// A connection, its time and its readings.
+// A connection with simulated clock and counters.
 class Ledger : public ::testing::Test {
  protected:
   std::optional<Flood> Examine(milliseconds later = milliseconds(20)) {
@@ -143,7 +143,7 @@ TEST_F(Ledger, TooManyStreamsAreAFlood) {
 TEST_F(Ledger, HeadersWithoutAnEndAreNotHiddenByAnOpenCall) {
   ledger_.OnCallBegun();
   ledger_.OnReadBegun();
-  Streams(2, 2);  // The second one never becomes a call.
+  Streams(2, 2);  // The second stream never becomes a call.
   ASSERT_EQ(Examine(), std::nullopt);
   std::optional<Flood> flood;
   for (int k = 0; k < 10 && !flood; ++k) {
@@ -282,7 +282,7 @@ TEST(Tally, ReportsCallsAndReads) {
   EXPECT_EQ(connection->ledger.Take().reads_open, 0u);
 }
 
-// Connections with bytes that nothing accounts for, each below the limit of one.
+// Connections with unaccounted bytes, each below the limit of one connection.
 class Guard : public ::testing::Test {
  protected:
   void Add(const std::string& address, std::uint64_t bytes, int calls = 0) {

@@ -1,5 +1,4 @@
-// Frames out of parts, in every order of their coming, and whatever is wrong with a part. Also
-// under ThreadSanitizer.
+// Frames in parts: every order of arrival, and every defect of a part. Also under ThreadSanitizer.
 #include "server/stream/frame_assembler.h"
 
 #include <gmock/gmock.h>
@@ -44,7 +43,7 @@ std::string ReasonOf(const absl::Status& status) {
   return violation ? violation->reason : std::string(status.message());
 }
 
-// An assembler with a member for each part; member 0 is the leader.
+// An assembler with one member per part; member 0 is the leader.
 class FrameAssemblerTest : public ::testing::Test {
  protected:
   void Begin(std::uint32_t parts, FrameAssembler::Terms terms = {}) {
@@ -71,7 +70,7 @@ class FrameAssemblerTest : public ::testing::Test {
   bool IsReady(std::uint64_t sequence, milliseconds age = milliseconds(0)) const {
     return assembler_->IsReady(sequence, begin_, begin_ + age);
   }
-  // Takes frame `sequence`, which is complete, and expects its parts in their order.
+  // Takes frame `sequence`, which must be complete, and checks its parts.
   void ExpectWhole(std::uint64_t sequence) {
     const auto taken = assembler_->Take();
     ASSERT_TRUE(taken.ok()) << taken.status();
@@ -90,7 +89,7 @@ class FrameAssemblerTest : public ::testing::Test {
 };
 
 TEST_F(FrameAssemblerTest, AFrameIsWholeWhenAllPartsHaveComeWhateverTheirOrder) {
-  // Events: parts 1 to 3 of frames 1 and 2; frame 2 may be whole before frame 1 is.
+  // Events: parts 1 to 3 of frames 1 and 2. Frame 2 may be complete before frame 1.
   std::vector<int> order(6);
   std::iota(order.begin(), order.end(), 0);
   do {
@@ -214,7 +213,7 @@ TEST_F(FrameAssemblerTest, ACallTakesOverAPartFromAnotherWhichThenCannotTakeItAw
 TEST_F(FrameAssemblerTest, TheTimeoutBeginsWithTheFirstPartThatIsHeld) {
   Begin(3);
   ASSERT_TRUE(Offer(1, 1).ok());
-  const auto later = begin_ + milliseconds(60);  // Part 0 comes.
+  const auto later = begin_ + milliseconds(60);  // Part 0 arrives.
   assembler_->LeaderSent(1);
   EXPECT_FALSE(assembler_->IsReady(1, later, begin_ + milliseconds(99)));
   EXPECT_TRUE(assembler_->IsReady(1, later, begin_ + milliseconds(100)));
@@ -230,7 +229,7 @@ TEST_F(FrameAssemblerTest, PartsAreNotHeldForAPart0ThatDoesNotCome) {
   EXPECT_EQ(FindViolation(assembler_->OutcomeOf(1))->value, "0, 1, 2");
   EXPECT_EQ(Refusal(2, 1), kReasonPartLate);
   EXPECT_EQ(Refusal(1, 2), "") << "the next frame is another one";
-  // Part 0 comes too late.
+  // Part 0 arrives too late.
   assembler_->LeaderSent(1);
   EXPECT_TRUE(IsReady(1));
   EXPECT_EQ(ReasonOf(assembler_->Take().status()), kReasonPartsMissing);
@@ -261,7 +260,7 @@ TEST_F(FrameAssemblerTest, MembersAreToldOfAnswersAndOfTheEnd) {
   EXPECT_TRUE(members_[1]->left[0].ok());
   EXPECT_EQ(ReasonOf(assembler_->OutcomeOf(2)), kReasonPartLate);
   EXPECT_EQ(ReasonOf(assembler_->Join(1, members_[1]).status()), kReasonLeaderGone);
-  assembler_->End(absl::OkStatus());  // Is told once.
+  assembler_->End(absl::OkStatus());  // Reported once.
   EXPECT_EQ(members_[1]->left.size(), 1u);
 }
 
@@ -272,14 +271,14 @@ TEST_F(FrameAssemblerTest, MembersOfALeaderThatIsLostAreToldToComeBack) {
   EXPECT_TRUE(absl::IsUnavailable(members_[1]->left[0]));
 }
 
-TEST_F(FrameAssemblerTest, PartsAreGivenUpOnceTheCheckpointThatCoversThemHasSurelyArrived) {
+TEST_F(FrameAssemblerTest, DropsPartsWhenACheckpointThatCoversThemHasArrived) {
   Begin(1, {.has_checkpoints = true});
   EXPECT_EQ(assembler_->resume_sequence(), 1u);
   for (std::uint64_t sequence = 1; sequence <= 4; ++sequence) {
     ASSERT_TRUE(assembler_->Take().ok());
     assembler_->Answered(sequence + 1, sequence == 2);
   }
-  assembler_->LeaderSent(5);  // Has received the answer to 1.
+  assembler_->LeaderSent(5);  // The client has received answer 1.
   EXPECT_EQ(assembler_->resume_sequence(), 1u);
   assembler_->LeaderSent(6);
   EXPECT_EQ(assembler_->resume_sequence(), 3u);

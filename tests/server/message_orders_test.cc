@@ -1,6 +1,6 @@
-// Streams of random orders of messages and events, legal and illegal, each step of which is held
-// against a small model. PARTIEMC_ORDERS sets how many: the default is for every day, 1000000 for a
-// release. An order prints its seed when it fails; PARTIEMC_SEED starts from that one.
+// Streams with random orders of legal and illegal messages and events. Each step is compared with a
+// small model. PARTIEMC_ORDERS sets the number of orders: the default is for daily runs, 1000000
+// for a release. A failing order prints its seed; PARTIEMC_SEED starts from it.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -30,7 +30,7 @@ ReconstructionParameters Parameters(bool legal) {
       .placement = Placement::kMarchingSquares, .spacing = 1, .kernel_radius = legal ? 2.0 : 99.0};
 }
 
-// The good frame that comes after `index` other good ones: a few particles that move.
+// Good frame number `index`: a few moving particles.
 std::vector<double> GoodFrame(std::size_t index) {
   std::vector<double> positions;
   for (int k = 0; k < 9; ++k) {
@@ -51,7 +51,7 @@ std::vector<StreamModel::Digests> ResultsOfAnUndisturbedStream() {
   return results;
 }
 
-// One order: a client, a network and a server in trouble, all of them from one seed.
+// One order of events between a client, a network and a server, determined by one seed.
 class Order {
  public:
   Order(std::uint64_t seed, SteppedPool& pool, MemoryBudget& budget,
@@ -81,7 +81,7 @@ class Order {
         FAIL() << "stands still";
       }
     }
-    if (transport_.reading()) EndReads();  // What a transport may still do after the end.
+    if (transport_.reading()) EndReads();  // Allowed for a transport after the end.
     transport_.machine().Cancelled();
     transport_.machine().Drain();
     transport_.machine().TakenOver();
@@ -106,7 +106,7 @@ class Order {
     }
   }
 
-  // What may happen at any moment, also in the middle of opening and answering.
+  // Events that may occur at any moment, also during opening and answering.
   void SomethingMeanwhile() {
     switch (random_.Below(4)) {
       case 0:
@@ -136,7 +136,7 @@ class Order {
   }
 
   std::pair<MemoryRequest, std::string> RandomRequest() {
-    // Nearly always `open` first and frames behind it, so that streams get somewhere.
+    // Usually `open` first and frames after it, so that streams progress.
     const bool first = std::exchange(first_, false);
     if (first != random_.Chance(0.04)) return {{RequestKind::kOpen, 0, {}}, ""};
     if (random_.Chance(0.01)) return {{RequestKind::kMalformed, 0, {}}, ""};
@@ -249,11 +249,11 @@ TEST(MessageOrders, AreAnsweredAsTheModelSays) {
     SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed << " PARTIEMC_ORDERS=1");
     Order(seed, pool, budget, results, seen).Run();
     EXPECT_EQ(budget.held(), 0u);
-    if (HasFailure()) return;  // The first order tells more than a flood.
+    if (HasFailure()) return;  // The first failure is enough.
   }
   for (const auto& [what, count] : seen) std::cout << what << ": " << count << '\n';
   if (orders < 1000) return;
-  // The script reaches everything that it is about.
+  // All kinds of events must have occurred.
   for (const char* end :
        {"OK ", "CANCELLED ", "INVALID_ARGUMENT PROTOCOL", "UNAVAILABLE DRAINING",
         "DEADLINE_EXCEEDED IDLE", "ABORTED TAKEN_OVER", "INVALID_ARGUMENT OUT_OF_RANGE"}) {

@@ -1,4 +1,4 @@
-// The command line, the environment and the config file of the server; addresses.
+// Command line, environment and config file of the server; addresses.
 #include "server/options.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,7 @@ CommandLine Parsed(std::vector<const char*> arguments) {
   return early == nullptr ? std::get<CommandLine>(parsed) : CommandLine{};
 }
 
-// The one line with which the arguments are refused.
+// The error line for these arguments.
 std::string Refused(std::vector<const char*> arguments) {
   const auto parsed = Parse(std::move(arguments));
   const auto* early = std::get_if<EarlyExit>(&parsed);
@@ -40,7 +40,7 @@ std::string Refused(std::vector<const char*> arguments) {
   return early->text;
 }
 
-// Set for the length of a test.
+// Sets a variable during a test.
 class Environment {
  public:
   Environment(const char* name, const char* value) : name_(name) { setenv(name, value, 1); }

@@ -28,14 +28,14 @@ struct World {
   SteppedPool& pool;
   MemoryBudget& budget;
   Clock::time_point now{};
-  std::string broken = {};  // The first promise that was broken.
+  std::string broken = {};  // The first violated promise.
 
   void Require(bool holds, const std::string& promise) {
     if (!holds && broken.empty()) broken = promise;
   }
 };
 
-// The parts that are there, by frame: all that the reference knows of a stream.
+// Received parts by frame: the whole state of the reference.
 using PartsThere = std::map<std::uint64_t, std::set<std::uint32_t>>;
 
 class PartOfRank final : public PartBytes {};
@@ -65,7 +65,7 @@ class Rank final : private StreamTransport, private StreamHandler {
     }
   }
 
-  std::uint64_t bytes;  // Of each message.
+  std::uint64_t bytes;  // Bytes of each message.
 
   bool reading() const { return read_slot_.has_value(); }
   bool writing() const { return writing_.has_value(); }
@@ -96,7 +96,7 @@ class Rank final : private StreamTransport, private StreamHandler {
     writing_.reset();
     machine_->WriteDone(!cut_);
   }
-  // A write that goes on fails, as it does in gRPC.
+  // A pending write fails, as in gRPC.
   void Disconnect() {
     cut_ = true;
     machine_->Cancelled();
@@ -157,7 +157,7 @@ class Rank final : private StreamTransport, private StreamHandler {
     const auto parts = assembler_->Take();
     const bool whole = there_[sequence].size() == assembler_->parts() - 1;
     world_.Require(!parts.ok() || whole, "a frame without all of its parts is not computed");
-    // Parts that were dropped, as part 0 came too late, are there for the reference alone.
+    // Parts that were dropped because part 0 was late exist for the reference only.
     const bool late = !parts.ok() && FindViolation(parts.status())->value.starts_with("0");
     world_.Require(parts.ok() || !whole || late, "a frame with all of its parts is computed");
     there_.erase(sequence);
@@ -252,7 +252,7 @@ class Model {
       Pass(milliseconds(700 * choose_(4)));
     } else if (dice == 29) {
       rank.Disconnect();
-      world_.pool.Step();  // What goes on of it ends.
+      world_.pool.Step();  // Ends its pending work.
       if (part > 0 && !stream.ranks[0]->finished()) {
         Connect(stream, part, stream.assembler->next_wanted());
       }
@@ -263,7 +263,7 @@ class Model {
     }
   }
 
-  // A stream without part 0 begins again, as its client would resume it.
+  // A stream without part 0 restarts, like a client that resumes it.
   void RestartIfOver(Stream& stream) {
     if (!stream.ranks[0]->finished()) return;
     for (auto& rank : stream.ranks) rank->Disconnect();
@@ -280,17 +280,17 @@ class Model {
     }
   }
 
-  // Permits that have lapsed may bring a frame of part 0 each. Parts are dropped.
+  // Expired permits may bring one frame of part 0 each. Parts are dropped.
   void CheckBound() {
     const std::uint64_t beyond = 2 * slots_ + (looked_ ? streams_.size() : 0);
-    const std::uint64_t small = 64;  // Answers and `open`.
+    const std::uint64_t small = 64;  // Responses and `open`.
     world_.Require(budget_.planned() <= budget_.bytes() + beyond * kMessage + small,
                    "what is held and planned stays within the budget and its slots");
     world_.Require(budget_.reads().streams_beyond() <= slots_, "no more slots than there are");
   }
 
-  // Stream after stream, while the next ones are silent: each connection sends two more frames than
-  // any of its stream has sent, and half-closes.
+  // One stream after the other, while the next ones are silent: each connection sends two frames
+  // more than any of its stream has sent, and half-closes.
   void Drain() {
     for (auto& stream : streams_) RestartIfOver(*stream);
     for (auto& stream : streams_) {
@@ -303,7 +303,7 @@ class Model {
     }
   }
 
-  // Returns whether anything has happened.
+  // True if anything has happened.
   bool DrainOnce(Stream& stream, std::uint64_t last) {
     bool moved = false;
     for (auto& other : streams_) {

@@ -1,5 +1,5 @@
-// Streams whose frames come in parts over several connections, in an order that a test or a fuzzer
-// chooses: the server's machines against a reference that only remembers which parts were sent.
+// Streams in parts over several connections, in an order chosen by a test or a fuzzer. Compares the
+// server's machines with a reference that only stores which parts were sent.
 #pragma once
 
 #include <cstddef>
@@ -10,17 +10,17 @@
 
 namespace partiemc::server {
 
-/// Chooses a number below `count`.
+/// Returns a number below `count`.
 using ChooseBelow = std::function<std::size_t(std::size_t count)>;
 
-/// Runs `steps` events: messages, answers that are taken, pauses, lost connections, lost streams.
-/// Then stream after stream sends the rest of its frames and ends, while the next ones are silent.
-/// Returns the promise that was broken, or nothing:
-///  - what is held or planned never exceeds the budget and the slots beyond it;
-///  - each frame of part 0 and each part is answered once, while its connection lives;
-///  - a frame is computed if and only if all of its parts are there;
-///  - no connection waits for ever;
-///  - nothing is held, planned, or waits at the end.
+/// Runs `steps` events: messages, received answers, pauses, lost connections, lost streams. Then
+/// each stream in turn sends the rest of its frames and ends, while the next ones are silent.
+/// Returns the violated promise, or an empty string:
+/// - held and planned memory never exceeds the budget and the slots beyond it;
+/// - each frame of part 0 and each part is answered once while its connection lives;
+/// - a frame is computed if and only if it has all parts;
+/// - no connection waits forever;
+/// - at the end nothing is held, planned or waiting.
 std::string RunPartsModel(SteppedPool& pool, const ChooseBelow& choose, std::size_t steps);
 
 }  // namespace partiemc::server

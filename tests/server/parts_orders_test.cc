@@ -1,6 +1,6 @@
-// Random orders of parts over several connections (parts_model.h). PARTIEMC_ORDERS sets their
-// number: the default is for every day, 100000 for a release. An order prints its seed when it
-// fails; PARTIEMC_SEED starts from that one.
+// Random orders of parts over several connections (parts_model.h). PARTIEMC_ORDERS sets the number
+// of orders: the default is for daily runs, 100000 for a release. A failing order prints its seed;
+// PARTIEMC_SEED starts from it.
 #include <gtest/gtest.h>
 
 #include <cstdint>

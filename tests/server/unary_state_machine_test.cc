@@ -1,5 +1,5 @@
-// Calls of one request and one answer: whatever happens in whatever order, they end once, hold
-// memory until the connection has taken the answer, and give it back.
+// Calls with one request and one response: for any order of events they end once, hold memory until
+// the connection has accepted the response, and release it.
 #include "server/stream/unary_state_machine.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ using std::chrono::steady_clock;
 constexpr std::uint64_t kBudget = 1000;
 constexpr UnaryLimits kLimits{.request = seconds(30), .answer = seconds(120)};
 
-// A call whose other side is the test. What the machine must never do throws.
+// A call driven by the test. Throws if the machine violates its contract.
 class ScriptedCall final : private UnaryTransport {
  public:
   ScriptedCall(MemoryBudget& budget, ComputePool* pool, absl::Status admission = {},
@@ -138,7 +138,7 @@ TEST(UnaryStateMachine, ARequestForInformationNeedsNoRoom) {
   EXPECT_EQ(budget.held(), kBudget);
 }
 
-TEST(UnaryStateMachine, OneThatIsNotLetInReadsNothingAndEndsOnceAlthoughItIsCancelled) {
+TEST(UnaryStateMachine, ARefusedCallReadsNothingAndEndsOnceDespiteACancel) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr, DrainingError());
   EXPECT_FALSE(call.reading);
@@ -208,7 +208,7 @@ TEST(UnaryStateMachine, OneThatIsCancelledWhileItIsWorkedOnEndsWhenTheWorkDoes) 
   EXPECT_EQ(budget.held(), 0u);
 }
 
-// Everything that may happen to a call, in random orders, some of it while it is worked on.
+// All events of a call in random orders, some of them while it is computed.
 TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
   constexpr unsigned kSeed = 20261122;
   std::mt19937 random(kSeed);
@@ -255,7 +255,7 @@ TEST(UnaryStateMachine, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
       call->Bring(1);
       call->machine->Cancelled();
     }
-  }  // All work is done.
+  }  // Waits for all work.
   for (const auto& call : calls) {
     if (call->writing) call->EndWrite(true);
     EXPECT_TRUE(call->finished.has_value());
@@ -279,10 +279,10 @@ TEST(UnaryRegistry, EachKindOfCallsHasPlacesOfItsOwn) {
   EXPECT_EQ(FindViolation(registry.TakePlace(*last.machine, late))->reason, kReasonTooManyCalls);
   EXPECT_TRUE(registry.Enter(probe.machine, UnaryKind::kInformation).ok());
   EXPECT_TRUE(registry.TakePlace(*probe.machine, greedy).ok());
-  registry.Leave(*never.machine);  // Was never in.
+  registry.Leave(*never.machine);  // Was never admitted.
   EXPECT_EQ(registry.count(), 5u);
   registry.GiveBackPlace(*first.machine);
-  // A request that comes while its call ends takes a place, and no call takes one away for good.
+  // A request that arrives while its call ends takes a slot; no call keeps a slot.
   EXPECT_TRUE(registry.TakePlace(*first.machine, greedy).ok());
   registry.Leave(*first.machine);
   EXPECT_TRUE(registry.TakePlace(*second.machine, greedy).ok());

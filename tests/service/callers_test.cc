@@ -1,4 +1,4 @@
-// Several callers of one server: what each may, and that none of them locks the others out.
+// Several callers of one server: permissions, and that no caller blocks the others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 
 constexpr char kAlice[] = "alice-0123456789abcdef";
 constexpr char kMallory[] = "mallory-0123456789abcdef";
-// More than there are places for calls without a request.
+// More than the slots for calls without a request.
 constexpr int kMany = 200;
 
 template <typename Request, typename Response>
@@ -35,7 +35,7 @@ struct Bidi {
   }
   Bidi() = default;
   Bidi(Bidi&&) = default;
-  // The first answer; one without a case where the call has ended.
+  // The first response; empty if the call has ended.
   Response Ask(const Request& request) {
     Response response;
     rpc->Write(request);
@@ -91,7 +91,7 @@ class Callers : public ::testing::Test {
     request.mutable_open()->set_credits(1);
     return request;
   }
-  // The reason; "OK" where there was an answer.
+  // The reason of the refusal; "OK" for a result.
   std::string CallFrame(const char* token) {
     v1::ReconstructFrameRequest request;
     *request.mutable_parameters() = OpenRequest().open().parameters();
@@ -124,7 +124,7 @@ TEST_F(Callers, MuteStreamsOfOneKeepNobodyOut) {
   Stream stream = BeginStream(kAlice);
   EXPECT_TRUE(stream.Ask(OpenRequest()).has_opened()) << stream.EndReason();
   EXPECT_GE(CountEnded(mute, "TOO_MANY_OPENING"), 1);
-  // Nor others of the same caller, as all are behind a proxy.
+  // Nor other calls of the same caller, as behind a proxy.
   Stream own = BeginStream(kMallory);
   EXPECT_TRUE(own.Ask(OpenRequest()).has_opened()) << own.EndReason();
 }
@@ -163,7 +163,7 @@ TEST_F(Callers, StreamsThatTakeNoAnswersLeaveMemoryForOthers) {
       }
     });
   }
-  // Until the server has taken from each as much as it takes.
+  // Until the server has read from each as far as it does.
   EXPECT_TRUE(
       Eventually([&] { return Info(kAlice).load().memory_held() >= kStreams * frame / 2; }));
   for (int i = 0; i < 50; ++i) EXPECT_EQ(CallFrame(kAlice), "OK") << i;
@@ -206,7 +206,7 @@ TEST_F(Callers, WhoHearsOfAnEndHasThePlaceAgainAtOnce) {
   }
 }
 
-// A watcher may send a request at any time, and nobody sees how large before all of it has come.
+// A watcher may send a request at any time, and its size is known only when all of it has arrived.
 TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
   options_.limits.memory_budget = std::uint64_t{160} << 20;
   Serve("alice", "mallory");
@@ -219,7 +219,7 @@ TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
     watches.push_back(BeginWatch(kMallory));
     ASSERT_TRUE(watches.back().Ask(OpenWatch("tank")).has_opened());
   }
-  // The client's memory counts, too, as it is the same process.
+  // Client and server share this process, so the client's memory counts too.
   v1::WatchStreamRequest large;
   large.mutable_open()->set_stream_name(std::string(64 << 20, 'x'));
   ASSERT_EQ(Info(kAlice).load().watchers(), 4u);

@@ -1,6 +1,6 @@
-// SIGTERM at bad moments: while streams open, with full windows, with clients that never read, in
-// frames that outlast the grace time, twice. What clients got is whole, and the server leaves in
-// time. Ten servers are drained under load by default, `--drains 100` for more.
+// SIGTERM at bad moments: while streams open, with full windows, with clients that never read,
+// during frames longer than the grace time, twice. Clients receive complete data, and the server
+// stops in time. Drains ten servers under load by default; `--drains 100` for more.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -33,7 +33,7 @@ namespace health = grpc::health::v1;
 
 std::uint64_t drains = 10;
 
-// Only against hanging: far beyond any grace time here.
+// A timeout for hangs only, longer than any grace time here.
 constexpr std::chrono::seconds kPatience(60);
 
 class Drain : public ::testing::Test {
@@ -60,8 +60,8 @@ class Drain : public ::testing::Test {
   std::unique_ptr<ServingProcess> server_;
 };
 
-// What a client of a server that goes away has to get: answers from the first frame on, none left
-// out, the notice once, the answers to what had been read, and UNAVAILABLE.
+// Checks what a client of a draining server receives: answers from the first frame on without gaps,
+// one notice, the answers to all frames that were read, and UNAVAILABLE.
 void StreamUntilTheEnd(const std::shared_ptr<grpc::Channel>& channel, unsigned seed,
                        std::atomic<int>& streaming) {
   const auto expected = LocalDigests(seed, 4);
@@ -95,8 +95,7 @@ void StreamUntilTheEnd(const std::shared_ptr<grpc::Channel>& channel, unsigned s
   EXPECT_EQ(notices, 1);
 }
 
-// The server's own word, or that nobody listens any more, or gRPC's for a call that comes in the
-// moment in which it stops.
+// The status of the server, of a closed port, or gRPC's for a call at the moment of the shutdown.
 void ExpectTurnedAway(const grpc::Status& status) {
   EXPECT_THAT(status.error_code(),
               AnyOf(grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::CANCELLED))
@@ -163,7 +162,7 @@ TEST_F(Drain, ACallThatHasNotOpenedIsToldToGoElsewhere) {
   ExpectGoodEnd();
 }
 
-// Streams that are told to go one after the other, while whoever comes is served.
+// Streams are redirected one after the other, while new ones are served.
 TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
   constexpr unsigned kStreams = 5;
   Serve("30", {"--drain-delay", "3"});
@@ -182,9 +181,9 @@ TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
   ASSERT_TRUE(is_serving());
   Terminate();
   while (is_serving()) std::this_thread::yield();
-  // It is not ready any more, and serves.
+  // Not ready, but still serving.
   EXPECT_TRUE(clients.back()->SendAndReceive(BlobRequest(1, 3, 0)).has_frame());
-  // Each in its turn, in the order in which they came.
+  // In the order in which they were opened.
   StreamClient late(Channel());
   std::atomic<unsigned> gone = 0;
   std::vector<std::thread> readers;
@@ -208,7 +207,7 @@ TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
   ExpectGoodEnd();
 }
 
-// Clients whose windows are full and who never read an answer.
+// Clients with full windows that never read a response.
 TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
   for (const char* budget : {"1GB", "1"}) {
     Serve("0.5", {"--memory-budget", budget});
@@ -222,7 +221,7 @@ TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
         for (std::uint64_t k = 1; client.Send(BlobRequest(k, i, k % 3)); ++k) ++sent;
       });
     }
-    // Full once nothing more is taken for a while; the test is good whether it is or not.
+    // Counts as full when no more is accepted for a while. The test is valid in either case.
     for (std::uint64_t last = 0; last != sent || sent == 0;) {
       last = sent;
       std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -234,7 +233,7 @@ TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
   }
 }
 
-// A frame that takes long: all its particles lie within reach of every point of its outline.
+// A frame that takes long: each vertex is within reach of all its particles.
 v1::ReconstructRequest LongFrame() {
   constexpr std::size_t kParticles = 4'000'000;
   std::mt19937 random(1);
@@ -257,7 +256,7 @@ v1::ReconstructRequest OpenForLongFrames() {
   return open;
 }
 
-// Nothing may hold the server beyond its grace time: neither this frame nor who waits for it.
+// Neither this frame nor its client delays the server beyond the grace time.
 TEST_F(Drain, AFrameThatOutlastsTheGraceTimeDoesNotHoldTheServer) {
   Serve("0.2", {"--max-particles", "4000000", "--max-frame-bytes", "100MB"});
   StreamClient client(Channel());
@@ -265,14 +264,14 @@ TEST_F(Drain, AFrameThatOutlastsTheGraceTimeDoesNotHoldTheServer) {
   const auto frame = LongFrame();
   const double before_ms = ProcessCpuMs(server_->process().process());
   ASSERT_TRUE(client.Send(frame));
-  // To be sure that it is being computed: reading it takes a tenth of a second.
+  // Ensures that it is being computed: reading it takes a tenth of a second.
   while (ProcessCpuMs(server_->process().process()) < before_ms + 500) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   Terminate();
   const auto code = server_->process().WaitFor(kPatience);
   ASSERT_TRUE(code.has_value()) << "it hangs";
-  // 0 where the frame could be cancelled in time; 1 where the process was cut off.
+  // 0 if the frame was cancelled in time, 1 if the process was cut off.
   if (*code != 0) {
     EXPECT_EQ(*code, 1);
     EXPECT_THAT(server_->process().Output(), HasSubstr("cut off"));
@@ -287,7 +286,7 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
     Serve("3600");
     StreamClient client(Channel());
     ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
-    // Its answer is not taken, so that the drain waits for an hour.
+    // Its response is not read, so the drain would wait for an hour.
     std::atomic<bool> stop = false;
     std::thread writer([&] {
       for (std::uint64_t k = 1; !stop && client.Send(BlobRequest(k, 1, k % 3)); ++k) {
@@ -306,7 +305,7 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
   }
 }
 
-// Clients without a call that nobody looks after.
+// Idle clients without a call.
 TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
   Serve("3600");
   const auto idle = Channel();
@@ -319,8 +318,7 @@ TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
   ExpectGoodEnd();
 }
 
-// Peers that send SETTINGS and do not read the acknowledgements, so that gRPC cannot write any
-// more.
+// Peers that send SETTINGS and do not read the acknowledgements, so that gRPC cannot write.
 TEST_F(Drain, PeersThatReadNoAcknowledgementsAreNotWaitedFor) {
   Serve("4");
   const std::string address = server_->address();

@@ -1,5 +1,5 @@
-// Each row of "A part is refused" in proto/PROTOCOL.md: a test named as the row's reason, with the
-// exact reason and words (error_table_test.cc looks for rows without).
+// The rows of "A part is refused" in proto/PROTOCOL.md: one test per row, named by its reason, with
+// exact reason and words. error_table_test.cc finds rows without a test.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -50,7 +50,7 @@ TEST_F(PartRefused, PARTS_MISSING) {
               "parts: 1, 2; must come within 50 ms of the first part of their frame");
 }
 
-// One call of Reconstruct, with a token if there is one.
+// One Reconstruct call, optionally with a token.
 class TokenCall {
  public:
   TokenCall(v1::ReconstructionService::Stub& stub, const std::string& token) {
@@ -81,7 +81,7 @@ v1::ReconstructResponse AnswerAfterIdling(v1::ReconstructionService::Stub& stub,
   EXPECT_TRUE(leader.Exchange(OpenPart("tank", 0, 2)).has_opened());
   EXPECT_TRUE(member.Exchange(OpenPart("tank", 1, 2)).has_opened());
   EXPECT_TRUE(other.Exchange(OpenRequest("other")).has_opened());
-  // Each of these has the slot that the idle calls had before.
+  // Each of these takes the slot of the idle calls.
   EXPECT_TRUE(other.Exchange(BlobRequest(1, 1, 0)).has_frame());
   EXPECT_TRUE(other.Exchange(BlobRequest(2, 1, 1)).has_frame());
   return member.Exchange(part);
@@ -89,7 +89,7 @@ v1::ReconstructResponse AnswerAfterIdling(v1::ReconstructionService::Stub& stub,
 
 TEST_F(PartRefused, MEMORY_BUDGET) {
   options_.limits.memory_budget = 100;
-  options_.limits.history_bytes = 0;  // Which has a part of it.
+  options_.limits.history_bytes = 0;  // It shares the budget.
   options_.limits.streams_beyond_budget = 1;
   Serve();
   const auto part = PartRequest(1, 2, 1, 1, 0, true);

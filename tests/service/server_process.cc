@@ -139,7 +139,7 @@ ServingProcess::ServingProcess(std::vector<std::string> arguments, const Surroun
     }
   }
   address_ = FileText(port_file);
-  address_.pop_back();  // The end of the line.
+  address_.pop_back();  // Removes the newline.
 }
 
 }  // namespace partiemc::server

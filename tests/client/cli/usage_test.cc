@@ -1,4 +1,4 @@
-// A wrong word on the command line: one line, exit code 2, nothing done.
+// Invalid command lines: one line, exit code 2, no effect.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -119,7 +119,7 @@ TEST(Usage, NoServerThereIsExitCodeFour) {
     ExpectOneLine(ran);
     EXPECT_THAT(ran.error, HasSubstr("no server at unix:/nonexistent/socket"));
     EXPECT_THAT(ran.error, HasSubstr("start one with `partiemc-server --address"));
-    // The only one that can do without.
+    // The only verb that works without.
     EXPECT_EQ(ran.error.find("--local") != std::string::npos, arguments.front() == "replay");
   }
 }
