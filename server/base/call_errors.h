@@ -21,6 +21,8 @@ inline constexpr std::string_view kReasonMalformed = "MALFORMED";
 absl::Status ProtocolError(std::string found, std::string rule);
 /// UNAVAILABLE with the Violation of a draining server.
 absl::Status DrainingError();
+/// CANCELLED: the client has disconnected.
+absl::Status ClientGone();
 /// DEADLINE_EXCEEDED (IDLE) for a client that did `what` for `limit`: "sends no `open`".
 absl::Status IdleError(std::string what, std::chrono::milliseconds limit);
 

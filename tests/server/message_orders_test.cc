@@ -10,6 +10,7 @@
 #include <string>
 
 #include "partiemc/status.h"
+#include "server/reached_states.h"
 #include "server/scripted_transport.h"
 #include "server/stream_model.h"
 #include "support/random.h"
@@ -55,13 +56,15 @@ std::vector<StreamModel::Digests> ResultsOfAnUndisturbedStream() {
 class Order {
  public:
   Order(std::uint64_t seed, SteppedPool& pool, MemoryBudget& budget,
-        const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen)
+        const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen,
+        ReachedStates& reached)
       : random_(seed),
         window_(1 + random_.Below(4)),
         legal_(!random_.Chance(0.03)),
         slow_reader_(random_.Chance(0.3)),
         pool_(pool),
         seen_(seen),
+        reached_(reached),
         model_(window_, legal_, results),
         transport_(pool, budget, window_, Parameters(legal_), kLimits) {}
 
@@ -108,6 +111,10 @@ class Order {
 
   // Events that may occur at any moment, also during opening and answering.
   void SomethingMeanwhile() {
+    SomeEvent();
+    reached_.Add(transport_.machine().state());
+  }
+  void SomeEvent() {
     switch (random_.Below(4)) {
       case 0:
         return Cancel();
@@ -210,6 +217,7 @@ class Order {
 
   void ExpectAsPredicted(const char* after) {
     SCOPED_TRACE(testing::Message() << "after " << after);
+    reached_.Add(transport_.machine().state());
     EXPECT_EQ(transport_.reading(), model_.reading());
     EXPECT_EQ(transport_.writing() == model_.writing(), true)
         << "sequence " << (transport_.writing() ? transport_.writing()->sequence : 0) << " and "
@@ -233,6 +241,7 @@ class Order {
   const bool legal_, slow_reader_;
   SteppedPool& pool_;
   std::map<std::string, int>& seen_;
+  ReachedStates& reached_;
   StreamModel model_;
   ScriptedTransport transport_;
   bool first_ = true, half_closed_ = false;
@@ -245,14 +254,17 @@ TEST(MessageOrders, AreAnsweredAsTheModelSays) {
   SteppedPool pool;
   MemoryBudget budget(std::uint64_t{1} << 40);
   std::map<std::string, int> seen;
+  ReachedStates reached;
   for (std::uint64_t seed = first; seed < first + orders; ++seed) {
     SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed << " PARTIEMC_ORDERS=1");
-    Order(seed, pool, budget, results, seen).Run();
+    Order(seed, pool, budget, results, seen, reached).Run();
     EXPECT_EQ(budget.held(), 0u);
     if (HasFailure()) return;  // The first failure is enough.
   }
   for (const auto& [what, count] : seen) std::cout << what << ": " << count << '\n';
   if (orders < 1000) return;
+  std::cout << "states reached: " << reached.count() << '\n';
+  reached.ExpectAllRowsOf(MachineKind::kStream);
   // All kinds of events must have occurred.
   for (const char* end :
        {"OK ", "CANCELLED ", "INVALID_ARGUMENT PROTOCOL", "UNAVAILABLE DRAINING",

@@ -13,6 +13,7 @@
 
 #include "partiemc/status.h"
 #include "server/base/call_errors.h"
+#include "server/reached_states.h"
 #include "server/stream/stream_state_machine.h"
 #include "server/stream/unary_registry.h"
 
@@ -212,6 +213,7 @@ TEST(UnaryStateMachine, OneThatIsCancelledWhileItIsWorkedOnEndsWhenTheWorkDoes) 
 TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
   constexpr unsigned kSeed = 20261122;
   std::mt19937 random(kSeed);
+  ReachedStates reached;
   for (int order = 0; order < 20'000; ++order) {
     SCOPED_TRACE(::testing::Message() << "seed " << kSeed << ", order " << order);
     MemoryBudget budget(kBudget);
@@ -221,8 +223,15 @@ TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
     const std::vector<std::function<void()>> outside = {
         [&] { call.machine->Cancelled(); }, [&] { call.machine->GiveWay(DrainingError()); },
         [&] { call.machine->EndIfIdle(kLimits, steady_clock::now() + seconds(random() % 200)); }};
-    if (random() % 2 == 0) call.while_answering = outside[random() % outside.size()];
+    call.while_answering = [&] { reached.Add(call.machine->state()); };
+    if (random() % 2 == 0) {
+      call.while_answering = [&, happens = outside[random() % outside.size()]] {
+        happens();
+        reached.Add(call.machine->state());
+      };
+    }
     for (int step = 0; step < 6; ++step) {
+      reached.Add(call.machine->state());
       switch (random() % 5) {
         case 0:
           if (call.reading) call.Bring(random() % 1500);
@@ -238,11 +247,14 @@ TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
       }
     }
     call.machine->Cancelled();
+    reached.Add(call.machine->state());
     if (call.reading) call.EndRead();
     if (call.writing) call.EndWrite(false);
+    reached.Add(call.machine->state());
     ASSERT_TRUE(call.finished.has_value());
     ASSERT_EQ(budget.held(), 0u);
   }
+  reached.ExpectAllRowsOf(MachineKind::kUnary);
 }
 
 TEST(UnaryStateMachine, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
