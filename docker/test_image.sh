@@ -1,9 +1,10 @@
 #!/bin/bash
 # Builds both images of the Dockerfile without a container engine and runs them like compose.yaml
 # and compose.tls.yaml: on read-only roots, without privileges. Checks the health check, a replay of
-# the client's image, a browser and Prometheus, loopback by default, and exit code 0 within 5 s of
-# SIGTERM. Requires root; installs the missing packages of the set `image`. Keeps the base system in
-# build/image, and removes every container and image at the end.
+# the client's image through haproxy, a browser and Prometheus, loopback by default, and exit code 0
+# within 5 s of SIGTERM. Requires root; installs the missing packages of the set `image`. haproxy is
+# Debian's, not its image. Keeps the base system in build/image, and removes every container and
+# image at the end.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -39,8 +40,10 @@ choose_driver() {
 }
 
 unshare_pid=''
+proxy=''
 volume=''
 cleanup() {
+  [[ -z $proxy ]] || kill -KILL "$proxy" 2>/dev/null || true
   [[ -z $unshare_pid ]] || kill -KILL "$unshare_pid" 2>/dev/null || true
   "${buildah[@]}" rm --all >/dev/null 2>&1 || true
   "${buildah[@]}" rmi --all --force >/dev/null 2>&1 || true
@@ -166,6 +169,28 @@ run_client() {
     "${client_environment[@]}" "${words[@]}" partiemc "$@"
 }
 
+# start_proxy [FILE...]: haproxy in the server's network, with the environment of the proxy of
+# these compose files.
+start_proxy() {
+  local environment attempt
+  mapfile -t environment < <(composed environment proxy "$@" |
+    sed "s,=/tls/,=$server_root/tls/,; s,^PARTIEMC_PROXY=:50051$,PARTIEMC_PROXY=127.0.0.1:50050,")
+  nsenter --target "$server" --net env -i "${environment[@]}" \
+    /usr/sbin/haproxy -db -q -f docker/haproxy.cfg &
+  proxy=$!
+  for ((attempt = 0; attempt < 100; ++attempt)); do
+    nsenter --target "$server" --net ss --no-header --listening --tcp 'sport = :50050' |
+      grep -q . && return
+    sleep 0.1
+  done
+  fail "haproxy does not listen"
+}
+stop_proxy() {
+  kill -KILL "$proxy"
+  wait "$proxy" 2>/dev/null || true
+  proxy=
+}
+
 # Sends SIGTERM and expects exit code 0 within 5 s.
 stop_server() {
   local begin end code=0
@@ -259,11 +284,14 @@ stop_server "by default"
 mapfile -t composed < <(composed environment server compose.yaml)
 server_environment=("${image_environment[@]}" "${composed[@]}" PARTIEMC_METRICS=127.0.0.1:9464
   PARTIEMC_WEB=127.0.0.1:8080)
-mapfile -t replayed < <(composed command replay compose.yaml)
-echo "127.0.0.1 server" | tee -a "$server_root/etc/hosts" >>"$client_root/etc/hosts"
+# Server and proxy share a network here, so the proxy has another port.
+mapfile -t replayed < <(composed command replay compose.yaml | sed 's/proxy:50051/proxy:50050/')
+echo "127.0.0.1 server proxy" | tee -a "$server_root/etc/hosts" >>"$client_root/etc/hosts"
 start_server
+start_proxy compose.yaml
 check_privileges
 run_client "${replayed[@]}" >/dev/null
+stop_proxy
 frames=$(find "$volume/frames" -name '*.geojson' -size +0 | wc -l)
 counted=$(fetched http://127.0.0.1:9464/metrics | awk '/^partiemc_frames_total/ { print $2 }')
 ((frames > 0 && frames == counted)) || fail "$frames frames replayed, $counted in the metrics"
@@ -287,17 +315,18 @@ cp -a "$server_root"/tls/{ca.pem,tokens} "$client_root/tls"
 mapfile -t composed < <(composed environment server compose.yaml compose.tls.yaml)
 server_environment=("${image_environment[@]}" "${composed[@]}")
 start_server
-echo "healthy over TLS"
-! replay --server 127.0.0.1:50051 2>/dev/null ||
-  fail "a server with TLS takes a replay in the clear"
+start_proxy compose.yaml compose.tls.yaml
+echo "healthy behind TLS"
+! replay --server proxy:50050 2>/dev/null || fail "a proxy with TLS takes a replay in the clear"
 mapfile -t composed < <(composed environment replay compose.yaml compose.tls.yaml)
 client_environment+=("${composed[@]}")
-replay --server server:50051
+replay --server proxy:50050
 mapfile -t client_environment < <(printf '%s\n' "${client_environment[@]}" |
   grep -v ^PARTIEMC_TOKEN)
-refusal=$(run_client info --server server:50051 2>&1 >/dev/null) &&
+refusal=$(run_client info --server proxy:50050 2>&1 >/dev/null) &&
   fail "a server with tokens answers who has none"
 [[ $refusal == *"authorization: absent"* ]] || fail "who has no token is told: $refusal"
 echo "replay over TLS, with a token"
-stop_server "over TLS"
+stop_proxy
+stop_server "behind TLS"
 echo "test_image.sh: passed in $SECONDS s"

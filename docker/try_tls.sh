@@ -1,7 +1,7 @@
 #!/bin/bash
 # Creates the files that docker/compose.tls.yaml mounts. ca.pem: an authority, whose key is deleted.
-# server.pem and server.key: a certificate for the hosts `server` and `localhost`, valid for 30
-# days. tokens: one random token, which the client sends and the server knows.
+# server.crt and server.key: a certificate for the hosts `proxy`, `server` and `localhost`, valid for
+# 30 days. tokens: one random token, which the client sends and the server knows.
 set -euo pipefail
 
 if (($# != 1)) || [[ $1 == -* ]]; then
@@ -17,10 +17,10 @@ mkdir -p "$directory"
 new_key=(openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -noenc)
 "${new_key[@]}" -x509 -days "$days" -subj "/CN=partiemc trial authority" \
   -keyout "$secrets/ca.key" -out "$directory/ca.pem" 2>"$secrets/log" &&
-  "${new_key[@]}" -subj "/CN=server" -addext "subjectAltName=DNS:server,DNS:localhost" \
+  "${new_key[@]}" -subj "/CN=server" -addext "subjectAltName=DNS:proxy,DNS:server,DNS:localhost" \
     -keyout "$directory/server.key" -out "$secrets/server.csr" 2>>"$secrets/log" &&
   openssl x509 -req -in "$secrets/server.csr" -copy_extensions copy -days "$days" \
-    -CA "$directory/ca.pem" -CAkey "$secrets/ca.key" -out "$directory/server.pem" \
+    -CA "$directory/ca.pem" -CAkey "$secrets/ca.key" -out "$directory/server.crt" \
     2>>"$secrets/log" || {
   cat "$secrets/log" >&2
   exit 1

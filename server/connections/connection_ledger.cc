@@ -88,7 +88,9 @@ std::uint64_t ConnectionLedger::ReadAllowance() const {
 std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,
                                                const ConnectionReading& reading,
                                                Clock::time_point now) {
-  PayDebt(counts, reading, std::chrono::duration<double>(now - examined_).count());
+  const double seconds = std::chrono::duration<double>(now - examined_).count();
+  PayDebt(counts, reading, seconds);
+  CountStreams(counts, reading, seconds);
   const double allowed =
       static_cast<double>(counts.calls_open * kWindowBytes + counts.reads_open * ReadAllowance()) +
       lingering_;
@@ -96,8 +98,7 @@ std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,
   examined_ = now;
   last_counts_ = counts;
   last_ = reading;
-  if (reading.has_streams) streams_open_ = reading.streams_open;
-  if (rules_.max_streams > 0 && streams_open_ > rules_.max_streams) return Flood::kStreams;
+  if (rules_.max_streams > 0 && streams_ > rules_.max_streams) return Flood::kStreams;
   if (rules_.unaccounted_bytes == 0) return std::nullopt;
   if (excess_ > rules_.unaccounted_bytes) return Flood::kUnaccountedBytes;
   return ExamineHeaders(counts, reading, now);
@@ -117,6 +118,21 @@ void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& re
            static_cast<double>((reading.bytes_sent - last_.bytes_sent) / kReplyPart) +
            kBytesPerSecond * seconds;
   debt_ = std::max(0.0, debt_);
+}
+
+// A stream that was reset is no longer open, but gRPC still makes a call of it and has its memory
+// until then. Some streams never become calls, so the number is forgiven step by step.
+void ConnectionLedger::CountStreams(const Counts& counts, const ConnectionReading& reading,
+                                    double seconds) {
+  const double forgiven = static_cast<double>(rules_.max_streams) * seconds / kLingerSeconds;
+  waiting_streams_ = std::max(0.0, waiting_streams_ - forgiven);
+  if (!reading.has_streams) return;
+  waiting_streams_ += static_cast<double>(reading.streams_started - counted_started_) -
+                      static_cast<double>(counts.calls_begun - counted_begun_);
+  waiting_streams_ = std::max(0.0, waiting_streams_);
+  counted_started_ = reading.streams_started;
+  counted_begun_ = counts.calls_begun;
+  streams_ = std::max(reading.streams_open, static_cast<std::uint64_t>(waiting_streams_));
 }
 
 std::optional<Flood> ConnectionLedger::ExamineHeaders(const Counts& counts,

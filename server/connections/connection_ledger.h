@@ -16,7 +16,8 @@ struct ConnectionRules {
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
   /// Of one message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;
-  /// HTTP/2 streams that exist in gRPC at once. Each takes 10 to 16 kB. 0: not limited.
+  /// HTTP/2 streams that exist in gRPC at once, and streams that have not become calls yet, such as
+  /// those that were reset at once. Each takes 10 to 16 kB. 0: not limited.
   std::uint64_t max_streams = 1'000;
 };
 
@@ -79,8 +80,8 @@ class ConnectionLedger {
 
   /// Bytes beyond what open calls allow, as of the last Examine.
   std::uint64_t excess() const { return excess_; }
-  /// Streams as of the last reading that had them.
-  std::uint64_t streams_open() const { return streams_open_; }
+  /// Streams that are open or have not become calls, as of the last reading that had them.
+  std::uint64_t streams() const { return streams_; }
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }
   /// Whether a stream has not become a call: then its streams are worth another look.
@@ -89,6 +90,7 @@ class ConnectionLedger {
  private:
   std::uint64_t ReadAllowance() const;
   void PayDebt(const Counts& counts, const ConnectionReading& reading, double seconds);
+  void CountStreams(const Counts& counts, const ConnectionReading& reading, double seconds);
   std::optional<Flood> ExamineHeaders(const Counts& counts, const ConnectionReading& reading,
                                       Clock::time_point now);
 
@@ -103,7 +105,10 @@ class ConnectionLedger {
   ConnectionReading last_;
   double debt_ = 0;       // Bytes.
   double lingering_ = 0;  // Bytes that ended calls still allow.
-  std::uint64_t excess_ = 0, streams_open_ = 0;
+  std::uint64_t excess_ = 0, streams_ = 0;
+  // Streams that have not become calls, and the counts that they were computed from.
+  double waiting_streams_ = 0;
+  std::uint64_t counted_started_ = 0, counted_begun_ = 0;
   bool headers_pending_ = false;
   Clock::time_point pending_since_;
   std::uint64_t pending_stream_ = 0, pending_messages_ = 0, pending_bytes_ = 0;

@@ -10,7 +10,7 @@ namespace {
 constexpr double kBurstSeconds = 2;
 
 // An attacker that is cut comes again at once, before gRPC has freed what the flood took.
-constexpr std::chrono::seconds kBan(10);
+constexpr std::chrono::seconds kBan(10), kRefusal(1);
 
 }  // namespace
 
@@ -18,6 +18,7 @@ Admission ConnectionCounts::Add(const std::string& address, Clock::time_point no
   const double burst = kBurstSeconds * limits_.new_of_address;
   const auto [found, is_new] = addresses_.try_emplace(address);
   Address& counted = found->second;
+  if (now < counted.refused_until) return Admission::kRefused;
   if (is_new) {
     counted.tokens = burst;
   } else {
@@ -39,7 +40,7 @@ Admission ConnectionCounts::Add(const std::string& address, Clock::time_point no
 
 void ConnectionCounts::Remove(const std::string& address, Admission admission) {
   const auto found = addresses_.find(address);
-  if (found == addresses_.end()) return;
+  if (found == addresses_.end() || admission == Admission::kRefused) return;
   if (admission == Admission::kKept) {
     --found->second.kept;
     --kept_;
@@ -48,11 +49,13 @@ void ConnectionCounts::Remove(const std::string& address, Admission admission) {
   }
 }
 
-void ConnectionCounts::OnFlood(const std::string& address, Clock::time_point now) {
+void ConnectionCounts::OnFlood(const std::string& address, Admission admission,
+                               Clock::time_point now) {
   const auto found = addresses_.find(address);
   // Behind a proxy all clients have one address, and it has no limits.
   if (found == addresses_.end() || limits_.new_of_address == 0) return;
   found->second.banned_until = now + kBan;
+  if (admission == Admission::kHealthOnly) found->second.refused_until = now + kRefusal;
 }
 
 std::size_t ConnectionCounts::CountOf(const std::string& address) const {

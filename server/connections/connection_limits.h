@@ -22,6 +22,8 @@ enum class Admission {
   /// Beyond a limit. It is kept for health checks alone, so that a server that is flooded is not
   /// taken for dead by a probe from the same address.
   kHealthOnly,
+  /// Closed at once.
+  kRefused,
 };
 
 /// Counts connections of each address. Not thread-safe.
@@ -32,13 +34,15 @@ class ConnectionCounts {
   explicit ConnectionCounts(const ConnectionLimits& limits) : limits_(limits) {}
 
   /// Counts one more connection of `address`, as HostOfPeer writes it. Remove follows when it has
-  /// ended, with the same admission.
+  /// ended, with the same admission, unless it was refused.
   Admission Add(const std::string& address, Clock::time_point now);
   void Remove(const std::string& address, Admission admission);
 
   /// A connection of `address` was cut for a flood. For ten seconds the address opens connections
-  /// for health checks alone. Those that it has go on.
-  void OnFlood(const std::string& address, Clock::time_point now);
+  /// for health checks alone. If it floods in one of these, its connections are refused for a
+  /// second: over TLS a peer shows only after the handshake that it floods. The open connections of
+  /// the address go on.
+  void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
   /// Kept connections of all addresses.
   std::size_t count() const { return kept_; }
@@ -56,7 +60,7 @@ class ConnectionCounts {
     std::size_t kept = 0, health_only = 0;
     double tokens = 0;  // New connections that it may open now.
     Clock::time_point filled;
-    Clock::time_point banned_until;
+    Clock::time_point banned_until, refused_until;
   };
 
   const ConnectionLimits limits_;

@@ -101,6 +101,7 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   const std::lock_guard lock(mutex_);
   if (counts_.IsFull()) EvictIdleLocked();
   const Admission admission = counts_.Add(address, now);
+  if (admission == Admission::kRefused) return Abort(socket.get());
   connection.tracked =
       std::make_shared<TrackedConnection>(RulesOf(admission, rules_), admission, now);
   if (!connection.peer.name.empty() && !table_.Add(connection.peer.name, connection.tracked)) {
@@ -304,7 +305,7 @@ void ConnectionWatch::Cut(Connections::iterator connection, Flood flood, Clock::
   const Connection& cut = *connection;
   Abort(cut.socket.get());
   ++counters_.floods[static_cast<std::size_t>(flood)];
-  counts_.OnFlood(cut.peer.address, now);
+  counts_.OnFlood(cut.peer.address, cut.tracked->admission, now);
   if (give_back_memory_) give_back_at_ = std::min(give_back_at_, now + kBetweenGivingBack);
   if (log_limit_.Allow(now)) {
     LogEvent(spdlog::level::warn, "connection cut",
@@ -312,7 +313,7 @@ void ConnectionWatch::Cut(Connections::iterator connection, Flood flood, Clock::
               {"reason", std::string(FloodName(flood))},
               {"received", cut.reading.bytes_read},
               {"unaccounted", cut.tracked->ledger.excess()},
-              {"streams", cut.tracked->ledger.streams_open()},
+              {"streams", cut.tracked->ledger.streams()},
               {"calls", cut.tracked->ledger.calls_begun()}});
   }
   Remove(connection);

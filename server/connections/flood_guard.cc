@@ -41,7 +41,7 @@ std::optional<std::size_t> LargestOfLargest(const std::vector<ExaminedConnection
 std::optional<Excess> LargestExcess(const std::vector<ExaminedConnection>& connections,
                                     const ConnectionRules& rules) {
   const auto bytes = [](const TrackedConnection& one) { return one.ledger.excess(); };
-  const auto streams = [](const TrackedConnection& one) { return one.ledger.streams_open(); };
+  const auto streams = [](const TrackedConnection& one) { return one.ledger.streams(); };
   if (rules.unaccounted_bytes > 0) {
     if (const auto index =
             LargestOfLargest(connections, bytes, kConnectionsAtLimit * rules.unaccounted_bytes)) {

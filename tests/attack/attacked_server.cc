@@ -157,12 +157,13 @@ int AttackedServer::Terminate(std::chrono::milliseconds time) {
   return code_ = *code;
 }
 
-Proxy::Proxy(const std::string& server) {
+Proxy::Proxy(const std::string& server, const std::string& certificate) {
   address_ = "127.0.0.1:" + std::to_string(FreePort());
   std::vector<std::string> arguments = {"/usr/sbin/haproxy", "-db", "-q", "-f",
                                         PARTIEMC_SOURCE_DIR "/docker/haproxy.cfg"};
   std::vector<std::string> environment = {"PARTIEMC_PROXY=" + address_,
                                           "PARTIEMC_SERVER=" + server};
+  if (!certificate.empty()) environment.push_back("PARTIEMC_PROXY_CERT=" + certificate);
   std::vector<char*> argv, envp;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   for (std::string& variable : environment) envp.push_back(variable.data());

@@ -49,13 +49,15 @@ class AttackedServer {
 /// haproxy with docker/haproxy.cfg in front of a server, during the lifetime of this object.
 class Proxy {
  public:
-  /// Serves when it returns. Fails the test if the program is missing.
-  explicit Proxy(const std::string& server);
+  /// Serves when it returns. Fails the test if the program is missing. `certificate`: for TLS, the
+  /// file NAME.crt beside NAME.key.
+  explicit Proxy(const std::string& server, const std::string& certificate = "");
   ~Proxy();
   Proxy(const Proxy&) = delete;
   Proxy& operator=(const Proxy&) = delete;
 
   const std::string& address() const { return address_; }
+  pid_t process() const { return process_; }
 
  private:
   std::string address_;

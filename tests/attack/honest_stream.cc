@@ -112,14 +112,17 @@ struct HonestStream::State {
   Result expected;
 };
 
-HonestStream::HonestStream(const std::string& address, const std::string& token, unsigned seed)
+HonestStream::HonestStream(const std::string& address, const std::string& token, unsigned seed,
+                           const std::string& ca)
     : state_(std::make_unique<State>()) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetMaxReceiveMessageSize(-1);
   state_->seed = seed;
+  const auto credentials = ca.empty() ? grpc::InsecureChannelCredentials()
+                                      : grpc::SslCredentials({.pem_root_certs = ca});
   state_->stub = v1::ReconstructionService::NewStub(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+      grpc::CreateCustomChannel(address, credentials, arguments));
   if (!token.empty()) state_->context.AddMetadata("authorization", "Bearer " + token);
   // A timeout for hangs only.
   state_->context.set_deadline(std::chrono::system_clock::now() + std::chrono::hours(3));

@@ -15,8 +15,10 @@ namespace partiemc::attack {
 /// answer or the end of the call fails the test and stops it.
 class HonestStream {
  public:
-  /// Opened when it returns. An empty token sends none.
-  HonestStream(const std::string& address, const std::string& token, unsigned seed);
+  /// Opened when it returns. An empty token sends none. `ca`: the authority of the server's
+  /// certificate in PEM; empty: without TLS.
+  HonestStream(const std::string& address, const std::string& token, unsigned seed,
+               const std::string& ca = "");
   ~HonestStream();
 
   void Stop();

@@ -2,11 +2,14 @@
 // several can share a packet.
 #pragma once
 
+#include <openssl/ssl.h>
+
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -77,6 +80,8 @@ class Http2Client {
     bool greet = true;
     /// Source address of the client; empty: any.
     std::string source = {};
+    /// TLS with ALPN "h2". The server's certificate is not verified.
+    bool tls = false;
   };
 
   /// Connects to "127.0.0.1:PORT". Throws std::runtime_error on failure.
@@ -123,12 +128,19 @@ class Http2Client {
   void Close(bool reset);
 
  private:
+  struct FreeTls {
+    void operator()(SSL* tls) const { SSL_free(tls); }
+  };
+
+  void StartTls();
   bool WriteSome();
   bool ReadSome();
+  std::int64_t ReadBytes(char* buffer, std::size_t bytes);
   void Receive(const ReceivedFrame& frame);
   short Wait(short events, Clock::time_point deadline) const;
 
   int socket_ = -1;
+  std::unique_ptr<SSL, FreeTls> tls_;  // Null: in the clear.
   bool closed_ = false;
   std::string out_, in_;
   std::uint32_t next_stream_ = 1;

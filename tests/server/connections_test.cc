@@ -140,6 +140,23 @@ TEST_F(Ledger, TooManyStreamsAreAFlood) {
   EXPECT_EQ(Examine(), Flood::kStreams);
 }
 
+TEST_F(Ledger, ResetStreamsCountUntilTheyAreCalls) {
+  for (std::uint64_t started = 90; started < 2'000; started += 90) {
+    Streams(started, 0);
+    ASSERT_EQ(Examine(), std::nullopt) << started;
+    for (int k = 0; k < 90; ++k) ledger_.OnCallBegun();
+  }
+  Streams(reading_.streams_started + 130, 0);
+  EXPECT_EQ(Examine(), Flood::kStreams);
+}
+
+TEST_F(Ledger, StreamsThatNeverAreCallsAreForgiven) {
+  for (std::uint64_t started = 15; started < 2'000; started += 15) {
+    Streams(started, 0);
+    ASSERT_EQ(Examine(seconds(1)), std::nullopt) << started;
+  }
+}
+
 TEST_F(Ledger, HeadersWithoutAnEndAreNotHiddenByAnOpenCall) {
   ledger_.OnCallBegun();
   ledger_.OnReadBegun();
@@ -220,7 +237,7 @@ TEST_F(Counts, AllAddressesTogetherAreLimited) {
 
 TEST_F(Counts, AFloodBansItsAddressForTenSeconds) {
   EXPECT_EQ(Add("a"), Admission::kKept);
-  counts_.OnFlood("a", now_);
+  counts_.OnFlood("a", Admission::kKept, now_);
   counts_.Remove("a", Admission::kKept);
   now_ += seconds(9);
   EXPECT_EQ(Add("a"), Admission::kHealthOnly);
@@ -229,10 +246,22 @@ TEST_F(Counts, AFloodBansItsAddressForTenSeconds) {
   EXPECT_EQ(Add("a"), Admission::kKept);
 }
 
+TEST_F(Counts, AFloodDespiteABanRefusesForASecond) {
+  counts_.Remove("a", Add("a"));
+  counts_.OnFlood("a", Admission::kKept, now_);
+  EXPECT_EQ(Add("a"), Admission::kHealthOnly);
+  counts_.OnFlood("a", Admission::kHealthOnly, now_);
+  counts_.Remove("a", Admission::kHealthOnly);
+  EXPECT_EQ(Add("a"), Admission::kRefused);
+  EXPECT_EQ(Add("b"), Admission::kKept);
+  now_ += milliseconds(1'001);
+  EXPECT_EQ(Add("a"), Admission::kHealthOnly);
+}
+
 TEST(CountsWithoutLimits, NothingIsRefusedBehindAProxy) {
   ConnectionCounts counts({.connections = 0, .of_address = 0, .new_of_address = 0});
   counts.Add("proxy", {});
-  counts.OnFlood("proxy", {});
+  counts.OnFlood("proxy", Admission::kKept, {});
   for (int k = 0; k < 10'000; ++k) ASSERT_EQ(counts.Add("proxy", {}), Admission::kKept);
 }
 
