@@ -1,7 +1,7 @@
 #!/bin/bash
-# Shows PartiEMC at work, from a fresh clone on Debian 12: installs what is missing, builds, starts
-# a server and replays the bundled dam break through it. What comes out is left in build/demo. Then
-# the dam break plays on a loop, to be watched in a browser, until Ctrl-C.
+# Demo for a fresh clone on Debian 12: installs missing packages, builds, starts a server and
+# replays the bundled dam break through it. The results are in build/demo. Then plays the dam break
+# in a loop for a browser, until Ctrl-C.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -20,10 +20,10 @@ case ${1:-} in
   --no-browser) browser=false ;;
   -h | --help)
     echo "usage: client/demo.sh [--no-browser]"
-    echo "Installs the Debian packages that are missing, builds in $build, replays the bundled"
-    echo "recording through a server of its own and leaves the results in $output. Then plays it"
-    echo "on a loop for a browser, whose address it prints, until Ctrl-C."
-    echo "  --no-browser  end after the replay; the page and what builds it are left out"
+    echo "Installs missing Debian packages, builds in $build, replays the bundled recording"
+    echo "through a server and writes the results to $output. Then plays it in a loop for a browser"
+    echo "at the printed address, until Ctrl-C."
+    echo "  --no-browser  end after the replay, without the page and the packages that build it"
     exit 0
     ;;
   *)
@@ -102,7 +102,7 @@ docker/install.sh demo
 echo
 echo "== 2 of 3: build in $build (some minutes for the first time)"
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_TESTS=OFF \
-  -DPARTIEMC_VTK=OFF -DPARTIEMC_EVALUATION=OFF -DPARTIEMC_VIEWER="$browser" \
+  -DPARTIEMC_VTK=OFF -DPARTIEMC_VIEWER="$browser" \
   >"$work/cmake.log" 2>&1 || {
   cat "$work/cmake.log" >&2
   fail "CMake could not configure the build; its words are above"

@@ -1,8 +1,7 @@
 #!/bin/bash
-# Installs the Debian packages of the given sets, those that are missing and nothing else.
-# A set is a file beside this script: packages/SET.txt, one package a line; '@OTHER' includes
-# another set, 'PACKAGE ?COMMAND' leaves a package out where that command is there from elsewhere.
-# README, CI and image all install by this script.
+# Installs the missing Debian packages of the given sets. A set is a file packages/SET.txt with one
+# package per line; '@OTHER' includes another set, 'PACKAGE ?COMMAND' skips the package if the
+# command exists. The demo, CI and the image install by this script.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -25,7 +24,7 @@ usage() {
   sets
 }
 
-# The packages of a set, one a line, those of the sets that it includes first.
+# Prints the packages of a set, one per line, after the packages of the sets it includes.
 packages_of() {
   local file=$here/packages/$1.txt word unless
   [[ -f $file ]] || fail "no package set '$1'; there are: $(sets | awk '{ printf "%s ", $1 }')"
@@ -68,7 +67,7 @@ if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
     "'docker/install.sh --list ${chosen[*]}' names"
 fi
 
-# dpkg-query names on stderr, and fails for, what it has never heard of: both are expected here.
+# dpkg-query reports unknown packages on stderr and fails; both are expected here.
 installed=$(dpkg-query -W -f='${Package} ${db:Status-Status}\n' "${wanted[@]}" 2>/dev/null |
   awk '$2 == "installed" { print $1 }') || true
 mapfile -t missing < <(printf '%s\n' "${wanted[@]}" | grep -vxF -f <(printf '%s\n' "$installed"))
@@ -88,7 +87,7 @@ else
 fi
 
 apt_get() {
-  # A lock that another apt holds is waited for; a download is tried again before it fails.
+  # Waits for the lock of another apt, and repeats failed downloads.
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 \
     apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 "$@" </dev/null
 }

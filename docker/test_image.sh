@@ -1,10 +1,10 @@
 #!/bin/bash
-# Builds both images of the Dockerfile without a container engine and tries them as compose.yaml and
-# compose.tls.yaml have them, on read-only roots and without a privilege: the server answers its
-# health check, a replay of the client's image, a browser and Prometheus, listens on loopback unless
-# told otherwise, and leaves within 5 s of SIGTERM with exit code 0. Needs root; installs the
-# packages of the set `image` where they are missing. The base system is kept in build/image; every
-# container and image is removed at the end.
+# Builds both images of the Dockerfile without a container engine and runs them like compose.yaml
+# and compose.tls.yaml: on read-only roots, without privileges. Checks the health check, a replay of
+# the client's image through haproxy, a browser and Prometheus, loopback by default, and exit code 0
+# within 5 s of SIGTERM. Requires root; installs the missing packages of the set `image`. haproxy is
+# Debian's, not its image. Keeps the base system in build/image, and removes every container and
+# image at the end.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -12,17 +12,17 @@ fail() {
   echo "test_image.sh: $*" >&2
   exit 1
 }
-(($(id -u) == 0)) || fail "making a root file system takes root"
+(($(id -u) == 0)) || fail "making a root file system requires root"
 docker/install.sh image
 
 readonly work=$PWD/build/image
 readonly base=$work/bookworm base_image=localhost/bookworm
-readonly max_megabytes=160  # What the server's image may add to the base.
+readonly max_megabytes=160  # Limit of the server's image without its base.
 mkdir -p "$work"
 export BUILDAH_ISOLATION=chroot
 
-# A store of our own, so that nobody else's images are touched. Overlay where the kernel and the
-# file system have it; vfs copies every layer and takes many times longer.
+# A separate store, so that other images stay untouched. Overlay if the kernel and the file system
+# support it; vfs copies every layer and is many times slower.
 store=$(mktemp -d "$work/store.XXXXXX")
 choose_driver() {
   local driver container
@@ -40,8 +40,10 @@ choose_driver() {
 }
 
 unshare_pid=''
+proxy=''
 volume=''
 cleanup() {
+  [[ -z $proxy ]] || kill -KILL "$proxy" 2>/dev/null || true
   [[ -z $unshare_pid ]] || kill -KILL "$unshare_pid" 2>/dev/null || true
   "${buildah[@]}" rm --all >/dev/null 2>&1 || true
   "${buildah[@]}" rmi --all --force >/dev/null 2>&1 || true
@@ -49,7 +51,7 @@ cleanup() {
   rm -rf "$store" "$volume"
 }
 
-# Stands for the base that the Dockerfile names, for which it takes a registry.
+# Replaces the base of the Dockerfile, which would require a registry.
 make_base() {
   if [[ ! -d $base ]]; then
     echo "debootstrap: a minimal Debian 12 in ${base#"$PWD/"}"
@@ -82,7 +84,7 @@ build_images() {
   echo "both images built in $((SECONDS - began)) s"
 }
 
-# configured IMAGE FIELD: what an image says about itself, one value a line.
+# configured IMAGE FIELD: a field of the image's configuration, one value per line.
 configured() {
   "${buildah[@]}" inspect --type image --format "$2" "$1" | sed '/^$/d'
 }
@@ -90,12 +92,12 @@ lines_of() {
   configured "$1" "{{with .Docker.Config.$2}}{{range .}}{{println .}}{{end}}{{end}}"
 }
 
-# The root file system of a new container of an image.
+# Creates a container of an image and prints its root file system.
 root_of() {
   "${buildah[@]}" mount "$("${buildah[@]}" from --pull-never "$1")"
 }
 
-# added_megabytes ROOT: what an image adds to its base.
+# added_megabytes ROOT: size of an image without its base.
 added_megabytes() {
   local all base_alone
   all=$(du -sx --block-size=MB "$1" | cut -d M -f 1)
@@ -103,8 +105,8 @@ added_megabytes() {
   echo $((all - base_alone))
 }
 
-# What compose.yaml, with compose.tls.yaml on top where that is named, says of a service: its
-# environment or its command, one a line.
+# The environment or command of a service in compose.yaml, with compose.tls.yaml on top if given,
+# one value per line.
 composed() {
   /usr/bin/python3 - "$@" <<'PYTHON'
 import sys, yaml
@@ -120,21 +122,21 @@ for line in found if key == "command" else (f"{name}={text}" for name, text in f
 PYTHON
 }
 
-# What an engine does at `run` with read_only, cap_drop ALL and no-new-privileges, once there are
-# namespaces: ROOT with its /proc read-only, VOLUME at /data where there is one, no capability.
+# Emulates an engine's `run` with read_only, cap_drop ALL and no-new-privileges inside of
+# namespaces: ROOT with a read-only /proc, VOLUME at /data if given, no capability.
 readonly contained='
   root=$1 volume=$2 && shift 2
   mount --rbind "$root" "$root"
   [[ -z $volume ]] || mount --bind "$volume" "$root/data"
   mount -o remount,bind,ro "$root"
   exec env -i "$@"'
-# unprivileged ROOT USER: the words that go before a program.
+# unprivileged ROOT USER: prefix of a command.
 unprivileged() {
   words=(chroot "$1" setpriv --reuid="$2" --regid="$2" --clear-groups --no-new-privs
     --bounding-set=-all --inh-caps=-all --ambient-caps=-all)
 }
 
-# The program is number 1 in its container.
+# The program is process 1 of its container.
 start_server() {
   local attempt words
   unprivileged "$server_root" "$server_user"
@@ -150,7 +152,7 @@ start_server() {
   fail "the server is not healthy after 30 s"
 }
 
-# What an engine does at `exec`.
+# Emulates an engine's `exec`.
 in_server() {
   local words
   unprivileged "$server_root" "$server_user"
@@ -167,7 +169,29 @@ run_client() {
     "${client_environment[@]}" "${words[@]}" partiemc "$@"
 }
 
-# Sends SIGTERM and wants exit code 0 within 5 s.
+# start_proxy [FILE...]: haproxy in the server's network, with the environment of the proxy of
+# these compose files.
+start_proxy() {
+  local environment attempt
+  mapfile -t environment < <(composed environment proxy "$@" |
+    sed "s,=/tls/,=$server_root/tls/,; s,^PARTIEMC_PROXY=:50051$,PARTIEMC_PROXY=127.0.0.1:50050,")
+  nsenter --target "$server" --net env -i "${environment[@]}" \
+    /usr/sbin/haproxy -db -q -f docker/haproxy.cfg &
+  proxy=$!
+  for ((attempt = 0; attempt < 100; ++attempt)); do
+    nsenter --target "$server" --net ss --no-header --listening --tcp 'sport = :50050' |
+      grep -q . && return
+    sleep 0.1
+  done
+  fail "haproxy does not listen"
+}
+stop_proxy() {
+  kill -KILL "$proxy"
+  wait "$proxy" 2>/dev/null || true
+  proxy=
+}
+
+# Sends SIGTERM and expects exit code 0 within 5 s.
 stop_server() {
   local begin end code=0
   begin=$(date +%s%N)
@@ -184,7 +208,7 @@ replay() {
   run_client replay /usr/local/share/partiemc/recordings/dam_break.pemc --quiet "$@"
 }
 
-# fetched URL: what the server answers to a request of its own network.
+# fetched URL: the server's response to a request from its network.
 fetched() {
   nsenter --target "$server" --net /usr/bin/python3 - "$1" <<'PYTHON'
 import sys, urllib.request
@@ -193,7 +217,7 @@ print(urllib.request.urlopen(sys.argv[1], timeout=5).read().decode())
 PYTHON
 }
 
-# May not write, has no capability and cannot get one, is not root.
+# Expects a read-only root, no capabilities, none to gain, and a user other than root.
 check_privileges() {
   local status=/proc/$server/status uid folder
   for folder in /data /tmp; do
@@ -208,7 +232,7 @@ check_privileges() {
   echo "runs as user $uid on a read-only root, without capabilities"
 }
 
-# check_packages ROOT: the list of packages is that of the image.
+# check_packages ROOT: compares the list of packages with the image's.
 check_packages() {
   local list=$1/usr/local/share/partiemc/packages.tsv
   diff <(cut -f 1 "$list") <(chroot "$1" dpkg-query --show --showformat='${Package}\n') ||
@@ -241,7 +265,7 @@ echo "over the base: server $megabytes MB, client $(added_megabytes "$client_roo
 ((megabytes <= max_megabytes)) || fail "more than $max_megabytes MB"
 echo "server: ${command[*]}; health check: ${check[*]:1}"
 
-# A volume that the client's user may write, as an engine makes it from the image's /data.
+# A volume for the client's user, as an engine creates it from the image's /data.
 volume=$(mktemp -d "$work/volume.XXXXXX")
 chown "$(stat -c %u:%g "$client_root/data")" "$volume"
 
@@ -256,15 +280,18 @@ listens=$(nsenter --target "$server" --net ss --no-header --listening --tcp --nu
   fail "without a setting the server listens elsewhere than on loopback: $listens"
 stop_server "by default"
 
-# As compose.yaml has it; beside it what it leaves out, on loopback.
+# As in compose.yaml; and on loopback, which it leaves out.
 mapfile -t composed < <(composed environment server compose.yaml)
 server_environment=("${image_environment[@]}" "${composed[@]}" PARTIEMC_METRICS=127.0.0.1:9464
   PARTIEMC_WEB=127.0.0.1:8080)
-mapfile -t replayed < <(composed command replay compose.yaml)
-echo "127.0.0.1 server" | tee -a "$server_root/etc/hosts" >>"$client_root/etc/hosts"
+# Server and proxy share a network here, so the proxy has another port.
+mapfile -t replayed < <(composed command replay compose.yaml | sed 's/proxy:50051/proxy:50050/')
+echo "127.0.0.1 server proxy" | tee -a "$server_root/etc/hosts" >>"$client_root/etc/hosts"
 start_server
+start_proxy compose.yaml
 check_privileges
 run_client "${replayed[@]}" >/dev/null
+stop_proxy
 frames=$(find "$volume/frames" -name '*.geojson' -size +0 | wc -l)
 counted=$(fetched http://127.0.0.1:9464/metrics | awk '/^partiemc_frames_total/ { print $2 }')
 ((frames > 0 && frames == counted)) || fail "$frames frames replayed, $counted in the metrics"
@@ -281,24 +308,25 @@ kill -0 "$client" 2>/dev/null || fail "the replay at two frames a second is over
 stop_server "under an open stream"
 wait "$client" || true
 
-# As compose.tls.yaml has it on top.
+# With compose.tls.yaml on top.
 docker/try_tls.sh "$server_root/tls"
 mkdir -p "$client_root/tls"
 cp -a "$server_root"/tls/{ca.pem,tokens} "$client_root/tls"
 mapfile -t composed < <(composed environment server compose.yaml compose.tls.yaml)
 server_environment=("${image_environment[@]}" "${composed[@]}")
 start_server
-echo "healthy over TLS"
-! replay --server 127.0.0.1:50051 2>/dev/null ||
-  fail "a server with TLS takes a replay in the clear"
+start_proxy compose.yaml compose.tls.yaml
+echo "healthy behind TLS"
+! replay --server proxy:50050 2>/dev/null || fail "a proxy with TLS takes a replay in the clear"
 mapfile -t composed < <(composed environment replay compose.yaml compose.tls.yaml)
 client_environment+=("${composed[@]}")
-replay --server server:50051
+replay --server proxy:50050
 mapfile -t client_environment < <(printf '%s\n' "${client_environment[@]}" |
   grep -v ^PARTIEMC_TOKEN)
-refusal=$(run_client info --server server:50051 2>&1 >/dev/null) &&
+refusal=$(run_client info --server proxy:50050 2>&1 >/dev/null) &&
   fail "a server with tokens answers who has none"
 [[ $refusal == *"authorization: absent"* ]] || fail "who has no token is told: $refusal"
 echo "replay over TLS, with a token"
-stop_server "over TLS"
+stop_proxy
+stop_server "behind TLS"
 echo "test_image.sh: passed in $SECONDS s"

@@ -1,9 +1,9 @@
 #!/bin/bash
-# What compose.replicas.yaml brings up, from Debian's packages and on loopback, without a container
-# engine: three replicas, NATS, haproxy, Prometheus with its dashboard, and a replay. Checks that
-# each replica shows the stream, that the dashboard has all of them, and that one that drains takes
-# the stream nowhere out of sight; then ends all of it. With --stay it says where everything is, and
-# runs until Ctrl-C. Programs are those of PATH, or of the folder that PARTIEMC_BIN names.
+# Starts the services of compose.replicas.yaml on loopback from Debian's packages, without a
+# container engine: three replicas, NATS, haproxy, Prometheus with its dashboard, and a replay.
+# Checks that each replica and the dashboard show the stream, and that a drain of one replica keeps
+# it visible; then stops everything. With --stay it prints all addresses and runs until Ctrl-C. Uses
+# the programs in PATH or in the folder PARTIEMC_BIN.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -51,7 +51,7 @@ nats=$(free_port) proxy=$(free_port) prometheus=$(free_port)
 PATH=$PATH:/usr/sbin
 start nats nats-server -a 127.0.0.1 -p "$nats"
 
-# The files of the composition, with these ports in place of names.
+# The configuration files, with these ports in place of names.
 cp docker/replicas/haproxy.cfg docker/replicas/prometheus.yml "$work"
 sed -i "s/bind :50051/bind 127.0.0.1:$proxy/" "$work/haproxy.cfg"
 addresses=()

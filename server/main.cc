@@ -26,17 +26,17 @@ namespace {
 
 constexpr std::chrono::seconds kHealthCheckTimeout{3};
 
-// What is still going on at the end of the grace time has this long to see that it was cancelled.
+// Time after the grace time for cancelled work to end.
 constexpr std::chrono::milliseconds kTimeToEnd{500};
-constexpr int kCutOff = 1;  // The exit code where it has not.
+constexpr int kCutOff = 1;  // Exit code if it has not ended.
 
 int Fail(const absl::Status& status) {
   std::fprintf(stderr, "partiemc-server: %s\n", std::string(status.message()).c_str());
   return 1;
 }
 
-// gRPC's listener ends for good when a connection finds no descriptor left (CVE-2023-4785), so the
-// server has as many as it may.
+// gRPC's listener stops for good if a connection finds no free descriptor (CVE-2023-4785), so the
+// process raises its limit to the maximum.
 void TakeAllDescriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -44,7 +44,7 @@ void TakeAllDescriptors() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-// Under a temporary name first: who waits for the file must not read half of it.
+// Writes to a temporary name first, so that readers never see half of the file.
 absl::Status WritePortFile(const std::string& flag, const std::string& path,
                            const Address& address) {
   const std::string temporary = path + ".part";
@@ -55,12 +55,12 @@ absl::Status WritePortFile(const std::string& flag, const std::string& path,
   if (file.good()) std::filesystem::rename(temporary, path, error);
   if (!file.good() || error) {
     return absl::UnavailableError("cannot write " + flag + " " + path +
-                                  ": is its folder there, and may this user write to it?");
+                                  ": check that its folder exists and is writable");
   }
   return absl::OkStatus();
 }
 
-// One of these, or 0 after `time`.
+// Returns the received signal, or 0 after `time`.
 int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
   const auto until = std::chrono::steady_clock::now() + time;
   for (;;) {
@@ -74,10 +74,10 @@ int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
   }
 }
 
-// Whoever sets it first decides how the process ends: the drain, or what cuts it short.
+// The first thread to set it decides how the process ends: the drain or the cut.
 std::atomic<bool> leaving = false;
 
-// Ends the process, whatever goes on in it, at a further signal or when the grace time is over.
+// Ends the process in any state, at a second signal or at the end of the grace time.
 void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
   const int signal = WaitForSignal(signals, grace + kTimeToEnd);
   if (leaving.exchange(true)) return;
@@ -90,16 +90,17 @@ void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
 int Serve(const CommandLine& line) {
   KeepFreedMemory();
   TakeAllDescriptors();
-  // Distributions build abseil with its search for deadlocks, which every lock of gRPC pays for.
+  // Disables abseil's deadlock detection, which distributions enable and every lock of gRPC pays
+  // for.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  // Before gRPC starts threads, so that these signals wait for sigwait and interrupt nobody.
+  // Blocks the signals before gRPC starts threads, so that only sigwait receives them.
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
-  signal(SIGPIPE, SIG_IGN);  // Whoever reads the log may go.
+  signal(SIGPIPE, SIG_IGN);  // The reader of the log may exit.
 
   SetUpLogging(line.log_level, line.log_format);
   FlushLogOnAbort();
@@ -131,7 +132,7 @@ int Serve(const CommandLine& line) {
   if (line.drain_delay.count() > 0) (*server)->SendAway(line.drain_delay);
   (*server)->Drain(line.grace);
   server->reset();
-  // Drained in the very moment in which it is cut short.
+  // The drain finished while CutDrainShort is ending the process.
   while (leaving.exchange(true)) std::this_thread::sleep_for(kTimeToEnd);
   LogEvent(spdlog::level::info, "stopped", {});
   FlushLog();
@@ -150,7 +151,7 @@ int main(int argc, char** argv) {
   }
   const auto& line = std::get<CommandLine>(parsed);
   if (!line.health_check) return Serve(line);
-  SetUpLogging("off", LogFormat::kText);  // gRPC would tell standard error of every attempt.
+  SetUpLogging("off", LogFormat::kText);  // gRPC would print every attempt to standard error.
   RefuseTraces();
   const auto status =
       CheckHealth(*line.health_check, kHealthCheckTimeout, line.health_check_security);

@@ -16,31 +16,30 @@ namespace partiemc::server {
 namespace {
 
 constexpr char kDescription[] =
-    "Serves partiemc.v1: streams of particle frames in, isolines and meshes out.\n"
+    "Serves partiemc.v1: reconstructs outlines and meshes of streamed particle frames.\n"
     "\n"
-    "  partiemc-server                                   on 127.0.0.1:50051, this machine only\n"
+    "  partiemc-server                                   on 127.0.0.1:50051, for this machine "
+    "only\n"
     "  partiemc-server --address unix:/run/partiemc.sock\n"
     "  partiemc-server --address 0.0.0.0:50051 --tls-cert server.pem --tls-key server.key \\\n"
-    "    --token-file tokens                             for any network\n"
-    "  partiemc-server --address 0.0.0.0:50051 --insecure   for a network that is trusted\n"
-    "  partiemc-server --health-check                    is one running? Exit code 0 or 1\n"
+    "    --token-file tokens                             for untrusted networks\n"
+    "  partiemc-server --address 0.0.0.0:50051 --insecure   for trusted networks\n"
+    "  partiemc-server --health-check                    checks whether one runs: exit code 0 or "
+    "1\n"
     "\n"
-    "SIGTERM or SIGINT drains it: what clients have sent is answered, then it leaves. A second "
-    "one\n"
-    "ends it at once.\n";
+    "SIGTERM or SIGINT drains the server: it answers the frames it has received, then exits. A\n"
+    "second signal ends it at once.\n";
 
 constexpr char kFooter[] =
-    "\nEvery option can also stand in the file of --config (TOML or INI, `max-streams = 8`) or in "
-    "the\n"
-    "environment variable that is named with it. The command line counts most, then the file.\n"
-    "GRPC_TRACE is ignored: gRPC's traces print tokens. Clients that give no sign of life for 25 "
-    "s\n"
-    "are taken for gone.\n"
-    "Exit codes: 0 good, 1 failed or cut off after --grace-seconds, 2 wrong command line, 128 + N "
-    "ended\n"
-    "by a second signal N.";
+    "\nEvery option can also be set in the file of --config (TOML or INI, `max-streams = 8`) or "
+    "by\n"
+    "its environment variable. The command line takes precedence, then the file. GRPC_TRACE is\n"
+    "ignored, because gRPC's traces print tokens. Clients that are silent for 25 s are\n"
+    "disconnected.\n"
+    "Exit codes: 0 success, 1 failed or cut off after --grace-seconds, 2 invalid command line,\n"
+    "128 + N ended by a second signal N.";
 
-// What the flags fill in, before it is checked as a whole.
+// Values of the flags before they are checked together.
 struct Raw {
   std::string address = "127.0.0.1:50051";
   std::string health_check;
@@ -61,53 +60,53 @@ struct Raw {
   CommandLine line;
 };
 
-// Beyond this the receive limit of 1.25 times would not fit into gRPC's int.
+// The receive limit of 1.25 times this value must fit into gRPC's int.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
 
-// A frame is in memory before it is counted, so a small budget wants small frames; but a budget
-// that is next to nothing still lets streams go on, one frame after the other.
+// The default frame size is this part of the budget, because a frame is in memory before it is
+// counted. With a very small budget, streams still progress one frame at a time.
 constexpr std::uint64_t kFramesInBudget = 8;
 constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 
 void AddServingOptions(CLI::App& app, Raw& raw) {
   app.add_option("--address", raw.address,
-                 "HOST:PORT, [IPV6]:PORT or unix:PATH to listen on; port 0 takes any that is free")
+                 "HOST:PORT, [IPV6]:PORT or unix:PATH to listen on; port 0 selects a free port")
       ->capture_default_str()
       ->type_name("ADDRESS")
       ->envname("PARTIEMC_ADDRESS");
   app.add_option("--port-file", raw.port_file,
-                 "Write the address that was bound to this file once the server serves")
+                 "Write the bound address to this file when the server serves")
       ->type_name("FILE")
       ->envname("PARTIEMC_PORT_FILE");
-  app.add_option(
-         "--threads", raw.line.server.threads,
-         "Threads that compute, all streams together (default: one for each processor that this "
-         "machine or container has); results do not depend on it")
+  app.add_option("--threads", raw.line.server.threads,
+                 "Compute threads for all streams (default: one per processor of this machine or "
+                 "container); results do not depend on it")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_THREADS");
-  app.add_option(
-         "--grace-seconds", raw.grace_seconds,
-         "Once it drains, cancel what is not done within this time, and end a second after it")
+  app.add_option("--grace-seconds", raw.grace_seconds,
+                 "Time limit of a drain: remaining calls are cancelled, and the process ends a "
+                 "second later")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->type_name("SECONDS")
       ->envname("PARTIEMC_GRACE_SECONDS");
   app.add_option("--nats", raw.nats,
-                 "Share streams with the other replicas that this server of NATS connects, "
-                 "nats://[USER:PASSWORD@]HOST[:PORT] or tls://...: each can then be watched at all "
-                 "of them. Several with commas between them")
+                 "Share streams with other replicas through this NATS server, "
+                 "nats://[USER:PASSWORD@]HOST[:PORT] or tls://...: every stream can be watched at "
+                 "every replica. Separate several servers by commas")
       ->type_name("URL")
       ->envname("PARTIEMC_NATS");
-  app.add_option("--advertise", raw.advertise,
-                 "With --nats: where clients reach this server. A replica that drains tells its "
-                 "streams the addresses of the others, and clients of this project go there")
+  app.add_option(
+         "--advertise", raw.advertise,
+         "With --nats: address at which clients reach this server. A draining replica sends "
+         "its streams the addresses of the others, where they resume")
       ->type_name("HOST:PORT")
       ->envname("PARTIEMC_ADVERTISE");
   app.add_option("--drain-delay", raw.drain_delay,
-                 "After SIGTERM, serve on for this time before it drains, while health checks say "
-                 "no, so that proxies send nobody new; in its second half streams are told to go, "
+                 "Time after SIGTERM in which the server still serves, while health checks fail so "
+                 "that proxies send no new clients. In its second half, streams are redirected "
                  "one after the other")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
@@ -116,10 +115,11 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
 }
 
 void AddSecurity(CLI::App& app, Raw& raw) {
-  const char* const kGroup = "Security (files are read again when they change)";
+  const char* const kGroup = "Security (changed files are reloaded)";
   CLI::Option* certificate =
-      app.add_option("--tls-cert", raw.tls.certificate,
-                     "Speak TLS with this certificate: PEM, those between it and its root after it")
+      app.add_option(
+             "--tls-cert", raw.tls.certificate,
+             "Use TLS with this certificate: PEM, followed by its intermediate certificates")
           ->type_name("FILE")
           ->envname("PARTIEMC_TLS_CERT")
           ->group(kGroup);
@@ -130,28 +130,30 @@ void AddSecurity(CLI::App& app, Raw& raw) {
   certificate->needs(key);
   key->needs(certificate);
   app.add_option("--tls-client-ca", raw.tls.client_ca,
-                 "Take only clients with a certificate signed by an authority of this file (mTLS)")
+                 "Require client certificates signed by an authority of this file (mTLS)")
       ->needs(certificate)
       ->type_name("FILE")
       ->envname("PARTIEMC_TLS_CLIENT_CA")
       ->group(kGroup);
-  app.add_option("--token-file", raw.token_file,
-                 "Take only calls with a bearer token of this file; a line is TOKEN [NAME] "
-                 "[may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N] "
-                 "[bytes=64MB]: NAME is its client's in the log, what is left out is not limited. "
-                 "Health checks need none")
+  app.add_option(
+         "--token-file", raw.token_file,
+         "Require a bearer token of this file, except for health checks. A line is TOKEN [NAME] "
+         "[may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N] "
+         "[bytes=64MB]. NAME identifies the client in the log; fields that are left out set "
+         "no limit")
       ->type_name("FILE")
       ->envname("PARTIEMC_TOKEN_FILE")
       ->group(kGroup);
-  app.add_option("--checkpoint-key-file", raw.checkpoint_key_file,
-                 "Sign the checkpoints that streams are resumed from, and take only signed ones: a "
-                 "key, the same for all servers that share streams; a second line has a key that "
-                 "is still, or already, taken")
+  app.add_option(
+         "--checkpoint-key-file", raw.checkpoint_key_file,
+         "Sign checkpoints with the key in this file, and accept only signed ones. All servers "
+         "that share streams need the same key. A second key on its own line is accepted "
+         "but not used for signing")
       ->type_name("FILE")
       ->envname("PARTIEMC_CHECKPOINT_KEY_FILE")
       ->group(kGroup);
   app.add_flag("--insecure", raw.line.server.insecure,
-               "Listen on an address that other machines reach, although all travels in the clear")
+               "Allow an address that other machines can reach without TLS")
       ->envname("PARTIEMC_INSECURE")
       ->group(kGroup);
 }
@@ -160,37 +162,37 @@ void AddLimits(CLI::App& app, Raw& raw) {
   ServerLimits& limits = raw.line.server.limits;
   const char* const kGroup = "Limits";
   app.add_option("--max-streams", limits.max_streams,
-                 "Streams open at once; one too many is refused at once")
+                 "Maximum number of open streams; further ones are refused")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_STREAMS")
       ->group(kGroup);
   app.add_option("--frames-in-flight", limits.frames_in_flight,
-                 "Frames of a stream that are read ahead of its client's taking the answers")
+                 "Window of a stream: frames accepted before their results are received")
       ->check(CLI::Range(1, 64))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_FRAMES_IN_FLIGHT")
       ->group(kGroup);
   app.add_option("--max-watchers", limits.max_watchers,
-                 "Watchers of all streams together; one too many is refused at once")
+                 "Maximum number of watchers of all streams; further ones are refused")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_WATCHERS")
       ->group(kGroup);
   app.add_option("--max-parts", limits.max_parts,
-                 "Parts that frames of a stream may come in, and connections of all streams that "
-                 "send them; 0: frames come whole")
+                 "Maximum number of parts of a frame, and of connections that send parts for all "
+                 "streams; 0: no parts")
       ->check(CLI::Range(0, 10'000))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_PARTS")
       ->group(kGroup);
   app.add_option("--max-watcher-bytes", limits.max_watcher_bytes,
-                 "Memory that one watcher may hold, units as in 16MB allowed; larger results "
-                 "cannot be watched")
+                 "Memory limit of one watcher, with a unit as in 16MB; larger results cannot be "
+                 "watched")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::Range(std::uint64_t{4096}, kMaxFrameBytes))
       ->capture_default_str()
@@ -198,49 +200,61 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->envname("PARTIEMC_MAX_WATCHER_BYTES")
       ->group(kGroup);
   app.add_option("--history-bytes", limits.history_bytes,
-                 "Results of a stream that are kept for watchers who come late or go back, units "
-                 "as in 64MB allowed, the oldest dropped; of all streams at most an eighth of "
-                 "--memory-budget, in equal shares; 0: none")
+                 "History of a stream for watchers that join late or go back, with a unit as in "
+                 "64MB; the oldest results are dropped. All histories share an eighth of "
+                 "--memory-budget equally; 0: none")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50))
       ->capture_default_str()
       ->type_name("BYTES")
       ->envname("PARTIEMC_HISTORY_BYTES")
       ->group(kGroup);
-  app.add_option("--max-particles", limits.frame.max_particles, "Particles of one frame")
+  app.add_option("--max-particles", limits.frame.max_particles,
+                 "Maximum number of particles of a frame")
       ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostParticles))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_PARTICLES")
       ->group(kGroup);
-  app.add_option("--max-tiles", limits.frame.max_tiles,
-                 "Tiles of 32 x 32 lattice nodes that one frame may reach, 10 kB of memory each "
-                 "and more where drops are many")
+  app.add_option(
+         "--max-tiles", limits.frame.max_tiles,
+         "Maximum number of tiles (32 x 32 lattice nodes) of a frame; a tile takes 10 kB, and "
+         "more with many drops")
       ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostTiles))
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_MAX_TILES")
       ->group(kGroup);
-  app.add_option("--max-frame-bytes", raw.max_frame_bytes,
-                 "Bytes of one serialised frame, units as in 200MB allowed (default: 48 for each "
-                 "of --max-particles, but at most an eighth of --memory-budget)")
+  app.add_option(
+         "--max-frame-bytes", raw.max_frame_bytes,
+         "Maximum size of a serialised frame, with a unit as in 200MB (default: 48 bytes per "
+         "particle of --max-particles, at most an eighth of --memory-budget)")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::Range(std::uint64_t{1}, kMaxFrameBytes))
       ->type_name("BYTES")
       ->envname("PARTIEMC_MAX_FRAME_BYTES")
       ->group(kGroup);
-  app.add_option("--memory-budget", raw.line.server.limits.memory_budget,
-                 "Bytes that requests, answers and histories of all streams hold, units as in 2GB "
-                 "allowed; "
-                 "beyond it a stream has one frame in flight (default: half of the memory that "
-                 "this machine or container has)")
+  app.add_option(
+         "--memory-budget", raw.line.server.limits.memory_budget,
+         "Memory for requests, responses and histories of all streams, with a unit as in 2GB. "
+         "When it is used up, streams take turns with one frame each (default: half of the "
+         "memory of this machine or container)")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::PositiveNumber)
       ->type_name("BYTES")
       ->envname("PARTIEMC_MEMORY_BUDGET")
       ->group(kGroup);
+  app.add_option(
+         "--streams-beyond-budget", limits.streams_beyond_budget,
+         "Maximum number of streams with a frame beyond --memory-budget at the same time; the "
+         "others wait. A larger number takes more memory and shortens the wait for large frames")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_STREAMS_BEYOND_BUDGET")
+      ->group(kGroup);
   app.add_option("--idle-timeout", raw.idle_seconds,
-                 "End a stream that has had no frame for this time; 0: never")
+                 "End a stream that sends no frame for this time; 0: never")
       ->check(CLI::Range(0.0, 1e8))
       ->capture_default_str()
       ->type_name("SECONDS")
@@ -248,11 +262,55 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
 }
 
+void AddConnections(CLI::App& app, Raw& raw) {
+  ConnectionLimits& limits = raw.line.server.connections;
+  const char* const kGroup = "Connections of --address";
+  app.add_option(
+         "--max-connections", limits.connections,
+         "Maximum number of connections, at most half of the file descriptors. Above it, a "
+         "connection without a call is closed; if all have calls, the new one may only make "
+         "health checks")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_MAX_CONNECTIONS")
+      ->group(kGroup);
+  app.add_option(
+         "--connections-per-address", limits.of_address,
+         "Maximum number of connections of one address, except for health checks; 0: no limit, "
+         "for a server behind a proxy")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_CONNECTIONS_PER_ADDRESS")
+      ->group(kGroup);
+  app.add_option(
+         "--new-connections-per-address", limits.new_of_address,
+         "Maximum rate of new connections of one address per second, with bursts of twice the "
+         "rate, except for health checks; 0: no limit, for a server behind a proxy")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str()
+      ->type_name("N")
+      ->envname("PARTIEMC_NEW_CONNECTIONS_PER_ADDRESS")
+      ->group(kGroup);
+  app.add_option(
+         "--unaccounted-bytes", raw.line.server.unaccounted_bytes,
+         "Maximum number of bytes of a TCP connection that belong to no call and no message, with "
+         "a unit as in 512KiB. A connection above it is cut, and its address may only make "
+         "health checks for ten seconds; 0: no limit")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 40))
+      ->capture_default_str()
+      ->type_name("BYTES")
+      ->envname("PARTIEMC_UNACCOUNTED_BYTES")
+      ->group(kGroup);
+}
+
 void AddMetrics(CLI::App& app, Raw& raw) {
   app.add_option(
          "--metrics", raw.metrics,
-         "Serve metrics to Prometheus at http://ADDRESS/metrics, 127.0.0.1:9464 say: counts "
-         "and times, no names and no data of streams. Without it there are none")
+         "Serve Prometheus metrics at http://ADDRESS/metrics, for example 127.0.0.1:9464: counts "
+         "and times without names or data of streams. Off by default")
       ->type_name("ADDRESS")
       ->envname("PARTIEMC_METRICS")
       ->group("Metrics");
@@ -261,31 +319,32 @@ void AddMetrics(CLI::App& app, Raw& raw) {
 void AddWeb(CLI::App& app, Raw& raw) {
   const char* const kGroup = "Web (off without --web)";
   CLI::Option* const web =
-      app.add_option("--web", raw.web,
-                     "Serve the viewer's page at http://ADDRESS/, 127.0.0.1:8080 say, and the "
-                     "methods over WebSocket, with the same TLS, tokens and limits")
+      app.add_option(
+             "--web", raw.web,
+             "Serve the viewer's page at http://ADDRESS/, for example 127.0.0.1:8080, and the "
+             "methods over WebSocket, with the same TLS, tokens and limits")
           ->type_name("ADDRESS")
           ->envname("PARTIEMC_WEB")
           ->group(kGroup);
   app.add_option("--web-root", raw.web_options.root,
-                 "The folder with the built page (default: share/partiemc/viewer of where this is "
-                 "installed)")
+                 "Folder of the built page (default: share/partiemc/viewer of the installation)")
       ->needs(web)
       ->type_name("DIR")
       ->envname("PARTIEMC_WEB_ROOT")
       ->group(kGroup);
-  app.add_option("--web-origin", raw.web_options.origins,
-                 "Let pages of this origin call too, https://HOST[:PORT]; may come several times. "
-                 "Those that this server serves may always, by the address that it listens on")
+  app.add_option(
+         "--web-origin", raw.web_options.origins,
+         "Allow pages of this origin, https://HOST[:PORT], to call; may be given several times. "
+         "Pages of this server may always call")
       ->needs(web)
       ->type_name("ORIGIN")
       ->envname("PARTIEMC_WEB_ORIGIN")
       ->group(kGroup);
   app.add_option(
          "--web-host", raw.web_options.hosts,
-         "Accept requests that name this host, as those that a proxy of this machine passes "
-         "on; may be given several times. On a loopback address only localhost, loopback "
-         "addresses, these names and the hosts of --web-origin are accepted")
+         "Accept requests for this host name, for example from a proxy on this machine; may be "
+         "given several times. On a loopback address, the server accepts only localhost, "
+         "loopback addresses, these names and the hosts of --web-origin")
       ->needs(web)
       ->type_name("NAME")
       ->envname("PARTIEMC_WEB_HOST")
@@ -314,7 +373,7 @@ void AddWeb(CLI::App& app, Raw& raw) {
       ->type_name("N")
       ->envname("PARTIEMC_WEB_CONNECTIONS_PER_ADDRESS")
       ->group(kGroup);
-  app.add_option("--web-port-file", raw.web_port_file, "As --port-file, for --web")
+  app.add_option("--web-port-file", raw.web_port_file, "Same as --port-file for --web")
       ->needs(web)
       ->type_name("FILE")
       ->envname("PARTIEMC_WEB_PORT_FILE")
@@ -323,13 +382,14 @@ void AddWeb(CLI::App& app, Raw& raw) {
 
 void AddLogging(CLI::App& app, Raw& raw) {
   const char* const kGroup = "Log (to standard error)";
-  app.add_option("--log-level", raw.line.log_level, "How much: one line per stream event at info")
+  app.add_option("--log-level", raw.line.log_level,
+                 "Log level; info writes one line per stream event")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str()
       ->type_name("LEVEL")
       ->envname("PARTIEMC_LOG_LEVEL")
       ->group(kGroup);
-  app.add_option("--log-format", raw.log_format, "text, or json: one object a line")
+  app.add_option("--log-format", raw.log_format, "text, or json with one object per line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str()
       ->type_name("FORMAT")
@@ -343,7 +403,7 @@ EarlyExit Wrong(const std::string& message) {
   return {2, "partiemc-server: " + line + "; see --help\n"};
 }
 
-// Rounded up, so that a short time does not become none.
+// Rounds up, so that a short time does not become 0.
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(std::ceil(seconds * 1000)));
 }
@@ -377,7 +437,8 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
     if (!advertised->unix_path.empty() || advertised->port == 0) {
       return Wrong("--advertise must be HOST:PORT, with the port that clients connect to");
     }
-    if (raw.nats.empty()) return Wrong("--advertise needs --nats: by it replicas are told of it");
+    if (raw.nats.empty())
+      return Wrong("--advertise needs --nats, which sends the address to replicas");
     raw.line.server.advertised_address = raw.advertise;
   }
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
@@ -418,25 +479,26 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   AddServingOptions(app, raw);
   AddSecurity(app, raw);
   AddLimits(app, raw);
+  AddConnections(app, raw);
   AddWeb(app, raw);
   AddMetrics(app, raw);
   AddLogging(app, raw);
   app.add_option(
          "--health-check", raw.health_check,
-         "Ask the server at this address (default: --address) whether it serves, and leave; "
-         "with --tls-cert over TLS, with --tls-client-ca showing --tls-cert to it")
+         "Check whether the server at this address (default: --address) serves, and exit. Uses "
+         "TLS with --tls-cert, and that certificate as client certificate with --tls-client-ca")
       ->expected(0, 1)
       ->type_name("[ADDRESS]")
       ->configurable(false);
   app.add_flag("--print-memory-plan", raw.print_memory_plan,
-               "Print what memory these options may take, and leave")
+               "Print the maximum memory for these options, and exit")
       ->configurable(false);
-  // CLI11 reads the environment only after the file, too late for the file's own name.
+  // CLI11 reads the environment after the file, too late for the name of the file.
   const char* const config = std::getenv("PARTIEMC_CONFIG");
   app.set_config("--config", config != nullptr ? config : "",
-                 "Read options from this file (or from that of PARTIEMC_CONFIG)",
+                 "Read options from this file (environment: PARTIEMC_CONFIG)",
                  /*config_required=*/config != nullptr);
-  // A misspelt option in the file would otherwise pass in silence.
+  // Otherwise a misspelt option in the file would be ignored.
   app.allow_config_extras(CLI::config_extras_mode::error);
   app.set_version_flag("--version", "partiemc-server " PARTIEMC_VERSION);
   try {

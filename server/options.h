@@ -14,25 +14,26 @@ namespace partiemc::server {
 
 struct CommandLine {
   ServerOptions server;
-  /// Finished frames are delivered and streams are ended within this time of SIGTERM.
+  /// Time after SIGTERM for delivering finished frames and ending streams.
   std::chrono::milliseconds grace{4000};
-  /// For so long after SIGTERM the server serves on, and is no longer ready (Server::SendAway).
+  /// Time after SIGTERM in which the server still serves but reports that it is not ready
+  /// (Server::SendAway).
   std::chrono::milliseconds drain_delay{0};
-  /// Where the address that was bound is written, once the server serves.
+  /// File for the bound address, written when the server serves.
   std::optional<std::string> port_file;
-  /// The same of the gateway.
+  /// Same for the gateway.
   std::optional<std::string> web_port_file;
-  /// Only ask the server at this address whether it serves.
+  /// Only checks whether the server at this address serves.
   std::optional<Address> health_check;
   HealthCheckSecurity health_check_security;
   std::string log_level = "info";
   LogFormat log_format = LogFormat::kText;
 };
 
-/// Nothing is left to do but to print `text` and to leave with `code`.
+/// The process prints `text` and exits with `code`.
 struct EarlyExit {
   int code = 0;      ///< 0 for --help and --version, 2 for a wrong command line.
-  std::string text;  ///< For standard output if `code` is 0, else one line for standard error.
+  std::string text;  ///< For standard output if `code` is 0, otherwise one line for standard error.
 };
 
 std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* const* argv);

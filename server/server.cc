@@ -3,6 +3,7 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/base/listening.h"
+#include "server/base/received_bytes.h"
 #include "server/calls/methods.h"
 #include "server/compute/heap.h"
 #include "server/compute/worker_memory.h"
@@ -20,6 +22,7 @@
 #include "server/rpc/call_guard.h"
 #include "server/rpc/health_service.h"
 #include "server/rpc/service.h"
+#include "server/rpc/stream_counts.h"
 #include "server/security/tls_credentials.h"
 #include "server/stream/memory_plan.h"
 #include "server/telemetry/logging.h"
@@ -28,21 +31,24 @@
 namespace partiemc::server {
 namespace {
 
-// What clients may do to find out that a connection is dead; gRPC's own 5 minutes are too long.
-constexpr int kShortestPingIntervalMs = 500;
+// Size of one read from a connection.
+constexpr int kReadBytes = 32 << 10;
 
-// Of one call, in its connection.
-constexpr int kUnreadBytes = 256 << 10;
-
-// A connection that does not get as far as HTTP/2 (and TLS) ends after this.
+// Time limit for the handshakes of HTTP/2 and TLS.
 constexpr int kHandshakeTimeoutMs = 10'000;
 constexpr int kReflectionThreads = 16;
 
+// Descriptors for the gateway, files and threads.
+constexpr std::uint64_t kOtherDescriptors = 512;
+
+// Streams of a connection that have ended but are not destroyed yet.
+constexpr std::uint64_t kStreamsThatEnd = 64;
+
 constexpr std::chrono::milliseconds kTimeToCut(250);
-// For the last words to arrive, and connections to close in the orderly way. gRPC itself waits
-// until each client has answered, which one that has no call looks at every few seconds only.
+// Time for the last statuses to arrive and for connections to close cleanly. gRPC itself waits for
+// each client's reply, and an idle client reads only every few seconds.
 constexpr std::chrono::milliseconds kTimeToClose(500);
-// Several times as long as a call takes to come in.
+// Several times as long as a new call takes to arrive.
 constexpr std::chrono::milliseconds kQuiet(50);
 
 absl::Status CheckSecurity(const ServerOptions& options, const Address& address) {
@@ -54,7 +60,7 @@ absl::Status CheckSecurity(const ServerOptions& options, const Address& address)
       "--insecure if the network is trusted"));
 }
 
-// What `parse` makes of the file that `flag` names.
+// Parses the file of `flag` by `parse`.
 template <typename Parse>
 auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
     -> decltype(parse(std::string())) {
@@ -68,26 +74,54 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
   return secrets;
 }
 
-// How the process is watched. It may hold what it has begun with, its workers and the budget, of
-// which histories have a part. Frames of streams may be taken beyond that, and results that
-// watchers have not taken are outside of it: for either a sixteenth of the budget more, so that
-// they turn nobody away at once.
+// Limits for the process's memory: its memory at the start, the workers, and the budget, which
+// includes histories. Outside the budget: frames above it, and undelivered results of watchers, up
+// to a sixteenth of the budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const WatchRegistry& watchers) {
   const std::uint64_t outside =
       ResidentBytes() + options.threads * kWorkerBytes + options.limits.AllHistoryBytes();
-  const std::uint64_t planned = budget.bytes(), more = planned / kPartsOfBudgetBeyond;
+  const std::uint64_t room = budget.bytes(), more = room / kPartsOfBudgetBeyond;
+  const std::uint64_t most =
+      room + options.limits.ReadBytesBeyond() + options.limits.WorkerBytesBeyond();
   return {.resident_bytes = ResidentBytes,
-          .most_bytes =
-              [outside, planned, more, &budget] {
-                return outside + std::clamp(budget.held(), planned, planned + more);
-              },
+          .most_bytes = [outside, room, most,
+                         &budget] { return outside + std::clamp(budget.planned(), room, most); },
           .more_bytes = [more, &watchers] { return std::min(watchers.held_bytes(), more); },
-          .give_back_freed = GiveBackFreedMemory};
+          .give_back_freed = GiveBackFreedMemory,
+          .limit_bytes = outside + most,
+          .received_bytes = ReceivedBytesOfConnections};
 }
 
-// Of a stream of another replica the newest result is kept whatever its size: to fetch it again
-// would take a moment.
+BeyondBudget BeyondOf(const ServerLimits& limits) {
+  return {.reads = {.streams_beyond = limits.streams_beyond_budget,
+                    .message_bytes = limits.MaxMessageBytes()},
+          .worker_bytes = limits.WorkerBytesBeyond()};
+}
+
+// Each connection uses two descriptors.
+ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
+  ConnectionLimits limits = options.connections;
+  rlimit descriptors{};
+  if (getrlimit(RLIMIT_NOFILE, &descriptors) != 0) return limits;
+  const std::uint64_t free =
+      descriptors.rlim_cur - std::min<std::uint64_t>(descriptors.rlim_cur, kOtherDescriptors);
+  limits.connections =
+      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(free / 2, 1, limits.connections));
+  return limits;
+}
+
+// Callers within their limits have fewer streams.
+ConnectionRules RulesOfConnections(const ServerOptions& options) {
+  return {.unaccounted_bytes = options.unaccounted_bytes,
+          .max_message_bytes = options.limits.MaxMessageBytes(),
+          .max_streams = options.unaccounted_bytes == 0
+                             ? std::uint64_t{0}
+                             : options.limits.CallsOfOneCaller() + kStreamsThatEnd};
+}
+
+// Keeps the newest result of another replica's stream whatever its size, because fetching it again
+// takes a moment.
 Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
   return {.broadcaster = {.mailbox_bytes = limits.max_watcher_bytes,
                           .kept_bytes = limits.max_watcher_bytes},
@@ -96,7 +130,7 @@ Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
           .watches = limits.max_watchers};
 }
 
-// For watchers to be told that the server drains; one that does not read is cut then.
+// Time for watchers to receive the notice of the drain. A watcher that does not read is then cut.
 constexpr std::chrono::milliseconds kWatchPatience(500);
 
 }  // namespace
@@ -116,15 +150,17 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                                                       RelayLimits(options.limits, history_),
                                                       options.advertised_address)),
       calls_(options.limits.max_streams),
-      budget_(options.limits.FrameBudget()),
+      budget_(options.limits.FrameBudget(), BeyondOf(options.limits)),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_)),
+      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_), &budget_.reads()),
       methods_(std::make_unique<Methods>(options_.limits, authentication_, opening_, registry_,
                                          calls_, budget_, pool_, watchers_, dispatcher_, history_,
                                          checkpoint_keys_, *metrics_, relay_.get())),
-      service_(std::make_unique<Service>(*methods_)),
-      health_(std::make_unique<HealthService>(authentication_, opening_, calls_, budget_)) {}
+      service_(std::make_unique<Service>(*methods_, connections_)),
+      health_(std::make_unique<HealthService>(authentication_, opening_, calls_, budget_,
+                                              connections_)),
+      watch_(LimitsOfConnections(options), RulesOfConnections(options), connections_) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
   if (auto status = CheckSecurity(options, options.address); !status.ok()) return status;
@@ -215,6 +251,7 @@ void Server::AddGauges() {
       "Results that watchers can go back to, of all streams; a part of --memory-budget of its own.",
       [this] { return history_.held(); });
   if (relay_ != nullptr) AddRelayMetrics();
+  AddConnectionMetrics();
   const auto count = [this](const char* name, const char* help, std::uint64_t LogLosses::*value) {
     metrics_->AddCounter(name, help, [value] { return static_cast<double>(LossesOfLog().*value); });
   };
@@ -227,6 +264,27 @@ void Server::AddGauges() {
       [this] {
         return std::chrono::system_clock::to_time_t(tls_identity_->Get().identity->not_after);
       });
+}
+
+void Server::AddConnectionMetrics() {
+  metrics_->AddGauge("partiemc_connections", "Connections of --address.",
+                     [this] { return static_cast<double>(watch_.count()); });
+  const auto add = [this](const char* name, const char* help,
+                          const std::atomic<std::uint64_t>& count) {
+    metrics_->AddCounter(name, help, [&count] { return static_cast<double>(count.load()); });
+  };
+  const ConnectionWatch::Counters& counters = watch_.counters();
+  add("partiemc_connections_accepted_total", "Connections that were accepted.", counters.accepted);
+  add("partiemc_connections_health_only_total",
+      "Connections beyond a limit, which are for health checks alone.", counters.health_only);
+  add("partiemc_connections_evicted_total",
+      "Connections without a call that were ended for a new one.", counters.evicted);
+  add("partiemc_connections_cut_unaccounted_total",
+      "Connections that were cut for bytes that no call accounts for.", counters.floods[0]);
+  add("partiemc_connections_cut_streams_total", "Connections that were cut for too many streams.",
+      counters.floods[1]);
+  add("partiemc_connections_cut_headers_total",
+      "Connections that were cut for headers without an end.", counters.floods[2]);
 }
 
 void Server::AddRelayMetrics() {
@@ -253,50 +311,59 @@ void Server::AddRelayMetrics() {
 absl::Status Server::Listen() {
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
-  int port = 0;
+  auto acceptor = Acceptor::Listen(address_, options_.keepalive.timeout, watch_);
+  if (!acceptor.ok()) return acceptor.status();
   credentials_ =
       options_.tls ? MakeTlsCredentials(*tls_identity_) : grpc::InsecureServerCredentials();
-  builder.AddListeningPort(address_.ToString(), credentials_, &port);
+  hand_over_ = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials_);
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
-  if (authentication_.required()) {
-    interceptors.push_back(MakeGuardOfForeignServices(authentication_));
-  }
+  interceptors.push_back(MakeGuardOfForeignServices(authentication_, connections_));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   builder.RegisterService(service_.get());
   builder.RegisterService(health_.get());
   builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.MaxMessageBytes()));
-  // Clients ask a connection for a sign of life this often at most, whether it carries data or not.
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
-                             kShortestPingIntervalMs);
+  // Disables gRPC's limit: ConnectionWatch counts PINGs with the other bytes. gRPC would need 64
+  // MiB for the errors of a flood of PINGs.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  // What has left without a word (a frozen program, a cut cable) would hold its stream for hours.
+  // Detects lost clients (a frozen program, a cut cable), which would hold their streams for hours.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS,
                              static_cast<int>(options_.keepalive.interval.count()));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
                              static_cast<int>(options_.keepalive.timeout.count()));
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // As many as it takes.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // No limit.
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
-  // What a client may send before it is read: windows that grow with the connection's speed, as
-  // gRPC's do by itself, let a hundred bodies that nobody will read hold 70 MiB. A read that goes
-  // on has all of its message let in, so that large frames come as fast, but for one round trip.
+  // Fixes the window of bytes that a client may send before they are read. gRPC's growing windows
+  // would let a hundred unread bodies hold 70 MiB. A pending read opens the window for its whole
+  // message, so large frames only lose one round trip.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
-  // A caller has no more calls, in however many connections, unless its token says otherwise: then
-  // those beyond them wait in the client, or go by another connection.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, static_cast<int>(kUnreadBytes));
+  // The limit of one connection equals a caller's default limit of calls. Further calls wait in the
+  // client or use another connection.
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(options_.limits.CallsOfOneCaller()));
-  // Otherwise two servers share a port without noticing, and clients reach one of them.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  // Reflection alone is not ours: each of its calls has a thread for as long as it goes on.
+  // gRPC parses all of one read, whatever happens to the connection. 32 KiB can contain 4,000
+  // calls, which take 40 MiB; gRPC's default of 4 MiB would take more than 1 GiB.
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
+  // Bounds the threads of reflection, the only service that uses a thread for each call.
   grpc::ResourceQuota quota;
   quota.SetMaxThreads(kReflectionThreads);
   builder.SetResourceQuota(quota);
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) {
-    return absl::UnavailableError(absl::StrCat("cannot listen on ", address_.ToString(),
-                                               ": gRPC refuses it; choose another --address"));
+    return absl::UnavailableError(
+        absl::StrCat("cannot serve on ", address_.ToString(), ": gRPC refuses its options"));
   }
-  if (address_.unix_path.empty()) address_.port = static_cast<std::uint16_t>(port);
+  acceptor_ = *std::move(acceptor);
+  if (address_.unix_path.empty()) address_.port = acceptor_->port();
+  streams_ = std::make_unique<ChannelzStreams>();
+  watch_.Start(streams_.get(), GiveBackFreedMemory);
+  acceptor_->Start([this](int descriptor) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.fd = descriptor;
+    hand_over_->HandleNewConnection(&connection);
+  });
   health_->SetServing(true);
   return absl::OkStatus();
 }
@@ -320,17 +387,20 @@ std::optional<Address> Server::web_address() const {
 }
 
 Server::~Server() {
-  // No watch waits for its stream any more.
+  // Watches stop waiting for their streams.
   if (relay_ != nullptr) relay_->Drain();
-  // All of its calls end while what they use is there.
+  // Ends all its calls while the objects they use exist.
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now());
   if (server_ == nullptr) return;
+  acceptor_->StopListening();
+  watch_.EndAllAt(std::chrono::steady_clock::now() + kTimeToClose);
   server_->Shutdown(std::chrono::system_clock::now());
   server_->Wait();
+  acceptor_.reset();
 }
 
-// A call that comes while gRPC shuts down is cut without a word, so clients that look for a server
-// are told to look elsewhere until no more of them come.
+// Waits until no new calls arrive. A call that arrives during gRPC's shutdown is cut without a
+// reason, so they are refused before, with a reason to try elsewhere.
 void Server::WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const {
   std::uint64_t before = 0;
   do {
@@ -356,22 +426,23 @@ void Server::StopBeingReady() {
 void Server::SendAway(std::chrono::milliseconds delay) {
   StopBeingReady();
   std::this_thread::sleep_for(delay / 2);
-  if (relay_ != nullptr) registry_.SetElsewhere(relay_->Addresses());  // Others may drain as well.
+  if (relay_ != nullptr)
+    registry_.SetElsewhere(relay_->Addresses());  // Addresses of replicas that do not drain.
   registry_.SendAway(delay - delay / 2);
 }
 
 void Server::Drain(std::chrono::milliseconds grace) {
-  // Cutting those who do not take their answers takes a moment of the grace time too.
+  // Reserves part of the grace time for cutting clients that do not read their responses.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
   StopBeingReady();
   registry_.Drain();
   calls_.Drain();
-  // gRPC's own Shutdown tells a stream nothing: it waits, then cuts. So the streams go first, and
-  // to the last word: a connection that closes with requests unread takes back what was just
+  // gRPC's Shutdown sends nothing to streams: it waits, then cuts. Streams therefore end first,
+  // including their status: closing a connection with unread requests discards the bytes just
   // written.
   registry_.WaitUntilEmpty(deadline);
   calls_.WaitForFrames(deadline);
-  dispatcher_.Flush();  // So that watchers hear of the last results before they are sent home.
+  dispatcher_.Flush();  // Delivers the last results before the watches end.
   if (relay_ != nullptr) relay_->Drain();
   watchers_.Drain(std::min(deadline, std::chrono::steady_clock::now() + kWatchPatience));
   WaitUntilNobodyComes(deadline);
@@ -380,9 +451,12 @@ void Server::Drain(std::chrono::milliseconds grace) {
       kTimeToClose);
   const auto closed = std::chrono::system_clock::now() + left;
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + left);
+  acceptor_->StopListening();
+  // A client that does not respond would delay the end.
+  watch_.EndAllAt(std::chrono::steady_clock::now() + left);
   server_->Shutdown(closed);
   server_->Wait();
-  metrics_endpoint_.reset();  // Last, so that the drain can be watched.
+  metrics_endpoint_.reset();  // Last, so that metrics cover the drain.
 }
 
 }  // namespace partiemc::server

@@ -1,5 +1,4 @@
-// The running server: gRPC's server with the service, health and reflection, its gateway, and its
-// drain.
+// The running server: gRPC server with service, health and reflection, gateway, and drain.
 #pragma once
 
 #include <atomic>
@@ -12,6 +11,9 @@
 #include "common/address.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
+#include "server/connections/acceptor.h"
+#include "server/connections/connection_table.h"
+#include "server/connections/connection_watch.h"
 #include "server/security/authentication.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/security/file_reloader.h"
@@ -33,6 +35,9 @@ namespace grpc {
 class Channel;
 class Server;
 class ServerCredentials;
+namespace experimental {
+class ExternalConnectionAcceptor;
+}
 }  // namespace grpc
 
 namespace partiemc::server {
@@ -44,74 +49,78 @@ class Methods;
 class Service;
 class WebGateway;
 
-/// How a server finds out that a connection is dead although nobody closed it. The name of a
-/// producer that vanished is free after both times.
+/// How the server detects that a connection is dead without being closed. The name of a lost
+/// producer is free after the sum of both times.
 struct Keepalive {
-  /// A connection without a sign of life for this time is asked for one.
+  /// A connection that is silent for this time gets a ping.
   std::chrono::milliseconds interval{15'000};
-  /// It is closed if it gives none within this time. Longer than the 5 s in which a gRPC client
-  /// that waits for nothing looks at its connections.
+  /// It is closed if it stays silent for this time. Longer than 5 s, because an idle gRPC client
+  /// reads its connections only every 5 s.
   std::chrono::milliseconds timeout{10'000};
 };
 
 struct ServerOptions {
   Address address{.host = "127.0.0.1", .port = 50051, .unix_path = {}};
-  /// Allows an address beyond this machine, although everything travels in the clear.
+  /// Allows an address that other machines can reach without TLS.
   bool insecure = false;
-  /// Speaks TLS, and nothing else, with this identity.
+  /// Requires TLS with this identity.
   std::optional<TlsFiles> tls;
-  /// Lets in only callers with a token of this file (BearerTokens::Parse), health checks apart.
+  /// Admits only callers with a token of this file (BearerTokens::Parse), except health checks.
   std::optional<std::string> token_file;
-  /// Signs checkpoints and takes only those signed by a key of this file (CheckpointKeys::Parse).
+  /// Signs checkpoints, and accepts only checkpoints signed with a key of this file
+  /// (CheckpointKeys::Parse).
   std::optional<std::string> checkpoint_key_file;
-  /// How soon a change of those files counts: for connections and calls that begin after it.
+  /// Interval for checking those files for changes, which apply to later connections and calls.
   std::chrono::milliseconds reload_interval{1000};
-  /// Where metrics are served over HTTP; they hold no names and no data of streams.
+  /// Address for metrics over HTTP. They contain no names and no data of streams.
   std::optional<Address> metrics;
-  /// Where the viewer's page and the methods are served over HTTP and WebSocket, with the same
-  /// identity, tokens and limits.
+  /// Options for the viewer's page and the methods over HTTP and WebSocket, with the same identity,
+  /// tokens and limits.
   std::optional<WebOptions> web;
-  /// Where replicas tell each other of their streams (ConnectToNats).
+  /// URL of the NATS server that connects replicas (ConnectToNats).
   std::optional<std::string> nats;
-  /// Where clients that another replica sends away may come to; empty: none is sent here.
+  /// Address to which draining replicas redirect clients; empty: none.
   std::string advertised_address;
-  /// Threads that compute, all streams together, at least 1.
+  /// Compute threads of all streams, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
+  /// Limits of the connections of `address`.
+  ConnectionLimits connections;
+  /// Limit of the bytes of a connection that belong to no call and no message; 0: none.
+  std::uint64_t unaccounted_bytes = ConnectionRules{}.unaccounted_bytes;
   Keepalive keepalive;
 };
 
 class Server {
  public:
-  /// Listens and serves when it returns.
-  /// Errors: INVALID_ARGUMENT for an address beyond this machine with neither `tls` nor
-  /// `insecure`, and for files of `tls`, tokens or keys that do not hold what they should;
-  /// UNAVAILABLE where it cannot listen; a line that says what, where and what to do.
+  /// Listens and serves when it returns. Errors: INVALID_ARGUMENT for an address that other
+  /// machines can reach with neither `tls` nor `insecure`, and for invalid files of `tls`, tokens
+  /// or keys; UNAVAILABLE if it cannot listen. Each message is one line: problem, place, remedy.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
 
-  /// Stops at once if it was not drained.
+  /// Stops at once unless it was drained.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// With the port that it got.
+  /// With the actual port.
   const Address& address() const { return address_; }
-  /// Where metrics are served, if they are.
+  /// Absent if metrics are off.
   std::optional<Address> metrics_address() const;
-  /// Where the gateway is, if there is one.
+  /// Absent if the gateway is off.
   std::optional<Address> web_address() const;
 
-  /// To this server without a socket, for tests and embedding.
+  /// A channel to this server without a socket, for tests and embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
-  /// Serves on for `delay`, while health checks say that it does not, so that proxies send nobody
-  /// new; in its second half the streams are told to go elsewhere, one after the other, so that
-  /// they do not all come there in the same moment. Drain comes next.
+  /// Serves for `delay` more, while health checks report that it does not, so that proxies send no
+  /// new clients. In the second half, streams are redirected one after the other, so that they do
+  /// not reconnect at the same moment. Call Drain afterwards.
   void SendAway(std::chrono::milliseconds delay);
 
-  /// Takes no new call, tells the streams, answers what they have sent, ends watches, and stops.
-  /// What is not done shortly before the end of `grace` is cancelled; connections without a call of
-  /// ours are not waited for. Returns when nothing goes on any more.
+  /// Refuses new calls, notifies the streams, answers the frames they have sent, ends watches and
+  /// stops. Calls that remain shortly before the end of `grace` are cancelled. Connections without
+  /// a call are closed. Returns when all calls have ended.
   void Drain(std::chrono::milliseconds grace);
 
  private:
@@ -122,6 +131,7 @@ class Server {
   absl::Status OpenGateway();
   void AddGauges();
   void AddRelayMetrics();
+  void AddConnectionMetrics();
   void StopBeingReady();
   void WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const;
 
@@ -144,12 +154,18 @@ class Server {
   IdleTimer idle_timer_;
   IntakeGuard intake_guard_;
   std::unique_ptr<Methods> methods_;
+  ConnectionTable connections_;
   std::unique_ptr<Service> service_;
   std::unique_ptr<HealthService> health_;
-  std::atomic<bool> leaves_ = false;  // As the gateway's health says.
+  std::atomic<bool> leaves_ = false;  // Reported by the gateway's health check.
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> hand_over_;
+  std::unique_ptr<StreamCounter> streams_;
   std::unique_ptr<grpc::Server> server_;
+  ConnectionWatch watch_;
+  std::unique_ptr<Acceptor>
+      acceptor_;  // Destroyed before the objects that receive its connections.
   std::unique_ptr<WebGateway> web_;
-  // The last two stop before what they load into and read from goes.
+  // The last two are destroyed before the objects they use.
   FileReloader reloader_;
   std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };

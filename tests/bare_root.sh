@@ -1,19 +1,19 @@
 #!/bin/bash
-# Tries on a bare Debian 12 what README promises: a root made by debootstrap, with git and
-# ca-certificates and nothing else, a clone of this repository in it, and the scripts as a newcomer
-# runs them. Needs root. The bare system is kept in build/bare_root, so that the next run is quick.
+# Tries the instructions of README on a bare Debian 12: a root made by debootstrap with git and
+# ca-certificates only, and a clone of this repository. Requires root. Keeps the bare system in
+# build/bare_root for the next run.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 usage() {
   cat <<'USAGE'
 usage: tests/bare_root.sh [--working-tree] [--keep] [TRY...]
-  --working-tree  take the files as they are, committed or not, instead of a clone
-  --keep          leave the root for a look at it, and tell where it is
-What to try, each in a root of its own; demo and tests by default:
+  --working-tree  use the working tree, with uncommitted changes, instead of a clone
+  --keep          keep the root and print its path
+TRY is one of these, each in a separate root; demo and tests by default:
   demo    client/demo.sh --no-browser, twice
   tests   tests/run.sh, then its quickest step again
-  core    the core alone, where no package of the service is installed
+  core    the core alone, without the packages of the service
   packages  the Debian packages and the wheel: installed, tried, removed (docker/debian/build.sh)
 USAGE
 }
@@ -36,7 +36,7 @@ for argument in "$@"; do
   esac
 done
 ((${#tries[@]})) || tries=(demo tests)
-(($(id -u) == 0)) || fail "making a root file system takes root"
+(($(id -u) == 0)) || fail "making a root file system requires root"
 docker/install.sh image
 
 readonly work=$PWD/build/bare_root
@@ -75,7 +75,7 @@ make_root() {
   fi
 }
 
-# Runs a command in the root, in the clone, with mounts and processes of its own: both end with it.
+# Runs a command in the clone inside the root, with its own mounts and processes, which end with it.
 in_root() {
   unshare --mount --pid --fork --kill-child --mount-proc="$root/proc" bash -c '
     root=$1
@@ -91,7 +91,7 @@ in_root() {
 
 outcomes=()
 failed=0
-# try NAME COMMAND...: runs the command and keeps its outcome for the end.
+# try NAME COMMAND...: runs the command and stores its outcome for the end.
 try() {
   local name=$1 begin=$SECONDS outcome=passed
   shift

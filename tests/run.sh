@@ -1,5 +1,5 @@
 #!/bin/bash
-# Installs what is missing, builds everything and runs every test. The last line that it prints is
+# Installs missing packages, builds everything and runs every test. The last line is
 # "N passed, N failed", summed over all steps; the exit code is 0 only if nothing failed.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
@@ -12,21 +12,21 @@ usage() {
   cat <<'USAGE'
 usage: tests/run.sh [--no-install] [STEP...]
 Steps, all of them by default:
-  layout      every source file is laid out as .clang-format says
-  contract    the .proto as buf lints it, and that it breaks nobody (where npm can fetch buf)
+  layout      every source file has the format of .clang-format
+  contract    buf lints the .proto and finds no incompatible change (if npm can fetch buf)
   release     the whole project, optimised, and all of its tests
-  recordings  the bundled recordings replayed, and the files that come out checked (after release)
+  recordings  replays of the bundled recordings, with checks of the written files (after release)
   viewer      page and report: unit tests by node, both in Chromium (after release)
   sanitized   core, sessions, client streams and the gateway under AddressSanitizer and
               UndefinedBehaviorSanitizer
-  threads     core and sessions under ThreadSanitizer, as far as threads meet in them
+  threads     core and sessions under ThreadSanitizer
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
-  includes    every source includes what it needs (after sanitized and fuzz, which compile most)
-  core-alone  the core without gRPC, Protobuf and VTK, as a shared library, and a consumer of it
-              installed
-  consumer    everything installed, found and used by tests/consumer (after release)
+  includes    every source includes the headers it needs (after sanitized and fuzz)
+  core-alone  the core without gRPC, Protobuf and VTK, as an installed shared library, and a
+              consumer of it
+  consumer    tests/consumer finds and uses the installed project (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
-Builds are kept in build/, so that a second run compiles only what has changed.
+Builds are kept in build/, so a second run compiles changed files only.
 With CI=true a skipped test or step fails, unless tests/skips.txt names it with its reason.
 USAGE
 }
@@ -51,10 +51,10 @@ done
 passed=0
 failed=0
 failures=()
-details=$(mktemp)  # What the failed tests wrote.
+details=$(mktemp)  # Output of the failed tests.
 trap 'rm -f "$details"' EXIT
 
-# Seconds since the beginning, and of processor time of what has ended since then.
+# Prints the elapsed seconds and the processor time of ended children.
 headline() {
   local ticks
   ticks=$(awk '{ sub(/.*\) /, ""); print $14 + $15 }' /proc/$$/stat)
@@ -67,7 +67,7 @@ record_failure() {
   echo "FAILED: $2"
 }
 
-# record_skips KIND LOG...: prints what did not run (tests/support/skips.py). In continuous integration a
+# record_skips KIND LOG...: prints the skipped tests (tests/support/skips.py). In continuous integration a
 # skipped test fails unless tests/skips.txt names it.
 record_skips() {
   local found name reason
@@ -100,7 +100,7 @@ check() {
   fi
 }
 
-# What each failed test wrote, of a log of CTest's: its line of the result and what follows it.
+# The output of each failed test in a CTest log: its result line and the lines after it.
 failed_tests() {
   awk '/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: / { shown = /\*\*\*/ && !/\*\*\*Skipped/ }
        /^[0-9]+% tests passed/ { exit }
@@ -111,8 +111,8 @@ names_of_failed_tests() {
   failed_tests "$1" | sed -n -E 's|^ *[0-9]+/[0-9]+ Test +#[0-9]+: ([^ ]+) .*|\1|p' | paste -sd ' '
 }
 
-# run_ctest NAME DIRECTORY [OPTION...]: runs the tests of a build directory, or those that CTest's
-# options choose, and adds CTest's own figures to the sum.
+# run_ctest NAME DIRECTORY [OPTION...]: runs the tests of a build directory, selected by CTest's
+# options, and adds CTest's figures to the sum.
 run_ctest() {
   local name=$1 directory=$2 log
   shift 2
@@ -134,7 +134,7 @@ run_ctest() {
   rm -f "$log"
 }
 
-# A file that includes gRPC takes more than 1 GB to compile: no more jobs than memory allows.
+# Memory limits the number of jobs: a file that includes gRPC takes more than 1 GB to compile.
 build_jobs() {
   local processors memory
   processors=$(nproc)
@@ -150,8 +150,8 @@ step_layout() {
     clang-format-14 --dry-run --Werror "${files[@]}"
 }
 
-# buf comes from npm alone, which a machine may not have, or not reach. The contract is compared with
-# what was released by contract_test, too, without either.
+# buf comes from npm, which may be missing or offline. contract_test also compares the contract with
+# the released one, without buf.
 step_contract() {
   local buf=build/buf/node_modules/.bin/buf
   if [[ ! -x $buf ]]; then
@@ -178,7 +178,7 @@ step_recordings() {
     --partiemc build/release/bin/partiemc
 }
 
-# run_node NAME SCRIPT: runs tests by node's own runner, and adds its figures to the sum.
+# run_node NAME SCRIPT: runs tests by node's runner and adds its figures to the sum.
 run_node() {
   local name=$1 log
   log=$(mktemp)
@@ -201,7 +201,7 @@ run_node() {
   rm -f "$log"
 }
 
-# Its packages come from npm alone, as buf does.
+# Its packages come from npm.
 step_viewer() {
   if ! client/viewer/build.sh --packages >build/viewer.log 2>&1; then
     echo "npm is not installed or cannot fetch the viewer's packages (build/viewer.log)"
@@ -213,10 +213,9 @@ step_viewer() {
   PARTIEMC_BIN=build/release/bin run_node "viewer in Chromium" client/viewer/tests/page/run.mjs
 }
 
-# Core, server and relay, one room after the other, then of the client what goes on in the
-# background, so that nothing else is compiled with sanitizers but what the fuzzers attack, in the
-# next step but one: it is the same build. Tests that count allocations would count the
-# sanitizer's, slowly.
+# Core, server and relay, then the client's background work. Step fuzz uses the same build, so only
+# these and the fuzz targets are compiled with sanitizers. Tests that count allocations are left out,
+# because they would count the sanitizer's.
 step_sanitized() {
   check "sanitized: configure" cmake --preset asan || return
   local room
@@ -272,14 +271,14 @@ if $install; then
   fi
 fi
 jobs=$(build_jobs)
-# As many again as there are processors: a dozen tests mostly wait.
+# Twice the processors, because some tests mostly wait.
 readonly jobs test_jobs=$((2 * $(nproc)))
 for step in "${steps[@]}"; do
   headline "$step"
   "step_$step"
 done
 
-# Again, next to the result: by now it is far up.
+# Repeats the failures next to the result.
 if [[ -s $details ]]; then
   headline "failed tests"
   head -n 200 "$details"

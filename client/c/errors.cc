@@ -7,7 +7,7 @@
 namespace partiemc::c {
 namespace {
 
-// What partiemc_last_error points to.
+// Storage behind partiemc_last_error.
 struct LastError {
   std::string message;
   Violation violation;

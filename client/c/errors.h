@@ -1,4 +1,4 @@
-// How what goes wrong reaches a program in C.
+// Reports errors to a program in C.
 #pragma once
 
 #include <exception>
@@ -9,10 +9,10 @@
 
 namespace partiemc::c {
 
-/// Keeps `status` for partiemc_last_error of this thread, and gives its code.
+/// Stores `status` for partiemc_last_error of this thread and returns its code.
 partiemc_code Keep(const absl::Status& status);
 
-/// Calls `body`, which gives a status; no exception leaves it.
+/// Returns the code of `body`'s status. Converts exceptions to an error.
 template <typename Body>
 partiemc_code Guarded(Body body) noexcept {
   try {

@@ -1,5 +1,5 @@
-/* usage: example PICTURE.svg [ADDRESS]. A dam that breaks, roughly; without an address all happens
- * in here. */
+/* usage: example PICTURE.svg [ADDRESS]. A simplified dam break; without an address it is computed
+ * in this process. */
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -40,8 +40,10 @@ int main(int argc, char** argv) {
     printf("%zu rings, area %.6f, ", event.ring_count, event.area);
     printf("%016" PRIx64 " %016" PRIx64 "\n", event.rings_digest, event.mesh_digest);
   }
-  if (code != PARTIEMC_OK) fprintf(stderr, "%s\n", partiemc_last_error()->message);
-  else if (draw(&event, argv[1]) != 0) perror(argv[1]);
+  if (code != PARTIEMC_OK)
+    fprintf(stderr, "%s\n", partiemc_last_error()->message);
+  else if (draw(&event, argv[1]) != 0)
+    perror(argv[1]);
   partiemc_close(stream);
   return code;
 }

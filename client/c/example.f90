@@ -1,10 +1,10 @@
-! usage: example_fortran. The dam of example.c from Fortran, by iso_c_binding, in this process.
+! usage: example_fortran. The dam break of example.c in Fortran with iso_c_binding, in this process.
 program example
   use, intrinsic :: iso_c_binding
   implicit none
   integer(c_int32_t), parameter :: float64 = 2
 
-  ! Both as in partiemc.h, up to what is used here: `size` tells the library where they end.
+  ! Structs of partiemc.h up to the last member used here; `size` gives their length.
   type, bind(c) :: partiemc_options
     integer(c_size_t) :: size
     real(c_double) :: spacing

@@ -1,4 +1,4 @@
-// Arrays of a program in C as the client takes them.
+// Converts the arrays of a C program to the client's arrays.
 #pragma once
 
 #include <vector>
@@ -9,9 +9,9 @@
 
 namespace partiemc::c {
 
-/// A view of `particles`, and of `attributes`, which it fills.
-/// Errors: INVALID_ARGUMENT with a Violation (reason UNSUPPORTED) for a type that an array may not
-/// have, (reason COUNT) for one without an address.
+/// Returns a view of `particles`; fills `attributes` and refers to it. Errors: INVALID_ARGUMENT
+/// with a Violation (reason UNSUPPORTED) for a type that the array must not have, (reason COUNT)
+/// for an array without an address.
 absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
                                                 std::vector<client::AttributeArrays>& attributes);
 

@@ -32,12 +32,12 @@ using partiemc::client::Stream;
 
 struct partiemc_stream {
   std::unique_ptr<FrameStream> stream;
-  std::unique_ptr<LatestSender> latest;  // Ends before the stream. Null without `latest`.
+  std::unique_ptr<LatestSender> latest;  // Destroyed before the stream. Null without `latest`.
   bool shows_normals = false;
   Event event;
-  std::vector<partiemc_values> values;                             // Of the event.
-  std::vector<std::vector<partiemc_values>> section_values;        // Of its sections.
-  std::vector<partiemc::client::AttributeArrays> sent_attributes;  // Of the sender's thread.
+  std::vector<partiemc_values> values;                             // Attributes of the last event.
+  std::vector<std::vector<partiemc_values>> section_values;        // Attributes of its sections.
+  std::vector<partiemc::client::AttributeArrays> sent_attributes;  // Sender's thread only.
 };
 
 namespace partiemc::c {
@@ -45,15 +45,15 @@ namespace {
 
 std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
-// `seconds`, or `otherwise` for 0.
+// Converts `seconds`; `otherwise` for 0.
 std::chrono::milliseconds Milliseconds(double seconds, std::chrono::milliseconds otherwise) {
-  constexpr double kLongest = 1e9;  // Some thirty years: what clocks can add.
+  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
   if (seconds == 0 || seconds != seconds) return otherwise;
   return std::chrono::milliseconds(
       static_cast<std::int64_t>(1000 * std::clamp(seconds, 0.0, kLongest)));
 }
 
-// Of six numbers; none of a null pointer.
+// Reads six numbers; empty for a null pointer.
 std::optional<SlicePlane> SliceOf(const double* numbers) {
   if (numbers == nullptr) return std::nullopt;
   SlicePlane slice;
@@ -89,7 +89,7 @@ std::vector<std::string> NamesOf(const char* list) {
   return absl::StrSplit(list, ',', absl::SkipEmpty());
 }
 
-// What is not given is that of the environment.
+// Options that are not set come from the environment.
 client::Credentials CredentialsOf(const partiemc_options& options) {
   client::Credentials result = client::CredentialsFromEnvironment();
   const auto take = [](const char* text, std::string& value) {
@@ -162,7 +162,7 @@ absl::Status Send(partiemc_stream& stream, const partiemc_particles* particles, 
   return sent.status();
 }
 
-// RingMeasures are handed on as they are.
+// RingMeasures are exposed without conversion.
 static_assert(sizeof(RingMeasures) == sizeof(partiemc_ring) &&
               offsetof(RingMeasures, area) == offsetof(partiemc_ring, area) &&
               offsetof(RingMeasures, perimeter) == offsetof(partiemc_ring, perimeter) &&
@@ -242,7 +242,7 @@ absl::Status ViewSection(partiemc_stream& stream, std::size_t index, partiemc_ev
     return absl::InvalidArgumentError(
         absl::StrCat("section: ", index, "; must be below the ", count, " of the last event"));
   }
-  // Those of other sections stay where they are.
+  // Grows only: pointers into other sections must stay valid.
   if (stream.section_values.size() < count) stream.section_values.resize(count);
   partiemc_event view = Empty(PARTIEMC_RESULT);
   view.sequence = stream.event.sequence;

@@ -1,4 +1,5 @@
-// Structs of C that may have been compiled with a shorter or a longer version of themselves.
+// Copies C structs between callers and libraries of different versions: `size` gives the caller's
+// length.
 #pragma once
 
 #include <algorithm>
@@ -7,14 +8,14 @@
 
 namespace partiemc::c {
 
-/// Writes as much of `ours` as a caller has whose struct is `size` bytes long.
+/// Copies the first `size` bytes of `ours` to the caller's struct.
 template <typename T>
 void Give(T ours, std::size_t size, T* theirs) {
   ours.size = size;
   std::memcpy(static_cast<void*>(theirs), &ours, std::min(size, sizeof ours));
 }
 
-/// `theirs` with what it lacks at `defaults`.
+/// Copies `theirs`; members beyond its size come from `defaults`.
 template <typename T>
 T Take(const T* theirs, T defaults) {
   if (theirs != nullptr) {

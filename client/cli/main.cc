@@ -4,7 +4,6 @@
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
 #include "client/cli/convert.h"
-#include "client/cli/evaluate.h"
 #include "client/cli/info.h"
 #include "client/cli/load/load.h"
 #include "client/cli/replay/replay.h"
@@ -41,13 +40,11 @@ int main(int argc, char** argv) {
   partiemc::client::QueryFlags info;
   partiemc::client::LoadFlags load;
   partiemc::client::ConvertFlags convert;
-  partiemc::client::EvaluateFlags evaluate;
   const CLI::App* replay_verb = AddReplay(app, replay);
   const CLI::App* watch_verb = AddWatch(app, watch);
   const CLI::App* streams_verb = AddStreams(app, streams);
   const CLI::App* info_verb = AddInfo(app, info);
   const CLI::App* load_verb = AddLoad(app, load);
-  const CLI::App* evaluate_verb = AddEvaluate(app, evaluate);
   AddConvert(app, convert);
   try {
     app.parse(argc, argv);
@@ -61,6 +58,5 @@ int main(int argc, char** argv) {
   if (streams_verb->parsed()) return Streams(streams);
   if (info_verb->parsed()) return Info(info);
   if (load_verb->parsed()) return Load(load);
-  if (evaluate_verb->parsed()) return Evaluate(evaluate);
   return Convert(convert);
 }

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "client/cli/console.h"
 #include "client/output/text.h"
+#include "common/text.h"
 
 namespace partiemc::client {
 namespace {
@@ -24,24 +26,19 @@ std::string Names(std::span<const Value> values) {
 }
 
 std::optional<double> Number(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    return std::nullopt;
-  }
-  return value;
+  const auto number = ParseNumber<double>(text);
+  return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
 // Six numbers, separated by commas.
 std::optional<std::array<double, 6>> SixNumbers(std::string_view text) {
+  const std::vector<std::string_view> parts = Split(text, ',', /*blanks=*/"");
   std::array<double, 6> numbers{};
+  if (parts.size() != numbers.size()) return std::nullopt;
   for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const std::size_t comma = text.find(',');
-    if ((comma == std::string_view::npos) != (k + 1 == numbers.size())) return std::nullopt;
-    const auto number = Number(text.substr(0, comma));
+    const auto number = Number(parts[k]);
     if (!number) return std::nullopt;
     numbers[k] = *number;
-    text.remove_prefix(std::min(comma, text.size() - 1) + 1);
   }
   return numbers;
 }

@@ -1,6 +1,5 @@
 #include "client/cli/watch.h"
 
-#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -14,9 +13,9 @@
 #include "client/cli/console.h"
 #include "client/cli/frame_outputs.h"
 #include "client/cli/stream_recorder.h"
-#include "client/input/base/text.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
+#include "common/text.h"
 #include "partiemc/client/watcher.h"
 
 namespace partiemc::client {
@@ -43,10 +42,8 @@ FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sec
 constexpr std::string_view kOldest = "oldest";
 
 std::optional<std::uint64_t> ParseFrom(std::string_view text) {
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || number == 0) return std::nullopt;
-  return number;
+  const auto number = ParseNumber<std::uint64_t>(text);
+  return number != 0u ? number : std::nullopt;
 }
 
 // The value of WatcherOptions::from_sequence.
@@ -130,7 +127,7 @@ void CompleteRecording(WatchFlags& flags, bool has_mode) {
 }
 
 absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
-  const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
+  const std::vector<std::string_view> servers = Split(flags.server.address, ',');
   return Watcher::Open(servers.front(), flags.stream,
                        {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
                         .credits = flags.credits,

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """Draws the pictures of this folder: runs each simulation, watches its stream, keeps a few frames.
 
-    client/couplings/draw.py NAME...        of pysph_dam_break, lammps_column, numpy_drops
+    client/couplings/draw.py NAME...        NAME: pysph_dam_break, lammps_column, numpy_drops
 
-Needs PYTHONPATH as client/python/README.md has it, and PARTIEMC_SERVER_PROGRAM or a partiemc-server
-in PATH. A minute for pysph_dam_break.
+Requires PYTHONPATH as in client/python/README.md, and PARTIEMC_SERVER_PROGRAM or a partiemc-server
+in PATH. pysph_dam_break takes a minute.
 """
 
 import os
@@ -18,7 +18,7 @@ import numpy
 import partiemc
 
 HERE = pathlib.Path(__file__).parent
-# The stream's name, the simulation's options, the times that are drawn, and what the picture shows.
+# For each picture: stream name, options of the simulation, times to draw, visible box.
 PICTURES = {
     "pysph_dam_break": ("dam-break", ["--every", "50", "--tf", "0.96", "--disable-output",
                                       "--quiet"], [0.1, 0.4, 0.7, 0.95], (0, 0, 4.1, 2.1)),
@@ -30,7 +30,7 @@ PICTURES = {
 
 
 def watched(address, name, times, coupling):
-    """Of the stream's results the first at or after each of `times`."""
+    """Returns the stream's first result at or after each of `times`."""
     while not any(stream["name"] == name for stream in partiemc.streams(address)):
         if coupling.poll() is not None:
             sys.exit(f"{coupling.args[0]} has ended with {coupling.returncode}")
@@ -46,7 +46,7 @@ def watched(address, name, times, coupling):
 
 
 def rings_path(rings, scale, left, top):
-    """The outlines as SVG has them, in tenths of a pixel: each point once, relative to the last."""
+    """Data of an SVG path in tenths of a pixel: each vertex relative to the previous one."""
     words = []
     for ring in rings:
         points = numpy.rint((ring - (left, top)) * (scale, -scale)).astype(int)

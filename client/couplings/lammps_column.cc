@@ -1,8 +1,8 @@
 // usage: lammps_column SCRIPT ADDRESS EVERY STEPS
 //
 // A collapsing column of grains (lammps_column.in), computed by LAMMPS as a library and streamed
-// while it runs: what a simulator in C++ does that has LAMMPS or a solver of its own linked in.
-// Under mpirun each process sends the grains that it has.
+// during the run. An example for a C++ simulator that links LAMMPS or has its own solver. Under
+// mpirun each process sends its own grains.
 #include <lammps/library.h>
 
 #include <cinttypes>
@@ -24,7 +24,7 @@ struct Live {
   absl::Status status = absl::OkStatus();
 };
 
-// What `fix external` calls: `positions` points to the coordinates of `count` particles, x, y, z,
+// Callback of `fix external`: `positions` points to the coordinates of `count` particles, x, y, z,
 // x, y, z, ... The stream copies each number once.
 void Send(void* context, std::int64_t step, int count, int* ids, double** positions, double**) {
   Live& live = *static_cast<Live*>(context);
@@ -43,14 +43,14 @@ void Send(void* context, std::int64_t step, int count, int* ids, double** positi
       live.stream->SendArrays(particles, static_cast<double>(step) * live.step_length).status();
 }
 
-// Until the end of the stream; on a thread of its own, as the simulation does not wait for it.
+// Receives until the end of the stream, on its own thread, because the simulation does not wait.
 absl::Status Receive(client::Stream& stream) {
   client::Event event;
   for (;;) {
     const auto received = stream.Receive(event);
     if (!received.ok()) return received.status();
     if (*received == client::Received::kEnd) return absl::OkStatus();
-    if (event.kind == client::Event::Kind::kPartTaken) continue;  // Results come to process 0.
+    if (event.kind == client::Event::Kind::kPartTaken) continue;  // Process 0 receives the results.
     if (event.kind != client::Event::Kind::kResult) {
       std::fprintf(stderr, "%s\n", event.message.c_str());
       continue;

@@ -5,8 +5,8 @@
     client/couplings/lammps_column.py --every 50 --steps 5000
     mpirun -np 4 client/couplings/lammps_column.py --every 50 --steps 5000
 
-`fix external` of the input script calls `send` between two steps, so any script becomes live by one
-line of its own and the lines of `main`. Of several processes each sends the grains that it has.
+`fix external` of the input script calls `Sender` between two steps. To stream another script, add
+this line to it and copy `main`. With several processes, each sends its own grains.
 """
 
 import argparse
@@ -20,7 +20,7 @@ SCRIPT = pathlib.Path(__file__).with_name("lammps_column.in")
 
 
 class Sender:
-    """What `fix external` calls. LAMMPS cannot be told of an exception: it is kept for later."""
+    """Callback of `fix external`. LAMMPS ignores exceptions, so it stores one in `error`."""
 
     def __init__(self, simulation, stream):
         self.simulation, self.stream, self.error = simulation, stream, None
@@ -40,7 +40,7 @@ class Sender:
 
 def receive(stream):
     for result in stream:
-        if result is None:  # Results come to process 0.
+        if result is None:  # Process 0 receives the results.
             continue
         print(f"t = {result.time!r}: {len(result.rings)} rings, area {result.area!r}, "
               f"{result.rings_digest:016x} {result.mesh_digest:016x}", flush=True)
@@ -48,18 +48,18 @@ def receive(stream):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
-    parser.add_argument("--every", type=int, default=20, help="Steps from frame to frame")
+    parser.add_argument("--server", help="Server address; default PARTIEMC_SERVER or this machine")
+    parser.add_argument("--every", type=int, default=20, help="Steps between frames")
     parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--latest", action="store_true",
-                        help="Never wait for the server: leave frames out where it is behind")
+                        help="Never wait for the server; skip frames while it is behind")
     options = parser.parse_args()
     simulation = lammps.lammps(cmdargs=["-log", "none", "-screen", "none", "-var", "every",
                                         str(options.every)])
     simulation.file(str(SCRIPT))
     rank, ranks = (simulation.extract_setting(name) for name in ("world_rank", "world_size"))
     parts = {"part": rank, "parts": ranks} if ranks > 1 else {}
-    # The stream ends before the thread that receives from it is waited for.
+    # Leaving `with` ends the stream first, then waits for the receiving thread.
     with ThreadPoolExecutor(1) as receiver, partiemc.connect(
             options.server, latest=options.latest, name="column", spacing=1.0,
             echo_particles=True, **parts) as stream:
@@ -71,7 +71,7 @@ def main():
             raise sender.error
         stream.finish()
         received.result()
-    simulation.finalize()  # Of MPI, which wants to hear of the end of every process.
+    simulation.finalize()  # Finalizes MPI in every process.
 
 
 if __name__ == "__main__":

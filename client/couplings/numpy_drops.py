@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Two drops meet: smoothed particle hydrodynamics in NumPy, streamed while it runs.
+"""Two colliding drops: smoothed particle hydrodynamics in NumPy, streamed during the run.
 
     partiemc-server &
     client/couplings/numpy_drops.py --every 10 --steps 1500
 
-A loop of your own, as it is written with Taichi or Warp, too: `positions` is there what
-`field.to_numpy()` or `array.numpy()` gives. One thread sends and receives.
+An example for your own loop. With Taichi or Warp, `positions` is the return value of
+`field.to_numpy()` or `array.numpy()`. One thread sends and receives.
 """
 
 import argparse
@@ -14,8 +14,8 @@ import numpy
 import partiemc
 
 SPACING = 0.05
-LENGTH = 1.3 * SPACING  # Of the kernel, which ends at twice that.
-SOUND = 15.0            # Ten times as fast as what moves.
+LENGTH = 1.3 * SPACING  # Kernel length; the kernel's support is twice as long.
+SOUND = 15.0  # Ten times the fastest motion.
 VISCOSITY = 0.3
 STEP = 0.001
 
@@ -28,7 +28,7 @@ def disc(x, y, radius):
 
 
 def neighbours(positions):
-    """The pairs that may meet within the next steps: two arrays of indices."""
+    """Pairs that may interact within the next steps: two arrays of indices."""
     x, y = positions.T
     squared = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
     return numpy.nonzero(numpy.triu(squared < (2.5 * LENGTH) ** 2, 1))
@@ -41,13 +41,13 @@ def accelerations(positions, velocities, first, second):
     squared = (apart ** 2).sum(axis=1)
     ratio = numpy.sqrt(squared) / LENGTH
     near = numpy.maximum(1 - ratio / 2, 0)
-    mass = SPACING ** 2 * 7 / (4 * numpy.pi * LENGTH ** 2)  # Times the kernel's own factor.
+    mass = SPACING ** 2 * 7 / (4 * numpy.pi * LENGTH ** 2)  # Includes the kernel's constant factor.
     kernel = mass * near ** 4 * (2 * ratio + 1)
     density = (mass + numpy.bincount(first, kernel, count) + numpy.bincount(second, kernel, count))
     pressure = SOUND ** 2 * numpy.maximum(density - 1, 0) / density ** 2
     approach = ((velocities[first] - velocities[second]) * apart).sum(axis=1)
     friction = VISCOSITY * LENGTH * SOUND * approach / (squared + 0.01 * LENGTH ** 2)
-    slope = 5 * mass / LENGTH ** 2 * near ** 3  # Of the kernel, over the distance.
+    slope = 5 * mass / LENGTH ** 2 * near ** 3  # Derivative of the kernel divided by the distance.
     push = (pressure[first] + pressure[second] - numpy.minimum(friction, 0)) * slope
     return numpy.stack([numpy.bincount(first, push * along, count)
                         - numpy.bincount(second, push * along, count)
@@ -74,8 +74,8 @@ def show(result):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
-    parser.add_argument("--every", type=int, default=10, help="Steps from frame to frame")
+    parser.add_argument("--server", help="Server address; default PARTIEMC_SERVER or this machine")
+    parser.add_argument("--every", type=int, default=10, help="Steps between frames")
     parser.add_argument("--steps", type=int, default=1500)
     options = parser.parse_args()
     with partiemc.connect(options.server, name="drops", spacing=SPACING,
@@ -83,7 +83,7 @@ def main():
         for step, time, positions, velocities in simulate(options.steps):
             if step % options.every == 0:
                 stream.send(positions, time, velocities=velocities)
-            # Waits only where the server is a whole window behind.
+            # Waits only if the window is full.
             while stream.in_flight:
                 result = stream.receive(None if stream.in_flight == stream.window else 0)
                 if result is None:

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""PySPH's two-dimensional dam break, streamed while it is computed.
+"""PySPH's two-dimensional dam break, streamed during the run.
 
     partiemc-server &
     client/couplings/pysph_dam_break.py --every 20 --max-steps 2000
 
-The example itself is PySPH's own, unchanged; all its options are there, too. Every application of
-PySPH is coupled in the same way: by a `post_step` that sends, and a thread that receives.
+Runs PySPH's own example with all its options. Any PySPH application can be coupled like this: a
+`post_step` sends, and a thread receives.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -17,16 +17,16 @@ from pysph.examples.dam_break_2d import DamBreak2D
 class LiveDamBreak(DamBreak2D):
     def add_user_options(self, group):
         super().add_user_options(group)
-        group.add_argument("--server", help="Address; that of PARTIEMC_SERVER or this machine")
-        group.add_argument("--every", type=int, default=20, help="Steps from frame to frame")
+        group.add_argument("--server", help="Server address; default PARTIEMC_SERVER or this machine")
+        group.add_argument("--every", type=int, default=20, help="Steps between frames")
         group.add_argument("--latest", action="store_true",
-                           help="Never wait for the server: leave frames out where it is behind")
+                           help="Never wait for the server; skip frames while it is behind")
 
     def post_step(self, solver):
-        # PySPH counts the step, and adds its length to the time, after this.
+        # PySPH increments step and time after this call.
         if (solver.count + 1) % self.options.every:
             return
-        fluid = self.particles[0]  # Views of PySPH's own memory; `send` copies each once.
+        fluid = self.particles[0]  # Views of PySPH's memory; `send` copies each once.
         self.stream.send((fluid.x, fluid.y), solver.t + solver.dt,
                          volumes=fluid.m / fluid.rho, velocities=(fluid.u, fluid.v))
 
@@ -41,7 +41,7 @@ def main():
     simulation = LiveDamBreak()
     simulation.setup()
     options = simulation.options
-    # The stream ends before the thread that receives from it is waited for.
+    # Leaving `with` ends the stream first, then waits for the receiving thread.
     with ThreadPoolExecutor(1) as receiver, partiemc.connect(
             options.server, latest=options.latest, name="dam-break", spacing=simulation.dx,
             echo_particles=True) as simulation.stream:

@@ -20,7 +20,7 @@ absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::st
                           wire::ReconstructedFrame& scratch, Event& event) {
   event.sequence = AnsweredSequence(response);
   if (response.has_frame()) {
-    std::swap(scratch.result, event.frame.result);  // The caller's buffers are used again.
+    std::swap(scratch.result, event.frame.result);  // Reuses the caller's buffers.
     const absl::Status status = wire::DecodeResult(response.frame(), scratch);
     std::swap(scratch.result, event.frame.result);
     if (!status.ok()) {
@@ -54,9 +54,10 @@ absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::st
     event.message = response.notice().message();
     return absl::OkStatus();
   }
-  return absl::DataLossError(absl::StrCat("the server at ", address,
-                                          " sent an answer that this client does not know: use a "
-                                          "client of the server's version"));
+  return absl::DataLossError(
+      absl::StrCat("the server at ", address,
+                   " sent a response that this client does not support: use a "
+                   "client of the server's version"));
 }
 
 }  // namespace partiemc::client

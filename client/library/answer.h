@@ -1,4 +1,4 @@
-// What a server's message means to the receiver of a stream.
+// Converts a server's responses to the events of a stream.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace partiemc::client {
 
-/// Whether `response` answers a frame, or a part of one.
+/// True for a response to a frame or to a part of one.
 bool IsAnswer(const v1::ReconstructResponse& response);
 
-/// The number of the frame that `response` answers; 0 where it answers none.
+/// The number of the frame that `response` answers; 0 if it answers none.
 std::uint64_t AnsweredSequence(const v1::ReconstructResponse& response);
 
-/// Fills `event` with what `response` says; it is not StreamOpened. Buffers of `event` are used
-/// again; `scratch` belongs to this function.
-/// Errors: DATA_LOSS, naming the server at `address`, for what makes no sense.
+/// Fills `event` from `response`, which is not StreamOpened. Reuses the buffers of `event`;
+/// `scratch` is private to this function. Errors: DATA_LOSS with the server's address for a
+/// malformed response.
 absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::string& address,
                           wire::ReconstructedFrame& scratch, Event& event);
 

@@ -7,13 +7,13 @@ namespace partiemc::client {
 std::chrono::milliseconds Backoff::NextPause() {
   const std::size_t attempt = attempts_++;
   if (attempt < address_count_) return std::chrono::milliseconds(0);
-  // Within a round one address after the other is tried at once.
+  // A round tries all its addresses without pauses.
   if (attempt % address_count_ != 0) return std::chrono::milliseconds(0);
   constexpr std::size_t kMostDoublings = 30;
   const std::size_t doublings = std::min(attempt / address_count_ - 1, kMostDoublings);
   const auto pause = std::min<std::chrono::milliseconds::rep>(
       policy_.first_pause.count() << doublings, policy_.longest_pause.count());
-  // A step of a linear congruential generator (Knuth's MMIX); its upper bits are the good ones.
+  // One step of a linear congruential generator (Knuth's MMIX). Its upper bits are the random ones.
   random_ = random_ * 6364136223846793005u + 1442695040888963407u;
   const double left_out = static_cast<double>(random_ >> 32) * 0x1p-32 / 2;
   return std::chrono::milliseconds(

@@ -1,4 +1,4 @@
-// When to try again to reach a server.
+// Pauses between attempts to reach a server.
 #pragma once
 
 #include <chrono>
@@ -9,15 +9,15 @@
 
 namespace partiemc::client {
 
-/// One loss of a connection: how long to wait before each attempt to go on.
+/// Pauses of one loss of a connection.
 class Backoff {
  public:
-  /// `random` tells this client's pauses from those of others.
+  /// `random` seeds the jitter, so that clients do not retry at the same moment.
   Backoff(const ReconnectPolicy& policy, std::size_t address_count, std::uint64_t random)
       : policy_(policy), address_count_(address_count), random_(random) {}
 
-  /// 0 while there are addresses that have not been tried. Then between one and two halves of a
-  /// pause that doubles up to the longest, with each round over the addresses.
+  /// 0 until every address has been tried once. Then a pause at the start of each round over the
+  /// addresses: it doubles up to the longest, and the jitter removes up to half of it.
   std::chrono::milliseconds NextPause();
 
  private:

@@ -13,21 +13,20 @@
 namespace partiemc::client {
 namespace {
 
-// A port that is refused is tried again this soon: long enough to cost nothing, short enough that
-// a server which starts at the same time is found at once.
+// Backoff after a refused connection: long enough to cost nothing, short enough to find a starting
+// server at once.
 constexpr int kFirstBackoffMs = 100;
 constexpr int kLongestBackoffMs = 500;
 
-// A connection whose other end has silently gone is noticed after both: how long nothing comes
-// before that end is asked for a sign, and how long it may take to give one, over a slow line with
-// megabytes under way, too.
+// A dead connection is detected after the sum of both: the silence before a ping, and the time for
+// its acknowledgement. The latter must cover a slow connection with megabytes on the way.
 constexpr int kKeepaliveMs = 4000;
 constexpr int kKeepaliveTimeoutMs = 6000;
 
-// Enough for a server that starts at the same time.
+// Enough for a server that is starting.
 constexpr std::chrono::milliseconds kConnectTimeout(2000);
 
-// For asking gRPC why there is no connection; it knows the answer already.
+// For the call that returns gRPC's reason for the missing connection, which gRPC already has.
 constexpr std::chrono::seconds kReasonTimeout(1);
 
 absl::StatusOr<Address> ParseTarget(const std::string& address) {
@@ -70,15 +69,15 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
-  // gRPC's own retries do not suit streams, which are resumed by this library; and a call that a
-  // proxy has turned away could hang in them even when it was cancelled.
+  // Disables gRPC's retries: this library resumes streams itself, and a call that a proxy has
+  // refused could hang in them after a cancel.
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // A connection of its own: after a loss none that may be dead, too.
+  // Opens a new connection instead of sharing one, which may be dead after a loss.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // The address is where the frames go; an http_proxy meant for browsers must not reroute them.
+  // Frames go directly to the address; an http_proxy for browsers must not redirect them.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> senders;
   if (*token_sender != nullptr) senders.push_back(*std::move(token_sender));
@@ -96,18 +95,18 @@ absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::s
   v1::GetServerInfoResponse response;
   const auto stub = v1::ReconstructionService::NewStub(channel);
   const grpc::Status status = stub->GetServerInfo(&context, {}, &response);
-  if (status.ok()) return absl::OkStatus();  // It came up in the meantime.
+  if (status.ok()) return absl::OkStatus();  // The server has started since.
   const std::string reason = Reason(status);
   if (reason.find("certificate") != std::string::npos) {
     return absl::UnavailableError(
-        absl::StrCat("the server at ", address, " has a certificate that does not hold (", reason,
+        absl::StrCat("the server at ", address, " has an invalid certificate (", reason,
                      "): it must be valid, for that host, and signed by an authority of --tls-ca"));
   }
   if (reason.find("refused") == std::string::npos && reason.find("closed") != std::string::npos) {
     return absl::UnavailableError(
-        absl::StrCat("what listens at ", address, " ends the connection (", reason,
-                     "): a server may speak TLS (--tls) or not, and ask clients for a certificate "
-                     "(--tls-cert, --tls-key)"));
+        absl::StrCat("the program at ", address, " closed the connection (", reason,
+                     "): check whether the server uses TLS (--tls) and requires a client "
+                     "certificate (--tls-cert, --tls-key)"));
   }
   return absl::UnavailableError(absl::StrCat("no server at ", address, " (", reason,
                                              "): start one with `partiemc-server --address ",
@@ -143,14 +142,14 @@ absl::Status FromGrpc(const grpc::Status& status, const std::string& address) {
     case grpc::StatusCode::UNAVAILABLE:
       return absl::Status(
           code, absl::StrCat("the connection to the server at ", address, " was lost (",
-                             Reason(status), "): look at the server's log, then start again"));
+                             Reason(status), "): read the server's log, then start again"));
     case grpc::StatusCode::UNIMPLEMENTED:
-      return absl::Status(code, absl::StrCat("what listens at ", address,
+      return absl::Status(code, absl::StrCat("the program at ", address,
                                              " does not speak partiemc.v1: give the address of a "
                                              "partiemc-server"));
     default:
       return absl::Status(
-          code, absl::StrCat("the server at ", address, " says: ", status.error_message()));
+          code, absl::StrCat("the server at ", address, " reports: ", status.error_message()));
   }
 }
 

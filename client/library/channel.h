@@ -1,4 +1,4 @@
-// How this library reaches a server, and what it says when it cannot.
+// Opens connections to a server, and describes connection errors.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -14,38 +14,39 @@
 
 namespace partiemc::client {
 
-/// A channel with this library's settings; connects when it is first used.
-/// Errors: INVALID_ARGUMENT unless `address` is HOST:PORT, [IPV6]:PORT or unix:PATH, and for
-/// credentials that do not hold, or do not suit the address.
+/// Creates a channel with this library's settings. It connects at its first use. Errors:
+/// INVALID_ARGUMENT unless `address` is HOST:PORT, [IPV6]:PORT or unix:PATH, and for credentials
+/// that are invalid or unsafe for the address.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials);
 
-/// What MakeChannel would say of the address, and of sending the token there.
+/// Makes the checks of MakeChannel on the address and on sending the token to it.
 absl::Status CheckAddress(const std::string& address, const Credentials& credentials);
 
-/// Waits until `channel` is connected. A refused connection is tried again until the time is over.
-/// Errors: UNAVAILABLE, "no server at ADDRESS (WHY): ...".
+/// Waits until `channel` is connected. Retries refused connections until `timeout`. Errors:
+/// UNAVAILABLE, "no server at ADDRESS (WHY): ...".
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout);
 
-/// A channel for one call that has until `deadline`: as MakeChannel, then Connect, which gets as
-/// long as a server needs that starts at the same time.
+/// MakeChannel and Connect for one call that ends at `deadline`. Connect waits long enough for a
+/// server that is just starting.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(const std::string& address,
                                                                 const Credentials& credentials,
                                                                 std::chrono::milliseconds deadline);
 
-/// "0.25 s", as texts of this library tell times: to the millisecond.
+/// Formats a duration with milliseconds: "0.25 s".
 std::string Seconds(std::chrono::nanoseconds duration);
 
-/// What is said when a server that was reached did not accept `call` ("stream", "watcher") in time.
+/// The error for a server that was reached but did not accept `call` ("stream", "watcher") within
+/// `time`.
 absl::Status NotAccepted(const std::string& address, const char* call,
                          std::chrono::milliseconds time);
 
-/// Why a call has failed, in the system's words, which gRPC's end in:
-/// "...: Failed to connect to remote host: Connection refused".
+/// The cause at the end of gRPC's message: "Connection refused" for "...: Failed to connect to
+/// remote host: Connection refused".
 std::string Reason(const grpc::Status& status);
 
-/// The end of a call as one line that names the server. OK stays OK.
+/// Converts the status of a call to one line that names the server. OK stays OK.
 absl::Status FromGrpc(const grpc::Status& status, const std::string& address);
 
 }  // namespace partiemc::client

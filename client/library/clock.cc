@@ -12,7 +12,7 @@ class MonotonicClock final : public Clock {
 
 class Device final : public RandomSource {
  public:
-  // A device of its own for each call: std::random_device is not thread-safe.
+  // One device for each call: std::random_device is not thread-safe.
   std::uint64_t Next() override { return std::random_device{}(); }
 };
 

@@ -1,4 +1,4 @@
-// Time and chance of this library, passed in so that tests decide about both.
+// Interfaces for clock and random source, so that tests can replace both.
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ class RandomSource {
   virtual std::uint64_t Next() = 0;
 };
 
-/// Those of the machine.
+/// The clock and the random source of the machine.
 Clock& SystemClock();
 RandomSource& SystemRandom();
 

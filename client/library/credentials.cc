@@ -16,7 +16,7 @@ namespace {
 
 namespace experimental = grpc::experimental;
 
-constexpr std::size_t kMaxTokenBytes = 512;  // As servers take it.
+constexpr std::size_t kMaxTokenBytes = 512;  // The server's limit.
 
 absl::Status Wrong(std::string field, std::string value, std::string rule) {
   return ViolationError(
@@ -71,14 +71,14 @@ class TokenSender final : public experimental::Interceptor {
   std::string header_;
 };
 
-// An interceptor rather than call credentials, which gRPC has for TLS alone.
+// An interceptor, because gRPC allows call credentials with TLS only.
 class TokenSenderFactory final : public experimental::ClientInterceptorFactoryInterface {
  public:
   explicit TokenSenderFactory(Credentials credentials) : credentials_(std::move(credentials)) {}
 
   experimental::Interceptor* CreateClientInterceptor(experimental::ClientRpcInfo*) override {
     const auto token = TokenOf(credentials_);
-    // A file that has gone meanwhile: the server says that there is no token.
+    // If the file is missing now, the call carries no token, and the server refuses it.
     return token.ok() ? new TokenSender(absl::StrCat("Bearer ", *token)) : nullptr;
   }
 
@@ -141,7 +141,7 @@ Credentials CredentialsFromEnvironment() {
                           .key_file = Variable("PARTIEMC_TLS_KEY"),
                           .token = Variable("PARTIEMC_TOKEN"),
                           .token_file = Variable("PARTIEMC_TOKEN_FILE")};
-  // What is no clear no, is taken for the safer side.
+  // Any value that does not clearly disable TLS enables it.
   constexpr std::string_view kNo[] = {"", "0", "false", "no", "off", "n", "f", "disable"};
   credentials.tls = !std::ranges::count(kNo, absl::AsciiStrToLower(Variable("PARTIEMC_TLS"))) ||
                     !credentials.ca_file.empty() || !credentials.cert_file.empty() ||

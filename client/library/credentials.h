@@ -1,4 +1,4 @@
-// Credentials as gRPC takes them.
+// Converts Credentials to gRPC's objects.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -14,15 +14,14 @@
 
 namespace partiemc::client {
 
-/// Of the connection; clear text without `tls`.
-/// Errors: INVALID_ARGUMENT, with the field of Credentials, for a file that cannot be read or holds
-/// something else.
+/// Credentials of the connection; clear text without `tls`. Errors: INVALID_ARGUMENT with the field
+/// of Credentials for a file that cannot be read or is not PEM.
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials(
     const Credentials& credentials);
 
-/// What adds the token to every call of a channel to `address`; null where there is none.
-/// Errors: INVALID_ARGUMENT where the token cannot be read, is none, or would leave this machine in
-/// the clear. No error has the token in it.
+/// Creates the interceptor that adds the token to every call to `address`; null without a token.
+/// Errors: INVALID_ARGUMENT if the token cannot be read, is malformed, or would leave this machine
+/// unencrypted. No error contains the token.
 absl::StatusOr<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>>
 MakeTokenSender(const Credentials& credentials, const Address& address);
 

@@ -11,7 +11,7 @@
 namespace partiemc::client {
 namespace {
 
-// What a message of gRPC holds at most, less room for what is round the frame.
+// Maximum size of a gRPC message minus the fields around the frame.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() - 64;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Frames as a stream sends them.
+// Encodes frames as requests and checks them against the server's limits.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -14,16 +14,16 @@
 
 namespace partiemc::client {
 
-/// Errors: RESOURCE_EXHAUSTED with a Violation for more particles than the server takes.
+/// Errors: RESOURCE_EXHAUSTED with a Violation if there are more particles than the server allows.
 absl::Status CheckParticleCount(std::size_t particles, const StreamLimits& limits);
 
-/// `frame` as a request. Copies each array once.
-/// Errors: RESOURCE_EXHAUSTED with a Violation for more bytes than the server takes.
+/// Encodes `frame` as a request. Copies each array once. Errors: RESOURCE_EXHAUSTED with a
+/// Violation if the request has more bytes than the server allows.
 absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const wire::FrameRows& frame,
                                                     std::uint64_t sequence,
                                                     const StreamLimits& limits);
 
-/// Of a frame that got no place in the window within `timeout`: DEADLINE_EXCEEDED with a Violation.
+/// The error for a frame that got no slot in the window: DEADLINE_EXCEEDED with a Violation.
 absl::Status SendTimeout(std::chrono::milliseconds timeout);
 
 }  // namespace partiemc::client

@@ -14,16 +14,16 @@
 namespace partiemc::client {
 namespace {
 
-// Rows that are gathered column by column: few enough to stay in the nearest cache.
+// Rows gathered at once, column by column: few enough for the L1 cache.
 constexpr std::size_t kRowsAtOnce = 512;
 
-// Whether numbers of type From are those of type To, bit for bit.
+// True if numbers of type From have the bits of type To.
 template <typename From, typename To>
 constexpr bool kSameBits = std::is_same_v<From, To> ||
                            (std::is_integral_v<From> && std::is_integral_v<To> &&
                             sizeof(From) == sizeof(To));
 
-// Where the first row is, if the columns lie beside each other as a row has them.
+// The address of the first row if the columns are interleaved like a row; otherwise null.
 template <typename To, typename View, std::size_t N>
 const std::byte* InPlace(const std::array<View, N>& columns) {
   const std::byte* first = nullptr;
@@ -38,7 +38,7 @@ const std::byte* InPlace(const std::array<View, N>& columns) {
   return first;
 }
 
-// Column by column: `to` is where the first row has its number.
+// Copies one column; `to` is its place in the first row.
 template <typename To, typename View>
 void GatherColumn(const View& column, std::size_t begin, std::size_t end, std::size_t row_bytes,
                   std::byte* to) {
@@ -47,7 +47,7 @@ void GatherColumn(const View& column, std::size_t begin, std::size_t end, std::s
                        static_cast<std::ptrdiff_t>(begin) * column.stride();
     for (std::size_t row = begin; row < end; ++row) {
       From number;
-      std::memcpy(&number, from, sizeof number);  // Neither side needs to be aligned.
+      std::memcpy(&number, from, sizeof number);  // Both sides may be unaligned.
       const To converted = static_cast<To>(number);
       std::memcpy(to, &converted, sizeof converted);
       from += column.stride();
@@ -56,7 +56,7 @@ void GatherColumn(const View& column, std::size_t begin, std::size_t end, std::s
   });
 }
 
-// `count` rows of the `columns`, each number as a `To`.
+// Writes `count` rows of the `columns`, each number as a `To`.
 template <typename To, typename View, std::size_t N>
 wire::RowArray Rows(std::size_t count, const std::array<View, N>& columns) {
   constexpr std::size_t kRowBytes = N * sizeof(To);

@@ -1,4 +1,4 @@
-// Particles from anywhere in memory, gathered into the arrays of a frame.
+// Gathers particle arrays with arbitrary strides into the arrays of a frame.
 #pragma once
 
 #include "absl/status/status.h"
@@ -8,10 +8,10 @@
 
 namespace partiemc::client {
 
-/// A view of `particles` as a frame's message holds them: rows of two or three coordinates, volumes
-/// velocities and attributes as float, ids as 64 bits. Nothing is copied until rows are written.
-/// Errors: INVALID_ARGUMENT with a Violation (reason COUNT) for coordinates or velocities of which
-/// one is missing.
+/// Returns a view of `particles` in the layout of a frame's message: rows of two or three
+/// coordinates; volumes, velocities and attributes as float; ids as 64 bits. Numbers are copied
+/// only when rows are written. Errors: INVALID_ARGUMENT with a Violation (reason COUNT) if one
+/// component of coordinates or velocities is missing.
 absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double time);
 
 }  // namespace partiemc::client

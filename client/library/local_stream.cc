@@ -55,7 +55,7 @@ class Worker final : public LocalStream {
   void Cancel() override;
 
  private:
-  template <typename Particles>  // A frame or its rows.
+  template <typename Particles>  // Frame or wire::FrameRows.
   absl::StatusOr<std::uint64_t> Submit(const Particles& frame, double time);
   void Run();
   void Process(const OwnedFrame& frame, Event& event);
@@ -65,18 +65,18 @@ class Worker final : public LocalStream {
   const std::optional<std::chrono::milliseconds> send_timeout_;
   StreamInfo info_;
   Arena arena_;
-  State state_;                    // Of the worker's thread alone.
-  Workspace workspace_;            // Likewise.
-  std::vector<Attribute> chosen_;  // Likewise.
+  State state_;                    // Worker's thread only.
+  Workspace workspace_;            // Worker's thread only.
+  std::vector<Attribute> chosen_;  // Worker's thread only.
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<OwnedFrame> frames_;        // Sent, not yet in work.
-  std::vector<OwnedFrame> free_frames_;  // Their buffers wait for the next ones.
-  std::deque<Event> events_;             // Answered, not yet received.
+  std::deque<OwnedFrame> frames_;        // Sent, not yet being computed.
+  std::vector<OwnedFrame> free_frames_;  // Buffers for later frames.
+  std::deque<Event> events_;             // Computed, not yet received.
   std::vector<Event> free_events_;
   std::size_t in_flight_ = 0;
-  std::uint64_t next_sequence_ = 1;  // Of the sender's thread alone.
+  std::uint64_t next_sequence_ = 1;  // Sender's thread only.
   bool finished_ = false, cancelled_ = false;
   std::thread thread_;
 };
@@ -99,7 +99,7 @@ absl::StatusOr<std::uint64_t> Worker::Submit(const Particles& frame, double time
     owned = std::move(free_frames_.back());
     free_frames_.pop_back();
   }
-  lock.unlock();  // There is one sender: nobody else takes the place in the window meanwhile.
+  lock.unlock();  // Safe: the only sender is this thread, so the slot in the window stays free.
   const std::uint64_t sequence = next_sequence_++;
   owned.Assign(frame, time, sequence);
   lock.lock();

@@ -13,14 +13,14 @@
 
 namespace partiemc::client {
 
-/// A copy of a frame. Assigning to it uses its memory again.
+/// Holds a copy of a frame. Assignment reuses its memory.
 class OwnedFrame {
  public:
   OwnedFrame() = default;
-  OwnedFrame(OwnedFrame&&) = default;  // Moved vectors keep their elements where they are.
+  OwnedFrame(OwnedFrame&&) = default;  // Moved vectors keep the addresses of their elements.
   OwnedFrame& operator=(OwnedFrame&&) = default;
 
-  /// frame().time is `time` from then on, whatever `frame` says.
+  /// Copies `frame` and sets its time to `time`.
   void Assign(const Frame& frame, double time, std::uint64_t number) {
     frame_ = frame;
     frame_.time = time;
@@ -36,12 +36,13 @@ class OwnedFrame {
     CopyAttributes(frame.attributes);
   }
 
-  /// Likewise, of arrays that lie anywhere.
+  /// Same as above for arrays with arbitrary strides.
   void Assign(const wire::FrameRows& rows, double time, std::uint64_t number) {
     Take(rows, time, number, [](const std::byte*, std::size_t) { return false; });
   }
 
-  /// A frame that owns those arrays only that do not lie as frames have them; the others must stay.
+  /// Copies only the arrays whose layout differs from a frame's. The other arrays must outlive this
+  /// object.
   void Adopt(const wire::FrameRows& rows) {
     Take(rows, rows.scalars.time, 0, [](const std::byte* place, std::size_t alignment) {
       return place != nullptr && reinterpret_cast<std::uintptr_t>(place) % alignment == 0;
@@ -114,8 +115,8 @@ class OwnedFrame {
   std::vector<float> volumes_, velocities_;
   std::vector<std::uint64_t> ids_;
   std::vector<Carried> carried_;
-  std::vector<Attribute> attributes_;  // Of views into those.
-  Frame frame_;                        // Of views into the vectors.
+  std::vector<Attribute> attributes_;  // Views into `carried_`.
+  Frame frame_;                        // Views into the vectors.
   std::uint64_t number_ = 0;
 };
 

@@ -8,7 +8,7 @@
 
 namespace partiemc::client {
 
-// Attempts to find the stream that was lost.
+// Attempts to rejoin the lost stream.
 class RejoiningWatch::Calls final : public Attempts {
  public:
   explicit Calls(RejoiningWatch& watch) : watch_(watch) {}
@@ -31,7 +31,8 @@ class RejoiningWatch::Calls final : public Attempts {
     const auto opened = news_ ? *std::exchange(news_, {}) : call.WaitUntilOpened(Clock::now());
     if (!opened.ok()) {
       const std::string reason = call.reason();
-      // The producer may not have come back yet, the place of the former call not be free.
+      // Can change: the producer may still be reconnecting, and the lost call may still hold its
+      // slot.
       retryable = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS" ||
                   reason == "TOO_MANY_OPENING" || reason == "CALLER_WATCHERS" ||
                   reason == "CALLER_CALLS" || call.lost();
@@ -56,7 +57,7 @@ class RejoiningWatch::Calls final : public Attempts {
 
  private:
   RejoiningWatch& watch_;
-  std::optional<absl::StatusOr<bool>> news_;  // Of a call that was waited for.
+  std::optional<absl::StatusOr<bool>> news_;  // Result of the last Wait.
 };
 
 absl::StatusOr<std::unique_ptr<Watcher>> Watcher::Open(std::string_view address,
@@ -76,8 +77,8 @@ RejoiningWatch::RejoiningWatch(std::vector<std::string> addresses, std::string_v
       options_(options),
       retry_(std::move(addresses), "watcher", options.rejoin, options.connect_timeout) {}
 
-// The stream is at one of the servers; what one of them says is worth more than that there is none
-// at an address.
+// Tries all addresses. A server's refusal says more than an address without a server, so it is the
+// error that is returned.
 absl::Status RejoiningWatch::Connect() {
   const std::size_t count = retry_.addresses().size();
   const auto time = options_.connect_timeout / static_cast<int>(count);
@@ -132,7 +133,7 @@ absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
     auto received = call_->Receive(frame, left);
     if (received.ok() && *received == Received::kNothingYet) return received;
     if (received.ok() && *received == Received::kEvent) {
-      if (frame.sequence <= last_) continue;  // Seen before the watch was lost.
+      if (frame.sequence <= last_) continue;  // Delivered before the loss.
       Account(frame);
       return received;
     }
@@ -142,43 +143,43 @@ absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
 
 std::optional<std::uint64_t> RejoiningWatch::From() const {
   if (last_ == 0) return options_.from_sequence;
-  // Who wants the newest alone does not want to wait for what it missed.
+  // A watcher of the newest frames does not need those it missed.
   const bool goes_on = options_.mode == WatchMode::kEvery || options_.from_sequence;
   return goes_on ? std::optional(last_ + 1) : std::nullopt;
 }
 
-// What lies between two calls nobody has counted: results that were dropped, or that came while
-// nobody watched, and frames that were refused.
+// Nothing counts the results between two calls: they were dropped, or computed while the watch was
+// lost, or refused.
 void RejoiningWatch::Account(WatchedFrame& frame) {
   frame.gap = 0;
   frame.rejoined.clear();
   if (retry_.lost()) {
-    frame.rejoined = retry_.Story();
+    frame.rejoined = retry_.LossDescription();
     if (last_ == 0) {
-      frame.dropped += untold_;
+      frame.dropped += unreported_drops_;
     } else {
       frame.gap = frame.sequence - last_ - 1;
       frame.dropped = 0;
     }
     retry_.Recovered();
-    untold_ = 0;
+    unreported_drops_ = 0;
   }
   last_ = frame.sequence;
 }
 
-// Whether there is any sense in looking for the stream.
+// Begins a loss; false if a retry cannot succeed.
 bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   end_ = call_->end();
-  end_.dropped += untold_;
+  end_.dropped += unreported_drops_;
   if (options_.rejoin.give_up_after.count() <= 0 || lineage_.empty() || !call_->lost()) {
     return false;
   }
-  untold_ = end_.dropped;
+  unreported_drops_ = end_.dropped;
   joined_ = false;
   if (!retry_.lost()) lost_ = received;
   retry_.Lose(absl::StrCat("lost the stream at ", address(), " (", call_->why(), ")"));
   SetCall(nullptr);
-  // A producer that is gone from a server that is there may come back to it.
+  // The producer was lost but the server is not: the producer may come back to it.
   if (!end_.reason.empty() && received.ok()) {
     retry_.TryAgain(received.status());
   } else {
@@ -214,7 +215,7 @@ void RejoiningWatch::SetCall(std::shared_ptr<WatchCall> call) {
   std::unique_lock lock(mutex_);
   std::swap(call, call_);
   if (cancelled_ && call_ != nullptr) call_->Cancel();
-  lock.unlock();  // The former one ends without it.
+  lock.unlock();  // Destroys the former call without the lock.
 }
 
 void RejoiningWatch::Cancel() {

@@ -1,5 +1,5 @@
-// A watch that outlives its calls: where one is lost it looks for the stream, at every address, and
-// goes on with what has not been seen.
+// A watch that survives the loss of its call: it looks for the stream at every address and
+// continues with the frames it has not delivered.
 #pragma once
 
 #include <chrono>
@@ -20,16 +20,16 @@
 
 namespace partiemc::client {
 
-/// Used by one thread, but for Cancel.
+/// Used by one thread, except Cancel.
 class RejoiningWatch final : public Watcher {
  public:
   using Clock = WatchCall::Clock;
 
-  /// At least one address.
+  /// Requires: at least one address.
   RejoiningWatch(std::vector<std::string> addresses, std::string_view stream_name,
                  const WatcherOptions& options);
 
-  /// As Watcher::Open; to be called first.
+  /// Same as Watcher::Open. Must be called first.
   absl::Status Connect();
 
   const WatchedStream& stream() const override { return stream_; }
@@ -47,10 +47,11 @@ class RejoiningWatch final : public Watcher {
   absl::Status ConnectAt(std::chrono::milliseconds connect_timeout);
   absl::StatusOr<Received> ReceiveOrLose(WatchedFrame& frame,
                                          std::optional<std::chrono::milliseconds> wait);
-  // The first frame that is asked for; none: the newest.
+  // The sequence number to request; absent: the newest.
   std::optional<std::uint64_t> From() const;
   bool Lose(const absl::StatusOr<Received>& received);
-  // kEvent once it goes on, kNothingYet if it does not yet; else it never will.
+  // kEvent if the watch continues, kNothingYet if it has not rejoined at `until`. Errors end the
+  // watch.
   absl::StatusOr<Received> Rejoin(std::optional<Clock::time_point> until);
   void Account(WatchedFrame& frame);
   void SetCall(std::shared_ptr<WatchCall> call);
@@ -63,13 +64,14 @@ class RejoiningWatch final : public Watcher {
   std::string lineage_;
   WatchEnd end_;
   RetryLoop retry_;
-  bool joined_ = false;                           // In `call_`; else it is an attempt, or nothing.
-  std::optional<absl::StatusOr<Received>> lost_;  // What ended it; given if nothing comes of it.
-  std::optional<absl::StatusOr<Received>> over_;  // Once nothing more will come.
-  std::uint64_t last_ = 0;                        // Sequence number of the last frame; 0: none yet.
-  std::uint64_t untold_ = 0;                      // Drops that ends of calls have told since.
+  bool joined_ = false;  // True if `call_` is the current watch, false if it is an attempt or null.
+  std::optional<absl::StatusOr<Received>>
+      lost_;  // Status of the lost call; returned if the watch gives up.
+  std::optional<absl::StatusOr<Received>> over_;  // Set when the watch has ended.
+  std::uint64_t last_ = 0;                        // Number of the last delivered frame; 0: none.
+  std::uint64_t unreported_drops_ = 0;  // Drops counted by ended calls and not yet reported.
 
-  std::mutex mutex_;  // Guards everything below; `call_` changes in the receiver's thread alone.
+  std::mutex mutex_;  // Guards the members below. Only the receiver's thread changes `call_`.
   std::condition_variable cancel_came_;
   std::shared_ptr<WatchCall> call_;
   bool cancelled_ = false;

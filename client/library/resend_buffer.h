@@ -1,4 +1,4 @@
-// The frames of a stream that may have to be sent again: those after its last checkpoint.
+// Frames of a stream since its last checkpoint, held for resending.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -9,8 +9,8 @@
 
 namespace partiemc::client {
 
-/// Holds requests by their sequence numbers, without a gap. A request's bytes are shared with gRPC,
-/// not copied. Not thread-safe.
+/// Requests in the order of their sequence numbers, without gaps. Shares their bytes with gRPC. Not
+/// thread-safe.
 class ResendBuffer {
  public:
   /// `first` is the number of the first frame.

@@ -14,7 +14,7 @@
 namespace partiemc::client {
 namespace {
 
-// A server may announce any window; this one bounds the memory of this side.
+// Limits the client's memory: a server may announce a window of any size.
 constexpr std::size_t kMaxFramesInFlight = 64;
 
 absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
@@ -31,7 +31,8 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
 
 constexpr auto kNever = StreamCall::Clock::time_point::max();
 
-// Of a call that was open: what part 0 waits for is its former call alone.
+// Purpose for classifying the end of an open call. Only a resuming part 0 may wait for its former
+// call.
 CallPurpose LossPurpose(const StreamOptions& options) {
   return options.parts.part > 0 ? CallPurpose::kJoin : CallPurpose::kOpen;
 }
@@ -49,7 +50,7 @@ absl::Status CheckParts(const StreamOptions& options) {
   }
   if (parts.parts == 0) return absl::OkStatus();
   if (options.name.empty()) {
-    return InvalidParts("name", "\"\"", "must be given where frames come in parts");
+    return InvalidParts("name", "\"\"", "must be given if frames come in parts");
   }
   const std::chrono::milliseconds most =
       std::min<std::chrono::milliseconds>(options.deadline, std::chrono::minutes(10));
@@ -60,7 +61,7 @@ absl::Status CheckParts(const StreamOptions& options) {
   return absl::OkStatus();
 }
 
-// 0 is no limit.
+// A limit of 0 means no limit.
 bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
   return limit == 0 || (former != 0 && limit >= former);
 }
@@ -105,11 +106,11 @@ absl::Status ResumingStream::OpenFirst(Lock& lock) {
   info_ = *std::move(info);
   if (options_.parts.parts > 0 && opened->message.limits().max_parts() == 0) {
     connector_.Drop(lock, std::move(opened->call));
-    return absl::UnimplementedError("the server takes no frames in parts: use a newer one");
+    return absl::UnimplementedError("the server does not support frames in parts: use a newer one");
   }
   survives_ = options_.reconnect.give_up_after.count() > 0 && options_.checkpoint_interval > 0 &&
               (sends_other_part() || !opened->message.stream_token().empty());
-  // A part that comes late has the number of its step all the same.
+  // A part that joins late still numbers its frames from 1, by step.
   checkpoint_next_ = next_answer_ =
       sends_other_part() ? 1 : std::max<std::uint64_t>(1, opened->message.next_sequence());
   resend_ = ResendBuffer(next_answer_);
@@ -148,15 +149,15 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
   return sequence;
 }
 
-// Whether a frame of that many bytes may be taken now.
+// True if a frame of `bytes` may be queued now.
 bool ResumingStream::MaySend(std::uint64_t bytes) const {
   if (resend_.end() - next_answer_ >= info_.frames_in_flight) return false;
   if (resend_.bytes() + bytes > options_.max_held_bytes && !all_answered()) return false;
-  // One frame at a time waits for being written; what is left of a lost call counts no more.
+  // Only one frame at a time waits to be written. The queue of a lost call does not count.
   return call_ == nullptr || call_->reads_over() || call_->backlog() == 0;
 }
 
-// What the stream has ended for, if its call is done and no other may do better.
+// The status that ended the stream; absent if its call continues or a retry can succeed.
 std::optional<absl::Status> ResumingStream::FatalEnd() const {
   if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
   Loss loss = LossOf(*call_, LossPurpose(options_));
@@ -192,8 +193,8 @@ absl::Status ResumingStream::WaitToSend(Lock& lock, Clock::time_point start, std
        .value = absl::StrCat(bytes, " bytes"),
        .rule = absl::StrCat("must fit into max_held_bytes, ", options_.max_held_bytes, ", beside ",
                             resend_.bytes(),
-                            " that are held since the last checkpoint; allow more, "
-                            "or a smaller checkpoint_interval")});
+                            " held since the last checkpoint; increase max_held_bytes "
+                            "or decrease checkpoint_interval")});
 }
 
 absl::Status ResumingStream::TooSlowToSend() const {
@@ -241,7 +242,7 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
     if (std::exchange(owes_event_, false)) {
       event.kind = Event::Kind::kReconnected;
       event.sequence = 0;
-      event.message = connector_.Story();
+      event.message = connector_.LossDescription();
       return Received::kEvent;
     }
     if (next_answer_ < over_below_) {
@@ -287,14 +288,14 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
 ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
   if (call_->reads_over()) return call_->progress_at() + kEndTimeout;
   if (all_answered() && !finished_) return std::nullopt;
-  if (sends_other_part()) return std::nullopt;  // It waits for part 0.
+  if (sends_other_part()) return std::nullopt;  // Its responses wait for part 0.
   return std::max(due_since_, call_->progress_at()) + options_.deadline;
 }
 
-// Delivers an answer that the caller has not had yet; else drops it and gives false.
+// Fills `event` if the response is new to the caller; otherwise drops it and returns false.
 absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response response,
                                              Event& event) {
-  // The receiver's thread alone changes what is used here without the lock.
+  // Safe without the lock: only the receiver's thread changes these members.
   const bool is_answer = IsAnswer(*response);
   const bool is_new = is_answer ? next_of_call_ == next_answer_ : !survives_;
   lock.unlock();
@@ -323,7 +324,7 @@ absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response re
   return is_new;
 }
 
-// Of an answer with a checkpoint: the frames up to this one need not be sent again.
+// Stores the checkpoint of an answer. The frames up to this one need not be resent.
 void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
   if (answer.has_part() && survives_) {
     checkpoint_next_ =
@@ -337,7 +338,7 @@ void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
   resend_.DropBelow(checkpoint_next_);
 }
 
-// The call has ended: whether the stream has, too. False where it is to go on.
+// Handles the end of the call: true if the stream has ended, false if it reconnects.
 absl::StatusOr<bool> ResumingStream::EndCall(Lock& lock) {
   const Loss loss = LossOf(*call_, LossPurpose(options_));
   // Part 0 has finished.
@@ -355,11 +356,11 @@ void ResumingStream::LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, cons
   resume.set_checkpoint(checkpoint_);
   resume.set_stream_token(token_);
   connector_.Lost(loss, std::move(resume));
-  monitor_.changed.notify_all();  // What waits for the call's backlog need not any more.
+  monitor_.changed.notify_all();  // Wakes a sender that waits for the call's queue.
   connector_.Drop(lock, std::move(call));
 }
 
-// False where there is no other call at `until`.
+// Reconnects; false if no call is open at `until`.
 absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
   auto opened = connector_.OpenAgain(lock, until);
   if (!opened.ok()) return opened.status();
@@ -375,7 +376,7 @@ absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
   return true;
 }
 
-// Whether the frames that were taken under the first server's terms are good here.
+// Checks that the new server accepts frames that were sent under the first server's limits.
 absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                                           const StreamInfo& info) const {
   const std::string& address = opened.call->address();
@@ -400,20 +401,20 @@ absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                    " has smaller limits than the first: give all servers of a stream the same"));
 }
 
-// A part of a frame that is over when its call is replaced is not sent again.
+// Parts of frames that are already over are not resent.
 std::uint64_t ResumingStream::FirstToSend(const StreamConnector::Opened& opened) const {
   if (!sends_other_part()) return checkpoint_next_;
   return std::clamp(opened.message.next_sequence(), checkpoint_next_, resend_.end());
 }
 
-// Sends what is unanswered through a call that has been opened, and makes it the stream's.
+// Resends unanswered frames through the opened call and makes it the stream's call.
 void ResumingStream::Adopt(Lock& lock, StreamConnector::Opened opened, std::size_t window) {
   token_ = opened.message.stream_token();
   next_of_call_ = FirstToSend(opened);
   over_below_ = next_of_call_;
   StreamCall& call = *opened.call;
   call.SetWindow(lock, window);
-  // Until it is the stream's call, the sender adds to the buffer alone: frames keep their order.
+  // Until the call is the stream's, the sender only adds to the buffer, so frames stay in order.
   for (std::uint64_t k = next_of_call_; k < resend_.end(); ++k) call.Queue(lock, resend_.at(k));
   due_since_ = adopted_at_ = Clock::now();
   call_ = std::move(opened.call);
@@ -435,7 +436,7 @@ std::size_t ResumingStream::InFlight() const {
 
 void ResumingStream::Cancel() {
   Lock lock(monitor_.mutex);
-  if (FatalEnd()) return;  // It is to be told what for.
+  if (FatalEnd()) return;  // Keeps the status that ended the stream.
   Fail(lock, absl::CancelledError("the stream was cancelled")).IgnoreError();
 }
 

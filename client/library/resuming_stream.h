@@ -1,15 +1,15 @@
-// A stream that goes on over one call after the other: what Stream is made of.
+// Implements Stream over successive calls.
 //
-// Every frame is held from Send until a checkpoint covers it. After a loss a new call opens with
-// the last checkpoint that has come, and gets every frame after it again, in order. Answers up to
-// the last one that the caller has got are dropped. So each frame's answer is delivered once, and
-// since results depend on checkpoint and frames alone, with the same bits.
+// Holds every frame from Send until a checkpoint covers it. After a loss it opens a new call with
+// the last checkpoint and resends all later frames in order. It drops results that the caller has
+// already received. Each result is therefore delivered once. Results depend only on checkpoint and
+// frames, so their bits do not change.
 //
 //   streaming (call_) --lost--> StreamConnector --opened--> streaming
-//       |                           +-- refused, or for too long: failed (failure_)
-//       +-- everything is answered: end; what cannot be mended: failed
+//       |                           +-- refused, or give_up_after passed: failed (failure_)
+//       +-- all frames answered: end; permanent error: failed
 //
-// The receiver's thread alone opens calls and replaces them; the sender only queues.
+// Only the receiver's thread opens and replaces calls; the sender only queues.
 #pragma once
 
 #include <cstdint>
@@ -53,7 +53,7 @@ class ResumingStream final : public Stream {
 
   ResumingStream(std::vector<std::string> addresses, const StreamOptions& options);
 
-  // With the lock, which they may let go meanwhile. Of the receiver's thread:
+  // Require the lock and may release it while they wait. Receiver's thread:
   absl::Status OpenFirst(Lock& lock);
   absl::StatusOr<Received> Advance(Lock& lock, Event& event, OptionalTime until);
   absl::StatusOr<bool> GoOn(Lock& lock, OptionalTime until);
@@ -64,7 +64,7 @@ class ResumingStream final : public Stream {
   absl::StatusOr<bool> EndCall(Lock& lock);
   void LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, const Loss& loss);
   OptionalTime AnswerDue() const;
-  // Of any thread:
+  // Any thread:
   absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles);
   absl::Status Fail(Lock& lock, absl::Status failure);
   absl::Status WaitToSend(Lock& lock, Clock::time_point start, std::uint64_t bytes);
@@ -76,26 +76,26 @@ class ResumingStream final : public Stream {
   std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const;
 
   const StreamOptions options_;
-  // Fixed once open:
+  // Constant after opening:
   StreamInfo info_;
-  bool survives_ = false;  // Its calls.
+  bool survives_ = false;  // Reconnects after a loss.
 
   mutable Monitor monitor_;
   StreamConnector connector_;
-  wire::ReconstructedFrame scratch_;  // Of the receiver's thread alone.
-  bool owes_event_ = false;           // Likewise: a reconnection is to be told.
+  wire::ReconstructedFrame scratch_;  // Receiver's thread only.
+  bool owes_event_ = false;           // A kReconnected event is due. Receiver's thread only.
 
   // Guarded by the monitor:
-  std::unique_ptr<StreamCall> call_;  // Null while the connector looks for another.
+  std::unique_ptr<StreamCall> call_;  // Null while reconnecting.
   ResendBuffer resend_{1};
   std::string token_, checkpoint_;
-  std::uint64_t checkpoint_next_ = 1;         // The number that the checkpoint expects.
-  std::uint64_t next_answer_ = 1;             // To be delivered.
-  std::uint64_t next_of_call_ = 1;            // To be answered by call_.
-  std::uint64_t over_below_ = 0;              // Parts that call_ has found to be over.
-  Clock::time_point due_since_, adopted_at_;  // What the deadline counts from.
+  std::uint64_t checkpoint_next_ = 1;  // The first frame after the checkpoint.
+  std::uint64_t next_answer_ = 1;      // The next frame to deliver.
+  std::uint64_t next_of_call_ = 1;     // The next frame that call_ answers.
+  std::uint64_t over_below_ = 0;       // All parts below this frame are over, as reported by call_.
+  Clock::time_point due_since_, adopted_at_;  // Start of the deadline.
   bool finished_ = false;                     // FinishSending was called.
-  absl::Status failure_;                      // What the stream has ended for.
+  absl::Status failure_;                      // Status that ended the stream.
 };
 
 }  // namespace partiemc::client

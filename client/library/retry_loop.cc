@@ -35,11 +35,11 @@ void RetryLoop::Learn(const std::vector<std::string>& addresses) {
   address_ = static_cast<std::size_t>(std::ranges::find(addresses_, current) - addresses_.begin());
 }
 
-void RetryLoop::Lose(std::string story) {
+void RetryLoop::Lose(std::string description) {
   if (backoff_) return;
   backoff_.emplace(policy_, addresses_.size(), surroundings_.random->Next());
   lost_at_ = attempt_at_ = Now();
-  story_ = std::move(story);
+  loss_ = std::move(description);
 }
 
 void RetryLoop::TryNext(absl::Status refusal) {
@@ -71,7 +71,7 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
       }
       if (now >= *attempt_until_) {
         attempts.Drop();
-        // One that was cut short by the end says nothing: what there was before it is told.
+        // An attempt that was cut short by give_up_at says nothing, so the earlier error stays.
         if (*attempt_until_ < give_up_at) TryNext(NotAccepted(address(), call_, connect_timeout_));
         attempt_until_.reset();
         continue;
@@ -90,14 +90,14 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
 }
 
 Reconnecting RetryLoop::Progress() const {
-  return {.loss = story_,
+  return {.loss = loss_,
           .refusal = std::string(refusal_.message()),
           .elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(Now() - lost_at_),
           .give_up_after = policy_.give_up_after};
 }
 
-std::string RetryLoop::Story() const {
-  return absl::StrCat(story_, ", went on at ", address(), " after ", Seconds(Now() - lost_at_));
+std::string RetryLoop::LossDescription() const {
+  return absl::StrCat(loss_, ", continued at ", address(), " after ", Seconds(Now() - lost_at_));
 }
 
 }  // namespace partiemc::client

@@ -1,4 +1,4 @@
-// After a loss: at which address, when and for how long to try again. One for streams and watches.
+// Schedules attempts after a loss: address, pause and time limit. Used by streams and watches.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 
 namespace partiemc::client {
 
-/// Who makes the attempts: opens calls, one at a time.
+/// Makes attempts for a RetryLoop: opens calls, one at a time.
 class Attempts {
  public:
   using TimePoint = Clock::TimePoint;
@@ -23,14 +23,14 @@ class Attempts {
   virtual ~Attempts() = default;
 
   virtual bool Cancelled() = 0;
-  /// Begins to open a call at `address`; waits for nothing. Errors end the loop.
+  /// Starts to open a call at `address` without waiting. Errors end the loop.
   virtual absl::Status Start(const std::string& address) = 0;
-  /// What has become of the attempt: true where the call is open, false where nothing is known yet.
-  /// Errors end the loop, but for those that `retryable` is set for.
+  /// State of the attempt: true if the call is open, false if it is pending. An error ends the loop
+  /// unless `retryable` is set.
   virtual absl::StatusOr<bool> Check(bool& retryable) = 0;
-  /// Gives the attempt up.
+  /// Abandons the attempt.
   virtual void Drop() = 0;
-  /// Waits until then, or for news of the attempt or a Cancel.
+  /// Waits until `until`, a change of the attempt, or Cancel.
   virtual void Wait(TimePoint until) = 0;
 };
 
@@ -40,56 +40,57 @@ class RetryLoop {
   using TimePoint = Clock::TimePoint;
   enum class Outcome { kOpened, kNotYet, kGaveUp, kCancelled };
 
-  /// At least one address. `call` is what is opened, for messages: "stream", "watcher".
+  /// Requires: at least one address. `call` is "stream" or "watcher", for messages.
   RetryLoop(std::vector<std::string> addresses, const char* call, const ReconnectPolicy& policy,
             std::chrono::milliseconds connect_timeout, const TimeAndChance& surroundings = {});
 
   const std::vector<std::string>& addresses() const { return addresses_; }
-  /// The one in use, or to be tried next.
+  /// The address in use, or the next one to try.
   const std::string& address() const { return addresses_[address_]; }
-  /// Addresses to try after those that were given, in place of others learned before; the one in
-  /// use stays. Of many the first some.
+  /// Replaces the addresses learned before; the given addresses and the one in use stay. Only the
+  /// first few of a long list are used.
   void Learn(const std::vector<std::string>& addresses);
   void UseNextAddress() { address_ = (address_ + 1) % addresses_.size(); }
 
-  /// The call at address() is lost; `story` tells where and why. One that comes before Recovered
-  /// prolongs the loss before it.
-  void Lose(std::string story);
-  /// The next attempt, after a pause, is at the next address, or at the same. `refusal`: what came
-  /// of the last one.
+  /// Begins a loss of the call at address(); `description` describes it. A loss before Recovered
+  /// extends the previous one.
+  void Lose(std::string description);
+  /// Schedules the next attempt, after a pause: TryNext at the next address, TryAgain at the same.
+  /// `refusal` is the error of the last attempt.
   void TryNext(absl::Status refusal);
   void TryAgain(absl::Status refusal);
-  /// The next loss is another one.
+  /// Ends the loss.
   void Recovered() { backoff_.reset(); }
   /// From Lose to Recovered.
   bool lost() const { return backoff_.has_value(); }
 
-  /// Makes attempts until one has opened a call, nothing later than `until`. Requires lost().
-  /// Errors: those of `attempts`.
+  /// Makes attempts until one has opened a call, at most until `until`. Requires lost(). Errors:
+  /// from `attempts`.
   absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<TimePoint> until);
 
-  /// Of the loss that is being mended. Requires lost().
+  /// Requires lost().
   Reconnecting Progress() const;
-  /// Of the last loss, recovered or not: that of Lose, and where it has gone on, in one line.
-  std::string Story() const;
-  /// Of the last attempt.
+  /// One line about the last loss: the description passed to Lose, and the address where the call
+  /// continues.
+  std::string LossDescription() const;
+  /// Error of the last attempt.
   const absl::Status& refusal() const { return refusal_; }
 
  private:
   TimePoint Now() const { return surroundings_.clock->Now(); }
 
   std::vector<std::string> addresses_;
-  const std::size_t given_;  // Of them, at the front.
+  const std::size_t given_;  // Number of given addresses, at the front.
   const char* const call_;
   const ReconnectPolicy policy_;
   const std::chrono::milliseconds connect_timeout_;
   const TimeAndChance surroundings_;
 
   std::size_t address_ = 0;
-  std::optional<Backoff> backoff_;  // From Lose to Recovered.
+  std::optional<Backoff> backoff_;  // Set from Lose to Recovered.
   TimePoint lost_at_, attempt_at_;
-  std::string story_;
-  std::optional<TimePoint> attempt_until_;  // While one is under way.
+  std::string loss_;
+  std::optional<TimePoint> attempt_until_;  // Set while an attempt is in progress.
   absl::Status refusal_;
 };
 

@@ -10,8 +10,8 @@
 namespace partiemc::client {
 namespace {
 
-// Reasons of proto/PROTOCOL.md. A name or a place may be held by what is left of the stream's own
-// former call, and a server of another version or with other keys may have a better one beside it.
+// Reasons of proto/PROTOCOL.md. Another attempt may succeed: the stream's former call may still
+// hold a name or a slot, and another server may have a version or keys that accept the checkpoint.
 constexpr std::string_view kDraining = "DRAINING";
 constexpr std::array<std::string_view, 7> kRetryableWhileResuming = {
     "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",    "CALLER_STREAMS",

@@ -1,4 +1,4 @@
-// Why a call has ended before its stream, and whether another call may do better.
+// Decides why a call ended early and whether a retry can succeed.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -13,26 +13,27 @@ namespace partiemc::client {
 
 struct Loss {
   absl::Status status;  ///< One line that names the server; never OK.
-  std::string why;      ///< In a few words.
+  std::string why;      ///< Short cause for messages.
   bool retryable = false;
 };
 
-/// Whether a call that ended with these has lost its connection or its server, rather than been
-/// refused.
+/// True if the call lost its connection or its server, false if it was refused.
 bool IsLostConnection(grpc::StatusCode code, std::string_view reason);
 
-/// What a call was for.
+/// Purpose of a call.
 enum class CallPurpose {
   kOpen,
   kResume,
-  kJoin,  ///< As another part than 0.
+  kJoin,  ///< A part other than 0.
 };
 
-/// Of a call that is done. A server that gives a reason has decided: only its going away is
-/// retryable and, unless a stream was to be opened, what another replica or a moment may change; of
-/// a part also that part 0 is not there. Without a reason the
-/// connection has ended the call, in words that depend on what was between: UNAVAILABLE for none,
-/// INTERNAL, UNKNOWN or CANCELLED for a proxy, OK for one that closes politely.
+/// Classifies the end of a call. Requires: the call is done.
+/// With a reason, the server has decided. Draining is retryable. When a stream is resumed, so are
+/// refusals that another replica or a later attempt can change; for a part also the absence of part
+/// 0.
+/// Without a reason, the connection was lost. The code then depends on the intermediary:
+/// UNAVAILABLE for none, INTERNAL, UNKNOWN or CANCELLED for a proxy, OK for a proxy that closes
+/// cleanly.
 Loss LossOf(const StreamCall& call, CallPurpose purpose);
 
 }  // namespace partiemc::client

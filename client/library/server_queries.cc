@@ -1,4 +1,4 @@
-// Questions that a server answers in one call each.
+// Unary queries of a server.
 #include <grpcpp/grpcpp.h>
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace {
 
 using Stub = v1::ReconstructionService::Stub;
 
-// A connection for calls that have until one deadline together.
+// One connection for calls that share a deadline.
 class Query {
  public:
   static absl::StatusOr<Query> Connect(std::string_view address, std::chrono::milliseconds deadline,
@@ -64,7 +64,7 @@ ServerInfo Decode(const v1::GetServerInfoResponse& message) {
                  .memory_budget = message.load().memory_budget(),
                  .watched_bytes = message.load().watched_bytes()};
   }
-  // The codec knows the enums. It refuses those that this version does not know.
+  // The codec rejects placements that this version does not know; they are left out.
   for (const int placement : message.placements()) {
     v1::ReconstructionParameters parameters;
     parameters.set_placement(static_cast<v1::Placement>(placement));
@@ -90,7 +90,7 @@ StreamSummary Decode(const v1::StreamSummary& message) {
                         .watchers = message.watchers(),
                         .open_seconds = message.open_seconds(),
                         .idle_seconds = message.idle_seconds()};
-  // A newer server may have parameters that this version does not know: the rest is told anyway.
+  // A newer server may have unknown parameters; the other fields are still valid.
   const auto parameters = wire::DecodeParameters(message.parameters());
   if (parameters.ok()) summary.parameters = *parameters;
   return summary;

@@ -9,7 +9,7 @@
 namespace partiemc::client {
 namespace {
 
-// Beside the window's answers there may be a notice, and one message is being read into.
+// One for a notice in addition to the window's responses, and one for the current read.
 constexpr std::size_t kSpareMessages = 2;
 
 std::string MethodName() {
@@ -69,7 +69,7 @@ void StreamCall::Cancel(Lock& lock) {
   EndReadsIfCancelled(lock);
 }
 
-// While none goes on, no read will tell that the call is over.
+// Without a pending read, no callback would report that the call has ended.
 void StreamCall::EndReadsIfCancelled(Lock& lock) {
   if (!cancelled_ || reading_ != nullptr) return;
   reads_over_ = true;
@@ -86,7 +86,7 @@ StreamCall::Response StreamCall::Take(Lock&) {
 void StreamCall::Recycle(Lock& lock, Response response) {
   spare_.push_back(std::move(response));
   if (reading_ != nullptr || window_ == 0) return;
-  progress_at_ = Clock::now();  // Nothing was read meanwhile: that was not the server's fault.
+  progress_at_ = Clock::now();  // No read was pending, so the silence was not the server's.
   ReadNext(lock);
 }
 
@@ -118,7 +118,8 @@ void StreamCall::ReadNext(Lock& lock) {
   RunOutside(lock, [this, into = reading_.get()] { StartRead(into); });
 }
 
-// Starts an operation without the lock: gRPC may call back at once. The hold stays until then.
+// Starts an operation without the lock, since gRPC may call back immediately. The hold stays until
+// it has started.
 template <typename Operation>
 void StreamCall::RunOutside(Lock& lock, Operation operation) {
   ++outside_operations_;
@@ -138,7 +139,7 @@ void StreamCall::ReleaseHoldWhenIdle(Lock& lock) {
 }
 
 void StreamCall::OnWriteDone(bool ok) {
-  // A failed write is told by the end of the reads and by OnDone, with its reason.
+  // The end of the reads and OnDone report a failed write with its reason.
   Lock lock(monitor_.mutex);
   writing_ = !ok;
   request_.Clear();

@@ -1,13 +1,12 @@
-// One Reconstruct call: a reactor between gRPC's threads and those of a ResumingStream.
+// One Reconstruct call: connects gRPC's threads to the threads of a ResumingStream.
 //
 //   any thread            Queue: frame -> `queue_`
 //   gRPC's threads        the next frame of `queue_` is written when the server's window has room
-//                         OnReadDone: answer -> `ready_`, next read into a spare message
+//                         OnReadDone: response -> `ready_`, next read into a spare message
 //   receiver's thread     Take: `ready_` -> caller; Recycle: the message is spare again
 //
-// gRPC's threads never do more than pass a pointer on. A hold keeps the call alive while an
-// operation may be started from outside of gRPC's threads; it is given back once nothing more can
-// be read.
+// gRPC's threads only pass pointers. A hold (gRPC's AddHold) keeps the call alive while another
+// thread may start an operation. It is released when no more reads follow.
 #pragma once
 
 #include <grpcpp/generic/generic_stub.h>
@@ -27,16 +26,16 @@
 
 namespace partiemc::client {
 
-/// One lock for a stream and its calls, and what is told of every change under it.
+/// Mutex shared by a stream and its calls, and the condition that signals changes.
 struct Monitor {
   std::mutex mutex;
   std::condition_variable changed;
 };
 
-/// How long a call may take to end after its last message; then it counts as broken.
+/// A call that takes longer to end after its last message is treated as broken.
 inline constexpr std::chrono::seconds kEndTimeout(1);
 
-/// A member with a `lock` expects the monitor's to be held, and may let it go meanwhile.
+/// Members with a `lock` require the monitor's lock and may release it while they run.
 class StreamCall final
     : private grpc::ClientBidiReactor<grpc::ByteBuffer, v1::ReconstructResponse> {
  public:
@@ -44,41 +43,41 @@ class StreamCall final
   using Lock = std::unique_lock<std::mutex>;
   using Response = std::unique_ptr<v1::ReconstructResponse>;
 
-  /// `monitor` outlives the call.
+  /// `monitor` must outlive the call.
   StreamCall(Monitor& monitor, std::shared_ptr<grpc::Channel> channel, std::string address);
-  /// Cancels, and waits until gRPC is done with it. Without the lock.
+  /// Cancels and waits until gRPC has finished with the call. Requires: the lock is not held.
   ~StreamCall() override;
 
-  /// Sends `open`. To be called first, once, without the lock.
+  /// Sends `open`. Call first and once. Requires: the lock is not held.
   void Start(const v1::OpenStream& open);
-  /// Allows so many frames to be written ahead of their answers, and reads on. To be called once,
-  /// with the first answer: until then none but it is read.
+  /// Sets the number of frames that may be written ahead of their answers, and starts reading. Call
+  /// once, after the first response; before, only that response is read.
   void SetWindow(Lock& lock, std::size_t frames);
 
-  /// `frame` is written in its turn.
+  /// Appends `frame` to the queue.
   void Queue(Lock& lock, grpc::ByteBuffer frame);
-  /// No frame comes after those that are queued.
+  /// Half-closes the call after the queued frames.
   void HalfClose(Lock& lock);
   void Cancel(Lock& lock);
 
-  /// The next answer; null where none is there.
+  /// The next response; null if there is none.
   Response Take(Lock& lock);
   void Recycle(Lock& lock, Response response);
 
-  /// Frames that are queued and not yet being written.
+  /// Frames in the queue whose write has not begun.
   std::size_t backlog() const { return queue_.size(); }
-  /// Answers that wait to be taken.
+  /// Responses that can be taken.
   std::size_t ready() const { return ready_.size(); }
-  /// When the server was last heard of, or could go on again.
+  /// Time of the last message from the server, or of the last resumed read.
   Clock::time_point progress_at() const { return progress_at_; }
-  /// No answer will come any more; the status may be on its way.
+  /// No response will follow; the status may still be pending.
   bool reads_over() const { return reads_over_; }
   bool done() const { return done_; }
   const std::string& address() const { return address_; }
 
-  // Once done():
+  // Valid when done():
   const grpc::Status& end() const { return end_; }
-  /// The reason that the server gave (proto/PROTOCOL.md); empty where it has not spoken itself.
+  /// The server's reason (proto/PROTOCOL.md); empty if the status is not from the server.
   std::string reason() const;
 
  private:
@@ -102,16 +101,16 @@ class StreamCall final
   std::vector<Response> spare_;
   Response reading_;
   std::deque<Response> ready_;
-  grpc::ByteBuffer request_;  // While it is being written.
+  grpc::ByteBuffer request_;  // The request being written.
   std::deque<grpc::ByteBuffer> queue_;
   std::size_t window_ = 0;
-  std::uint64_t written_ = 0, answered_ = 0;  // Frames.
+  std::uint64_t written_ = 0, answered_ = 0;  // Numbers of frames.
   Clock::time_point progress_at_ = Clock::now();
   bool writing_ = false;
   bool half_close_wanted_ = false, half_closed_ = false;
   bool started_ = false, cancelled_ = false, reads_over_ = false, hold_ = false, done_ = false;
   int outside_operations_ = 0;
-  grpc::Status end_;  // Valid once done_.
+  grpc::Status end_;  // Valid when done_.
 };
 
 }  // namespace partiemc::client

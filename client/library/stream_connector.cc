@@ -12,8 +12,8 @@
 namespace partiemc::client {
 namespace {
 
-// How long one of several addresses may take to be reached before the next is tried, and how long
-// to rest between two rounds, when a stream is opened.
+// When a new stream has several addresses: time limit for connecting to each, and pause between two
+// attempts.
 constexpr std::chrono::milliseconds kShortConnect(250);
 constexpr std::chrono::milliseconds kRest(20);
 
@@ -47,7 +47,7 @@ absl::Status NotOpened(const std::string& address) {
 
 }  // namespace
 
-// Attempts to open the stream. The monitor's lock is let go while it waits.
+// Attempts to open the stream. Releases the monitor's lock while it waits.
 class StreamConnector::Calls final : public Attempts {
  public:
   Calls(StreamConnector& connector, Lock& lock) : connector_(connector), lock_(lock) {}
@@ -81,7 +81,7 @@ class StreamConnector::Calls final : public Attempts {
 
   void Wait(TimePoint until) override { connector_.monitor_.changed.wait_until(lock_, until); }
 
-  // Once one is open.
+  // Requires: a call is open.
   Opened TakeOpened() { return {std::move(connector_.attempt_), std::move(message_)}; }
 
  private:
@@ -165,7 +165,7 @@ absl::StatusOr<std::optional<StreamConnector::Opened>> StreamConnector::OpenAgai
     case RetryLoop::Outcome::kGaveUp:
       break;
   }
-  return absl::UnavailableError(absl::StrCat("the stream could not go on within ",
+  return absl::UnavailableError(absl::StrCat("the stream could not continue within ",
                                              Seconds(options_.reconnect.give_up_after), ": ",
                                              retry_.refusal().message()));
 }

@@ -1,4 +1,4 @@
-// Finds a server for a stream: which address, when, and for how long.
+// Finds a server for a stream: address, time and time limit of each attempt.
 #pragma once
 
 #include <chrono>
@@ -17,8 +17,8 @@
 
 namespace partiemc::client {
 
-/// Used by the receiver's thread alone, but for Cancel. Members with a `lock` expect the monitor's
-/// to be held and let it go meanwhile.
+/// Used by the receiver's thread only, except Cancel. Members with a `lock` require the monitor's
+/// lock and release it while they wait.
 class StreamConnector {
  public:
   using Clock = StreamCall::Clock;
@@ -29,38 +29,36 @@ class StreamConnector {
     v1::StreamOpened message;
   };
 
-  /// `monitor` outlives it. At least one address.
+  /// `monitor` must outlive this object. Requires: at least one address.
   StreamConnector(Monitor& monitor, std::vector<std::string> addresses,
                   const StreamOptions& options);
 
-  /// Opens a new stream at the first address where that works.
-  /// Errors: those of Stream::Open.
+  /// Opens a new stream at the first address that accepts it. Errors: see Stream::Open.
   absl::StatusOr<Opened> OpenNew(Lock& lock);
 
-  /// Addresses that a server knows, for when the stream is lost: those that the credentials suit.
+  /// Adds addresses from a server's notice for failover, if the credentials suit them.
   void Learn(const v1::StreamNotice& notice);
-  /// The stream has lost its call by `loss`: from now on OpenAgain is about that. A loss
-  /// that comes before Recovered prolongs the one before it.
+  /// Records that the stream lost its call; OpenAgain then resumes it with `resume`. A loss before
+  /// Recovered extends the previous one.
   void Lost(const Loss& loss, v1::ResumeStream resume);
-  /// Goes on with what is to be done about a loss: waits, connects, opens. Nothing when it is not
-  /// through at `until`. Errors: what the server refuses the stream for; UNAVAILABLE when
-  /// ReconnectPolicy::give_up_after is over.
+  /// Continues to reconnect: waits, connects, opens. Returns nothing if no call is open at `until`.
+  /// Errors: the server's refusal; UNAVAILABLE after ReconnectPolicy::give_up_after.
   absl::StatusOr<std::optional<Opened>> OpenAgain(Lock& lock,
                                                   std::optional<Clock::time_point> until);
-  /// The stream has got on: the next loss is another one.
+  /// Ends the loss: a new result was delivered.
   void Recovered() { retry_.Recovered(); }
 
-  /// Absent unless a loss is being mended.
+  /// Absent unless the stream reconnects.
   std::optional<Reconnecting> Progress() const {
     return retry_.lost() ? std::optional(retry_.Progress()) : std::nullopt;
   }
-  /// Where and why the stream was lost, and where it has gone on, in one line.
-  std::string Story() const { return retry_.Story(); }
+  /// One line about the last loss: address, cause and where the stream continues.
+  std::string LossDescription() const { return retry_.LossDescription(); }
 
-  /// Ends a call. Of the receiver's thread.
+  /// Ends a call. Receiver's thread only.
   static void Drop(Lock& lock, std::unique_ptr<StreamCall> call);
 
-  /// Any thread: OpenAgain fails soon with CANCELLED.
+  /// Any thread. OpenAgain soon fails with CANCELLED.
   void Cancel(Lock& lock);
 
  private:

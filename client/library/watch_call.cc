@@ -121,7 +121,7 @@ absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
       if (!status_->ok()) return FromGrpc(*status_, address_);
       if (end_.reason.empty()) {
         return absl::UnavailableError(
-            absl::StrCat("the server at ", address_, " ended the watch without a word"));
+            absl::StrCat("the server at ", address_, " ended the watch without a reason"));
       }
       return Received::kEnd;
     }
@@ -148,7 +148,7 @@ absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
 }
 
 absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& frame) {
-  if (!message.has_frame()) return Broken("sent a message that this client does not know");
+  if (!message.has_frame()) return Broken("sent a message that this client does not support");
   v1::ReconstructedFrame& result = *message.mutable_frame()->mutable_frame();
   std::swap(decoded_.result, frame.frame.result);  // The caller's buffers are used again.
   const absl::Status status = wire::DecodeResult(result, decoded_);
@@ -203,7 +203,7 @@ bool WatchCall::lost() {
 std::string WatchCall::why() {
   const std::lock_guard lock(mutex_);
   if (status_ && !status_->ok()) return Reason(*status_);
-  return end_.message.empty() ? "ended without a word" : end_.message;
+  return end_.message.empty() ? "ended without a reason" : end_.message;
 }
 
 absl::Status WatchCall::Broken(const char* what) const {

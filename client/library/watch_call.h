@@ -1,5 +1,5 @@
-// One WatchStream call. A thread of its own opens it and reads; what it has read waits in `ready_`,
-// which credit bounds. The receiver's thread decodes and gives the credit back.
+// One WatchStream call. Its thread opens the call and reads messages into `ready_`; the credits
+// bound their number. The receiver's thread decodes them and returns the credits.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -24,7 +24,7 @@
 
 namespace partiemc::client {
 
-/// Used by one thread, but for Cancel.
+/// Used by one thread, except Cancel.
 class WatchCall {
  public:
   using Clock = std::chrono::steady_clock;
@@ -34,30 +34,30 @@ class WatchCall {
   /// Cancels.
   ~WatchCall();
 
-  /// Begins to open, in place of options.from_sequence with `from_sequence`; waits for nothing.
+  /// Starts to open the call without waiting. `from_sequence` replaces options.from_sequence.
   void Start(std::string_view stream_name, const WatcherOptions& options,
              std::optional<std::uint64_t> from_sequence);
-  /// Whether the server has accepted the watcher; waits for that until then at most.
-  /// Errors: what it was refused for.
+  /// Waits at most until `until`; true if the server has accepted the watcher. Errors: the server's
+  /// refusal.
   absl::StatusOr<bool> WaitUntilOpened(Clock::time_point until);
-  /// As Watcher::Receive, once open.
+  /// Same as Watcher::Receive. Requires: open.
   absl::StatusOr<Received> Receive(WatchedFrame& frame,
                                    std::optional<std::chrono::milliseconds> wait);
-  /// Any thread: what waits returns CANCELLED soon, and so does all that comes.
+  /// Any thread. Current and later calls soon return CANCELLED.
   void Cancel();
 
   const std::string& address() const { return address_; }
-  // Once open:
+  // Valid when open:
   const WatchedStream& stream() const { return stream_; }
   const std::string& lineage() const { return lineage_; }
-  // Once ended:
+  // Valid when ended:
   const WatchEnd& end() const { return end_; }
-  /// Of the status; empty if none.
+  /// Reason in the status; empty if there is none.
   std::string reason();
-  /// Whether the connection, the server or the producer is gone, rather than anything said that
-  /// another call would be told as well.
+  /// True if the connection, the server or the producer was lost. False if another call would be
+  /// refused too.
   bool lost();
-  /// Why it has ended, in a few words.
+  /// Short cause of the end.
   std::string why();
 
  private:
@@ -71,7 +71,7 @@ class WatchCall {
   const std::unique_ptr<v1::ReconstructionService::Stub> stub_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::WatchStreamRequest, v1::WatchStreamResponse>> rpc_;
-  // Of the receiver's thread:
+  // Receiver's thread only:
   WatchedStream stream_;
   std::string lineage_;
   WatchEnd end_;
@@ -82,8 +82,8 @@ class WatchCall {
   std::condition_variable changed_;
   std::deque<Message> ready_;
   std::vector<Message> spare_;
-  std::optional<grpc::Status> status_;  // Once nothing more will be read.
-  std::string reason_;                  // Of it.
+  std::optional<grpc::Status> status_;  // Set after the last read.
+  std::string reason_;                  // Reason in `status_`.
   bool cancelled_ = false;
   std::thread thread_;
 };

@@ -9,10 +9,10 @@
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/str_split.h"
 #include "client/output/atomic_file.h"
 #include "client/output/formats.h"
 #include "client/output/text.h"
+#include "common/text.h"
 
 namespace partiemc::client {
 namespace {
@@ -52,8 +52,8 @@ std::string_view Name(FrameFormat format) {
 
 absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names) {
   std::vector<FrameFormat> formats;
-  for (const std::string& word :
-       std::vector<std::string>(absl::StrSplit(std::string(names), ','))) {
+  for (const std::string_view part : Split(names, ',', /*blanks=*/"")) {
+    const std::string word(part);
     const auto format = std::find_if(kFormats.begin(), kFormats.end(),
                                      [&](FrameFormat known) { return Name(known) == word; });
     if (format == kFormats.end()) {

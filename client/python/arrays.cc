@@ -35,7 +35,7 @@ py::array AsArray(const py::object& given, const char* field) {
   return array;
 }
 
-// Whether `type` is T in this machine's order of bytes, whatever NumPy calls it.
+// True if `type` is T in this machine's byte order, under any of NumPy's names.
 template <typename T>
 bool Is(const py::dtype& type) {
   const py::dtype same = py::dtype::of<T>();
@@ -43,7 +43,7 @@ bool Is(const py::dtype& type) {
          type.attr("isnative").cast<bool>();
 }
 
-// A view of numbers of the type that the array has, from `first` on.
+// A view of the array's numbers from `first` on, in the array's type.
 client::Reals RealsOf(const py::array& array, const void* first, py::ssize_t stride) {
   if (Is<float>(array.dtype())) return {static_cast<const float*>(first), stride};
   return {static_cast<const double*>(first), stride};
@@ -87,7 +87,7 @@ PythonParticles::PythonParticles(const py::object& positions, const py::object& 
 }
 
 void PythonParticles::TakeAttributes(const py::dict& given) {
-  names_.reserve(given.size());  // Views into them stay.
+  names_.reserve(given.size());  // Keeps views into the names valid.
   for (const auto& [key, value] : given) {
     const auto values = py::reinterpret_borrow<py::object>(value);
     if (!py::isinstance<py::str>(key)) {
@@ -105,7 +105,7 @@ void PythonParticles::TakeAttributes(const py::dict& given) {
   arrays_.attributes = attributes_;
 }
 
-// Of float or double, in this machine's order of bytes.
+// Converts to float or double in this machine's byte order, if necessary.
 py::array PythonParticles::Real(const py::array& given, const char* field) {
   py::array array = given;
   if (!Is<float>(array.dtype()) && !Is<double>(array.dtype())) {

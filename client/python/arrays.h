@@ -1,4 +1,4 @@
-// NumPy's arrays in, views of our own out.
+// Converts NumPy arrays to views, and results to NumPy arrays.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -13,24 +13,23 @@
 
 namespace partiemc::python {
 
-/// What a frame is made of in Python: arrays, and a view of them. Arrays are views themselves, of
-/// whatever stride; what is of another kind (lists, other types of numbers, another order of bytes)
-/// is converted, which copies it.
+/// The arrays of a frame, and a view of them. NumPy arrays are used in place with any strides.
+/// Lists, other number types and other byte orders are converted, which copies them.
 class PythonParticles {
  public:
   /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes` and
-  /// `ids`: N. `velocities`: as positions. `attributes`: a dict of names and (N,), (N, 2), (N, 3),
-  /// or tuples. None for what is not there. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
+  /// `ids`: N. `velocities`: like positions. `attributes`: a dict from names to (N,), (N, 2), (N,
+  /// 3), or tuples. None: absent. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
   PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,
                   const pybind11::object& ids, const pybind11::object& velocities,
                   const pybind11::object& attributes);
-  PythonParticles(const PythonParticles&) = delete;  // Of views into itself.
+  PythonParticles(const PythonParticles&) = delete;  // Holds views into itself.
   PythonParticles& operator=(const PythonParticles&) = delete;
 
   const client::ParticleArrays& arrays() const { return arrays_; }
 
  private:
-  // The columns of `given`: two or three views of as many numbers.
+  // The columns of `given`: two or three views of the same length.
   std::vector<client::Reals> Columns(const pybind11::object& given, const char* field);
   void TakeAttributes(const pybind11::dict& given);
   client::Reals Numbers(const pybind11::object& given, const char* field);
@@ -45,7 +44,7 @@ class PythonParticles {
   client::ParticleArrays arrays_;
 };
 
-/// A view that nobody may write to, of memory that `owner` keeps. `T` is what NumPy is told.
+/// Returns a read-only array of memory that `owner` keeps alive. `T` is the array's dtype.
 template <typename T>
 pybind11::array View(const void* first, std::vector<pybind11::ssize_t> shape,
                      std::vector<pybind11::ssize_t> strides, pybind11::handle owner) {
@@ -56,7 +55,7 @@ pybind11::array View(const void* first, std::vector<pybind11::ssize_t> shape,
   return view;
 }
 
-/// The numbers of a vector, in rows of `columns`; of one dimension where that is 1.
+/// Returns the numbers of a vector in rows of `columns`; one-dimensional if `columns` is 1.
 template <typename As, typename T>
 pybind11::array View(const std::vector<T>& numbers, std::size_t columns, pybind11::handle owner) {
   static_assert(sizeof(As) == sizeof(T));

@@ -1,4 +1,4 @@
-// Statuses as exceptions of Python.
+// Converts statuses to Python exceptions.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -12,9 +12,9 @@
 
 namespace partiemc::python {
 
-/// Throws partiemc.Error for `status`, which is not OK. With the GIL.
+/// Throws partiemc.Error for `status`, which must not be OK. Requires the GIL.
 [[noreturn]] void Raise(const absl::Status& status);
-/// Of frame `sequence`, refused by the server.
+/// Throws partiemc.Error for frame `sequence`, which the server refused.
 [[noreturn]] void Raise(const std::string& message, const Violation& violation,
                         std::uint64_t sequence);
 
@@ -22,7 +22,7 @@ inline void RaiseUnlessOk(const absl::Status& status) {
   if (!status.ok()) Raise(status);
 }
 
-/// INVALID_ARGUMENT with a Violation: what the caller has given is of the wrong kind.
+/// INVALID_ARGUMENT with a Violation, for an argument of the wrong kind.
 absl::Status Invalid(std::string_view reason, std::string field, std::string value,
                      std::string rule);
 

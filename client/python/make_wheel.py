@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Makes a wheel of the package as it was built: make_wheel.py BUILD/python OUTPUT_DIR.
+"""Makes a wheel of the built package: make_wheel.py BUILD/python OUTPUT_DIR.
 
-Needs nothing but Python itself, no network. The wheel is for this Python and this kind of machine;
-the shared libraries that the module needs are Debian's (docker/packages/runtime.txt).
+Requires only Python, no network. The wheel works for this Python version and platform. The module
+needs Debian's shared libraries (docker/packages/runtime.txt).
 """
 
 import base64
@@ -42,7 +42,7 @@ def make_wheel(build, output):
     wheel = pathlib.Path(output) / f"partiemc-{version}-{tag}.whl"
     with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
-            # A fixed date, so that the same package is the same wheel.
+            # A fixed date makes builds reproducible.
             entry = zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0))
             entry.external_attr = 0o100644 << 16
             archive.writestr(entry, content, zipfile.ZIP_DEFLATED)

@@ -1,4 +1,4 @@
-// What partiemc/__init__.py is made of.
+// Native part of the package, imported by partiemc/__init__.py.
 #include <pybind11/pybind11.h>
 
 #include "client/python/reconstruct.h"

@@ -20,7 +20,7 @@ namespace {
 
 namespace py = pybind11;
 
-// Takes `name` out of the arguments, if it is there and not None.
+// Removes `name` from the arguments; empty if it is absent or None.
 template <typename T>
 std::optional<T> Take(py::dict& arguments, const char* name) {
   if (!arguments.contains(name)) return std::nullopt;
@@ -51,9 +51,9 @@ void TakeNamed(py::dict& arguments, const char* field, Value& value) {
   }
 }
 
-// In seconds.
+// Reads a time in seconds.
 void TakeTime(py::dict& arguments, const char* name, std::chrono::milliseconds& time) {
-  constexpr double kLongest = 1e9;  // Some thirty years: what clocks can add.
+  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
   if (const auto seconds = Take<double>(arguments, name)) {
     if (!(*seconds >= 0)) {
       Raise(
@@ -72,7 +72,7 @@ void TakeTime(py::dict& arguments, const char* name,
   time = given;
 }
 
-// ("z", 0.5), or a point and a normal.
+// Reads ("z", 0.5), or a point and a normal.
 void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
   const auto given = Take<py::object>(arguments, "slice");
   if (!given) return;
@@ -89,7 +89,7 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
       if (axis == std::string_view::npos) return refuse();
       slice->normal = {};
       slice->origin[axis] = pair.second.cast<double>();
-      // So that results have the two other axes in their order.
+      // Normal along -y, so that results have the axes x and z in this order.
       slice->normal[axis] = axis == 1 ? -1 : 1;
     } else {
       slice->origin = pair.first.cast<std::array<double, 3>>();
@@ -100,12 +100,12 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
   }
 }
 
-// Dicts of what differs.
+// Reads dicts of the values that differ.
 void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
   const auto given = Take<std::vector<py::dict>>(arguments, "sections");
   if (!given) return;
   for (std::size_t k = 0; k < given->size(); ++k) {
-    py::dict left((*given)[k].attr("copy")());  // The caller's stays as it is.
+    py::dict left((*given)[k].attr("copy")());  // Leaves the caller's dict unchanged.
     Section& section = sections.emplace_back();
     TakeSlice(left, section.slice);
     TakeInto(left, "isovalue", section.isovalue);
@@ -116,7 +116,7 @@ void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
   }
 }
 
-py::object Told(const std::optional<SlicePlane>& slice) {
+py::object ToPython(const std::optional<SlicePlane>& slice) {
   if (!slice) return py::none();
   const auto triple = [](const std::array<double, 3>& v) {
     return py::make_tuple(v[0], v[1], v[2]);
@@ -152,7 +152,8 @@ client::Credentials TakeCredentials(py::dict arguments) {
   TakeInto(arguments, "ca_file", credentials.ca_file);
   TakeInto(arguments, "cert_file", credentials.cert_file);
   TakeInto(arguments, "key_file", credentials.key_file);
-  if (arguments.contains("token_file")) credentials.token.clear();  // That of the environment.
+  if (arguments.contains("token_file"))
+    credentials.token.clear();  // Replaces the token of the environment.
   TakeInto(arguments, "token", credentials.token);
   TakeInto(arguments, "token_file", credentials.token_file);
   credentials.tls |= !credentials.ca_file.empty() || !credentials.cert_file.empty();
@@ -211,13 +212,13 @@ void ExpectNothingElse(const py::dict& arguments, const char* function) {
   }
 }
 
-py::dict Told(const ReconstructionParameters& parameters) {
+py::dict ToDict(const ReconstructionParameters& parameters) {
   py::list sections;
   for (const Section& section : parameters.sections) {
-    py::dict told;
-    told["slice"] = Told(section.slice);
-    told["isovalue"] = section.isovalue;
-    sections.append(told);
+    py::dict dict;
+    dict["slice"] = ToPython(section.slice);
+    dict["isovalue"] = section.isovalue;
+    sections.append(dict);
   }
   const auto named = [](auto value) { return std::string(Name(value)); };
   using namespace py::literals;
@@ -229,7 +230,7 @@ py::dict Told(const ReconstructionParameters& parameters) {
       "surface_offset"_a = parameters.surface_offset, "normal_memory"_a = parameters.normal_memory,
       "clean"_a = parameters.clean, "min_component_area"_a = parameters.min_component_area,
       "min_component_particles"_a = parameters.min_component_particles,
-      "slice"_a = Told(parameters.slice), "isovalue"_a = parameters.isovalue,
+      "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
       "sections"_a = sections);
 }
 

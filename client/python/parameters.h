@@ -1,4 +1,5 @@
-// Keyword arguments as parameters and options.
+// Converts keyword arguments to parameters and options. Each Take function removes the arguments it
+// uses.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -9,20 +10,19 @@
 
 namespace partiemc::python {
 
-/// Takes the parameters of a reconstruction out of `arguments`; None counts as not given.
-/// Raises partiemc.Error for a name that no parameter has, TypeError for a value of another kind.
+/// Takes the reconstruction parameters; None means not given. Raises partiemc.Error for an unknown
+/// name of a value, TypeError for a value of the wrong type.
 ReconstructionParameters TakeParameters(pybind11::dict arguments);
-/// Takes tls, ca_file, cert_file, key_file, token and token_file. Whoever names a certificate wants
+/// Takes tls, ca_file, cert_file, key_file, token and token_file. Setting a certificate enables
 /// TLS.
 client::Credentials TakeCredentials(pybind11::dict arguments);
-/// Takes all else that a stream may be opened with, parameters included. `latest`: of a producer
-/// that skips frames.
+/// Takes all options of a stream, including parameters. `latest`: the producer skips frames.
 client::StreamOptions TakeStreamOptions(pybind11::dict arguments, bool latest);
 client::WatcherOptions TakeWatcherOptions(pybind11::dict arguments);
-/// Raises TypeError where something is left.
+/// Raises TypeError if arguments are left.
 void ExpectNothingElse(const pybind11::dict& arguments, const char* function);
 
-/// What parameters are, by the names that they are given by.
-pybind11::dict Told(const ReconstructionParameters& parameters);
+/// Converts parameters to a dict with the names of the keyword arguments.
+pybind11::dict ToDict(const ReconstructionParameters& parameters);
 
 }  // namespace partiemc::python

@@ -24,7 +24,7 @@ namespace {
 
 namespace py = pybind11;
 
-// A sequence of frames: parameters, what one frame leaves for the next, and warm buffers.
+// Reconstructs a sequence of frames. Keeps parameters, state and warm buffers.
 class Sequence {
  public:
   explicit Sequence(py::dict arguments) {
@@ -62,10 +62,10 @@ class Sequence {
     frames_ = 0;
   }
 
-  py::dict parameters() const { return Told(reconstructor_->parameters()); }
+  py::dict parameters() const { return ToDict(reconstructor_->parameters()); }
 
  private:
-  // With the lock.
+  // Requires the lock.
   absl::Status Compute(const client::ParticleArrays& particles, std::optional<double> time,
                        PythonResult& result) {
     result.time = time.value_or(static_cast<double>(frames_));
@@ -91,7 +91,7 @@ class Sequence {
 
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::optional<Reconstructor> reconstructor_;
-  std::unique_ptr<Arena> arena_;  // Null: as many threads as there are.
+  std::unique_ptr<Arena> arena_;  // Null: all threads.
 
   std::mutex mutex_;  // Guards everything below.
   State state_;
@@ -105,8 +105,8 @@ class Sequence {
 void DefineReconstructor(py::module_& module) {
   using namespace py::literals;
   py::class_<Sequence>(module, "Reconstructor",
-                       "Reconstructs frames of one simulation, one after the other, in this "
-                       "process: outlines are as steady and rings are tracked as in a stream.")
+                       "Reconstructs the frames of one simulation in this process. Outlines are "
+                       "steady and rings are tracked, as in a stream.")
       .def(py::init(
                [](const py::kwargs& arguments) { return std::make_unique<Sequence>(arguments); }),
            "Reconstructor(*, spacing=None, threads=None, placement='virtual-plane', "
@@ -114,12 +114,12 @@ void DefineReconstructor(py::module_& module) {
       .def("reconstruct", &Sequence::Reconstruct, "positions"_a, "time"_a = py::none(),
            py::kw_only(), "volumes"_a = py::none(), "ids"_a = py::none(),
            "velocities"_a = py::none(), "attributes"_a = py::none(),
-           "The next frame; `time` defaults to the number of frames before it. See "
-           "partiemc.reconstruct for the arrays. Raises partiemc.Error; such a frame leaves no "
-           "trace.")
-      .def("reset", &Sequence::Reset, "Forgets all frames.")
+           "Reconstructs the next frame; `time` defaults to the number of earlier frames. See "
+           "partiemc.reconstruct for the arrays. Raises partiemc.Error; a refused frame changes "
+           "nothing.")
+      .def("reset", &Sequence::Reset, "Discards the state of earlier frames.")
       .def_property_readonly("parameters", &Sequence::parameters,
-                             "As resolved, by name; a spacing of None is estimated.");
+                             "Resolved parameters by name; a spacing of None is estimated.");
 }
 
 }  // namespace partiemc::python

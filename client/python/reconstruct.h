@@ -1,4 +1,4 @@
-// The core in this process, for Python.
+// Python class that runs the core in this process.
 #pragma once
 
 #include <pybind11/pybind11.h>

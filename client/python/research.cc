@@ -14,7 +14,7 @@ namespace {
 
 namespace py = pybind11;
 
-// Sets what the dict research[kind] names, of all `named` members of `target`.
+// Applies the dict research[kind] to the `named` members of `target`.
 template <typename Value, typename Named, typename Target>
 void TakeAll(py::dict& research, const char* kind, const Named& named, Target& target) {
   if (!research.contains(kind)) return;

@@ -1,5 +1,5 @@
-// What research varies and users leave alone. Not part of the documented package:
-// client/evaluation/partiemc_evaluation uses it.
+// Parameters for research only. Not part of the documented package; used by
+// client/evaluation/partiemc_evaluation.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -8,9 +8,9 @@
 
 namespace partiemc::python {
 
-/// Removes `_research` from `arguments`: a dict {"steps": {name: bool}, "constants": {name:
-/// float}} of what differs from the default. Raises KeyError for an unknown name, TypeError for a
-/// value of another kind.
+/// Removes `_research` from `arguments`: a dict {"steps": {name: bool}, "constants": {name: float}}
+/// of the values that differ from the default. Raises KeyError for an unknown name, TypeError for a
+/// value of the wrong type.
 VirtualPlaneVariant TakeResearch(pybind11::dict& arguments);
 
 /// Adds `_research()`, which returns the steps and constants with their default values in the same

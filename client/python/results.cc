@@ -15,7 +15,7 @@ namespace {
 
 namespace py = pybind11;
 
-// A part of a result. `owner` is the result's object in Python: what arrays hold on to.
+// A part of a result. `owner` is the Python object that keeps the arrays alive.
 template <typename Part>
 struct PartOf {
   py::object owner;
@@ -24,7 +24,7 @@ struct PartOf {
 using RingsView = PartOf<Rings>;
 using MeshView = PartOf<Mesh>;
 
-// A member of all measures, without a copy.
+// One member of all measures, as a strided view.
 template <typename As, typename T>
 py::array Column(const RingsView& rings, T RingMeasures::*member, py::ssize_t columns = 0) {
   const auto& measures = rings.part.measures;
@@ -50,24 +50,24 @@ static_assert(offsetof(RingMeasures, centroid_y) ==
 void DefineRings(py::module_& module) {
   using R = const RingsView&;
   py::class_<RingsView>(module, "Rings",
-                        "Closed polylines, contourpy's way: flat points and offsets. All arrays "
-                        "are read-only views that keep the result. rings[k] is the (P, 2) points "
-                        "of ring k.")
+                        "Closed polylines as flat points and offsets, as in contourpy. All arrays "
+                        "are read-only views that keep the result alive. rings[k] is the (P, 2) "
+                        "array of ring k.")
       .def("__len__", [](R r) { return r.part.RingCount(); })
       .def("__getitem__", &RingPoints)
       .def_property_readonly(
           "points", [](R r) { return View<double>(r.part.points, 2, r.owner); },
           "(P, 2) float64, world units. The inside lies on the left: outer rings run "
-          "counter-clockwise, holes clockwise. No ring's first point is repeated at its end.")
+          "counter-clockwise, holes clockwise. The first point is not repeated at the end.")
       .def_property_readonly(
           "offsets", [](R r) { return View<std::uint32_t>(r.part.offsets, 1, r.owner); },
           "(R + 1,) uint32: ring k has points[offsets[k]:offsets[k + 1]].")
       .def_property_readonly(
           "outer_of", [](R r) { return View<std::int32_t>(r.part.outer_of, 1, r.owner); },
-          "(R,) int32: of a hole its outer ring, of an outer ring -1.")
+          "(R,) int32: the outer ring of a hole, -1 for an outer ring.")
       .def_property_readonly(
           "normals", [](R r) { return View<float>(r.part.normals, 2, r.owner); },
-          "(P, 2) float32, outward unit normals; (0, 2) where a stream was not asked for them.")
+          "(P, 2) float32, outward unit normals; (0, 2) if the stream has no normals.")
       .def_property_readonly(
           "area", [](R r) { return Column<double>(r, &RingMeasures::area); },
           "(R,) float64, world units squared; negative for holes.")
@@ -76,14 +76,14 @@ void DefineRings(py::module_& module) {
           "(R,) float64, world units.")
       .def_property_readonly(
           "centroids", [](R r) { return Column<double>(r, &RingMeasures::centroid_x, 2); },
-          "(R, 2) float64, world units, of the area that each ring encloses.")
+          "(R, 2) float64, world units: centroid of the area that each ring encloses.")
       .def_property_readonly(
           "particle_counts",
           [](R r) { return Column<std::uint64_t>(r, &RingMeasures::particle_count); },
           "(R,) uint64: particles of the ring's component, 0 for holes.")
       .def_property_readonly(
           "identities", [](R r) { return Column<std::uint64_t>(r, &RingMeasures::identity); },
-          "(R,) uint64: the same in every frame where the ring goes on; 0: not tracked.")
+          "(R,) uint64: constant from frame to frame; 0: not tracked.")
       .def_property_readonly(
           "parents", [](R r) { return View<std::uint64_t>(r.part.parents, 1, r.owner); },
           "(Q,) uint64: identities, in the frame before, that ring k continues: "
@@ -91,14 +91,14 @@ void DefineRings(py::module_& module) {
       .def_property_readonly(
           "parent_offsets",
           [](R r) { return View<std::uint32_t>(r.part.parent_offsets, 1, r.owner); },
-          "(R + 1,) uint32; (1,) where nothing is tracked.");
+          "(R + 1,) uint32; (1,) if rings are not tracked.");
 }
 
 void DefineMesh(py::module_& module) {
   using M = const MeshView&;
   py::class_<MeshView>(module, "Mesh",
                        "Triangles that cover the inside. All arrays are read-only views that keep "
-                       "the result.")
+                       "the result alive.")
       .def("__len__", [](M m) { return m.part.TriangleCount(); })
       .def_property_readonly(
           "points", [](M m) { return View<double>(m.part.points, 2, m.owner); },
@@ -189,9 +189,9 @@ std::shared_ptr<PythonResult> ResultPool::Take() {
 void DefineResults(py::module_& module) {
   DefineRings(module);
   DefineMesh(module);
-  // Parts hold the object that they are asked of, so that what they show cannot go.
+  // Views hold the object they come from, so that their memory stays valid.
   py::class_<PythonResult, std::shared_ptr<PythonResult>>(module, "Result",
-                                                          "What a frame of particles became.")
+                                                          "The result of one frame.")
       .def_property_readonly(
           "rings",
           [](py::object self) {
@@ -203,47 +203,49 @@ void DefineResults(py::module_& module) {
           [](py::object self) {
             return MeshView{self, self.cast<const PythonResult&>().frame.result.mesh};
           },
-          "The inside: Mesh; empty where it was not asked for.")
+          "The inside: Mesh; empty with fill='none'.")
       .def_property_readonly(
           "attributes", [](const py::object& self) { return AttributesOf(self); },
-          "A dict of what particles carry, float32 at mesh.points, whose first are rings.points; "
-          "without a mesh at rings.points. (V,), or (V, 2) or (V, 3) of a vector.")
+          "Attributes at the vertices, a dict of float32 arrays: (V,), or (V, 2) or (V, 3) for "
+          "vectors. V is len(mesh.points), which begin with rings.points; without a mesh "
+          "len(rings.points).")
       .def_property_readonly(
           "sections", &SectionsOf,
-          "A list of Result: the frame's other outlines, in the order of `sections`.")
+          "Additional outlines of the frame: a list of Result in the order of `sections`.")
       .def_readonly("sequence", &PythonResult::sequence,
-                    "The frame's number: 1, 2, ... in a stream; 0 of partiemc.reconstruct.")
-      .def_readonly("time", &PythonResult::time, "Simulation time, as the frame came with.")
+                    "The frame's number: 1, 2, ... in a stream; 0 for partiemc.reconstruct.")
+      .def_readonly("time", &PythonResult::time, "Simulation time of the frame.")
       .def_property_readonly("area", Statistic(&FrameStatistics::area),
-                             "Sum over rings of their signed areas, world units squared.")
+                             "Sum of the rings' signed areas, world units squared.")
       .def_property_readonly("perimeter", Statistic(&FrameStatistics::perimeter),
-                             "Sum over rings, world units.")
+                             "Sum of the rings' perimeters, world units.")
       .def_property_readonly("spacing", Statistic(&FrameStatistics::spacing),
-                             "Spacing of particles used in this frame, world units.")
+                             "Particle spacing used in this frame, world units.")
       .def_property_readonly("cell_size", Statistic(&FrameStatistics::cell_size),
-                             "Of the lattice, world units.")
+                             "Cell size of the lattice, world units.")
       .def_property_readonly("particle_count", Statistic(&FrameStatistics::particles))
       .def_property_readonly("doubts", &DoubtsOf,
-                             "Names of what speaks against this answer, as 'spacing-provisional'.")
-      .def_property_readonly("times", &TimesOf, "Milliseconds of each stage, and in 'total'.")
+                             "Names of suspicious properties of the input, such as "
+                             "'spacing-provisional'.")
+      .def_property_readonly("times", &TimesOf, "Milliseconds of each stage, and 'total'.")
       .def_property_readonly(
           "rings_digest", [](PythonResult& r) { return WithDigests(r).rings_digest; },
-          "64 bits of the rings: equal digests mean equal bits.")
+          "64-bit digest of the rings: equal digests mean equal bits.")
       .def_property_readonly(
           "mesh_digest", [](PythonResult& r) { return WithDigests(r).mesh_digest; },
-          "64 bits of the mesh.")
+          "64-bit digest of the mesh.")
       .def_property_readonly(
           "particles",
           [](py::object self) {
             return View<double>(self.cast<const PythonResult&>().particles, 2, self);
           },
-          "(N, 2) float64 of a watched frame whose producer echoes them, else (0, 2).")
+          "(N, 2) float64: particles of a watched frame; (0, 2) unless its producer echoes them.")
       .def_readonly("dropped", &PythonResult::dropped,
-                    "Of a watched frame: how many did not come since the one before.")
+                    "Watched frames: number of frames dropped since the previous one.")
       .def_readonly("gap", &PythonResult::gap,
-                    "Of a watched frame: sequence numbers missed while the watch was lost.")
+                    "Watched frames: sequence numbers missed while the watch was lost.")
       .def_readonly("rejoined", &PythonResult::rejoined,
-                    "Of the first frame after the watch was lost: where and why, in one line.");
+                    "First frame after a loss of the watch: one line with place and cause.");
 }
 
 }  // namespace partiemc::python

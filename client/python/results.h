@@ -1,4 +1,4 @@
-// What a frame became, as Python sees it: arrays that are views and keep their result.
+// Results for Python: arrays are views that keep their result alive.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -14,22 +14,22 @@
 
 namespace partiemc::python {
 
-/// A result, which never changes once Python has it.
+/// A result. Constant once Python holds it.
 struct PythonResult {
   std::uint64_t sequence = 0;
   double time = 0;
   client::FrameResult frame;
-  /// Of `frame`; where they are not known yet, they are computed when somebody wants them.
+  /// False if the digests are not computed yet; they are computed at the first access.
   bool has_digests = true;
-  // Of watched frames:
+  // Set for watched frames:
   std::vector<double> particles;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;
-  /// Those of `frame`, once somebody has asked for them: they have taken its results then.
+  /// Sections as Python objects, filled at the first access. They take over the results of `frame`.
   std::vector<std::shared_ptr<PythonResult>> sections;
 };
 
-/// Results whose buffers are used again once Python has let them go. Safe to share between threads.
+/// Reuses the buffers of results that Python has released. Thread-safe.
 class ResultPool : public std::enable_shared_from_this<ResultPool> {
  public:
   std::shared_ptr<PythonResult> Take();

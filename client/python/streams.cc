@@ -31,19 +31,19 @@ using client::Event;
 using client::Received;
 using std::chrono::milliseconds;
 
-// After which a wait looks whether somebody has pressed Ctrl-C.
+// Poll interval for Ctrl-C while waiting for a response.
 constexpr milliseconds kSlice(100);
 
 std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
-  constexpr double kLongest = 1e9;  // Some thirty years: what clocks can add.
+  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
   if (!seconds) return std::nullopt;
   return std::chrono::steady_clock::now() +
          std::chrono::duration_cast<std::chrono::steady_clock::duration>(
              std::chrono::duration<double>(std::min(std::max(*seconds, 0.0), kLongest)));
 }
 
-// Calls `receive` with times to wait until something has come or `seconds` are over. Without the
-// GIL but for signals, which may raise.
+// Calls `receive` with successive waits until it returns an event or `seconds` have passed. Runs
+// without the GIL, except for the check of signals, which may raise.
 template <typename Receive>
 absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
   const auto until = Until(seconds);
@@ -117,7 +117,7 @@ class ProducerStream {
     return latest_ != nullptr ? std::nullopt : std::optional(*sent);
   }
 
-  // None where nothing has come in time, and for a part that was taken.
+  // None if no event arrives in time, and for an accepted part.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     for (;;) {
@@ -128,7 +128,7 @@ class ProducerStream {
         if (!lock.owns_lock()) return Received::kNothingYet;
         return stream_->Receive(event, slice);
       });
-      result->frame = std::move(event.frame);  // Its buffers, where nothing has come.
+      result->frame = std::move(event.frame);  // Returns unused buffers.
       RaiseUnlessOk(received.status());
       if (*received == Received::kNothingYet) return nullptr;
       if (*received == Received::kEnd) RaiseEnd();
@@ -164,7 +164,7 @@ class ProducerStream {
     RaiseUnlessOk(status);
   }
 
-  // Answers that nobody has received are dropped, so that frames on their way arrive.
+  // Drops unreceived results, so that frames on the way are still sent.
   void Close() {
     const py::gil_scoped_release others_may_run;
     std::thread receiver([this] {
@@ -193,7 +193,7 @@ class ProducerStream {
   std::size_t InFlight() const { return stream_->InFlight(); }
   std::size_t Window() const { return stream_->info().frames_in_flight; }
   std::string Id() const { return stream_->info().stream_id; }
-  py::dict Parameters() const { return Told(stream_->info().parameters); }
+  py::dict Parameters() const { return ToDict(stream_->info().parameters); }
   py::dict Counts() const {
     const auto counts = latest_ != nullptr ? latest_->counts() : client::OfferCounts{};
     using namespace py::literals;
@@ -204,9 +204,9 @@ class ProducerStream {
  private:
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::unique_ptr<client::Stream> stream_;
-  std::unique_ptr<client::LatestSender> latest_;  // Ends before the stream.
-  std::timed_mutex receiving_;                    // One thread at a time.
-  std::mutex sending_;                            // Likewise; guards what follows.
+  std::unique_ptr<client::LatestSender> latest_;  // Destroyed before the stream.
+  std::timed_mutex receiving_;                    // Held by the receiving thread.
+  std::mutex sending_;  // Held by the sending thread; guards the members below.
   std::uint64_t frames_ = 0;
   bool finished_ = false;
 };
@@ -229,7 +229,7 @@ class Watch {
     watcher_.reset();
   }
 
-  // None where nothing has come in time; the end is an exception.
+  // None if no frame arrives in time; the end raises an exception.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     client::WatchedFrame frame;
@@ -239,7 +239,7 @@ class Watch {
       if (!lock.owns_lock()) return Received::kNothingYet;
       return watcher_->Receive(frame, slice);
     });
-    result->frame = std::move(frame.frame);  // Its buffers, where nothing has come.
+    result->frame = std::move(frame.frame);  // Returns unused buffers.
     RaiseUnlessOk(received.status());
     if (*received == Received::kNothingYet) return nullptr;
     if (*received == Received::kEnd) {
@@ -269,13 +269,13 @@ class Watch {
     const py::gil_scoped_release others_may_run;
     watcher_->Cancel();
   }
-  py::dict Parameters() const { return Told(watcher_->stream().parameters); }
+  py::dict Parameters() const { return ToDict(watcher_->stream().parameters); }
   std::string End() const { return watcher_->end().reason; }
 
  private:
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::unique_ptr<client::Watcher> watcher_;
-  std::timed_mutex receiving_;  // One thread at a time.
+  std::timed_mutex receiving_;  // Held by the receiving thread.
 };
 
 py::list Streams(const std::optional<std::string>& address, const py::kwargs& arguments) {
@@ -291,7 +291,7 @@ py::list Streams(const std::optional<std::string>& address, const py::kwargs& ar
   py::list list;
   for (const client::StreamSummary& one : *streams) {
     list.append(py::dict("name"_a = one.name, "id"_a = one.stream_id, "labels"_a = one.labels,
-                         "parameters"_a = Told(one.parameters),
+                         "parameters"_a = ToDict(one.parameters),
                          "last_sequence"_a = one.last_sequence, "frames"_a = one.frames,
                          "frame_errors"_a = one.frame_errors, "watchers"_a = one.watchers,
                          "open_seconds"_a = one.open_seconds, "idle_seconds"_a = one.idle_seconds));
@@ -324,28 +324,27 @@ void DefineStreams(py::module_& module) {
   using namespace py::literals;
   py::class_<ProducerStream>(
       module, "Stream",
-      "Frames to a server, answers back: made by partiemc.connect. One thread may send while "
-      "another one receives. It outlives lost connections; no frame is lost or comes twice.")
+      "A stream to a server, opened by partiemc.connect. One thread may send while another "
+      "receives. It survives lost connections; each frame is answered once.")
       .def(py::init<const std::optional<std::string>&, bool, py::dict>())
       .def("send", &ProducerStream::Send, "positions"_a, "time"_a = py::none(), py::kw_only(),
            "volumes"_a = py::none(), "ids"_a = py::none(), "velocities"_a = py::none(),
            "attributes"_a = py::none(),
            "Sends a frame and returns its number. The arrays (see partiemc.reconstruct) are copied "
-           "once, into the message, before it returns. `time` defaults to the number of frames "
-           "before it.\n\nWaits while `window` frames are sent and not received: a program with "
-           "one thread receives when in_flight has reached window. With latest=True it never "
-           "waits, and returns None.")
+           "once, into the message, before it returns. `time` defaults to the number of earlier "
+           "frames.\n\nWaits while `window` frames are sent and not received: a program with "
+           "one thread must receive when in_flight has reached window. With latest=True it never "
+           "waits and returns None.")
       .def("receive", &ProducerStream::Receive, "wait"_a = py::none(),
-           "The next Result. None where nothing has come within `wait` seconds; of another part "
-           "than 0 always, for each of its parts that was taken. Raises "
-           "partiemc.Error with a reason for a frame that was refused (the stream goes on), "
-           "without one when the stream has ended with an error; EOFError after finish() and "
-           "the last answer.")
+           "The next Result. None if no event arrives within `wait` seconds, and for each accepted "
+           "part of a part other than 0. Raises partiemc.Error with a reason for a refused frame "
+           "(the stream continues), without a reason if the stream has ended with an error; "
+           "EOFError after finish() and the last result.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &ProducerStream::Next)
       .def("finish", &ProducerStream::Finish,
-           "No more frames will come: iteration ends with the last answer. With latest=True waits "
-           "until the newest frame has been sent, so another thread must receive.")
+           "Declares that no frame follows: iteration ends with the last result. With latest=True "
+           "it waits until the newest frame has been sent, so another thread must receive.")
       .def("cancel", &ProducerStream::Cancel, "Ends the stream at once, from any thread.")
       .def("__enter__", [](py::object self) { return self; })
       .def(
@@ -359,27 +358,32 @@ void DefineStreams(py::module_& module) {
           })
       .def_property_readonly("in_flight", &ProducerStream::InFlight,
                              "Frames sent and not yet received.")
-      .def_property_readonly("window", &ProducerStream::Window, "How many there may be.")
-      .def_property_readonly("id", &ProducerStream::Id, "As in the server's log.")
-      .def_property_readonly("parameters", &ProducerStream::Parameters, "As resolved, by name.")
+      .def_property_readonly("window", &ProducerStream::Window, "Limit of in_flight.")
+      .def_property_readonly("id", &ProducerStream::Id, "The id in the server's log.")
+      .def_property_readonly("parameters", &ProducerStream::Parameters,
+                             "Resolved parameters by name.")
       .def_property_readonly("counts", &ProducerStream::Counts,
                              "With latest=True: frames 'sent', 'skipped', 'refused'.");
-  py::class_<Watch>(module, "Watch",
-                    "An iterator over somebody else's results: made by partiemc.watch.")
+  py::class_<Watch>(
+      module, "Watch",
+      "An iterator over the results of another producer's stream, opened by partiemc.watch.")
       .def(py::init<const std::optional<std::string>&, const std::string&, py::dict>())
-      .def("receive", &Watch::Receive, "wait"_a = py::none(),
-           "The next Result; None where nothing has come within `wait` seconds. EOFError at the "
-           "end of the stream, partiemc.Error when the watch was lost.")
+      .def(
+          "receive", &Watch::Receive, "wait"_a = py::none(),
+          "The next Result; None if no frame arrives within `wait` seconds. Raises EOFError at the "
+          "end of the stream, partiemc.Error if the watch was lost.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &Watch::Next)
-      .def("cancel", &Watch::Cancel, "Leaves at once, from any thread.")
+      .def("cancel", &Watch::Cancel, "Ends the watch at once, from any thread.")
       .def("__enter__", [](py::object self) { return self; })
       .def("__exit__", [](Watch& watch, const py::args&) { watch.Cancel(); })
-      .def_property_readonly("parameters", &Watch::Parameters, "Of the stream, by name.")
-      .def_property_readonly("end", &Watch::End, "Why it ended: 'FINISHED', 'PRODUCER_LOST', ...");
+      .def_property_readonly("parameters", &Watch::Parameters, "Parameters of the stream by name.")
+      .def_property_readonly("end", &Watch::End,
+                             "Reason of the end: 'FINISHED', 'PRODUCER_LOST', ...");
   module.def("streams", &Streams, "address"_a = py::none(),
-             "The streams that are open on a server: dicts.");
-  module.def("server", &Server, "address"_a = py::none(), "What a server is and allows: a dict.");
+             "Lists the open streams of a server: dicts.");
+  module.def("server", &Server, "address"_a = py::none(),
+             "Version and limits of a server: a dict.");
 }
 
 }  // namespace partiemc::python

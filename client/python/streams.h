@@ -1,4 +1,4 @@
-// Streams to and from servers, for Python.
+// Python classes for streams and watches.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Draws a replay as one animated SVG, which plays where pictures are shown: outlines, filled, with
-the edges of their merged meshes.
+"""Draws a replay as one animated SVG: filled outlines with the edges of their merged meshes.
 
   partiemc replay client/recordings/dam_break.pemc --local --output-dir frames --format geojson,obj
   client/recordings/animate.py frames client/recordings/dam_break.svg --step 2

@@ -1,6 +1,7 @@
 #!/bin/bash
-# Builds the Debian packages of this machine's architecture into DIR (default: build/debian/packages):
-# partiemc-server, partiemc, libpartiemc-c1, libpartiemc-dev and python3-partiemc; and Python's wheel.
+# Builds the Debian packages of this architecture into DIR (default: build/debian/packages):
+# partiemc-server, partiemc, libpartiemc-c1, libpartiemc-dev and python3-partiemc; and the Python
+# wheel.
 #   docker/install.sh debian && docker/debian/build.sh [DIR]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."

@@ -1,11 +1,11 @@
 #!/bin/bash
 # usage: manual_page.sh FILE.gz PAGE NAME PROGRAM [VERB]
-# Writes the manual page PAGE, a summary NAME of what it is, from what `PROGRAM [VERB] --help` says.
+# Writes the manual page PAGE with the one-line description NAME from `PROGRAM [VERB] --help`.
 set -euo pipefail
 file=$1 page=$2 name=$3 program=$4 verb=${5-}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-# help2man runs one program, whose name becomes the page's.
+# help2man names the page after the program it runs.
 cat >"$work/$page" <<SCRIPT
 #!/bin/bash
 [[ \$1 == --version ]] && exec echo "$page $("$program" --version | cut -d " " -f 2)"

@@ -1,5 +1,5 @@
-# Debian packages by CPack: docker/debian/build.sh. Five of the install rules' components, a package
-# each. Manual pages are what --help says.
+# Debian packages by CPack: docker/debian/build.sh. One package for each of five install components.
+# Manual pages are generated from --help.
 find_program(HELP2MAN help2man REQUIRED)
 find_program(GZIP gzip REQUIRED)
 

@@ -1,6 +1,6 @@
 #!/bin/bash
-# Installs the Debian packages and the wheel in DIR on this system, tries each and removes them again:
-# for a bare root, as tests/bare_root.sh packages makes one. Needs root.
+# Installs the Debian packages and the wheel in DIR on this system, tests each and removes them. For
+# a bare root, as made by tests/bare_root.sh packages. Requires root.
 set -euo pipefail
 packages=$(realpath "$1")
 work=$(mktemp -d)

@@ -4,12 +4,11 @@
 #include <netinet/in.h>
 #include <sys/un.h>
 
-#include <charconv>
 #include <cstddef>
-#include <system_error>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "common/text.h"
 
 namespace partiemc {
 namespace {
@@ -17,14 +16,9 @@ namespace {
 constexpr char kUnixScheme[] = "unix:";
 
 absl::StatusOr<std::uint16_t> ParsePort(const std::string& text, const std::string& whole) {
-  std::uint16_t port = 0;
-  const char* const end = text.data() + text.size();
-  const auto [parsed, error] = std::from_chars(text.data(), end, port);
-  if (text.empty() || parsed != end || error != std::errc()) {
-    return absl::InvalidArgumentError(absl::StrCat("address \"", whole, "\": the port \"", text,
-                                                   "\" must be a number from 0 to 65535"));
-  }
-  return port;
+  if (const auto port = ParseNumber<std::uint16_t>(text)) return *port;
+  return absl::InvalidArgumentError(absl::StrCat("address \"", whole, "\": the port \"", text,
+                                                 "\" must be a number from 0 to 65535"));
 }
 
 absl::StatusOr<Address> ParseUnix(const std::string& text) {

@@ -52,7 +52,7 @@ std::optional<char32_t> TakeCharacter(std::string_view& text) {
     if ((byte & 0xc0) != 0x80) return std::nullopt;
     character = (character << 6) | (byte & 0x3fu);
   }
-  // Too long for what it says, half of a pair of UTF-16, beyond the last character there is.
+  // Overlong encodings, surrogate halves, and values above the last character.
   constexpr std::array<char32_t, 5> kSmallest = {0, 0, 0x80, 0x800, 0x10000};
   if (character < kSmallest[lead.bytes] || character > 0x10ffff ||
       (character >= 0xd800 && character < 0xe000)) {

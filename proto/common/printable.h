@@ -7,12 +7,12 @@
 
 namespace partiemc {
 
-/// Takes the first character off `text`. Nothing where its first byte begins no character of UTF-8
-/// (RFC 3629); then that byte alone is taken off. Requires: `text` is not empty.
+/// Removes the first character of `text` and returns it. If `text` does not begin with a character
+/// of UTF-8 (RFC 3629), removes one byte and returns nothing. Requires: `text` is not empty.
 std::optional<char32_t> TakeCharacter(std::string_view& text);
 
-/// Whether a terminal would obey this character instead of showing it: C0, DEL and C1, the
-/// separators of lines and paragraphs, and what changes the direction of text.
+/// True for characters that a terminal interprets instead of showing: C0, DEL and C1, line and
+/// paragraph separators, and characters that change the direction of text.
 bool IsControl(char32_t character);
 
 /// Whether `text` is UTF-8 without control characters.

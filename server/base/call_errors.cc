@@ -19,6 +19,8 @@ absl::Status DrainingError() {
                          "connect to another one, or again later"});
 }
 
+absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
+
 absl::Status IdleError(std::string what, std::chrono::milliseconds limit) {
   const std::string seconds = absl::StrCat(std::chrono::duration<double>(limit).count(), " s");
   return ViolationError(

@@ -1,4 +1,4 @@
-// Why the server ends calls of any kind.
+// Reasons and errors that end calls of every kind.
 #pragma once
 
 #include <chrono>
@@ -9,18 +9,20 @@
 
 namespace partiemc::server {
 
-/// The reasons for which calls end (proto/PROTOCOL.md).
+/// Reasons of the end of a call (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonProtocol = "PROTOCOL";
 inline constexpr std::string_view kReasonDraining = "DRAINING";
 inline constexpr std::string_view kReasonTakenOver = "TAKEN_OVER";
 inline constexpr std::string_view kReasonIdle = "IDLE";
-/// Of a call, and of a frame, whose bytes are not the message that they should be.
+/// For a call or a frame with bytes that are not the expected message.
 inline constexpr std::string_view kReasonMalformed = "MALFORMED";
 
-/// INVALID_ARGUMENT (PROTOCOL) for a request that may not come now.
+/// INVALID_ARGUMENT (PROTOCOL) for a request that is not allowed in the call's state.
 absl::Status ProtocolError(std::string found, std::string rule);
-/// UNAVAILABLE with the Violation that a draining server gives everybody.
+/// UNAVAILABLE with the Violation of a draining server.
 absl::Status DrainingError();
+/// CANCELLED: the client has disconnected.
+absl::Status ClientGone();
 /// DEADLINE_EXCEEDED (IDLE) for a client that did `what` for `limit`: "sends no `open`".
 absl::Status IdleError(std::string what, std::chrono::milliseconds limit);
 

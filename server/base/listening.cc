@@ -45,7 +45,7 @@ absl::Status CheckUnix(const Address& address) {
   if (connect(probe.descriptor(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0) {
     return CannotListen(address, "another server listens there");
   }
-  if (errno == ECONNREFUSED) return absl::OkStatus();  // Left behind; gRPC replaces it.
+  if (errno == ECONNREFUSED) return absl::OkStatus();  // A stale file; gRPC replaces it.
   if (errno != ENOENT) return CannotListen(address, ErrorText(errno));
   const Socket socket(AF_UNIX);
   if (bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) != 0) {
@@ -64,7 +64,7 @@ absl::Status CheckTcp(const Address& address) {
       getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found);
   if (failure != 0) return CannotListen(address, gai_strerror(failure));
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(found, &freeaddrinfo);
-  // One address of several is enough, as it is for gRPC; only a port that is taken is not.
+  // Like gRPC, accepts one working address of several, unless the port is in use on another.
   int error = 0;
   bool any = false;
   for (const addrinfo* candidate = found; candidate != nullptr; candidate = candidate->ai_next) {

@@ -1,4 +1,4 @@
-// Whether a server could listen somewhere.
+// Checks whether the server can listen on an address.
 #pragma once
 
 #include "absl/status/status.h"
@@ -6,9 +6,9 @@
 
 namespace partiemc::server {
 
-/// Tries to listen there and lets go at once: gRPC itself does not say why it could not, and would
-/// take a Unix socket away from the server that owns it.
-/// Errors: UNAVAILABLE, a line that says where, why and what to do.
+/// Listens on `address` and stops at once. gRPC reports no reason for a failure, and would remove
+/// the Unix socket of a running server. Errors: UNAVAILABLE with one line: address, cause and
+/// remedy.
 absl::Status CheckCanListen(const Address& address);
 
 }  // namespace partiemc::server

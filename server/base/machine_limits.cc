@@ -11,14 +11,14 @@ namespace {
 
 constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
 
-// The number that the file begins with; "max" is none.
+// The number at the beginning of a file; "max" and errors mean unlimited.
 std::uint64_t NumberIn(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;
   return file >> number ? number : kUnlimited;
 }
 
-// Calls visit(folder) for a group and those that it is in, up to the folder `top`.
+// Calls visit(folder) for a group and its parents up to the folder `top`.
 template <typename Visit>
 void ForEachFolder(const std::string& top, std::string group, Visit visit) {
   for (;;) {
@@ -29,10 +29,10 @@ void ForEachFolder(const std::string& top, std::string group, Visit visit) {
   }
 }
 
-// Calls visit(version, folder) for the groups of this process that a controller looks after, and
-// those that they are in. "0::/a/b" for version 2, "4:memory:/a/b" or "3:cpu,cpuacct:/" for version
-// 1, whose groups inside of a container are named as seen from outside: what is not there limits
-// nothing, its top is looked at in any case.
+// Calls visit(version, folder) for the groups of this process that a controller manages, and for
+// their parents. Lines of /proc/self/cgroup are "0::/a/b" for version 2, "4:memory:/a/b" or
+// "3:cpu,cpuacct:/" for version 1. Inside a container, version 1 names groups as seen from outside:
+// a missing folder sets no limit, and the top folder is always visited.
 template <typename Visit>
 void ForEachGroup(const std::string& root, std::string_view controller, Visit visit) {
   std::ifstream groups(root + "/proc/self/cgroup");
@@ -53,8 +53,7 @@ void ForEachGroup(const std::string& root, std::string_view controller, Visit vi
   }
 }
 
-// The time of processors that a group may use, over the time in which it may; infinite where
-// nothing limits it.
+// The processor time of a group divided by its period; infinite without a limit.
 double QuotaOf(int version, const std::string& folder) {
   double quota = -1, period = 0;
   if (version == 2) {
@@ -72,7 +71,7 @@ std::uint64_t PhysicalMemory(const std::string& root) {
   std::ifstream file(root + "/proc/meminfo");
   std::string name;
   std::uint64_t kilobytes = 0;
-  // "MemTotal:       16316412 kB" is the first line.
+  // The first line is "MemTotal:       16316412 kB".
   return file >> name >> kilobytes && name == "MemTotal:" ? kilobytes * 1024 : kUnlimited;
 }
 

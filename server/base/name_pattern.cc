@@ -5,8 +5,8 @@
 
 namespace partiemc::server {
 
-// Only the last `*` ever has to take more characters: what stands before it fits as early as it
-// can, which leaves the most to the rest.
+// Backtracks to the last `*` only. The text before it matches as early as possible, which leaves
+// the most for the rest.
 bool MatchesPattern(std::string_view pattern, std::string_view name) {
   std::size_t p = 0, n = 0;
   std::optional<std::size_t> after_star;

@@ -1,4 +1,4 @@
-// Names of streams, and patterns of them as a token file has them.
+// Matches names of streams with the patterns of a token file.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,8 @@ namespace partiemc::server {
 
 inline constexpr std::size_t kMaxStreamNameBytes = 128;
 
-/// Whether `pattern` stands for the whole of `name`: `*` for any characters or none, `?` for any
-/// one, every other character for itself. Takes at most as many steps as the product of their
-/// lengths.
+/// True if `pattern` matches all of `name`: `*` matches any characters or none, `?` any one, any
+/// other character itself. Cost: the product of their lengths.
 bool MatchesPattern(std::string_view pattern, std::string_view name);
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// So many of a kind in a second, and the others counted.
+// Allows a number of events per second and counts the others.
 #pragma once
 
 #include <chrono>
@@ -8,14 +8,15 @@
 
 namespace partiemc::server {
 
-/// Safe from any thread.
+/// Thread-safe.
 class RateLimit {
  public:
   using Clock = std::chrono::steady_clock;
 
   explicit RateLimit(std::uint32_t per_second) : per_second_(per_second) {}
 
-  /// Whether one more is let through at `now`; seconds begin with the first that comes after one.
+  /// Counts one event at `now`; true if it is within the limit. Each second begins with the first
+  /// event after the previous one.
   bool Allow(Clock::time_point now) {
     const std::lock_guard lock(mutex_);
     if (now - begin_ >= std::chrono::seconds(1)) {
@@ -31,7 +32,7 @@ class RateLimit {
     return false;
   }
 
-  /// How many were held back since the last time that this was asked.
+  /// Returns the number of events over the limit since the last call.
   std::uint64_t TakeHeldBack() {
     const std::lock_guard lock(mutex_);
     return std::exchange(held_back_, 0);

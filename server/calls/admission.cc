@@ -5,8 +5,8 @@
 namespace partiemc::server {
 namespace {
 
-absl::StatusOr<AdmittedCall> WithPlace(Caller caller) {
-  auto place = caller.account()->Take(CallerAccount::Kind::kCall);
+absl::StatusOr<AdmittedCall> WithPlace(Caller caller, CallerAccount::Kind kind) {
+  auto place = caller.account()->Take(kind);
   if (!place.ok()) return place.status();
   return AdmittedCall{std::move(caller), *std::move(place)};
 }
@@ -20,12 +20,12 @@ absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const C
   if (permission != nullptr) {
     if (auto status = ((*caller).*permission)(); !status.ok()) return status;
   }
-  return WithPlace(*std::move(caller));
+  return WithPlace(*std::move(caller), CallerAccount::Kind::kCall);
 }
 
-absl::StatusOr<AdmittedCall> AdmitAnybody(const Authentication& authentication,
+absl::StatusOr<AdmittedCall> AdmitProbe(const Authentication& authentication,
                                           const CallOrigin& origin) {
-  return WithPlace(authentication.Anybody(origin.peer));
+  return WithPlace(authentication.Anybody(origin.peer), CallerAccount::Kind::kProbe);
 }
 
 }  // namespace partiemc::server

@@ -31,8 +31,9 @@ using Permission = absl::Status (Caller::*)() const;
 absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const CallOrigin& origin,
                                    Permission permission = nullptr);
 
-/// As Admit, for who needs no token: a probe. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
-absl::StatusOr<AdmittedCall> AdmitAnybody(const Authentication& authentication,
+/// As Admit, for a health check, which needs no token. It is counted apart from other calls, so
+/// that these keep no probe out. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
+absl::StatusOr<AdmittedCall> AdmitProbe(const Authentication& authentication,
                                           const CallOrigin& origin);
 
 }  // namespace partiemc::server

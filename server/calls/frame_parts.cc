@@ -42,6 +42,11 @@ std::chrono::milliseconds TimeoutOf(const v1::OpenStream& open) {
   return std::chrono::milliseconds(asked == 0 ? kDefaultTimeoutMs : asked);
 }
 
+// Often enough that a frame waits for its parts for hardly longer than the timeout.
+std::chrono::milliseconds LookEveryOf(std::chrono::milliseconds timeout) {
+  return std::clamp(timeout / 20, std::chrono::milliseconds(5), std::chrono::milliseconds(500));
+}
+
 }  // namespace
 
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
@@ -106,10 +111,7 @@ bool PartZero::MayAnswer(std::size_t slot) const {
          assembler_->IsReady(*frame.sequence, frame.came, FrameAssembler::Clock::now());
 }
 
-// Often enough that nobody waits for much longer than was said.
-std::chrono::milliseconds PartZero::LookEvery() const {
-  return std::clamp(timeout_ / 20, std::chrono::milliseconds(5), std::chrono::milliseconds(500));
-}
+std::chrono::milliseconds PartZero::LookEvery() const { return LookEveryOf(timeout_); }
 
 absl::Status PartZero::Join(std::size_t slot, std::span<const std::string> attributes,
                             v1::ReconstructRequest& request) {
@@ -142,13 +144,26 @@ void OtherPart::Came(std::size_t slot, grpc::ByteBuffer& request) {
     return;
   }
   auto status = joined_.assembler->Offer(joined_.seat, *sequence, request.Length(),
-                                         std::make_shared<PartMessage>(request));
+                                         std::make_shared<PartMessage>(request),
+                                         FrameAssembler::Clock::now());
   // What this call sends after it has left the assembly is told with its end.
   if (!absl::IsCancelled(status)) slots_[slot].refusal = std::move(status);
 }
 
 bool OtherPart::MayAnswer(std::size_t slot) const {
-  return !slots_[slot].refusal.ok() || joined_.assembler->IsOver(slots_[slot].sequence);
+  return !slots_[slot].refusal.ok() ||
+         joined_.assembler->IsOver(slots_[slot].sequence, FrameAssembler::Clock::now());
+}
+
+std::chrono::milliseconds OtherPart::LookEvery() const {
+  return LookEveryOf(joined_.assembler->timeout());
+}
+
+void OtherPart::Refuse(std::size_t slot, absl::Status why) {
+  Slot& part = slots_[slot];
+  if (!part.refusal.ok()) return;
+  joined_.assembler->Withdraw(joined_.seat, part.sequence);
+  part.refusal = std::move(why);
 }
 
 v1::ReconstructResponse OtherPart::Answer(std::size_t slot, absl::Status& refusal) {

@@ -72,6 +72,9 @@ class OtherPart {
   /// As PartZero.
   void Came(std::size_t slot, grpc::ByteBuffer& request);
   bool MayAnswer(std::size_t slot) const;
+  std::chrono::milliseconds LookEvery() const;
+  /// The server has no room for the part in `slot`: refuses it.
+  void Refuse(std::size_t slot, absl::Status why);
   /// The answer to the part in `slot`; leaves its refusal, if it was one, in `refusal`.
   v1::ReconstructResponse Answer(std::size_t slot, absl::Status& refusal);
 

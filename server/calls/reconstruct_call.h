@@ -37,6 +37,7 @@ class ReconstructCall final : public ByteCall, private StreamTransport {
   void StartWrite(Outgoing what, std::size_t slot) override;
   void Cut() override;
   void Finish(const absl::Status& status) override;
+  std::string peer() const override { return channel().peer(); }
 
   StreamRegistry& registry_;
   StreamMessages messages_;

@@ -257,7 +257,26 @@ bool StreamMessages::MayAnswer(std::size_t slot) {
 }
 
 std::chrono::milliseconds StreamMessages::LookEvery() const {
-  return part_zero_ ? part_zero_->LookEvery() : std::chrono::milliseconds(0);
+  if (part_zero_) return part_zero_->LookEvery();
+  return other_part_ ? other_part_->LookEvery() : std::chrono::milliseconds(0);
+}
+
+std::uint64_t StreamMessages::ComputedBytes(std::size_t /*slot*/, std::uint64_t bytes) const {
+  if (other_part_) return 0;
+  return part_zero_ ? bytes + part_zero_->assembler()->BytesOfNext() : bytes;
+}
+
+// Whole frames are computed in their turn. A part may wait for others for long.
+bool StreamMessages::DropFrame(std::size_t slot, const absl::Status& why) {
+  if (!other_part_) return false;
+  other_part_->Refuse(slot, why);
+  requests_[slot].Clear();
+  return true;
+}
+
+const void* StreamMessages::Assembly() const {
+  if (part_zero_) return part_zero_->assembler().get();
+  return other_part_ ? other_part_->joined().assembler.get() : nullptr;
 }
 
 void StreamMessages::End(const absl::Status& status) {

@@ -66,6 +66,9 @@ class StreamMessages final : public StreamHandler {
   Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) override;
   bool MayAnswer(std::size_t slot) override;
   std::chrono::milliseconds LookEvery() const override;
+  const void* Assembly() const override;
+  std::uint64_t ComputedBytes(std::size_t slot, std::uint64_t bytes) const override;
+  bool DropFrame(std::size_t slot, const absl::Status& why) override;
   /// The call has ended: whoever waits for parts of it is told.
   void End(const absl::Status& status);
 

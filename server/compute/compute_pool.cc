@@ -39,10 +39,11 @@ ComputePool::~ComputePool() {
 }
 
 void ComputePool::Submit(Job job, Afterwards afterwards, BusyStreams::Mark* stream,
-                         const CallerAccount* caller) {
+                         const CallerAccount* caller, std::uint64_t frame_bytes) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.Push(caller, stream, Task{std::move(job), std::move(afterwards), stream, caller});
+    tasks_.Push(caller, stream,
+                Task{std::move(job), std::move(afterwards), stream, caller, frame_bytes});
     ++waiting_;
     recent_.Came(caller, WarmSize::Clock::now());
   }
@@ -65,7 +66,11 @@ void ComputePool::Run() {
     std::unique_ptr<Worker> worker = TakeWorker();
     lock.unlock();
     if (shares && !narrow) narrow.emplace(threads_ - 1);
+    // Outside of the arena, whose threads must not wait for each other's frames.
+    worker->memory.BeginFrame(task->frame_bytes);
     (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
+    if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for it.
+    worker->memory.EndFrame();
     lock.lock();
     PutBack(std::move(worker), task->stream);
     End(*task);

@@ -72,11 +72,12 @@ class ComputePool {
 
   /// Runs `job`, then `afterwards`, which has no worker any more: what it submits gets the same
   /// one. `stream` is of the stream whose frame it is, if any, and lives as long as `job`; `caller`
-  /// is whose turn it takes, and no more than that. Never blocks on computing. Neither may throw.
-  /// Safe from any thread, jobs included.
+  /// is whose turn it takes, and no more than that. `frame_bytes` is the size of the frame's
+  /// message: while memory is short, large frames are computed one after the other (WorkerMemory).
+  /// Never blocks on computing. Neither may throw. Safe from any thread, jobs included.
   void Submit(
       Job job, Afterwards afterwards = [] {}, BusyStreams::Mark* stream = nullptr,
-      const CallerAccount* caller = nullptr);
+      const CallerAccount* caller = nullptr, std::uint64_t frame_bytes = 0);
 
   /// Jobs that have been submitted and not begun.
   std::size_t QueueLength() const;
@@ -89,6 +90,7 @@ class ComputePool {
     Afterwards afterwards;
     BusyStreams::Mark* stream;
     const CallerAccount* caller;  // May be gone once `job` is.
+    std::uint64_t frame_bytes;
   };
   using LinesOfCaller = RoundRobin<BusyStreams::Mark*, Line<Task>>;
   using Workers = std::vector<std::unique_ptr<Worker>>;

@@ -2,14 +2,14 @@
 
 namespace partiemc::server {
 
-FairShare::Fit FairShare::Fits(const CallerAccount* caller, std::uint64_t amount,
-                               std::uint64_t most) const {
+FairShare::Fit FairShare::FitsInto(std::uint64_t room, const CallerAccount* caller,
+                                   std::uint64_t amount, std::uint64_t most) const {
   const std::uint64_t own = caller == nullptr ? 0 : held_by(caller);
   if (own > most || amount > most - own) return Fit::kMoreThanShare;
-  const bool has_room = held_ <= room_ && amount <= room_ - held_;
+  const bool has_room = held_ <= room && amount <= room - held_;
   if (own == 0) return has_room ? Fit::kYes : Fit::kNoRoom;
   if (!has_room) return Fit::kMoreThanShare;
-  const std::uint64_t left = room_ - held_ - amount;
+  const std::uint64_t left = room - held_ - amount;
   return own <= left && amount <= left - own ? Fit::kYes : Fit::kMoreThanShare;
 }
 

@@ -26,9 +26,19 @@ class FairShare {
 
   explicit FairShare(std::uint64_t room) : room_(room) {}
 
-  /// Whether `caller` may have so much more, and no more than `most` in all. Null is the server
-  /// itself, to whom only the room counts.
-  Fit Fits(const CallerAccount* caller, std::uint64_t amount, std::uint64_t most = kNoLimit) const;
+  /// Whether `caller` may take `amount` more and hold at most `most` in all. Null is the server
+  /// itself, to which only the room applies.
+  Fit Fits(const CallerAccount* caller, std::uint64_t amount, std::uint64_t most = kNoLimit) const {
+    return FitsInto(room_ + beyond_, caller, amount, most);
+  }
+  /// Whether what `caller` holds would fit if `beyond` less were permitted beyond the room.
+  bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller, std::uint64_t most) const {
+    return FitsInto(room_ + beyond_ - beyond, caller, 0, most) == Fit::kYes;
+  }
+
+  /// Of what is held, `amount` is permitted beyond the room: it takes no room from other callers.
+  void AddBeyond(std::uint64_t amount) { beyond_ += amount; }
+  void RemoveBeyond(std::uint64_t amount) { beyond_ -= amount; }
 
   /// Counts what is held in any case, whether it fits or not.
   void Take(const CallerAccount* caller, std::uint64_t amount);
@@ -41,8 +51,12 @@ class FairShare {
   std::size_t callers() const { return held_by_.size(); }
 
  private:
+  Fit FitsInto(std::uint64_t room, const CallerAccount* caller, std::uint64_t amount,
+               std::uint64_t most) const;
+
   const std::uint64_t room_;
-  std::uint64_t held_ = 0;                                 // May be more than room_.
+  std::uint64_t beyond_ = 0;
+  std::uint64_t held_ = 0;                                 // May be more than both together.
   std::map<const CallerAccount*, std::uint64_t> held_by_;  // None is 0.
 };
 

@@ -1,8 +1,12 @@
 #include "server/compute/memory_budget.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 #include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/status.h"
 
 namespace partiemc::server {
 namespace {
@@ -16,9 +20,19 @@ std::uint64_t MostOf(const CallerAccount* caller) {
 
 }  // namespace
 
+absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget) {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonMemoryBudget), std::move(field), absl::StrCat(bytes, " bytes"),
+       absl::StrCat("must fit with what is being worked on into ", budget,
+                    " bytes; try again later, or start the server with a larger "
+                    "--memory-budget")});
+}
+
 void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
   const std::lock_guard lock(mutex_);
   share_.Take(caller, bytes);
+  held_ += bytes;
 }
 
 // Whether nobody who came before is to have it first.
@@ -36,7 +50,10 @@ Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
   const std::uint64_t most = MostOf(caller);
   const std::lock_guard lock(mutex_);
   const Fit fit = FitsNow({{}, bytes, caller, most});
-  if (fit == Fit::kYes) share_.Take(caller, bytes);
+  if (fit == Fit::kYes) {
+    share_.Take(caller, bytes);
+    held_ += bytes;
+  }
   if (fit == Fit::kNoRoom) TellShortage();
   return fit;
 }
@@ -49,6 +66,7 @@ bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>
   const bool fits = fit == Fit::kYes;
   if (fits) {
     share_.Take(caller, bytes);
+    held_ += bytes;
   } else {
     claims_.push_back(std::move(claim));
     if (fit == Fit::kNoRoom) TellShortage();
@@ -70,8 +88,59 @@ void MemoryBudget::GiveBack(std::uint64_t bytes, const CallerAccount* caller) {
   {
     const std::lock_guard lock(mutex_);
     share_.GiveBack(caller, bytes);
+    held_ -= bytes;
   }
+  may_compute_.notify_all();
   Grant();
+  reads_.ServeWaiting();
+}
+
+std::uint64_t MemoryBudget::TakeForWorker(std::uint64_t bytes, const void* worker) {
+  std::unique_lock lock(mutex_);
+  while (FitsNow({{}, bytes, nullptr, FairShare::kNoLimit}) != Fit::kYes) {
+    TellShortage();
+    if (worker_beyond_ == nullptr || worker_beyond_ == worker) {
+      bytes = std::min(bytes, most_of_worker_ - bytes_of_worker_beyond_);
+      TakeBeyond(bytes, worker);
+      return bytes;
+    }
+    may_compute_.wait(lock);
+  }
+  share_.Take(nullptr, bytes);
+  held_ += bytes;
+  return bytes;
+}
+
+bool MemoryBudget::TryTakeBeyond(std::uint64_t bytes, const void* worker) {
+  const std::lock_guard lock(mutex_);
+  if (worker_beyond_ != nullptr && worker_beyond_ != worker) return false;
+  if (bytes > most_of_worker_ - bytes_of_worker_beyond_) return false;
+  TakeBeyond(bytes, worker);
+  return true;
+}
+
+void MemoryBudget::TakeBeyond(std::uint64_t bytes, const void* worker) {
+  worker_beyond_ = worker;
+  bytes_of_worker_beyond_ += bytes;
+  share_.AddBeyond(bytes);
+  share_.Take(nullptr, bytes);
+  held_ += bytes;
+}
+
+bool MemoryBudget::IsBeyond(const void* worker) const {
+  const std::lock_guard lock(mutex_);
+  return worker_beyond_ == worker;
+}
+
+void MemoryBudget::GiveBackOfWorker(std::uint64_t bytes, const void* worker) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (worker_beyond_ == worker) {
+      worker_beyond_ = nullptr;
+      share_.RemoveBeyond(std::exchange(bytes_of_worker_beyond_, 0));
+    }
+  }
+  GiveBack(bytes);
 }
 
 void MemoryBudget::Grant() {
@@ -93,6 +162,7 @@ void MemoryBudget::Grant() {
       }
       if (waiter != nullptr) {
         share_.Take(claim->caller, claim->bytes);
+        held_ += claim->bytes;
         granted.emplace_back(std::move(waiter), claim->bytes);
       }
       claim = claims_.erase(claim);
@@ -112,7 +182,56 @@ void MemoryBudget::OnShortage(std::function<void()> tell) {
 
 std::uint64_t MemoryBudget::held() const {
   const std::lock_guard lock(mutex_);
+  return held_;
+}
+
+std::uint64_t MemoryBudget::planned() const {
+  const std::lock_guard lock(mutex_);
   return share_.held();
+}
+
+void MemoryBudget::Plan(std::uint64_t bytes, const CallerAccount* caller) {
+  const std::lock_guard lock(mutex_);
+  share_.Take(caller, bytes);
+}
+
+bool MemoryBudget::TryPlan(std::uint64_t bytes, const CallerAccount* caller) {
+  const std::uint64_t most = MostOf(caller);
+  const std::lock_guard lock(mutex_);
+  const Fit fit = share_.Fits(caller, bytes, most);
+  if (fit == Fit::kYes) share_.Take(caller, bytes);
+  if (fit == Fit::kNoRoom) TellShortage();
+  return fit == Fit::kYes;
+}
+
+void MemoryBudget::Unplan(std::uint64_t bytes, const CallerAccount* caller) {
+  const std::lock_guard lock(mutex_);
+  share_.GiveBack(caller, bytes);
+}
+
+absl::Status MemoryBudget::CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const {
+  const std::uint64_t most = MostOf(caller);
+  const std::lock_guard lock(mutex_);
+  if (caller != nullptr && share_.held_by(caller) > most) return TooManyBytesOfCaller(bytes);
+  if (share_.Fits(nullptr, 0) == Fit::kYes) return absl::OkStatus();
+  return NoRoomInBudget("frame", bytes, share_.room());
+}
+
+void MemoryBudget::ChangeBeyond(std::uint64_t before, std::uint64_t after) {
+  const std::lock_guard lock(mutex_);
+  share_.RemoveBeyond(before);
+  share_.AddBeyond(after);
+}
+
+bool MemoryBudget::FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const {
+  const std::uint64_t most = MostOf(caller);
+  const std::lock_guard lock(mutex_);
+  return share_.FitsWithout(beyond, caller, most);
+}
+
+std::uint64_t MemoryBudget::PlannedBy(const CallerAccount* caller) const {
+  const std::lock_guard lock(mutex_);
+  return share_.held_by(caller);
 }
 
 }  // namespace partiemc::server

@@ -86,7 +86,7 @@ void ImportedStream::SetOldest(std::uint64_t sequence) {
   if (limits_.history != nullptr) broadcaster_->SetOldestElsewhere(sequence);
 }
 
-void ImportedStream::Came(relay::v1::Result& result, Clock::time_point now) {
+void ImportedStream::OnMessage(relay::v1::Result& result, Clock::time_point now) {
   if (ended_ || result.number() == 0) return;
   if (result.fetch() == fetch_.fetch()) heard_ = now;
   SetOldest(result.oldest_sequence());
@@ -107,7 +107,7 @@ void ImportedStream::Came(relay::v1::Result& result, Clock::time_point now) {
   if (!fetching_) FetchFrom(next_number_, now);
 }
 
-void ImportedStream::Came(const relay::v1::FetchEnd& end, Clock::time_point now) {
+void ImportedStream::OnMessage(const relay::v1::FetchEnd& end, Clock::time_point now) {
   if (ended_) return;
   if (end.gone()) {
     return Lost({std::string(kReasonProducerLost), "the producer has gone", {}}, now);
@@ -137,11 +137,11 @@ void ImportedStream::FetchEnded(std::uint64_t last_number, Clock::time_point now
   DeliverWaiting(now);
   if (end_ && !fetching_) {
     const relay::v1::StreamEnd told = *std::exchange(end_, std::nullopt);
-    return Came(told, now);
+    return OnMessage(told, now);
   }
   if (ready_ || fetching_) return;
   ready_ = true;
-  TellWaiting(absl::OkStatus());
+  AnswerWaiting(absl::OkStatus());
 }
 
 void ImportedStream::DeliverUpTo(std::uint64_t number) {
@@ -166,7 +166,7 @@ void ImportedStream::DeliverWaiting(Clock::time_point now) {
   if (!waiting_.empty() && !fetching_) FetchFrom(next_number_, now);
 }
 
-void ImportedStream::Came(const relay::v1::StreamEnd& end, Clock::time_point now) {
+void ImportedStream::OnMessage(const relay::v1::StreamEnd& end, Clock::time_point now) {
   if (ended_) return;
   if (fetching_ || next_number_ <= end.last_number()) {
     const bool asked = fetching_;
@@ -181,7 +181,7 @@ void ImportedStream::Came(const relay::v1::StreamEnd& end, Clock::time_point now
   // This server does not drain.
   if (end.reason() == kReasonDraining) {
     told.reason = kReasonProducerLost;
-    told.message = "the server that had the stream is going away";
+    told.message = "the server of the stream drains";
   } else if (end.code() != 0) {
     told.status = ViolationError(static_cast<absl::StatusCode>(end.code()),
                                  {end.reason(), end.field(), end.value(), end.rule()});
@@ -199,10 +199,10 @@ void ImportedStream::End(const WatchEnd& end) {
   if (ended_) return;
   ended_ = true;
   broadcaster_->End(end);
-  TellWaiting(NoSuchStream(stream_.name()));
+  AnswerWaiting(NoSuchStream(stream_.name()));
 }
 
-// Without an answer to what is fetched. The end may be known already.
+// Ends the import without waiting for pending fetches. The end may already be known.
 void ImportedStream::Lost(const WatchEnd& otherwise, Clock::time_point now) {
   if (ended_) return;
   if (end_) FetchEnded(end_->last_number(), now);
@@ -212,10 +212,10 @@ void ImportedStream::Lost(const WatchEnd& otherwise, Clock::time_point now) {
 void ImportedStream::Fail(const absl::Status& status) {
   ended_ = true;
   broadcaster_->End({std::string(kReasonProducerLost), "its replica cannot be reached", {}});
-  TellWaiting(status);
+  AnswerWaiting(status);
 }
 
-void ImportedStream::TellWaiting(const absl::Status& status) {
+void ImportedStream::AnswerWaiting(const absl::Status& status) {
   for (const Ready& ready : std::exchange(await_, {})) ready(status);
 }
 

@@ -48,9 +48,9 @@ class ImportedStream {
   bool Covers(std::optional<std::uint64_t> from_sequence, Clock::time_point now) const;
   void Await(Ready ready);
 
-  void Came(relay::v1::Result& result, Clock::time_point now);
-  void Came(const relay::v1::FetchEnd& end, Clock::time_point now);
-  void Came(const relay::v1::StreamEnd& end, Clock::time_point now);
+  void OnMessage(relay::v1::Result& result, Clock::time_point now);
+  void OnMessage(const relay::v1::FetchEnd& end, Clock::time_point now);
+  void OnMessage(const relay::v1::StreamEnd& end, Clock::time_point now);
   /// Fetches results and the end that may have been lost.
   void FetchAgain(Clock::time_point now);
   /// The replica does not respond any more. Ends with the end that it reported, or with
@@ -59,7 +59,7 @@ class ImportedStream {
   /// Ends the stream.
   void End(const WatchEnd& end);
   /// Fails all pending joins.
-  void Refuse(const absl::Status& status) { TellWaiting(status); }
+  void Refuse(const absl::Status& status) { AnswerWaiting(status); }
   /// Called periodically.
   void Tick(Clock::time_point now, bool connected);
 
@@ -71,7 +71,7 @@ class ImportedStream {
   void DeliverUpTo(std::uint64_t number);
   void DeliverWaiting(Clock::time_point now);
   void Fail(const absl::Status& status);
-  void TellWaiting(const absl::Status& status);
+  void AnswerWaiting(const absl::Status& status);
   void SetOldest(std::uint64_t sequence);
 
   const RemoteStream stream_;

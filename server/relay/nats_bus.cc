@@ -22,7 +22,7 @@ constexpr std::int64_t kWriteDeadlineMs = 2000;
 constexpr std::int64_t kPingIntervalMs = 2000;
 constexpr int kMaxPingsOut = 2;
 constexpr std::int64_t kFlushMs = 1000;
-// Most pending bytes of a subscription. Beyond it messages are lost.
+// Limits of the pending messages of a subscription. Further messages are lost.
 constexpr int kPendingMessages = 65'536, kPendingBytes = 64 << 20;
 
 struct Deleter {

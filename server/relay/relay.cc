@@ -110,7 +110,7 @@ void Relay::Run() {
   for (Queue::Work work; queue_->Take(patience(), work); work = {}) {
     for (const auto& action : work.actions) action();
     for (const std::string& piece : work.messages[Queue::kNews]) Take(piece);
-    for (const std::string& piece : work.messages[Queue::kAsked]) TakeAsked(piece);
+    for (const std::string& piece : work.messages[Queue::kAsked]) OnAskedPiece(piece);
     const auto now = Clock::now();
     if (work.actions.empty() || now - answered_ >= kAnswerEvery) AnswerNextFetch(now);
     if (std::exchange(was_asked_, false)) Announce(now, false, false);
@@ -147,14 +147,14 @@ void Relay::CheckConnection(Clock::time_point now) {
     for (auto& [id, exported] : exports_) exported->WantedUntil(now + kExportLease);
   } else if (!is_connected && connected_) {
     disconnected_ = now;
-    told_away_ = true;
+    loss_logged_ = true;
     LogEvent(spdlog::level::warn,
              "NATS lost: streams of other replicas stand still for their watchers here, streams of "
              "this one for those elsewhere",
              {});
   }
-  if (!is_connected && !told_away_ && now - began_ > kFirstConnection) {
-    told_away_ = true;
+  if (!is_connected && !loss_logged_ && now - began_ > kFirstConnection) {
+    loss_logged_ = true;
     LogEvent(spdlog::level::warn,
              "NATS cannot be reached yet: only streams of this replica can be "
              "watched here",
@@ -292,7 +292,7 @@ void Relay::Lost(const std::string& replica) {
   for (Import& import : imports_) {
     if (import.stream->stream().replica != replica) continue;
     import.stream->Lost(
-        {std::string(kReasonProducerLost), "the server that had the stream is gone", {}},
+        {std::string(kReasonProducerLost), "the server of the stream was lost", {}},
         Clock::now());
   }
 }
@@ -314,13 +314,14 @@ void Relay::Take(const std::string& piece) {
       return Take(message.replica(), message.announcement());
     case Message::kFetchEnd:
       return tell(message.fetch_end().stream_id(),
-                  [&](ImportedStream& stream) { stream.Came(message.fetch_end(), now); });
+                  [&](ImportedStream& stream) { stream.OnMessage(message.fetch_end(), now); });
     case Message::kResult:
-      return tell(message.result().stream_id(),
-                  [&](ImportedStream& stream) { stream.Came(*message.mutable_result(), now); });
+      return tell(message.result().stream_id(), [&](ImportedStream& stream) {
+        stream.OnMessage(*message.mutable_result(), now);
+      });
     case Message::kStreamEnd:
       return tell(message.stream_end().stream_id(),
-                  [&](ImportedStream& stream) { stream.Came(message.stream_end(), now); });
+                  [&](ImportedStream& stream) { stream.OnMessage(message.stream_end(), now); });
     case Message::kFetch:  // TakeAsked.
     case Message::MESSAGE_NOT_SET:
       break;
@@ -341,8 +342,8 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
   was_asked_ = true;
 }
 
-// The export is wanted from now on, whenever the fetch is answered.
-void Relay::TakeAsked(const std::string& piece) {
+// The export stays active from now on, independent of the response to the fetch.
+void Relay::OnAskedPiece(const std::string& piece) {
   const auto whole = asked_joiner_.Add(piece);
   relay::v1::RelayMessage message;
   if (!whole || !message.ParseFromString(*whole) || !message.has_fetch() ||

@@ -126,7 +126,7 @@ class Relay final : private RelayPort {
   void Lost(const std::string& replica);
   void Take(const std::string& piece);
   void Take(const std::string& replica, const relay::v1::Announcement& announcement);
-  void TakeAsked(const std::string& piece);
+  void OnAskedPiece(const std::string& piece);
   void AnswerNextFetch(Clock::time_point now);
   void Answer(const std::string& replica, const relay::v1::Fetch& fetch);
   bool TryFind(const Search& search, Clock::time_point now);
@@ -156,9 +156,9 @@ class Relay final : private RelayPort {
   std::vector<Import> imports_;
   std::vector<Search> searches_;
   std::uint64_t local_changes_ = 0;
-  bool told_away_ = false;  // The log has the loss of the connection.
-  bool changed_ = false;    // The set of streams has changed, here or at another replica.
-  bool was_asked_ = false;  // Another replica has requested an announcement.
+  bool loss_logged_ = false;  // The loss of the connection is logged.
+  bool changed_ = false;      // The set of streams has changed, here or at another replica.
+  bool was_asked_ = false;    // Another replica has requested an announcement.
   bool will_drain_ = false;
   const Clock::time_point began_ = Clock::now();
   Clock::time_point announced_, asked_, ticked_, answered_, disconnected_ = began_;

@@ -24,9 +24,8 @@ struct RemoteStream {
   const std::string& name() const { return stream.summary().stream_name(); }
 };
 
-/// Thread-safe. If two replicas announce one stream, because it was resumed and the former replica
-/// has not given it up yet, the directory lists the one that was opened later by the clocks of
-/// both.
+/// Thread-safe. A stream may be announced by two replicas: it was resumed, and the former replica
+/// still holds it. The directory then lists the one that was opened later by the clocks of both.
 class StreamDirectory {
  public:
   using Clock = std::chrono::steady_clock;
@@ -40,7 +39,7 @@ class StreamDirectory {
   /// Treats all replicas as announced at `now`, after a disconnection of the bus.
   void Refresh(Clock::time_point now);
 
-  /// At most `count` distinct addresses of replicas that do not drain.
+  /// At most `count` distinct addresses. Draining replicas are left out.
   std::vector<std::string> Addresses(std::size_t count) const;
 
   /// Whether every known replica has announced its streams since `since`.

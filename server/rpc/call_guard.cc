@@ -22,8 +22,11 @@ using grpc::experimental::ServerRpcInfo;
 // Ends a refused call before its method has read anything.
 class Guard final : public Interceptor {
  public:
-  Guard(const Authentication& authentication, grpc::ServerContextBase& context)
-      : authentication_(authentication), context_(context) {}
+  Guard(const Authentication& authentication, const ConnectionTable& connections,
+        grpc::ServerContextBase& context)
+      : authentication_(authentication),
+        context_(context),
+        tally_(connections.BeginCall(context.peer(), CallKind::kOther)) {}
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
@@ -41,11 +44,13 @@ class Guard final : public Interceptor {
  private:
   const Authentication& authentication_;
   grpc::ServerContextBase& context_;
+  const CallTally tally_;
 };
 
 class GuardFactory final : public ServerInterceptorFactoryInterface {
  public:
-  explicit GuardFactory(const Authentication& authentication) : authentication_(authentication) {}
+  GuardFactory(const Authentication& authentication, const ConnectionTable& connections)
+      : authentication_(authentication), connections_(connections) {}
 
   Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
     const std::string_view method = call->method();
@@ -53,18 +58,19 @@ class GuardFactory final : public ServerInterceptorFactoryInterface {
         method.starts_with("/" + ServiceName() + "/")) {
       return nullptr;
     }
-    return new Guard(authentication_, *call->server_context());
+    return new Guard(authentication_, connections_, *call->server_context());
   }
 
  private:
   const Authentication& authentication_;
+  const ConnectionTable& connections_;
 };
 
 }  // namespace
 
 std::unique_ptr<ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(
-    const Authentication& authentication) {
-  return std::make_unique<GuardFactory>(authentication);
+    const Authentication& authentication, const ConnectionTable& connections) {
+  return std::make_unique<GuardFactory>(authentication, connections);
 }
 
 }  // namespace partiemc::server

@@ -1,18 +1,19 @@
-// Lets calls of services that are not ours in, or refuses them.
+// Counts calls of services that are not ours for their connections, and admits or refuses them.
 #pragma once
 
 #include <grpcpp/support/server_interceptor.h>
 
 #include <memory>
 
+#include "server/connections/connection_table.h"
 #include "server/security/authentication.h"
 
 namespace partiemc::server {
 
-/// For services that are not ours (reflection): ends calls that Authentication refuses with
-/// UNAUTHENTICATED. Health checks come in without a token, as probes have none. `authentication`
-/// outlives the server.
+/// For services that are not ours (reflection): counts each call for its connection, and ends calls
+/// that Authentication refuses with UNAUTHENTICATED. Health checks need no token. The arguments
+/// outlive the server.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(
-    const Authentication& authentication);
+    const Authentication& authentication, const ConnectionTable& connections);
 
 }  // namespace partiemc::server

@@ -6,8 +6,24 @@
 
 namespace partiemc::server {
 
-GrpcCall::GrpcCall(grpc::CallbackServerContext& context, const Make& make)
-    : context_(context), call_(make(*this, OriginOf(context))) {}
+GrpcCall::GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections,
+                   CallKind kind, const Make& make)
+    : context_(context),
+      tally_(connections.BeginCall(context.peer(), kind)),
+      call_(make(*this, OriginOf(context))) {}
+
+void GrpcCall::StartRead(grpc::ByteBuffer* message) {
+  tally_.OnReadBegun();
+  message_ = message;
+  Reactor::StartRead(message);
+}
+
+void GrpcCall::OnReadDone(bool ok) {
+  // A read that fails may leave a part of a message on the way, or one that is too large. It stays
+  // open in the tally, which allows those bytes.
+  if (ok) tally_.OnReadDone(message_->Length());
+  call_->OnReadDone(ok);
+}
 
 void GrpcCall::OnDone() {
   call_->OnDone();

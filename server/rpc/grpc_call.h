@@ -5,6 +5,7 @@
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -13,6 +14,7 @@
 #include "server/calls/admission.h"
 #include "server/calls/byte_call.h"
 #include "server/calls/call_channel.h"
+#include "server/connections/connection_table.h"
 
 namespace partiemc::server {
 
@@ -22,9 +24,11 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
  public:
   using Make = std::function<std::unique_ptr<ByteCall>(CallChannel&, const CallOrigin&)>;
 
-  GrpcCall(grpc::CallbackServerContext& context, const Make& make);
+  /// Counts for its connection in `connections`, which lives longer.
+  GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections, CallKind kind,
+           const Make& make);
 
-  void OnReadDone(bool ok) override { call_->OnReadDone(ok); }
+  void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override { call_->OnWriteDone(ok); }
   void OnCancel() override { call_->OnCancel(); }
   void OnDone() override;
@@ -32,7 +36,7 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
  private:
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
 
-  void StartRead(grpc::ByteBuffer* message) override { Reactor::StartRead(message); }
+  void StartRead(grpc::ByteBuffer* message) override;
   void StartWrite(const grpc::ByteBuffer* message) override { Reactor::StartWrite(message); }
   void Cancel() override { context_.TryCancel(); }
   void Finish(const absl::Status& status) override;
@@ -40,6 +44,8 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
   std::string peer() const override { return context_.peer(); }
 
   grpc::CallbackServerContext& context_;
+  CallTally tally_;
+  grpc::ByteBuffer* message_ = nullptr;  // Of the read that goes on.
   // gRPC calls nothing before the constructor has returned.
   std::unique_ptr<ByteCall> call_;
 };

@@ -34,14 +34,17 @@ absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
 }  // namespace
 
 HealthService::HealthService(const Authentication& authentication, OpeningCalls& opening,
-                             UnaryRegistry& calls, MemoryBudget& budget) {
+                             UnaryRegistry& calls, MemoryBudget& budget,
+                             const ConnectionTable& connections) {
   Serve("/grpc.health.v1.Health/Check", [&, this](grpc::CallbackServerContext* context) {
-    return new GrpcCall(*context, [&, this](CallChannel& channel, const CallOrigin& origin) {
-      return std::make_unique<UnaryCall>(
-          channel, /*meters=*/nullptr, AdmitAnybody(authentication, origin),
-          UnaryKind::kInformation, opening, calls, budget, /*pool=*/nullptr,
-          [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
-    });
+    return new GrpcCall(
+        *context, connections, CallKind::kHealthCheck,
+        [&, this](CallChannel& channel, const CallOrigin& origin) {
+          return std::make_unique<UnaryCall>(
+              channel, /*meters=*/nullptr, AdmitProbe(authentication, origin),
+              UnaryKind::kProbe, opening, calls, budget, /*pool=*/nullptr,
+              [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
+        });
   });
 }
 

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "server/compute/memory_budget.h"
+#include "server/connections/connection_table.h"
 #include "server/rpc/byte_service.h"
 #include "server/security/authentication.h"
 #include "server/stream/opening_calls.h"
@@ -19,7 +20,7 @@ class HealthService final : public ByteService {
  public:
   /// The arguments outlive the service.
   HealthService(const Authentication& authentication, OpeningCalls& opening, UnaryRegistry& calls,
-                MemoryBudget& budget);
+                MemoryBudget& budget, const ConnectionTable& connections);
 
   void SetServing(bool serving) { serving_ = serving; }
 

@@ -7,13 +7,14 @@
 
 namespace partiemc::server {
 
-Service::Service(const Methods& methods) {
+Service::Service(const Methods& methods, const ConnectionTable& connections) {
   for (const Methods::Method method : Methods::kAll) {
     Serve("/" + ServiceName() + "/" + std::string(Methods::Name(method)),
-          [&methods, method](grpc::CallbackServerContext* context) {
-            return new GrpcCall(*context, [&](CallChannel& channel, const CallOrigin& origin) {
-              return methods.Begin(method, channel, origin);
-            });
+          [&methods, &connections, method](grpc::CallbackServerContext* context) {
+            return new GrpcCall(*context, connections, CallKind::kOther,
+                                [&](CallChannel& channel, const CallOrigin& origin) {
+                                  return methods.Begin(method, channel, origin);
+                                });
           });
   }
 }

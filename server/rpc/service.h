@@ -2,14 +2,15 @@
 #pragma once
 
 #include "server/calls/methods.h"
+#include "server/connections/connection_table.h"
 #include "server/rpc/byte_service.h"
 
 namespace partiemc::server {
 
 class Service final : public ByteService {
  public:
-  /// `methods` outlives the service.
-  explicit Service(const Methods& methods);
+  /// The arguments outlive the service.
+  Service(const Methods& methods, const ConnectionTable& connections);
 };
 
 }  // namespace partiemc::server

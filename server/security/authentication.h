@@ -24,7 +24,7 @@ inline constexpr std::string_view kReasonTokenUnknown = "TOKEN_UNKNOWN";
 /// Thread-safe.
 class Authentication {
  public:
-  /// `quota` is that of a peer without a token, and of a token what its terms leave open.
+  /// `quota` applies to peers without a token, and to tokens whose terms set no value.
   explicit Authentication(CallerQuota quota = {}) : quota_(quota), peers_(quota) {}
 
   /// Replaces the tokens. Before the first call no token is required. A token that stays keeps its

@@ -17,6 +17,7 @@ struct Words {
 Words WordsOf(CallerAccount::Kind kind) {
   switch (kind) {
     case CallerAccount::Kind::kCall:
+    case CallerAccount::Kind::kProbe:
       return {kReasonCallerCalls, "caller.calls"};
     case CallerAccount::Kind::kStream:
       return {kReasonCallerStreams, "caller.streams"};
@@ -30,6 +31,7 @@ std::uint32_t LimitOf(const CallerQuota& quota, CallerAccount::Kind kind) {
   constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
   switch (kind) {
     case CallerAccount::Kind::kCall:
+    case CallerAccount::Kind::kProbe:
       return quota.calls.value_or(kNone);
     case CallerAccount::Kind::kStream:
       return quota.streams.value_or(kNone);

@@ -28,7 +28,7 @@ inline constexpr std::string_view kReasonCallerBytes = "CALLER_BYTES";
 /// of this object. Thread-safe.
 class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
  public:
-  enum class Kind { kCall, kStream, kWatcher };
+  enum class Kind { kCall, kStream, kWatcher, kProbe };
 
   /// A counted resource; released at destruction. Keeps the account alive.
   class Place {
@@ -65,7 +65,7 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
   std::uint32_t held(Kind kind) const;
 
  private:
-  static constexpr std::size_t kKinds = 3;
+  static constexpr std::size_t kKinds = 4;
 
   mutable std::mutex mutex_;  // Guards everything below.
   CallerQuota quota_;

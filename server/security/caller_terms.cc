@@ -1,14 +1,14 @@
 #include "server/security/caller_terms.h"
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
+#include "common/text.h"
 #include "server/base/name_pattern.h"
 
 namespace partiemc::server {
@@ -36,13 +36,9 @@ bool Consists(std::string_view text, std::string_view of) {
   });
 }
 
-std::vector<std::string> Split(std::string_view text) {
-  return absl::StrSplit(std::string(text), ',');
-}
-
 bool ReadMay(std::string_view text, CallerTerms& terms) {
   terms.may_produce = terms.may_watch = terms.may_list = false;
-  for (const std::string& word : Split(text)) {
+  for (const std::string_view word : Split(text, ',')) {
     bool* const may = word == "produce" ? &terms.may_produce
                       : word == "watch" ? &terms.may_watch
                       : word == "list"  ? &terms.may_list
@@ -53,7 +49,8 @@ bool ReadMay(std::string_view text, CallerTerms& terms) {
 }
 
 bool ReadNames(std::string_view text, CallerTerms& terms) {
-  terms.names = Split(text);
+  const std::vector<std::string_view> names = Split(text, ',');
+  terms.names.assign(names.begin(), names.end());
   return terms.names.size() <= kMaxPatterns &&
          std::ranges::all_of(terms.names, [](const std::string& pattern) {
            return !pattern.empty() && pattern.size() <= kMaxStreamNameBytes &&
@@ -64,10 +61,8 @@ bool ReadNames(std::string_view text, CallerTerms& terms) {
 // Removes the number from the front of `text`.
 template <typename Number>
 bool ReadNumber(std::string_view& text, std::optional<Number>& number) {
-  const auto [end, error] =
-      std::from_chars(text.data(), text.data() + text.size(), number.emplace());
-  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-  return error == std::errc() && *number > 0;
+  number = ConsumeNumber<Number>(text);
+  return number.value_or(0) > 0;
 }
 
 bool ReadCount(std::string_view text, std::optional<std::uint32_t>& count) {

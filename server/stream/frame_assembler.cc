@@ -29,15 +29,19 @@ absl::Status PartTakenOver() {
                          "must be sent by one call of the stream"});
 }
 
-// "3, 7, 8 and 5 more".
+// "3, 7, 8 and 5 more". `parts` are those from part 1 on.
 template <typename Parts>
-std::string Missing(const Parts& parts) {
+std::string NamesOfMissing(const Parts& parts, bool has_leader) {
   constexpr std::uint32_t kNamed = 8;
   std::string text;
   std::uint32_t missing = 0;
+  const auto name = [&](std::size_t part) {
+    if (++missing > kNamed) return;
+    absl::StrAppend(&text, missing > 1 ? ", " : "", part);
+  };
+  if (!has_leader) name(0);
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (parts[k] != nullptr || ++missing > kNamed) continue;
-    absl::StrAppend(&text, missing > 1 ? ", " : "", k + 1);
+    if (parts[k] == nullptr) name(k + 1);
   }
   if (missing > kNamed) absl::StrAppend(&text, " and ", missing - kNamed, " more");
   return text;
@@ -60,6 +64,7 @@ void FrameAssembler::SetLeader(std::weak_ptr<AssemblyMember> leader) {
 void FrameAssembler::LeaderSent(std::uint64_t sequence) {
   const std::lock_guard lock(mutex_);
   if (sequence < next_ || sequence - next_ >= terms_.window) return;  // A number that is refused.
+  last_of_leader_ = std::max(last_of_leader_, sequence);
   while (!checkpoints_.empty() && sequence >= terms_.window &&
          checkpoints_.front() <= sequence - terms_.window) {
     resume_ = checkpoints_.front() + 1;
@@ -72,7 +77,15 @@ bool FrameAssembler::IsReady(std::uint64_t sequence, Clock::time_point since,
   const std::lock_guard lock(mutex_);
   if (sequence != next_ || now - since >= terms_.timeout) return true;
   const auto found = frames_.find(sequence);
-  return (found == frames_.end() ? 0 : found->second.count) == members_.size();
+  if (found == frames_.end()) return members_.empty();
+  const Gathered& frame = found->second;
+  return frame.is_over || frame.count == members_.size() || now - frame.since >= terms_.timeout;
+}
+
+std::uint64_t FrameAssembler::BytesOfNext() const {
+  const std::lock_guard lock(mutex_);
+  const auto found = frames_.find(next_);
+  return found == frames_.end() ? 0 : found->second.all_bytes;
 }
 
 absl::StatusOr<std::vector<std::shared_ptr<const PartBytes>>> FrameAssembler::Take() {
@@ -84,10 +97,15 @@ absl::StatusOr<std::vector<std::shared_ptr<const PartBytes>>> FrameAssembler::Ta
   }
   frame.parts.resize(members_.size());
   if (frame.count == members_.size()) return std::move(frame.parts);
+  return Missing(frame, !frame.is_over);
+}
+
+absl::Status FrameAssembler::Missing(const Gathered& frame, bool has_leader) const {
   return ViolationError(
       absl::StatusCode::kDeadlineExceeded,
-      {std::string(kReasonPartsMissing), "parts", Missing(frame.parts),
-       absl::StrCat("must come within ", terms_.timeout.count(), " ms of part 0")});
+      {std::string(kReasonPartsMissing), "parts", NamesOfMissing(frame.parts, has_leader),
+       absl::StrCat("must come within ", terms_.timeout.count(),
+                    " ms of the first part of their frame")});
 }
 
 void FrameAssembler::Answered(std::uint64_t next_sequence, bool with_checkpoint) {
@@ -146,7 +164,7 @@ absl::StatusOr<FrameAssembler::Seat> FrameAssembler::Join(std::uint32_t part,
   {
     const std::lock_guard lock(mutex_);
     if (ended_) return LeaderGone();
-    Withdraw(part);
+    DropAll(part);
     Member& place = members_[part - 1];
     former = std::exchange(place.call, std::move(member));
     seat.holder = place.holder = ++holders_;
@@ -159,16 +177,26 @@ void FrameAssembler::Leave(const Seat& seat) {
   const std::lock_guard lock(mutex_);
   if (seat.holder == 0 || members_[seat.part - 1].holder != seat.holder) return;
   members_[seat.part - 1] = {};
-  Withdraw(seat.part);
+  DropAll(seat.part);
 }
 
 // The bytes stay with their call, so that little is freed under the lock.
-void FrameAssembler::Withdraw(std::uint32_t part) {
-  for (auto& [sequence, frame] : frames_) {
-    if (frame.parts[part - 1] == nullptr) continue;
-    frame.parts[part - 1] = nullptr;
-    frame.all_bytes -= std::exchange(frame.bytes[part - 1], 0);
-    --frame.count;
+void FrameAssembler::Drop(Gathered& frame, std::uint32_t part) {
+  if (frame.parts[part - 1] == nullptr) return;
+  frame.parts[part - 1] = nullptr;
+  frame.all_bytes -= std::exchange(frame.bytes[part - 1], 0);
+  --frame.count;
+}
+
+void FrameAssembler::DropAll(std::uint32_t part) {
+  for (auto& [sequence, frame] : frames_) Drop(frame, part);
+}
+
+void FrameAssembler::Withdraw(const Seat& seat, std::uint64_t sequence) {
+  const std::lock_guard lock(mutex_);
+  if (members_[seat.part - 1].holder != seat.holder) return;
+  if (const auto found = frames_.find(sequence); found != frames_.end()) {
+    Drop(found->second, seat.part);
   }
 }
 
@@ -185,6 +213,10 @@ absl::Status FrameAssembler::CheckOffer(std::uint32_t part, std::uint64_t sequen
   }
   const auto found = frames_.find(sequence);
   const bool begun = found != frames_.end();
+  if (begun && found->second.is_over) {
+    return RefusedPart(kReasonPartLate, "sequence", absl::StrCat(sequence),
+                       "must be that of another frame; part 0 has not come in time for this one");
+  }
   if (begun && found->second.parts[part - 1] != nullptr) {
     return RefusedPart(kReasonPartDuplicate, "sequence", absl::StrCat(sequence),
                        absl::StrCat("must be sent once by part ", part, "; the first one counts"));
@@ -199,7 +231,7 @@ absl::Status FrameAssembler::CheckOffer(std::uint32_t part, std::uint64_t sequen
 }
 
 absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std::uint64_t bytes,
-                                   std::shared_ptr<const PartBytes> part) {
+                                   std::shared_ptr<const PartBytes> part, Clock::time_point now) {
   std::shared_ptr<AssemblyMember> leader;
   {
     const std::lock_guard lock(mutex_);
@@ -207,7 +239,7 @@ absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std
       return absl::CancelledError("the call sends no part any more");
     }
     if (auto status = CheckOffer(seat.part, sequence, bytes); !status.ok()) return status;
-    Gathered& frame = frames_[sequence];
+    Gathered& frame = frames_.try_emplace(sequence, Gathered{.since = now}).first->second;
     frame.parts.resize(members_.size());
     frame.bytes.resize(members_.size());
     frame.parts[seat.part - 1] = std::move(part);
@@ -219,14 +251,26 @@ absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std
   return absl::OkStatus();
 }
 
-bool FrameAssembler::IsOver(std::uint64_t sequence) const {
+bool FrameAssembler::IsOver(std::uint64_t sequence, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
-  return ended_ || sequence < next_;
+  if (ended_ || sequence < next_) return true;
+  const auto found = frames_.find(sequence);
+  if (found == frames_.end()) return false;  // It is being computed.
+  Gathered& frame = found->second;
+  const bool has_leader = sequence <= last_of_leader_;
+  if (!frame.is_over && !has_leader && now - frame.since >= terms_.timeout) {
+    for (std::uint32_t part = 1; part <= members_.size(); ++part) Drop(frame, part);
+    frame.is_over = true;
+  }
+  return frame.is_over;
 }
 
 absl::Status FrameAssembler::OutcomeOf(std::uint64_t sequence) const {
   const std::lock_guard lock(mutex_);
   if (sequence < next_) return absl::OkStatus();
+  if (const auto found = frames_.find(sequence); found != frames_.end() && found->second.is_over) {
+    return Missing(found->second, false);
+  }
   return RefusedPart(kReasonPartLate, "sequence", absl::StrCat(sequence),
                      absl::StrCat("must be below ", next_, "; part 0 has ended the stream"));
 }

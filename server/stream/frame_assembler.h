@@ -54,7 +54,7 @@ class FrameAssembler {
     std::uint32_t parts = 1;
     std::size_t window = 1;                ///< Frames from the next to be answered on.
     std::uint64_t max_frame_bytes = 0;     ///< Of all parts of a frame but part 0.
-    std::chrono::milliseconds timeout{0};  ///< From the coming of part 0.
+    std::chrono::milliseconds timeout{0};  ///< From the first part that has come, 0 or another.
     bool has_checkpoints = false;          ///< Answers may bring them.
     std::uint64_t next_sequence = 1;       ///< Of the first frame.
   };
@@ -74,8 +74,11 @@ class FrameAssembler {
   /// out of the window say nothing.
   void LeaderSent(std::uint64_t sequence);
   /// Whether frame `sequence`, whose part 0 came at `since`, can be answered at `now`: all parts
-  /// are there, or it is too late for them, or it is not the next one.
+  /// are there, or it is too late for them, or it is not the next one. The timeout begins with the
+  /// first part that came.
   bool IsReady(std::uint64_t sequence, Clock::time_point since, Clock::time_point now) const;
+  /// What parts 1 and on of the next frame hold.
+  std::uint64_t BytesOfNext() const;
   /// Parts 1 and on of the next frame, which from now on is over: its parts come too late.
   /// Errors: DEADLINE_EXCEEDED (PARTS_MISSING) with the first few that have not come.
   absl::StatusOr<std::vector<std::shared_ptr<const PartBytes>>> Take();
@@ -96,15 +99,20 @@ class FrameAssembler {
   absl::StatusOr<Seat> Join(std::uint32_t part, std::weak_ptr<AssemblyMember> member);
   /// The call has ended: its parts that are not taken yet are gone. Another holder's stay.
   void Leave(const Seat& seat);
-  /// Keeps a part of frame `sequence`. Errors, each with a Violation, which leave all as it was:
-  /// PART_LATE, PART_DUPLICATE, PART_AHEAD, FRAME_BYTES; CANCELLED, without, for a call that has
-  /// left.
+  /// Keeps a part of frame `sequence`, which came at `now`. Errors, each with a Violation, which
+  /// leave all as it was: PART_LATE, PART_DUPLICATE, PART_AHEAD, FRAME_BYTES; CANCELLED, without,
+  /// for a call that has left.
   absl::Status Offer(const Seat& seat, std::uint64_t sequence, std::uint64_t bytes,
-                     std::shared_ptr<const PartBytes> part);
-  /// Whether a part of frame `sequence` waits for nothing any more.
-  bool IsOver(std::uint64_t sequence) const;
-  /// OK where the frame of a part that was taken was answered. Errors: PART_LATE where part 0 has
-  /// ended without it.
+                     std::shared_ptr<const PartBytes> part, Clock::time_point now);
+  /// Drops a part that was offered, unless it is taken already.
+  void Withdraw(const Seat& seat, std::uint64_t sequence);
+  /// Whether a part of frame `sequence` waits for nothing any more. If part 0 has not come within
+  /// the timeout after the first part, the frame is over at `now`: its parts are dropped, and
+  /// part 0 comes too late.
+  bool IsOver(std::uint64_t sequence, Clock::time_point now);
+  /// OK where the frame of a part that was taken was answered. Errors: DEADLINE_EXCEEDED
+  /// (PARTS_MISSING) where part 0 has not come in time, PART_LATE where it has ended without the
+  /// frame.
   absl::Status OutcomeOf(std::uint64_t sequence) const;
 
   /// The first frame whose parts are still wanted.
@@ -112,6 +120,7 @@ class FrameAssembler {
   /// Frames below it are never wanted again, also where part 0 is resumed.
   std::uint64_t resume_sequence() const;
   std::uint32_t parts() const { return terms_.parts; }
+  std::chrono::milliseconds timeout() const { return terms_.timeout; }
 
  private:
   struct Gathered {
@@ -119,6 +128,8 @@ class FrameAssembler {
     std::vector<std::uint64_t> bytes;                     // Of each.
     std::uint64_t all_bytes = 0;
     std::uint32_t count = 0;
+    Clock::time_point since;  // The first part came.
+    bool is_over = false;     // Part 0 has not come in time: the parts are gone.
   };
   struct Member {
     std::uint64_t holder = 0;  // 0: nobody.
@@ -127,7 +138,9 @@ class FrameAssembler {
 
   // With the lock held:
   absl::Status CheckOffer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes) const;
-  void Withdraw(std::uint32_t part);
+  static void Drop(Gathered& frame, std::uint32_t part);
+  void DropAll(std::uint32_t part);
+  absl::Status Missing(const Gathered& frame, bool has_leader) const;
   std::vector<std::weak_ptr<AssemblyMember>> Calls() const;
 
   const Terms terms_;
@@ -138,6 +151,7 @@ class FrameAssembler {
   std::uint64_t holders_ = 0;
   std::map<std::uint64_t, Gathered> frames_;  // By sequence, from wanted_ on.
   std::uint64_t next_;                        // To be answered.
+  std::uint64_t last_of_leader_ = 0;          // The last frame whose part 0 has come.
   std::uint64_t wanted_;                      // The first that is not taken: next_, or one more.
   std::deque<std::uint64_t> checkpoints_;     // Sent, perhaps not received.
   std::uint64_t resume_;

@@ -12,11 +12,10 @@
 
 namespace partiemc::server {
 
-/// At the worst, requests, answers, the buffers of compute threads and the histories of streams
-/// hold `memory_budget`, and one frame for each stream. Outside of it each thread has 16 MiB for
-/// its buffers, and may take up to 500 bytes for each particle of a frame where the budget is used
-/// up (worker_memory.h): 50 are usual. A frame whose tiles need more than that is refused unless
-/// the budget has room for them.
+/// At the worst, requests, answers, the buffers of compute threads and histories hold
+/// `memory_budget`, the frames of a few streams (ReadBytesBeyond) and what one frame is computed
+/// with (WorkerBytesBeyond). Outside of it each thread has 16 MiB for its buffers. MemoryPlan adds
+/// it up.
 struct ServerLimits {
   /// Of one frame. More suits larger simulations; memory grows with it as said above.
   FrameLimits frame{.max_particles = 4'000'000, .max_tiles = 131'072};
@@ -46,8 +45,30 @@ struct ServerLimits {
   std::uint32_t frames_in_flight = 4;
 
   /// Bytes that requests, answers, compute threads and histories hold together. While it is used
-  /// up, a stream is read from only when nothing of it is in flight. More suits many large streams.
+  /// up, a stream is read from only when nothing of it is in flight and it has a slot for a frame
+  /// beyond the budget. More suits many large streams.
   std::uint64_t memory_budget = std::uint64_t{1} << 30;
+
+  /// Streams that may have a frame beyond the budget at the same time, at least 1.
+  std::uint32_t streams_beyond_budget = 2;
+
+  /// What those frames hold: one message a stream. Frames in parts can hold two, as part 0 counts
+  /// apart from the others.
+  std::uint64_t ReadBytesBeyond() const {
+    return streams_beyond_budget * (max_parts > 0 ? 2 : 1) * MaxMessageBytes();
+  }
+  /// What one worker at a time may hold beyond the budget: the buffers for a compact body of the
+  /// most particles that a frame has.
+  std::uint64_t WorkerBytesBeyond() const {
+    const std::uint64_t most =
+        std::min<std::uint64_t>(frame.max_particles, max_frame_bytes / kLeastBytesOfParticle);
+    return kBytesOfCompactParticle * most;
+  }
+  /// Two float32.
+  static constexpr std::uint64_t kLeastBytesOfParticle = 8;
+  /// With all that a frame is computed with (core/src/workspace_bytes.h): 60 bytes, and its part of
+  /// the tiles.
+  static constexpr std::uint64_t kBytesOfCompactParticle = 80;
 
   /// Results of one stream that watchers can go back to, with 512 bytes for each of them; 0: none.
   std::uint64_t history_bytes = std::uint64_t{64} << 20;

@@ -20,9 +20,16 @@ MemoryPlan::MemoryPlan(const ServerLimits& limits, unsigned threads)
           {threads * kWorkerBytes, absl::StrFormat("%d compute threads (--threads)", threads)},
           {limits.AllHistoryBytes(), "results for who goes back (--history-bytes, --max-streams)"},
           {limits.FrameBudget(), "requests and answers (the rest of --memory-budget)"},
-          {limits.FrameBudget() / kPartsOfBudgetBeyond, "a frame of each stream beyond that"},
+          {limits.ReadBytesBeyond(),
+           absl::StrFormat("frames of %d streams beyond that (--streams-beyond-budget, "
+                           "--max-frame-bytes, --max-parts)",
+                           limits.streams_beyond_budget)},
+          {limits.WorkerBytesBeyond(),
+           "computing one frame beyond that (--max-particles, --max-frame-bytes)"},
           {limits.FrameBudget() / kPartsOfBudgetBeyond, "results that watchers have not taken"},
-          {kOnTheirWayBytes, "messages on their way"}} {}
+          {kOnTheirWayBytes, "messages on their way"},
+          {(std::uint64_t{limits.max_streams} + limits.max_parts) * kUnreadBytes,
+           "what streams have sent before they are read from (--max-streams, --max-parts)"}} {}
 
 std::uint64_t MemoryPlan::bytes() const {
   std::uint64_t bytes = 0;

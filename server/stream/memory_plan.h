@@ -15,9 +15,8 @@ struct MemoryPlan {
     std::string what;  ///< And which flag decides on it.
   };
 
-  /// `threads` that compute. As IntakeGuard holds the process to it: beyond it callers are refused,
-  /// but for a frame that is larger than what is left, and the tiles of drops that lie far apart
-  /// (worker_memory.h).
+  /// `threads` that compute. ReadPermits and WorkerMemory keep what is counted within it,
+  /// IntakeGuard the process.
   MemoryPlan(const ServerLimits& limits, unsigned threads);
 
   std::uint64_t bytes() const;
@@ -27,8 +26,10 @@ struct MemoryPlan {
   std::vector<Part> parts;
 };
 
-/// Of what streams may have in flight, and apart from that watchers may not have taken, so much
-/// more than is planned turns nobody away: one of so many parts of the budget.
+/// What a call may send before it is read, in its connection.
+inline constexpr std::uint64_t kUnreadBytes = 256 << 10;
+
+/// Results that watchers have not taken refuse no caller up to one of so many parts of the budget.
 inline constexpr std::uint64_t kPartsOfBudgetBeyond = 16;
 
 }  // namespace partiemc::server

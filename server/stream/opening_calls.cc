@@ -95,13 +95,18 @@ void OpeningCalls::GiveWayToAll() { HalfGivesWay(opening_, TooManyOpening(kMoreT
 
 void OpeningCalls::WatchersGiveWay() { HalfGivesWay(watchers_, TooManyWatchers()); }
 
-bool OpeningCalls::WaitForOne() {
+bool OpeningCalls::WaitForOne(const std::function<bool()>& also) {
   std::unique_lock lock(mutex_);
   waits_for_one_ = true;
-  one_came_.wait(lock,
-                 [this] { return stopped_ || opening_.count() > 0 || watchers_.count() > 0; });
+  one_came_.wait(
+      lock, [&] { return stopped_ || opening_.count() > 0 || watchers_.count() > 0 || also(); });
   waits_for_one_ = false;
   return !stopped_;
+}
+
+void OpeningCalls::LookAgain() {
+  const std::lock_guard lock(mutex_);
+  if (waits_for_one_) one_came_.notify_one();
 }
 
 void OpeningCalls::StopWaiting() {

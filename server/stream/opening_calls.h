@@ -97,8 +97,11 @@ class OpeningCalls {
   /// The same for the watchers.
   void WatchersGiveWay();
 
-  /// Returns true as soon as there is one, false from StopWaiting on. For one thread.
-  bool WaitForOne();
+  /// Returns true as soon as there is one, or `also` returns true; false from StopWaiting on. For
+  /// one thread.
+  bool WaitForOne(const std::function<bool()>& also = [] { return false; });
+  /// What `also` depends on has changed.
+  void LookAgain();
   void StopWaiting();
 
   /// Without the watchers.

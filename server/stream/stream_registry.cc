@@ -196,6 +196,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
     const std::lock_guard lock(mutex_);
     if (auto status = CheckPart(stream->description, terms); !status.ok()) return status;
     entries_.at(&machine).sends_part = true;
+    if (tell_earlier_look_) tell_earlier_look_();
   }
   // Without the lock: a call that had the part leaves.
   const auto& assembler = stream->description.assembler;

@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 
 namespace partiemc::server {
@@ -28,14 +27,13 @@ std::string Name(RequestKind kind) {
 
 constexpr std::chrono::milliseconds kLookWhileOpening(100);
 
-absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
-
 }  // namespace
 
 StreamStateMachine::StreamStateMachine(StreamTransport& transport, StreamHandler& handler,
                                        ComputePool& pool, MemoryBudget& budget, std::size_t window,
                                        std::shared_ptr<const CallerAccount> caller)
-    : transport_(transport),
+    : SerializedCall(MachineKind::kStream),
+      transport_(transport),
       handler_(handler),
       pool_(pool),
       budget_(budget),
@@ -43,45 +41,30 @@ StreamStateMachine::StreamStateMachine(StreamTransport& transport, StreamHandler
       window_(std::max<std::size_t>(window, 1)),
       slot_bytes_(window_) {}
 
-// Lets something happen to the state and does what follows from it.
-template <typename Event>
-void StreamStateMachine::On(Event event) {
-  Actions actions;
-  {
-    const std::lock_guard lock(mutex_);
-    event();
-    actions = Decide();
-  }
-  Perform(std::move(actions));
-}
-
 void StreamStateMachine::Start(absl::Status admission) {
-  On([&] {
-    if (!admission.ok()) End(std::move(admission));
-  });
+  const Event event(*this);
+  if (!admission.ok()) End(std::move(admission));
 }
 
 void StreamStateMachine::ReadDone(RequestKind kind, std::uint64_t bytes) {
-  bool open = false;
-  On([&] {
-    reading_ = false;
-    counts_.last_activity = std::chrono::steady_clock::now();
-    TakeRequest(kind, bytes);
-    surplus_ += std::exchange(set_aside_, 0);  // Now it is known what there is.
-    open = opening_;
-  });
-  if (!open) return;
-  if (bytes <= kQuickOpenBytes) return Open();
-  pool_.Submit([self = shared_from_this()](Worker&) { self->Open(); }, [] {}, nullptr,
-               caller_.get());
+  const Event event(*this);
+  const bool had_permit = state_.reading == Reading::kNext;
+  state_.reading = Reading::kIdle;
+  counts_.last_activity = std::chrono::steady_clock::now();
+  TakeRequest(kind, bytes);
+  if (!had_permit) return;
+  const absl::Status room = budget_.reads().Came(*this, bytes);
+  const bool is_frame = kind == RequestKind::kFrame && state_.phase == Phase::kServing;
+  if (!room.ok() && is_frame && handler_.DropFrame((read_ - 1) % window_, room)) {
+    SetSlotBytes(read_ - 1, 0);
+  }
 }
 
 void StreamStateMachine::TakeRequest(RequestKind kind, std::uint64_t bytes) {
-  if (phase_ == Phase::kOpening) {
-    opening_ = kind == RequestKind::kOpen;
-    if (opening_) return SetSlotBytes(0, bytes);
+  if (state_.phase == Phase::kOpening) {
+    if (kind == RequestKind::kOpen) return OpenLater(bytes);
     End(ProtocolError(Name(kind), "the first must be `open`"));
-  } else if (phase_ == Phase::kStreaming) {
+  } else if (state_.phase == Phase::kServing) {
     switch (kind) {
       case RequestKind::kFrame:
         last_bytes_ = std::max<std::uint64_t>(bytes, 1);
@@ -98,156 +81,186 @@ void StreamStateMachine::TakeRequest(RequestKind kind, std::uint64_t bytes) {
   }
 }
 
+void StreamStateMachine::OpenLater(std::uint64_t bytes) {
+  state_.computing = Computing::kOpen;
+  SetSlotBytes(0, bytes);
+  if (bytes <= kQuickOpenBytes) return Do([this] { Open(); });
+  Do([this] {
+    pool_.Submit([self = shared_from_this()](Worker&) { self->Open(); }, [] {}, nullptr,
+                 caller_.get());
+  });
+}
+
 void StreamStateMachine::Open() {
   absl::Status status = cancelled_ ? ClientGone() : handler_.Open(0, *this);
-  On([&] {
-    opening_ = false;
-    SetSlotBytes(0, 0);
-    if (!status.ok()) {
-      End(std::move(status));
-    } else if (phase_ == Phase::kOpening) {
-      phase_ = Phase::kStreaming;
-      owes_opened_ = true;
-    }
-  });
+  const Event event(*this);
+  state_.computing = Computing::kIdle;
+  SetSlotBytes(0, 0);
+  if (!status.ok()) {
+    End(std::move(status));
+  } else if (state_.phase == Phase::kOpening) {
+    state_.phase = Phase::kServing;
+    Write(Writing::kOpened);
+  }
 }
 
 void StreamStateMachine::ReadEnded() {
-  On([&] {
-    reading_ = false;
-    End(phase_ == Phase::kOpening ? ProtocolError("none", "the first must be `open`")
-                                  : absl::OkStatus());
-  });
+  const Event event(*this);
+  state_.reading = Reading::kEnded;
+  End(state_.phase == Phase::kOpening ? ProtocolError("none", "the first must be `open`")
+                                      : absl::OkStatus());
 }
 
 void StreamStateMachine::WriteDone(bool ok) {
-  On([&] {
-    writing_ = false;
-    if (in_flight_ == Outgoing::kAnswer) SetSlotBytes(written_++, 0);
-    counts_.last_activity = std::chrono::steady_clock::now();
-    if (!ok) Abandon(ClientGone());
-  });
+  const Event event(*this);
+  const Writing written = std::exchange(state_.writing, Writing::kIdle);
+  if (written == Writing::kResult || written == Writing::kResultThenNotice) {
+    SetSlotBytes(written_++, 0);
+  }
+  counts_.last_activity = std::chrono::steady_clock::now();
+  if (!ok) return Abandon(ClientGone());
+  const bool owes_notice =
+      written == Writing::kOpenedThenNotice || written == Writing::kResultThenNotice;
+  if (owes_notice && state_.phase != Phase::kAbandoned) Write(Writing::kNotice);
 }
 
 void StreamStateMachine::Cancelled() {
-  On([&] { Abandon(ClientGone()); });
+  const Event event(*this);
+  Abandon(ClientGone());
 }
 
 void StreamStateMachine::Granted(std::uint64_t bytes) {
-  On([&] {
-    // What comes after the machine has gone on without it goes back at once.
-    (waiting_ ? set_aside_ : surplus_) += bytes;
-    waiting_ = false;
-  });
+  const Event event(*this);
+  surplus_ += bytes;  // The read plans its memory itself.
+  if (state_.reading == Reading::kMemory) ReadAhead();
+}
+
+void StreamStateMachine::ReadPermitted() {
+  const Event event(*this);
+  if (state_.reading == Reading::kPermit) Read(Reading::kNext);
+}
+
+// The read fails with the stream.
+void StreamStateMachine::ReadRevoked(const absl::Status& status) {
+  const Event event(*this);
+  if (state_.reading == Reading::kNext && state_.phase == Phase::kServing) AbandonAndCut(status);
 }
 
 void StreamStateMachine::TakenOver() {
-  On([&] {
-    // Of one that is over there is nothing to take, and no transport to cut any more.
-    if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
-    Abandon(ViolationError(absl::StatusCode::kAborted, {std::string(kReasonTakenOver), "stream",
-                                                        "resumed by its producer in another call",
-                                                        "must be read where it was resumed"}));
-    owes_cut_ = writing_;  // Whoever takes no answers would keep it from ending.
-  });
+  const Event event(*this);
+  if (state_.phase == Phase::kAbandoned || state_.phase == Phase::kFinished) return;
+  AbandonAndCut(ViolationError(
+      absl::StatusCode::kAborted,
+      {std::string(kReasonTakenOver), "stream", "resumed by its producer in another call",
+       "must be read where it was resumed"}));
 }
 
 void StreamStateMachine::GiveWay(const absl::Status& status) {
-  On([&] {
-    if (phase_ == Phase::kOpening && !opening_) End(status);
-  });
+  const Event event(*this);
+  if (state_.phase == Phase::kOpening && state_.computing == Computing::kIdle) End(status);
 }
 
 void StreamStateMachine::Drain() {
-  On([&] {
-    if (phase_ == Phase::kStreaming) owes_notice_ = true;
-    if (phase_ == Phase::kOpening || phase_ == Phase::kStreaming) waits_for_none_ = true;
-    End(DrainingError());
-  });
+  const Event event(*this);
+  if (state_.phase == Phase::kServing) {
+    switch (state_.writing) {
+      case Writing::kOpened:
+        state_.writing = Writing::kOpenedThenNotice;
+        break;
+      case Writing::kResult:
+        state_.writing = Writing::kResultThenNotice;
+        break;
+      default:
+        Write(Writing::kNotice);
+    }
+  }
+  End(DrainingError(), Phase::kClosing);
 }
 
-void StreamStateMachine::LookAgain() {
-  On([] {});
-}
+void StreamStateMachine::LookAgain() { const Event event(*this); }
 
 void StreamStateMachine::LeftOut(const absl::Status& status) {
-  On([&] {
-    if (!status.ok()) waits_for_none_ = true;
-    if (phase_ == Phase::kOpening || phase_ == Phase::kStreaming) return End(status);
-    if (phase_ == Phase::kEnding && status_.ok()) status_ = status;
-  });
+  const Event event(*this);
+  End(status, status.ok() ? Phase::kEnding : Phase::kClosing);
+  if (status.ok() || state_.phase != Phase::kEnding) return;
+  state_.phase = Phase::kClosing;
+  if (status_.ok()) status_ = status;
 }
 
 TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now) {
+  const Event event(*this);
   TimePoint look_again = TimePoint::max();
-  On([&] {
-    if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
-    // What a handler waits for it knows once it is open, and that may be at any time.
-    const auto every = opening_ ? kLookWhileOpening : handler_.LookEvery();
-    if (every > every.zero()) look_again = now + every;
-    const auto limit = phase_ == Phase::kOpening ? limits.opening : limits.streaming;
-    if (limit <= limit.zero()) {
-      // An opening stream may come under the other limit at any time.
-      if (phase_ == Phase::kOpening && limits.streaming > limit.zero()) {
-        look_again = std::min(look_again, now + limits.streaming);
-      }
-      return;
+  if (state_.phase == Phase::kAbandoned || state_.phase == Phase::kFinished) return look_again;
+  const bool opens = state_.computing == Computing::kOpen;
+  const auto every = opens ? kLookWhileOpening : handler_.LookEvery();
+  if (every > every.zero()) look_again = now + every;
+  const bool is_opening = state_.phase == Phase::kOpening;
+  const auto limit = is_opening ? limits.opening : limits.streaming;
+  if (limit <= limit.zero()) {
+    // An opening stream may come under the other limit at any time.
+    if (is_opening && limits.streaming > limit.zero()) {
+      look_again = std::min(look_again, now + limits.streaming);
     }
-    const bool ours = opening_ || computing_ || computed_ < read_;
-    const TimePoint due = (ours ? now : counts_.last_activity) + limit;
-    if (now < due) {
-      look_again = std::min(look_again, due);
-    } else if (writing_) {
-      Abandon(IdleError("takes no answer", limit));
-      owes_cut_ = true;
-    } else {
-      End(IdleError(phase_ == Phase::kOpening ? "sends no `open`" : "sends no frame", limit));
-    }
-  });
+    return look_again;
+  }
+  const bool waits_for_us = opens || computed_ < read_;
+  const TimePoint due = (waits_for_us ? now : counts_.last_activity) + limit;
+  if (now < due) return std::min(look_again, due);
+  if (state_.writing != Writing::kIdle) {
+    AbandonAndCut(IdleError("takes no answer", limit));
+  } else {
+    End(IdleError(is_opening ? "sends no `open`" : "sends no frame", limit));
+  }
   return look_again;
 }
 
 StreamCounts StreamStateMachine::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 
 void StreamStateMachine::Compute(std::size_t slot, Worker& worker) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (phase_ == Phase::kAbandoned) return;
-  }
+  if (state().phase == Phase::kAbandoned) return;
   answered_ = handler_.Answer(slot, worker, cancelled_);
 }
 
 void StreamStateMachine::Computed() {
   // Taken before any other frame can be computed.
-  const std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
-  On([&] {
-    computing_ = false;
+  std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
+  {
+    const Event event(*this);
+    state_.computing = Computing::kIdle;
     ++computed_;
     if (!answered) return;
     SetSlotBytes(computed_ - 1, answered->bytes);
     ++(answered->is_result ? counts_.frames : counts_.frame_errors);
     counts_.last_sequence = answered->last_sequence;
-  });
-  if (answered && answered->afterwards) answered->afterwards();
+  }
+  if (!answered->afterwards) return;
+  const Event event(*this);  // A second one, so that its action comes after the write.
+  Do(std::move(answered->afterwards));
 }
 
-void StreamStateMachine::End(absl::Status status) {
-  if (phase_ != Phase::kOpening && phase_ != Phase::kStreaming) return;
-  phase_ = Phase::kEnding;
+void StreamStateMachine::End(absl::Status status, Phase phase) {
+  if (state_.phase != Phase::kOpening && state_.phase != Phase::kServing) return;
+  state_.phase = phase;
   status_ = std::move(status);
 }
 
 void StreamStateMachine::Abandon(absl::Status status) {
-  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
-  phase_ = Phase::kAbandoned;
+  if (state_.phase == Phase::kAbandoned || state_.phase == Phase::kFinished) return;
+  state_.phase = Phase::kAbandoned;
   status_ = std::move(status);
   cancelled_ = true;
 }
 
-// Counts what frame number `frame`, from 0, holds now instead of what it held before.
+// A write to a client that takes nothing would keep the stream from ending.
+void StreamStateMachine::AbandonAndCut(absl::Status status) {
+  Abandon(std::move(status));
+  if (state_.writing != Writing::kIdle) Do([this] { transport_.Cut(); });
+}
+
+// Replaces what frame number `frame`, from 0, holds of the budget.
 void StreamStateMachine::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
   std::uint64_t& held = slot_bytes_[frame % window_];
   if (bytes > held) {
@@ -258,105 +271,120 @@ void StreamStateMachine::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) 
   held = bytes;
 }
 
-StreamStateMachine::Actions StreamStateMachine::Decide() {
-  Actions actions;
-  if (!opening_ && !reading_ && !starting_read_ && MayRead(actions)) {
-    reading_ = starting_read_ = true;
-    actions.read = read_ % window_;
-  }
-  const bool answers = phase_ == Phase::kStreaming || phase_ == Phase::kEnding;
-  if (answers && MayCompute()) {
-    computing_ = true;
-    actions.compute = computed_ % window_;
-  }
-  if (answers && !writing_) DecideWrite(actions);
-  // Once finished there may be no transport any more.
-  if (std::exchange(owes_cut_, false) && phase_ != Phase::kFinished) {
-    actions.cut = cutting_ = true;
-  }
-  if (IsAllSaid() && !opening_ && !computing_ && !writing_ && !starting_read_ && !cutting_) {
-    phase_ = Phase::kFinished;
-    actions.finish = status_;
-  }
-  DecideMemory(actions);
-  return actions;
+void StreamStateMachine::Decide() {
+  DecideMemory();
+  DecideRead();
+  DecideCompute();
+  const bool answers = state_.phase == Phase::kServing || state_.phase == Phase::kEnding ||
+                       state_.phase == Phase::kClosing;
+  if (answers && state_.writing == Writing::kIdle && written_ < computed_) Write(Writing::kResult);
+  DecideFinish();
 }
 
-bool StreamStateMachine::MayCompute() {
-  return !computing_ && computed_ < read_ && handler_.MayAnswer(computed_ % window_);
+// Comes first, so that the stream holds nothing when another action ends it.
+void StreamStateMachine::DecideMemory() {
+  const bool serves = state_.phase == Phase::kServing;
+  if (state_.reading == Reading::kMemory && (!serves || read_ == written_)) {
+    state_.reading = Reading::kIdle;
+    Do([this] { budget_.StopWaiting(shared_from_this()); });
+  }
+  if (state_.reading == Reading::kPermit && !serves) {
+    state_.reading = Reading::kIdle;
+    budget_.reads().End(*this);
+  }
+  Do([this] { ReturnMemory(); });
 }
 
-bool StreamStateMachine::IsAllSaid() {
-  if (phase_ == Phase::kAbandoned) return true;
-  if (phase_ != Phase::kEnding || owes_notice_) return false;
-  return written_ == read_ || (waits_for_none_ && written_ == computed_ && !computing_);
+void StreamStateMachine::ReturnMemory() {
+  std::uint64_t bytes = 0;
+  {
+    const MutexLock lock(mutex_);
+    bytes = std::exchange(surplus_, 0);
+  }
+  if (bytes > 0) budget_.GiveBack(bytes, caller_.get());
+  budget_.reads().Serve();
 }
 
-// Asked only when the next read could begin at once.
-bool StreamStateMachine::MayRead(Actions& actions) {
-  if (phase_ == Phase::kOpening) return true;
-  if (phase_ != Phase::kStreaming || read_ - written_ >= window_) return false;
+void StreamStateMachine::DecideRead() {
+  if (state_.reading != Reading::kIdle || state_.computing == Computing::kOpen) return;
+  if (state_.phase == Phase::kOpening) return Read(Reading::kFirst);
+  if (state_.phase != Phase::kServing || read_ - written_ >= window_) return;
   if (read_ == written_) {
-    actions.stop_waiting = std::exchange(waiting_, false);
-    return true;
-  }
-  if (set_aside_ > 0) return true;
-  if (waiting_) return false;
-  if (budget_.TakeOrWait(last_bytes_, shared_from_this(), caller_.get())) {
-    set_aside_ = last_bytes_;
-    return true;
-  }
-  waiting_ = true;
-  return false;
-}
-
-// Room is set aside for a read only while the stream has something else in flight: what an idle
-// stream reads next costs nothing until it comes.
-void StreamStateMachine::DecideMemory(Actions& actions) {
-  if (phase_ != Phase::kStreaming && std::exchange(waiting_, false)) actions.stop_waiting = true;
-  if (phase_ != Phase::kStreaming || read_ == written_) surplus_ += std::exchange(set_aside_, 0);
-  if (phase_ == Phase::kFinished) {
-    for (std::uint64_t& bytes : slot_bytes_) surplus_ += std::exchange(bytes, 0);
-  }
-  actions.give_back = std::exchange(surplus_, 0);
-}
-
-void StreamStateMachine::DecideWrite(Actions& actions) {
-  if (owes_opened_) {
-    owes_opened_ = false;
-    actions.write = Outgoing::kOpened;
-  } else if (owes_notice_) {
-    owes_notice_ = false;
-    actions.write = Outgoing::kDraining;
-  } else if (written_ < computed_) {
-    actions.write = Outgoing::kAnswer;
-    actions.write_slot = written_ % window_;
+    const bool permitted = budget_.reads().Begin(shared_from_this(), NextRead());
+    permitted ? Read(Reading::kNext) : void(state_.reading = Reading::kPermit);
+  } else if (budget_.TakeOrWait(last_bytes_, shared_from_this(), caller_.get())) {
+    surplus_ += last_bytes_;
+    ReadAhead();
   } else {
+    state_.reading = Reading::kMemory;
+  }
+}
+
+// Reads while frames are in flight: the budget has room, so the read needs no turn.
+void StreamStateMachine::ReadAhead() {
+  budget_.reads().BeginNow(shared_from_this(), NextRead());
+  Read(Reading::kNext);
+}
+
+void StreamStateMachine::Read(Reading what) {
+  state_.reading = what;
+  Do([this, slot = read_ % window_] { transport_.StartRead(slot); });
+}
+
+// A frame may be somewhat larger than the one before.
+ReadPermits::Read StreamStateMachine::NextRead() const {
+  const void* const assembly = handler_.Assembly();
+  return {.stream = assembly != nullptr ? assembly : this,
+          .expected_bytes = last_bytes_ + last_bytes_ / 8,
+          .caller = caller_.get(),
+          .peer = transport_.peer()};
+}
+
+void StreamStateMachine::DecideCompute() {
+  const bool answers = state_.phase == Phase::kServing || state_.phase == Phase::kEnding ||
+                       state_.phase == Phase::kClosing;
+  const std::size_t slot = computed_ % window_;
+  if (!answers || state_.computing != Computing::kIdle || computed_ == read_ ||
+      !handler_.MayAnswer(slot)) {
     return;
   }
-  writing_ = true;
-  in_flight_ = *actions.write;
+  state_.computing = Computing::kResult;
+  Do([this, slot, bytes = handler_.ComputedBytes(slot, slot_bytes_[slot])] {
+    pool_.Submit([self = shared_from_this(), slot](Worker& worker) { self->Compute(slot, worker); },
+                 [self = shared_from_this()] { self->Computed(); }, &busy_mark_, caller_.get(),
+                 bytes);
+  });
 }
 
-void StreamStateMachine::Perform(Actions actions) {
-  const auto self = shared_from_this();
-  for (;;) {
-    // Before anything that may end the stream elsewhere: it ends with nothing held.
-    if (actions.stop_waiting) budget_.StopWaiting(self);
-    if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
-    if (actions.compute) {
-      pool_.Submit([self, slot = *actions.compute](Worker& worker) { self->Compute(slot, worker); },
-                   [self] { self->Computed(); }, &busy_mark_, caller_.get());
-    }
-    if (actions.write) transport_.StartWrite(*actions.write, actions.write_slot);
-    if (actions.cut) transport_.Cut();
-    if (actions.finish) transport_.Finish(*actions.finish);
-    if (!actions.read && !actions.cut) return;
-    if (actions.read) transport_.StartRead(*actions.read);
-    const std::lock_guard lock(mutex_);
-    if (actions.read) starting_read_ = false;
-    if (actions.cut) cutting_ = false;
-    actions = Decide();
+void StreamStateMachine::Write(Writing what) {
+  state_.writing = what;
+  const Outgoing outgoing = what == Writing::kOpened   ? Outgoing::kOpened
+                            : what == Writing::kNotice ? Outgoing::kDraining
+                                                       : Outgoing::kAnswer;
+  const std::size_t slot = outgoing == Outgoing::kAnswer ? written_ % window_ : 0;
+  Do([this, outgoing, slot] { transport_.StartWrite(outgoing, slot); });
+}
+
+void StreamStateMachine::DecideFinish() {
+  if (!IsAllSaid() || state_.computing != Computing::kIdle || state_.writing != Writing::kIdle) {
+    return;
+  }
+  state_.phase = Phase::kFinished;
+  budget_.reads().End(*this);
+  for (std::uint64_t& bytes : slot_bytes_) surplus_ += std::exchange(bytes, 0);
+  Do([this, status = status_] { transport_.Finish(status); });
+}
+
+bool StreamStateMachine::IsAllSaid() const {
+  switch (state_.phase) {
+    case Phase::kAbandoned:
+      return true;
+    case Phase::kEnding:
+      return written_ == read_;
+    case Phase::kClosing:
+      return written_ == computed_;
+    default:
+      return false;
   }
 }
 

@@ -17,7 +17,9 @@ absl::Status TooMany(UnaryKind kind, const FairShare& places, const CallerAccoun
   return ViolationError(
       absl::StatusCode::kResourceExhausted,
       {std::string(kReasonTooManyCalls),
-       kind == UnaryKind::kFrame ? "calls of ReconstructFrame" : "calls for information",
+       kind == UnaryKind::kFrame   ? "calls of ReconstructFrame"
+       : kind == UnaryKind::kProbe ? "health checks"
+                                   : "calls for information",
        absl::StrCat(places.held(), " going on, ", places.held_by(&caller), " of this caller"),
        absl::StrCat("must be at most ", places.room(),
                     ", and of one caller no more than are free; try again later")});

@@ -31,7 +31,8 @@ class UnaryRegistry {
   /// For one caller. There are twice as many places of each kind, and a caller has no more of them
   /// than are free (FairShare).
   explicit UnaryRegistry(std::uint32_t max_frame_calls)
-      : places_{FairShare(2 * std::uint64_t{max_frame_calls}), FairShare(2 * kInformationCalls)} {}
+      : places_{FairShare(2 * std::uint64_t{max_frame_calls}), FairShare(2 * kInformationCalls),
+                FairShare(2 * kInformationCalls)} {}
 
   /// A call comes in, without a request yet: those are counted elsewhere (OpeningCalls). Errors,
   /// each with a Violation: UNAVAILABLE (DRAINING), for frames only.
@@ -44,7 +45,7 @@ class UnaryRegistry {
   /// The connection has taken its last word.
   void Leave(const UnaryStateMachine& call);
 
-  /// Of both kinds.
+  /// Of all kinds.
   std::size_t count() const;
 
   /// Ends those that have waited for their clients for too long. Gives the time before which none
@@ -70,7 +71,7 @@ class UnaryRegistry {
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
   std::map<const UnaryStateMachine*, Entry> calls_;
-  std::array<FairShare, 2> places_;  // By kind.
+  std::array<FairShare, 3> places_;  // By kind.
   bool draining_ = false;
 };
 

@@ -3,16 +3,13 @@
 #include <string>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
-#include "server/stream/stream_state_machine.h"
+#include "server/base/call_errors.h"
 
 namespace partiemc::server {
 namespace {
 
 using TimePoint = std::chrono::steady_clock::time_point;
-
-absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
 
 absl::Status NoRequest() {
   return ViolationError(absl::StatusCode::kInvalidArgument,
@@ -22,53 +19,44 @@ absl::Status NoRequest() {
 absl::Status NoRoom(FairShare::Fit fit, std::string field, std::uint64_t bytes,
                     std::uint64_t budget) {
   if (fit == FairShare::Fit::kMoreThanShare) return TooManyBytesOfCaller(bytes);
-  return ViolationError(
-      absl::StatusCode::kResourceExhausted,
-      {std::string(kReasonMemoryBudget), std::move(field), absl::StrCat(bytes, " bytes"),
-       absl::StrCat("must fit with what is being worked on into ", budget,
-                    " bytes; try again later, or start the server with a larger "
-                    "--memory-budget")});
+  return NoRoomInBudget(std::move(field), bytes, budget);
 }
 
 }  // namespace
 
-// Lets something happen to the state and does what follows from it.
-template <typename Event>
-void UnaryStateMachine::On(Event event) {
-  Actions actions;
-  {
-    const std::lock_guard lock(mutex_);
-    event();
-    actions = Decide();
-  }
-  Perform(std::move(actions));
-}
+UnaryStateMachine::UnaryStateMachine(UnaryTransport& transport, MemoryBudget& budget,
+                                     ComputePool* pool, std::shared_ptr<const CallerAccount> caller,
+                                     UnaryKind kind)
+    : SerializedCall(MachineKind::kUnary),
+      transport_(transport),
+      budget_(budget),
+      pool_(pool),
+      caller_(std::move(caller)),
+      kind_(kind) {}
 
 void UnaryStateMachine::Start(absl::Status admission) {
-  On([&] {
-    owes_read_ = admission.ok() && phase_ == Phase::kReading;
-    if (!admission.ok()) End(std::move(admission));
-  });
+  const Event event(*this);
+  if (!admission.ok()) End(std::move(admission));
 }
 
 void UnaryStateMachine::ReadDone(std::uint64_t bytes) {
-  On([&] {
-    if (phase_ != Phase::kReading) return;
-    if (auto status = TakeBytes("request", bytes); !status.ok()) return End(std::move(status));
-    phase_ = Phase::kWorking;
-    owes_answer_ = true;
-  });
+  const Event event(*this);
+  state_.reading = Reading::kIdle;
+  if (state_.phase != Phase::kOpening) return;
+  if (auto status = TakeBytes("request", bytes); !status.ok()) return End(std::move(status));
+  state_.phase = Phase::kServing;
+  state_.computing = Computing::kResult;
+  Do([this, bytes] { StartAnswer(bytes); });
 }
 
 void UnaryStateMachine::ReadEnded() {
-  On([&] {
-    if (phase_ == Phase::kReading) End(NoRequest());
-  });
+  const Event event(*this);
+  state_.reading = Reading::kEnded;
+  if (state_.phase == Phase::kOpening) End(NoRequest());
 }
 
-// What the call holds from now on.
 absl::Status UnaryStateMachine::TakeBytes(std::string field, std::uint64_t bytes) {
-  if (kind_ == UnaryKind::kInformation) {
+  if (kind_ != UnaryKind::kFrame) {
     budget_.Take(bytes, caller_.get());
   } else if (const auto fit = budget_.TryTake(bytes, caller_.get()); fit != FairShare::Fit::kYes) {
     return NoRoom(fit, std::move(field), bytes, budget_.bytes());
@@ -77,114 +65,85 @@ absl::Status UnaryStateMachine::TakeBytes(std::string field, std::uint64_t bytes
   return absl::OkStatus();
 }
 
+void UnaryStateMachine::ReturnMemory() {
+  std::uint64_t bytes = 0;
+  {
+    const MutexLock lock(mutex_);
+    bytes = std::exchange(held_bytes_, 0);
+  }
+  if (bytes > 0) budget_.GiveBack(bytes, caller_.get());
+}
+
+void UnaryStateMachine::StartAnswer(std::uint64_t bytes) {
+  if (pool_ == nullptr) return Answer(nullptr);
+  pool_->Submit([self = shared_from_this()](Worker& worker) { self->Answer(&worker); }, [] {},
+                nullptr, caller_.get(), bytes);
+}
+
 void UnaryStateMachine::Answer(Worker* worker) {
   absl::StatusOr<std::uint64_t> bytes = ClientGone();
   if (!cancelled_) bytes = transport_.Answer(worker);
-  // The request is gone, so that its answer may have all that its caller may.
-  On([&] { surplus_ += std::exchange(held_bytes_, 0); });
-  On([&] {
-    working_ = false;
-    if (phase_ != Phase::kWorking) return;
-    if (!bytes.ok()) return End(bytes.status());
-    if (auto status = TakeBytes("answer", *bytes); !status.ok()) return End(std::move(status));
-    phase_ = Phase::kWriting;
-    phase_began_ = std::chrono::steady_clock::now();
-    owes_write_ = true;
-  });
+  ReturnMemory();  // The response may use the memory of its request.
+  const Event event(*this);
+  state_.computing = Computing::kIdle;
+  if (state_.phase != Phase::kServing) return;
+  if (!bytes.ok()) return End(bytes.status());
+  if (auto status = TakeBytes("answer", *bytes); !status.ok()) return End(std::move(status));
+  began_ = std::chrono::steady_clock::now();
+  state_.writing = Writing::kResult;
+  Do([this] { transport_.StartWrite(); });
 }
 
 void UnaryStateMachine::WriteDone(bool ok) {
-  On([&] {
-    writing_ = false;
-    if (phase_ != Phase::kWriting) return;
-    if (ok) {
-      End(absl::OkStatus());
-    } else {
-      Abandon(ClientGone());
-    }
-  });
+  const Event event(*this);
+  state_.writing = Writing::kIdle;
+  ok ? End(absl::OkStatus()) : End(ClientGone(), Phase::kAbandoned);
 }
 
 void UnaryStateMachine::Cancelled() {
-  On([&] { Abandon(ClientGone()); });
+  const Event event(*this);
+  End(ClientGone(), Phase::kAbandoned);
 }
 
 void UnaryStateMachine::GiveWay(const absl::Status& status) {
-  On([&] {
-    if (phase_ == Phase::kReading) End(status);
-  });
+  const Event event(*this);
+  if (state_.phase == Phase::kOpening) End(status);
 }
 
 TimePoint UnaryStateMachine::EndIfIdle(const UnaryLimits& limits, TimePoint now) {
-  TimePoint look_again = TimePoint::max();
-  On([&] {
-    if (phase_ != Phase::kReading && phase_ != Phase::kWriting) return;
-    const auto limit = phase_ == Phase::kReading ? limits.request : limits.answer;
-    if (limit <= limit.zero()) return;
-    if (now < phase_began_ + limit) {
-      look_again = phase_began_ + limit;
-    } else if (phase_ == Phase::kReading) {
-      End(IdleError("sends no request", limit));
-    } else {
-      Abandon(IdleError("takes no answer", limit));
-      owes_cut_ = true;
-    }
-  });
-  return look_again;
+  const Event event(*this);
+  const bool reads = state_.phase == Phase::kOpening;
+  const bool writes = state_.phase == Phase::kServing && state_.writing == Writing::kResult;
+  const auto limit = reads ? limits.request : limits.answer;
+  if ((!reads && !writes) || limit <= limit.zero()) return TimePoint::max();
+  if (now < began_ + limit) return began_ + limit;
+  if (reads) {
+    End(IdleError("sends no request", limit));
+  } else {
+    End(IdleError("takes no answer", limit), Phase::kAbandoned);
+    Do([this] { transport_.Cut(); });
+  }
+  return TimePoint::max();
 }
 
-void UnaryStateMachine::End(absl::Status status) {
-  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
-  phase_ = Phase::kEnding;
+void UnaryStateMachine::End(absl::Status status, Phase phase) {
+  if (state_.phase == Phase::kAbandoned || state_.phase == Phase::kFinished) return;
+  state_.phase = phase;
   status_ = std::move(status);
+  if (phase == Phase::kAbandoned) cancelled_ = true;
 }
 
-void UnaryStateMachine::Abandon(absl::Status status) {
-  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
-  phase_ = Phase::kAbandoned;
-  status_ = std::move(status);
-  cancelled_ = true;
-}
-
-UnaryStateMachine::Actions UnaryStateMachine::Decide() {
-  Actions actions;
-  if (std::exchange(owes_read_, false)) actions.read = calling_ = true;
-  if (std::exchange(owes_answer_, false)) actions.answer = working_ = true;
-  if (std::exchange(owes_write_, false) && phase_ == Phase::kWriting) {
-    actions.write = writing_ = true;
+void UnaryStateMachine::Decide() {
+  if (state_.phase == Phase::kOpening && state_.reading == Reading::kIdle) {
+    state_.reading = Reading::kFirst;
+    Do([this] { transport_.StartRead(); });
   }
-  const bool over = phase_ == Phase::kEnding || phase_ == Phase::kAbandoned;
-  if (!calling_ && std::exchange(owes_cut_, false) && over) actions.cut = calling_ = true;
-  if (over && !working_ && !writing_ && !calling_) {
-    phase_ = Phase::kFinished;
-    surplus_ += std::exchange(held_bytes_, 0);
-    actions.finish = status_;
-  }
-  actions.give_back = std::exchange(surplus_, 0);
-  return actions;
-}
-
-void UnaryStateMachine::Perform(Actions actions) {
-  const auto self = shared_from_this();
-  for (;;) {
-    if (actions.give_back > 0) budget_.GiveBack(actions.give_back, caller_.get());
-    if (actions.answer) {
-      if (pool_ == nullptr) {
-        Answer(nullptr);
-      } else {
-        pool_->Submit([self](Worker& worker) { self->Answer(&worker); }, [] {}, nullptr,
-                      caller_.get());
-      }
-    }
-    if (actions.write) transport_.StartWrite();
-    if (actions.cut) transport_.Cut();
-    if (actions.finish) transport_.Finish(*actions.finish);
-    if (!actions.read && !actions.cut) return;
-    if (actions.read) transport_.StartRead();
-    const std::lock_guard lock(mutex_);
-    calling_ = false;
-    actions = Decide();
-  }
+  const bool is_over = state_.phase == Phase::kEnding || state_.phase == Phase::kAbandoned;
+  const bool is_busy = state_.computing != Computing::kIdle || state_.writing != Writing::kIdle;
+  if (!is_over || is_busy) return;
+  state_.phase = Phase::kFinished;
+  Do([this] { ReturnMemory(); });
+  Do([this, status = status_] { transport_.Finish(status); });
 }
 
 }  // namespace partiemc::server

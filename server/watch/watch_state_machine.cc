@@ -14,40 +14,26 @@ absl::Status WatcherGone() { return absl::CancelledError("the watcher went away"
 
 }  // namespace
 
-// Applies an event to the state under the lock, then performs the resulting actions without it.
-template <typename Event>
-void WatchStateMachine::On(Event event) {
-  Actions actions;
-  {
-    const std::lock_guard lock(mutex_);
-    event();
-    actions = Decide();
-  }
-  Perform(std::move(actions));
-}
-
 void WatchStateMachine::Start(absl::Status admission) {
-  On([&] {
-    if (!admission.ok()) Refuse(std::move(admission));
-  });
+  const Event event(*this);
+  if (!admission.ok()) Refuse(std::move(admission));
 }
 
 void WatchStateMachine::ReadDone(const WatchRequest& request) {
-  bool open = false;
-  On([&] {
-    reading_ = false;
-    TakeRequest(request);
-    open = opening_;
-  });
-  if (open) transport_.StartOpen();
+  const Event event(*this);
+  state_.reading = Reading::kIdle;
+  TakeRequest(request);
 }
 
 void WatchStateMachine::TakeRequest(const WatchRequest& request) {
   using Kind = WatchRequest::Kind;
-  if (phase_ == Phase::kOpening) {
-    opening_ = request.kind == Kind::kOpen;
-    if (!opening_) Refuse(ProtocolError("no `open`", "the first must be `open`"));
-  } else if (phase_ != Phase::kWatching && phase_ != Phase::kEnding) {
+  if (state_.phase == Phase::kOpening) {
+    if (request.kind != Kind::kOpen) {
+      return Refuse(ProtocolError("no `open`", "the first must be `open`"));
+    }
+    state_.computing = Computing::kOpen;
+    Do([this] { transport_.StartOpen(); });
+  } else if (state_.phase != Phase::kServing && state_.phase != Phase::kEnding) {
     return;
   } else if (request.kind != Kind::kCredit) {
     End(WatchEnd::With(ProtocolError(request.kind == Kind::kOpen ? "open" : "no `credit`",
@@ -62,27 +48,22 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
 }
 
 // Joins before `opened` is written, so that the watcher misses no result published afterwards.
-// Nothing is written and nothing ends before that.
 void WatchStateMachine::Opened(const absl::StatusOr<WatchTerms>& terms) {
-  On([&] {
-    opening_ = false;
-    if (!terms.ok()) {
-      Refuse(terms.status());
-    } else if (phase_ == Phase::kOpening) {
-      phase_ = Phase::kWatching;
-      owes_opened_ = true;
-      mode_ = terms->mode;
-      credit_ = terms->credit;
-      keeps_history_ = terms->keeps_history;
-      Join(*terms);
-    }
-  });
+  const Event event(*this);
+  state_.computing = Computing::kIdle;
+  if (!terms.ok()) return Refuse(terms.status());
+  if (state_.phase != Phase::kOpening) return;
+  state_.phase = Phase::kServing;
+  mode_ = terms->mode;
+  credit_ = terms->credit;
+  keeps_history_ = terms->keeps_history;
+  Join(*terms);
 }
 
 void WatchStateMachine::Join(const WatchTerms& terms) {
   broadcaster_ = terms.broadcaster;
   const auto joined = broadcaster_->Join(shared_from_this(), terms.from_sequence);
-  held_ = joined.held;
+  Write(Writing::kOpened, [this, held = joined.held] { transport_.WriteOpened(held); });
   if (joined.first.frame != nullptr) return Take(joined.first);
   offered_ = joined.last_number;
   next_held_ = joined.next_held;
@@ -90,43 +71,40 @@ void WatchStateMachine::Join(const WatchTerms& terms) {
 }
 
 void WatchStateMachine::ReadEnded() {
-  On([&] {
-    reading_ = false;
-    half_closed_ = true;
-    if (phase_ == Phase::kOpening && !opening_) {
-      Refuse(ProtocolError("none", "the first must be `open`"));
-    }
-  });
+  const Event event(*this);
+  state_.reading = Reading::kEnded;
+  if (state_.phase == Phase::kOpening && state_.computing == Computing::kIdle) {
+    Refuse(ProtocolError("none", "the first must be `open`"));
+  }
 }
 
 void WatchStateMachine::WriteDone(bool ok) {
   Published written;  // Freed without the lock.
-  On([&] {
-    writing_ = false;
-    if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
-    written = std::exchange(in_write_, {});
-    if (!ok) Abandon(WatcherGone());
-  });
+  const Event event(*this);
+  state_.writing = Writing::kIdle;
+  if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
+  written = std::exchange(in_write_, {});
+  if (!ok) Abandon(WatcherGone());
 }
 
 void WatchStateMachine::Cancelled() {
-  On([&] { Abandon(WatcherGone()); });
+  const Event event(*this);
+  Abandon(WatcherGone());
 }
 
 void WatchStateMachine::Offer(std::span<const Published> frames) {
-  On([&] {
-    for (const Published& published : frames) {
-      if (phase_ != Phase::kWatching) return;
-      if (published.number <= offered_) continue;
-      // A frame that does not fit into the history is only offered.
-      if (published.number == next_held_ && !IsHeld(next_held_)) CatchUp();
-      if (next_held_ == 0) {
-        Take(published);
-      } else {
-        offered_ = published.number;
-      }
+  const Event event(*this);
+  for (const Published& published : frames) {
+    if (state_.phase != Phase::kServing) return;
+    if (published.number <= offered_) continue;
+    // A frame that does not fit into the history is only offered.
+    if (published.number == next_held_ && !IsHeld(next_held_)) CatchUp();
+    if (next_held_ == 0) {
+      Take(published);
+    } else {
+      offered_ = published.number;
     }
-  });
+  }
 }
 
 void WatchStateMachine::Take(const Published& published) {
@@ -199,85 +177,64 @@ void WatchStateMachine::MissUntil(std::uint64_t number) {
 }
 
 void WatchStateMachine::StreamEnded(const WatchEnd& end) {
-  On([&] {
-    if (phase_ != Phase::kWatching) return;
-    if (next_held_ == 0 && offered_ != 0 && end.last_number > offered_) {
-      counts_.dropped += end.last_number - offered_;
-      offered_ = end.last_number;
-    }
-    if (end.status.ok()) {
-      phase_ = Phase::kEnding;
-      end_ = end;
-      owes_ended_ = true;
-    } else {
-      End(end);
-    }
-  });
+  const Event event(*this);
+  if (state_.phase != Phase::kServing) return;
+  if (next_held_ == 0 && offered_ != 0 && end.last_number > offered_) {
+    counts_.dropped += end.last_number - offered_;
+    offered_ = end.last_number;
+  }
+  if (!end.status.ok()) return End(end);
+  state_.phase = Phase::kEnding;
+  end_ = end;
 }
 
 void WatchStateMachine::Drain() {
-  On([&] {
-    if (phase_ == Phase::kOpening) Refuse(DrainingError());
-    if (phase_ == Phase::kWatching || phase_ == Phase::kEnding)
-      End(WatchEnd::With(DrainingError()));
-  });
+  const Event event(*this);
+  Refuse(DrainingError());
+  End(WatchEnd::With(DrainingError()));
 }
 
 std::chrono::steady_clock::time_point WatchStateMachine::EndIfSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
-  auto look_again = std::chrono::steady_clock::time_point::max();
-  On([&] {
-    if (phase_ != Phase::kOpening || opening_ || limit <= limit.zero()) return;
-    if (now < came_ + limit) {
-      look_again = came_ + limit;
-    } else {
-      Refuse(IdleError("sends no `open`", limit));
-    }
-  });
-  return look_again;
+  const Event event(*this);
+  const bool waits = state_.phase == Phase::kOpening && state_.computing == Computing::kIdle;
+  if (!waits || limit <= limit.zero()) return std::chrono::steady_clock::time_point::max();
+  if (now < came_ + limit) return came_ + limit;
+  Refuse(IdleError("sends no `open`", limit));
+  return std::chrono::steady_clock::time_point::max();
 }
 
 void WatchStateMachine::GiveWay(const absl::Status& status) {
-  On([&] {
-    if (phase_ == Phase::kOpening && !opening_) Refuse(status);
-  });
+  const Event event(*this);
+  if (state_.computing == Computing::kIdle) Refuse(status);
 }
 
 void WatchStateMachine::GiveUp(const absl::Status& status) {
-  bool cut = false;
-  On([&] {
-    if (phase_ != Phase::kWatching && phase_ != Phase::kEnding) return;
-    cut = writing_;
-    Abandon(status);
-  });
-  if (cut) Cut();
+  const Event event(*this);
+  if (!IsOpen()) return;
+  Abandon(status);
+  if (state_.writing != Writing::kIdle) Do([this] { transport_.Cut(); });
 }
 
 void WatchStateMachine::Cut() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (phase_ == Phase::kFinished || cutting_) return;
-    cutting_ = true;
-  }
-  transport_.Cut();
-  On([&] {
-    cutting_ = false;
-    Abandon(WatcherGone());
-  });
+  const Event event(*this);
+  if (state_.phase == Phase::kFinished) return;
+  Abandon(WatcherGone());
+  Do([this] { transport_.Cut(); });
 }
 
 WatchCounts WatchStateMachine::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 
 std::size_t WatchStateMachine::held_bytes() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return held_bytes_;
 }
 
 bool WatchStateMachine::goes_back() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return next_held_ != 0 || keeps_history_;
 }
 
@@ -292,101 +249,83 @@ void WatchStateMachine::DropPending() {
 
 // Drops pending frames instead of waiting for credit.
 void WatchStateMachine::End(WatchEnd end) {
-  if (phase_ == Phase::kEnding && !owes_ended_) return;  // Another end has been sent.
-  phase_ = Phase::kEnding;
+  if (state_.phase != Phase::kServing && state_.phase != Phase::kEnding) return;
+  state_.phase = Phase::kEnding;
   end_ = std::move(end);
-  owes_ended_ = true;
   DropPending();
 }
 
 // Ends a watch that is not open yet by its status alone.
 void WatchStateMachine::Refuse(absl::Status status) {
-  if (phase_ != Phase::kOpening) return;
-  phase_ = Phase::kEnding;
+  if (state_.phase != Phase::kOpening) return;
+  state_.phase = Phase::kClosing;
   end_ = WatchEnd::With(std::move(status));
 }
 
 void WatchStateMachine::Abandon(absl::Status status) {
-  if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished) return;
-  phase_ = Phase::kAbandoned;
+  if (state_.phase == Phase::kAbandoned || state_.phase == Phase::kFinished) return;
+  state_.phase = Phase::kAbandoned;
   end_.status = std::move(status);
   DropPending();
 }
 
-WatchStateMachine::Actions WatchStateMachine::Decide() {
-  Actions actions;
-  const bool no_more_credit = half_closed_ && credit_ == 0;
-  if (no_more_credit && phase_ == Phase::kWatching && !writing_) {
-    End({std::string(kReasonCreditUsed), "half-closed, and all credit is used", {}});
-  }
-  if (no_more_credit && phase_ == Phase::kEnding) DropPending();
-  const bool open = phase_ == Phase::kWatching || phase_ == Phase::kEnding;
-  if ((phase_ == Phase::kOpening || open) && !half_closed_ && !opening_ && !reading_ &&
-      !starting_read_) {
-    actions.read = reading_ = starting_read_ = true;
-  }
-  if (open && !writing_ && !opening_) DecideWrite(actions);
-  const bool all_said =
-      phase_ == Phase::kAbandoned || (phase_ == Phase::kEnding && !owes_ended_ && !owes_opened_);
-  if (all_said && !opening_ && !writing_ && !starting_read_ && !cutting_) {
-    phase_ = Phase::kFinished;
-    actions.finish = end_.status;
-    actions.leave = std::exchange(broadcaster_, nullptr);
-  }
-  return actions;
+bool WatchStateMachine::IsOpen() const {
+  return state_.phase == Phase::kServing || state_.phase == Phase::kEnding ||
+         state_.phase == Phase::kClosing;
 }
 
-void WatchStateMachine::DecideWrite(Actions& actions) {
-  if (!owes_opened_ && next_held_ != 0) TakeHeld();
-  if (owes_opened_) {
-    owes_opened_ = false;
-    actions.write = Write::kOpened;
-    actions.held = held_;
-  } else if (!pending_.empty() && credit_ > 0) {
-    --credit_;
-    ++counts_.frames;
-    actions.write = Write::kFrame;
-    in_write_ = std::move(pending_.front());
-    pending_.pop_front();
-    actions.frame = in_write_;
-    actions.dropped = in_write_.number - next_told_;
-    actions.oldest_sequence = broadcaster_->oldest_sequence();
-    next_told_ = in_write_.number + 1;
-  } else if (owes_ended_ && pending_.empty() && next_held_ == 0) {
-    owes_ended_ = false;
-    actions.write = Write::kEnded;
-    actions.end = end_;
-    actions.dropped = offered_ == 0 ? 0 : offered_ + 1 - next_told_;
-  } else {
-    return;
-  }
-  writing_ = true;
-}
-
-void WatchStateMachine::Perform(Actions actions) {
-  const auto self = shared_from_this();
-  for (;;) {
-    if (actions.write) {
-      switch (*actions.write) {
-        case Write::kOpened:
-          transport_.WriteOpened(actions.held);
-          break;
-        case Write::kFrame:
-          transport_.WriteFrame(actions.frame, actions.dropped, actions.oldest_sequence);
-          break;
-        case Write::kEnded:
-          transport_.WriteEnded(actions.end, actions.dropped);
-          break;
-      }
+void WatchStateMachine::Decide() {
+  const bool writes = state_.writing != Writing::kIdle;
+  if (state_.reading == Reading::kEnded && credit_ == 0) {
+    if (state_.phase == Phase::kServing && !writes) {
+      End({std::string(kReasonCreditUsed), "half-closed, and all credit is used", {}});
     }
-    if (actions.leave != nullptr) actions.leave->Leave(*this);
-    if (actions.finish) transport_.Finish(*actions.finish);
-    if (!actions.read) return;
-    transport_.StartRead();
-    const std::lock_guard lock(mutex_);
-    starting_read_ = false;
-    actions = Decide();
+    if (state_.phase == Phase::kEnding) DropPending();
   }
+  if (!writes) DecideWrite();
+  const bool is_busy = state_.computing != Computing::kIdle || state_.writing != Writing::kIdle;
+  if ((state_.phase == Phase::kAbandoned || state_.phase == Phase::kClosing) && !is_busy) {
+    state_.phase = Phase::kFinished;
+    if (broadcaster_ != nullptr) {
+      Do([this, left = std::exchange(broadcaster_, nullptr)] { left->Leave(*this); });
+    }
+    Do([this, status = end_.status] { transport_.Finish(status); });
+  }
+  const bool reads = state_.phase == Phase::kOpening || IsOpen();
+  if (reads && state_.reading == Reading::kIdle && state_.computing == Computing::kIdle) {
+    state_.reading = state_.phase == Phase::kOpening ? Reading::kFirst : Reading::kNext;
+    Do([this] { transport_.StartRead(); });
+  }
+}
+
+void WatchStateMachine::DecideWrite() {
+  if (state_.phase != Phase::kServing && state_.phase != Phase::kEnding) return;
+  if (next_held_ != 0) TakeHeld();
+  if (!pending_.empty() && credit_ > 0) {
+    WriteFrame();
+  } else if (state_.phase == Phase::kEnding && pending_.empty() && next_held_ == 0) {
+    state_.phase = Phase::kClosing;
+    const std::uint64_t dropped = offered_ == 0 ? 0 : offered_ + 1 - next_told_;
+    Write(Writing::kNotice, [this, end = end_, dropped] { transport_.WriteEnded(end, dropped); });
+  }
+}
+
+void WatchStateMachine::WriteFrame() {
+  --credit_;
+  ++counts_.frames;
+  in_write_ = std::move(pending_.front());
+  pending_.pop_front();
+  const std::uint64_t dropped = in_write_.number - next_told_;
+  next_told_ = in_write_.number + 1;
+  Write(Writing::kResult,
+        [this, frame = in_write_, dropped, oldest = broadcaster_->oldest_sequence()] {
+          transport_.WriteFrame(frame, dropped, oldest);
+        });
+}
+
+void WatchStateMachine::Write(Writing what, Action action) {
+  state_.writing = what;
+  Do(std::move(action));
 }
 
 }  // namespace partiemc::server

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +13,8 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
+#include "server/base/serialized_call.h"
 #include "server/watch/result_history.h"
 #include "server/watch/result_mailbox.h"
 #include "server/watch/watch_end.h"
@@ -74,12 +75,13 @@ struct WatchCounts {
   std::size_t most_held_bytes = 0;  ///< Largest number of pending bytes.
 };
 
-/// The state machine of one watcher:
+/// The state machine of one watcher (phases: server/base/call_state.h). Ending owes the message
+/// `ended`, closing does not:
 ///
-///   opening --open--> watching --stream ends, fell behind, drain--> ending ----> finished
-///      |                 |                                            |             ^
-///      |                 +------------ cancelled, write failed -------+-> abandoned
-///      +-- no open, or refused: finished
+///   opening --open--> serving --stream ends, fell behind, drain--> ending --> closing --> finished
+///      |                 |                                            |          |          ^
+///      |                 +------------ cancelled, write failed -------+----------+-> abandoned
+///      +-- no open, or refused: closing
 ///
 /// A frame is written if there is credit and no other write. Until then `latest` holds only the
 /// newest frame; `every` holds all frames up to `max_bytes`, including the one being written.
@@ -90,12 +92,12 @@ struct WatchCounts {
 /// frame being written. After the end of the history it continues with offered frames. If the
 /// history drops its next frame, `latest` skips it; `every` ends, unless it has not received a
 /// frame yet.
-class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine> {
+class WatchStateMachine final : public SerializedCall {
  public:
   /// Requires: `transport` lives until its Finish returns; this is held by shared_ptr. A frame of
   /// more than `max_bytes` ends the watch.
   WatchStateMachine(WatchTransport& transport, std::size_t max_bytes)
-      : transport_(transport), max_bytes_(max_bytes) {}
+      : SerializedCall(MachineKind::kWatch), transport_(transport), max_bytes_(max_bytes) {}
 
   /// Starts the first read, or ends at once if `admission` is an error. Called once. Every watch,
   /// refused ones included, ends through this machine, so WatchTransport::Finish is called exactly
@@ -136,67 +138,46 @@ class WatchStateMachine : public std::enable_shared_from_this<WatchStateMachine>
   /// Whether it reads the history, or keeps it for other watchers.
   bool goes_back() const;
 
+  std::shared_ptr<WatchStateMachine> shared_from_this() {
+    return std::static_pointer_cast<WatchStateMachine>(SerializedCall::shared_from_this());
+  }
+
  private:
-  enum class Phase { kOpening, kWatching, kEnding, kAbandoned, kFinished };
-  enum class Write { kOpened, kFrame, kEnded };
-
-  // Actions to perform after the lock is released. The flags of their progress are already set.
-  struct Actions {
-    bool read = false;
-    std::optional<Write> write;
-    HeldFrames held;
-    Published frame;
-    WatchEnd end;
-    std::uint64_t dropped = 0, oldest_sequence = 0;
-    std::optional<absl::Status> finish;
-    std::shared_ptr<ResultBroadcaster> leave;
-  };
-
-  // With the lock held:
-  Actions Decide();
-  void DecideWrite(Actions& actions);
-  void TakeRequest(const WatchRequest& request);
-  void Join(const WatchTerms& terms);
-  void Take(const Published& published);
-  bool IsHeld(std::uint64_t number) const;
-  bool LeaveToHistory(const Published& published);
-  void TakeHeld();
-  void CatchUp();
-  void MissUntil(std::uint64_t number);
-  void End(WatchEnd end);
-  void Refuse(absl::Status status);
-  void Abandon(absl::Status status);
-  void DropPending();
-  // Without:
-  template <typename Event>
-  void On(Event event);
-  void Perform(Actions actions);
+  void Decide() override ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void DecideWrite() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Write(Writing what, Action action) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void WriteFrame() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void TakeRequest(const WatchRequest& request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Join(const WatchTerms& terms) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Take(const Published& published) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool IsHeld(std::uint64_t number) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool LeaveToHistory(const Published& published) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void TakeHeld() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void CatchUp() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void MissUntil(std::uint64_t number) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void End(WatchEnd end) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Refuse(absl::Status status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Abandon(absl::Status status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void DropPending() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool IsOpen() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   WatchTransport& transport_;
   const std::size_t max_bytes_;
 
   const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  Phase phase_ = Phase::kOpening;
-  WatchEnd end_;  // Set from kEnding on.
-  std::shared_ptr<ResultBroadcaster> broadcaster_;
-  WatchMode mode_ = WatchMode::kLatest;
-  bool keeps_history_ = false;
-  std::uint64_t credit_ = 0;
-  bool half_closed_ = false;
-  std::deque<Published> pending_;  // Pending frames.
-  Published in_write_;             // Being written.
-  std::size_t held_bytes_ = 0;     // Bytes of pending_ and in_write_.
-  HeldFrames held_;                // State of the history at the start.
-  std::uint64_t offered_ = 0;      // Number of the last offered frame; 0: none.
-  std::uint64_t next_held_ = 0;    // Next number to read from the history; 0: live.
-  std::uint64_t next_told_ = 0;    // Number of the next frame if none is dropped.
-  bool reading_ = false, writing_ = false, opening_ = false;
-  // Calls to the transport in progress; they must return before Finish.
-  bool starting_read_ = false, cutting_ = false;
-  bool owes_opened_ = false, owes_ended_ = false;
-  WatchCounts counts_;
+  WatchEnd end_ ABSL_GUARDED_BY(mutex_);  // Set from kEnding on.
+  std::shared_ptr<ResultBroadcaster> broadcaster_ ABSL_GUARDED_BY(mutex_);
+  WatchMode mode_ ABSL_GUARDED_BY(mutex_) = WatchMode::kLatest;
+  bool keeps_history_ ABSL_GUARDED_BY(mutex_) = false;
+  std::uint64_t credit_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::deque<Published> pending_ ABSL_GUARDED_BY(mutex_);
+  Published in_write_ ABSL_GUARDED_BY(mutex_);
+  std::size_t held_bytes_ ABSL_GUARDED_BY(mutex_) = 0;   // Of pending_ and in_write_.
+  std::uint64_t offered_ ABSL_GUARDED_BY(mutex_) = 0;    // The last offered frame; 0: none.
+  std::uint64_t next_held_ ABSL_GUARDED_BY(mutex_) = 0;  // Next of the history; 0: live.
+  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;  // Next frame if none is dropped.
+  WatchCounts counts_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

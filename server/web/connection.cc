@@ -48,7 +48,7 @@ void WebConnection::CloseAfter(std::chrono::milliseconds time) {
   deadline_.expires_after(time);
   deadline_.async_wait([weak = weak_from_this()](error_code error) {
     const auto self = weak.lock();
-    // It may have been moved while this was on its way.
+    // The deadline may have been moved since the timer fired.
     if (error || self == nullptr || self->deadline_.expiry() > std::chrono::steady_clock::now()) {
       return;
     }

@@ -1,4 +1,4 @@
-// One connection of the gateway, in the clear or with TLS, whatever is spoken over it.
+// One connection of the gateway, with or without TLS, for HTTP and WebSocket.
 #pragma once
 
 #include <boost/asio/basic_stream_socket.hpp>
@@ -24,16 +24,15 @@ namespace partiemc::server {
 
 using boost::beast::error_code;
 
-/// Everything that happens to a connection happens on its strand.
+/// All events of a connection run on its strand.
 using WebExecutor = boost::asio::strand<boost::asio::io_context::executor_type>;
 using WebSocket = boost::asio::basic_stream_socket<boost::asio::ip::tcp, WebExecutor>;
 using TlsWebSocket = boost::beast::ssl_stream<WebSocket>;
 
-/// As gRPC writes it: "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234".
+/// The peer in gRPC's format: "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234".
 std::string PeerOf(const boost::asio::ip::tcp::endpoint& endpoint);
 
-/// What does not depend on whether there is TLS. Held by shared_ptr only; but for Abort on the
-/// strand only.
+/// The part that is independent of TLS. Held by shared_ptr. Use on the strand only, except Abort.
 class WebConnection : public std::enable_shared_from_this<WebConnection> {
  public:
   WebConnection(WebContext& context_in, WebExecutor executor, std::string peer_in)
@@ -42,22 +41,22 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebConnection(const WebConnection&) = delete;
   WebConnection& operator=(const WebConnection&) = delete;
 
-  /// Closes the connection, whatever goes on, which fails then. From any thread.
+  /// Closes the connection; pending operations fail. From any thread.
   void Abort() {
     boost::asio::post(executor_, [self = shared_from_this()] { self->Close(); });
   }
-  /// The same at once.
+  /// Same as Abort, without posting to the strand.
   void Close();
-  /// Called once when the connection is closed by this side: what goes on may be waiting for
-  /// something else than the connection.
+  /// `closed` runs once when this side closes the connection. It ends operations that do not wait
+  /// for the socket.
   void WhenClosed(std::function<void()> closed) { closed_ = std::move(closed); }
 
-  /// Closes the connection after `time`, unless this is called again before.
+  /// Closes the connection after `time`, unless called again before.
   void CloseAfter(std::chrono::milliseconds time);
   void CloseNever() { deadline_.expires_at(std::chrono::steady_clock::time_point::max()); }
 
-  /// Closes the connection once the client has closed it, or after kWebCloseTime. Until then what
-  /// was written can arrive. What the client still sends is not read.
+  /// Closes the connection when the client has closed it, at the latest after kWebCloseTime, so
+  /// that written bytes can arrive. Ignores further bytes from the client.
   void CloseGently();
 
   const WebExecutor& executor() const { return executor_; }
@@ -65,7 +64,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebContext& context;
   const std::string peer;
   ConnectionSlots::Slot slot;
-  /// What has come and is not used up.
+  /// Received bytes that are not used yet.
   boost::beast::flat_buffer buffer{kMaxHeaderBytes};
 
  protected:

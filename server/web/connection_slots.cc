@@ -11,7 +11,8 @@ ConnectionSlots::Slot::~Slot() {
   const auto found = slots_->connections_.find(number_);
   if (!found->second.evicted) slots_->Uncount(found->second);
   slots_->connections_.erase(found);
-  // With the lock held: a thread that waits for the last connection may delete the slots after it.
+  // Notifies under the lock: a thread that waits for the last connection may destroy the slots
+  // afterwards.
   slots_->left_.notify_all();
 }
 
@@ -48,7 +49,7 @@ ConnectionSlots::Slot ConnectionSlots::Enter(const std::string& address, End end
   return slot;
 }
 
-// Called only if no slot is free, so that a pass over all connections is fast enough.
+// Linear in the connections, but called only if no slot is free.
 ConnectionSlots::Connection* ConnectionSlots::NextToEvict(bool reserved,
                                                           const std::string* address) {
   const auto may_go = [&](const Connection& connection) {

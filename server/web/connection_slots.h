@@ -25,21 +25,22 @@ namespace partiemc::server {
 class ConnectionSlots {
  public:
   struct Limits {
-    std::size_t connections = 256;  ///< Outside of the reserved slots; at least 1.
-    std::size_t per_address = 128;  ///< Of those; at least 1.
+    std::size_t connections = 256;  ///< Excludes the reserved slots; at least 1.
+    std::size_t per_address = 128;  ///< Part of `connections`; at least 1.
     std::size_t reserved = 16;      ///< At least 1.
   };
 
   enum class State {
-    kNoCall,   ///< Idle, and nothing is lost if it is closed.
-    kPending,  ///< Idle: the call has no request yet, or has ended and its status is on its way.
+    kNoCall,   ///< Idle. Closing it loses nothing.
+    kPending,  ///< Idle: a call without a request, or an ended call whose status is being sent.
     kServed,   ///< Not idle.
   };
 
-  /// Closes the connection soon. Called from any thread, possibly after the connection has gone.
+  /// Closes the connection soon. Called from any thread, possibly after the connection was
+  /// destroyed.
   using End = std::function<void()>;
 
-  /// The slot of one connection, until the connection is gone.
+  /// The slot of one connection; its destructor frees the slot.
   class Slot {
    public:
     Slot() = default;
@@ -52,7 +53,7 @@ class ConnectionSlots {
     }
     ~Slot();
 
-    /// Whether the connection is for health checks only.
+    /// True if the connection may only make health checks.
     bool reserved() const { return reserved_; }
     void SetState(State state);
 
@@ -66,14 +67,14 @@ class ConnectionSlots {
   explicit ConnectionSlots(Limits limits) : limits_(limits) {}
 
   /// Admits a connection from `address`. Sets `evicted` if another connection is closed for it. The
-  /// slots outlive it.
+  /// slots must outlive the Slot.
   Slot Enter(const std::string& address, End end, bool& evicted);
 
   std::size_t count() const;
-  /// Ends connections without a call, or all.
+  /// EndUnused ends connections without a call, EndAll ends all.
   void EndUnused() { EndSome(false); }
   void EndAll() { EndSome(true); }
-  /// Until all connections are gone; false if some are left at the deadline.
+  /// Waits until all connections are closed; false if the deadline passes first.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
   void WaitUntilEmpty();
 
@@ -83,24 +84,25 @@ class ConnectionSlots {
     End end;
     bool reserved = false;
     State state = State::kNoCall;
-    bool evicted = false;  // About to go, and not counted any more.
+    bool evicted = false;  // Being closed; no longer counted.
   };
 
-  // With the lock held:
+  // Require the lock:
   Connection* NextToEvict(bool reserved, const std::string* address);
   void Count(const Connection& connection);
   void Uncount(const Connection& connection);
   std::size_t CountOf(const std::string& address) const;
-  // Without:
+  // Requires that the lock is not held:
   void EndSome(bool all);
 
   const Limits limits_;
   mutable std::mutex mutex_;  // Guards everything below.
   std::condition_variable left_;
-  std::map<std::uint64_t, Connection> connections_;  // In the order in which they came.
-  // Without the evicted ones:
+  std::map<std::uint64_t, Connection> connections_;  // In the order of admission.
+  // Without evicted connections:
   std::size_t held_ = 0, held_reserved_ = 0;
-  std::unordered_map<std::string, std::size_t> held_by_;  // Outside of the reserved slots.
+  std::unordered_map<std::string, std::size_t>
+      held_by_;  // By address; excludes the reserved slots.
   std::uint64_t next_ = 1;
 };
 

@@ -1,4 +1,4 @@
-// What the connections of the gateway share.
+// State that the connections of the gateway share.
 #pragma once
 
 #include <prometheus/counter.h>
@@ -19,13 +19,13 @@
 
 namespace partiemc::server {
 
-/// A connection without a sign of life for `interval` is asked for one, and closed if it gives none
-/// within `timeout`.
+/// A connection that is silent for `interval` gets a ping. It is closed if it stays silent for
+/// `timeout`.
 struct WebPings {
   std::chrono::milliseconds interval, timeout;
 };
 
-/// partiemc_web_refusals_total.
+/// Counts partiemc_web_refusals_total.
 class WebRefusals {
  public:
   explicit WebRefusals(Metrics& metrics);
@@ -36,7 +36,7 @@ class WebRefusals {
   std::array<prometheus::Counter*, kWebRefusals> counters_{};
 };
 
-/// What is passed by reference lives longer. Safe from any thread.
+/// References must outlive it. Thread-safe.
 struct WebContext {
   const Methods& methods;
   const ServerLimits& limits;
@@ -48,15 +48,15 @@ struct WebContext {
   WebRefusals refusals;
   ConnectionSlots slots;
 
-  /// Counts and logs what was not let in.
+  /// Counts and logs a refused request.
   void Refuse(WebRefusal refusal, const std::string& peer, const absl::Status& why);
 };
 
-/// For how long a connection may take for its handshakes and the header of a request, ...
+/// Time limit for the handshakes and the header of a request.
 inline constexpr std::chrono::seconds kWebHeaderTime{10};
-/// ... for taking a response that is no answer of a call, ...
+/// Time limit for sending a response that does not belong to a call.
 inline constexpr std::chrono::seconds kWebResponseTime{30};
-/// ... for taking how its call ended, and closing.
+/// Time limit for sending the end of a call and closing.
 inline constexpr std::chrono::seconds kWebCloseTime{5};
 
 }  // namespace partiemc::server

@@ -5,9 +5,9 @@
 namespace partiemc::server {
 namespace {
 
-constexpr std::size_t kLeastChunk = 256;  // Far above what gRPC keeps within a slice itself.
+constexpr std::size_t kLeastChunk = 256;  // Well above the size that gRPC stores inside a slice.
 constexpr std::size_t kFirstChunk = 16 << 10;
-// So large that pieces cost nothing, so small that malloc has them at hand again.
+// Large enough to make pieces cheap, small enough that malloc reuses them.
 constexpr std::size_t kMostChunk = 1 << 20;
 
 }  // namespace
@@ -18,7 +18,7 @@ std::span<std::uint8_t> GatheredMessage::Room(std::size_t expected) {
     const std::size_t most = std::clamp(size_, kFirstChunk, kMostChunk);
     chunk_ = grpc::Slice(std::clamp(expected, kLeastChunk, most));
   }
-  // Nobody else has the slice yet.
+  // The slice is not shared yet, so writing to it is safe.
   return {const_cast<std::uint8_t*>(chunk_.begin()) + filled_, chunk_.size() - filled_};
 }
 
@@ -37,7 +37,7 @@ void GatheredMessage::CloseChunk() {
 
 grpc::ByteBuffer GatheredMessage::Take() {
   CloseChunk();
-  if (whole_.empty()) whole_.emplace_back();  // An empty message is one too.
+  if (whole_.empty()) whole_.emplace_back();  // An empty message is valid.
   grpc::ByteBuffer message(whole_.data(), whole_.size());
   Clear();
   return message;

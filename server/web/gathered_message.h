@@ -1,4 +1,4 @@
-// A message that comes in piece by piece.
+// Collects a message that arrives in pieces.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -10,19 +10,19 @@
 
 namespace partiemc::server {
 
-/// Takes memory as the message comes, whatever its sender has announced: at most about as much as
-/// has come, and 16 KiB.
+/// Allocates memory as bytes arrive, not by the announced length: at most about the received bytes
+/// plus 16 KiB.
 class GatheredMessage {
  public:
-  /// Bytes that have come.
+  /// Received bytes.
   std::size_t size() const { return size_; }
 
-  /// Where the next bytes go; never empty. `expected`: how many may still come, or a guess.
+  /// Space for the next bytes; never empty. `expected`: estimate of the bytes to come.
   std::span<std::uint8_t> Room(std::size_t expected);
-  /// So many were written to Room().
+  /// Records that `bytes` were written to Room().
   void Filled(std::size_t bytes);
 
-  /// The message, whose memory is handed over; the next one begins.
+  /// Moves out the message and starts the next one.
   grpc::ByteBuffer Take();
   void Clear();
 
@@ -30,7 +30,7 @@ class GatheredMessage {
   void CloseChunk();
 
   std::vector<grpc::Slice> whole_;
-  grpc::Slice chunk_;  // The last; its first bytes have come.
+  grpc::Slice chunk_;  // The current slice; its first `filled_` bytes are set.
   std::size_t filled_ = 0, size_ = 0;
 };
 

@@ -21,7 +21,7 @@ std::vector<std::string_view> All(const http::fields& fields, http::field name) 
 
 void SetUp(HttpParser& parser) {
   parser.header_limit(kMaxHeaderBytes);
-  // None at all would be below any length to Boost 1.74.
+  // Boost 1.74 treats an absent limit as smaller than any length.
   parser.body_limit(std::numeric_limits<std::uint64_t>::max());
 }
 

@@ -1,4 +1,4 @@
-// HTTP as Boost.Beast reads it.
+// Reads HTTP requests with Boost.Beast.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
@@ -10,16 +10,16 @@
 
 namespace partiemc::server {
 
-/// Of a request, all of it: who sends more is refused.
+/// Limit of a whole request header; a longer one is refused.
 inline constexpr std::uint32_t kMaxHeaderBytes = 16 << 10;
 
-/// Reads a header, and a body piece by piece to where it is told.
+/// Reads a header, then a body piece by piece into the caller's buffer.
 using HttpParser = boost::beast::http::request_parser<boost::beast::http::buffer_body>;
 
-/// Keeps `parser` from taking more than kMaxHeaderBytes, and bodies from any limit of its own.
+/// Limits the header of `parser` to kMaxHeaderBytes and removes the limit of the body.
 void SetUp(HttpParser& parser);
 
-/// What counts of a request whose header has come; views into `parser`.
+/// The relevant fields of a request whose header was read; views into `parser`.
 WebRequest ViewOf(const HttpParser& parser);
 
 }  // namespace partiemc::server

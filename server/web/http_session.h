@@ -1,4 +1,4 @@
-// The requests of one connection of the gateway, one after the other.
+// Serves the requests of one connection, one after the other.
 #pragma once
 
 #include <unistd.h>
@@ -29,7 +29,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   explicit HttpSession(std::shared_ptr<WebConnectionOver<Stream>> connection)
       : connection_(std::move(connection)) {}
 
-  /// Reads a request, answers it, or hands the connection to the call that it begins.
+  /// Reads a request. Answers it, or passes the connection to the call it begins.
   void ReadRequest() {
     allowed_origin_.clear();
     parser_ = std::make_unique<HttpParser>();
@@ -76,7 +76,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   }
 
   void Do(const WebRefused& refused) {
-    closes_ = closes_ || refused.http_status == 400;  // Where the request ends is in doubt.
+    closes_ = closes_ || refused.http_status == 400;  // The end of such a request is unknown.
     connection_->context.Refuse(refused.refusal, connection_->peer,
                                 absl::InvalidArgumentError("the request " + refused.rule));
     Send(ResponseTo(refused));
@@ -126,9 +126,9 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
         ->Begin(method, std::move(origin));
   }
 
-  // Only one whose request is read as a whole, and understood, is followed by another.
+  // Only a request that was read completely can be followed by another.
   void Send(WebResponse response) {
-    if (parser_->is_header_done()) {  // Else it was refused, and nothing of it can be asked.
+    if (parser_->is_header_done()) {  // Otherwise the request was refused and has no fields.
       const auto request = ViewOf(*parser_);
       closes_ = closes_ || !parser_->keep_alive() || request.has_body;
       if (request.method == "HEAD") response.head_only = true;
@@ -156,7 +156,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
     piece_.resize(kFilePiece);
     const auto count = read(file_->file.descriptor(), piece_.data(),
                             std::min<std::uint64_t>(left_, piece_.size()));
-    if (count <= 0) return connection_->Close();  // It has become shorter: less came than was said.
+    if (count <= 0) return connection_->Close();  // The file has become shorter than announced.
     left_ -= static_cast<std::uint64_t>(count);
     connection_->CloseAfter(kWebResponseTime);
     if (left_ == 0) file_.reset();
@@ -167,7 +167,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   std::unique_ptr<HttpParser> parser_;
   std::string allowed_origin_, text_;
   bool closes_ = false;
-  std::optional<PageFile> file_;  // Being sent.
+  std::optional<PageFile> file_;  // The file being sent.
   std::uint64_t left_ = 0;
   std::vector<char> piece_;
 };

@@ -1,4 +1,4 @@
-// The files of the built page, as the gateway serves them.
+// Opens the files of the built page for the gateway.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace partiemc::server {
 
-/// An open file, closed when this goes.
+/// An open file; its destructor closes it.
 class OpenFile {
  public:
   explicit OpenFile(int descriptor) : descriptor_(descriptor) {}
@@ -28,33 +28,32 @@ class OpenFile {
 struct PageFile {
   OpenFile file;
   std::uint64_t bytes = 0;
-  std::string type;         ///< Of its content, whether packed or not.
-  std::string tag;          ///< The ETag, with its quotes: another one once the file has changed.
-  bool has_packed = false;  ///< There is a packed variant: caches have to tell them apart.
-  bool is_packed = false;   ///< This is it: gzip.
+  std::string type;         ///< Type of the content, also if it is compressed.
+  std::string tag;          ///< ETag in quotes; changes with the file.
+  bool has_packed = false;  ///< A compressed variant exists, so caches must distinguish the two.
+  bool is_packed = false;   ///< The file is the gzip variant.
 };
 
-/// Safe from any thread.
+/// Thread-safe.
 class PageFiles {
  public:
   /// An empty `root` has no files.
   explicit PageFiles(std::string root) : root_(std::move(root)) {}
 
-  /// Whether there is a page.
+  /// True if the page is installed.
   bool HasPage() const { return Find({.path = "index.html"}).has_value(); }
-  /// An ordinary file of the folder; with takes_gzip the one beside it whose name ends in ".gz",
-  /// where there is one. Links are not followed, whatever they lead to.
+  /// Opens a regular file of the folder. With takes_gzip, opens NAME.gz beside it if that exists.
+  /// Never follows links.
   std::optional<PageFile> Find(const WebFile& wanted) const;
 
  private:
   const std::string root_;
 };
 
-/// PREFIX/share/partiemc/viewer of the program that runs as PREFIX/bin/...; empty if that is not
-/// there.
+/// PREFIX/share/partiemc/viewer for the program PREFIX/bin/...; empty if it does not exist.
 std::string DefaultPageRoot();
 
-/// By the ending of a name: "text/html; charset=utf-8".
+/// By the suffix of the name: "text/html; charset=utf-8".
 std::string_view TypeOfFile(std::string_view path);
 
 }  // namespace partiemc::server

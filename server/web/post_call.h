@@ -1,4 +1,4 @@
-// A call of one request and one answer as an HTTP POST.
+// A call with one request and one response, as an HTTP POST.
 #pragma once
 
 #include <boost/asio/buffer.hpp>
@@ -20,7 +20,7 @@
 
 namespace partiemc::server {
 
-/// The body of the request is read when its call asks for it, so not before its caller is let in.
+/// Reads the body when the call requests it, that is, after its caller was admitted.
 template <typename Stream>
 class PostCall final : public WebChannel {
  public:
@@ -33,7 +33,7 @@ class PostCall final : public WebChannel {
         parser_(std::move(parser)),
         allowed_origin_(std::move(allowed_origin)),
         next_(std::move(next)) {
-    connection_->CloseNever();  // The call's own state machine knows how long it may take.
+    connection_->CloseNever();  // The call's state machine has its own time limits.
   }
 
  private:
@@ -46,19 +46,19 @@ class PostCall final : public WebChannel {
     if (length && *length > message_limit()) {
       return Break(WebRefusal::kTooLarge, TooLarge(*length));
     }
-    parser_->body_limit(message_limit());  // Of all chunks, when they are announced.
+    parser_->body_limit(message_limit());  // For chunked bodies: limit of all chunks.
     const auto expect = parser_->get()[boost::beast::http::field::expect];
     if (!boost::beast::iequals(expect, "100-continue")) return ReadMore();
     static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
     boost::asio::async_write(stream_, boost::asio::buffer(kContinue),
                              [self = Self()](error_code error, std::size_t) {
-                               if (error) return self->Gone();
+                               if (error) return self->OnDisconnect();
                                self->ReadMore();
                              });
   }
 
   void ReadMore() {
-    if (!wanted()) return;  // It has ended meanwhile.
+    if (!wanted()) return;  // The call has ended since.
     if (parser_->is_done()) return BodyCame();
     const auto left = parser_->content_length_remaining();
     const auto expected = left ? *left : message_limit() + 1 - gathered_.size();
@@ -79,7 +79,7 @@ class PostCall final : public WebChannel {
     if (error == boost::beast::http::error::body_limit) {
       return Break(WebRefusal::kTooLarge, TooLarge(message_limit() + 1));
     }
-    if (error) return Gone();
+    if (error) return OnDisconnect();
     gathered_.Filled(room - parser_->get().body().size);
     if (gathered_.size() > message_limit()) {
       return Break(WebRefusal::kTooLarge, TooLarge(gathered_.size()));
@@ -92,7 +92,7 @@ class PostCall final : public WebChannel {
     WatchForEnd();
   }
 
-  // A client that goes away while its answer is made is noticed only by reading on.
+  // Reads while the response is computed, because only a read detects that the client disconnected.
   void WatchForEnd() {
     if (connection_->buffer.size() > 0) return;
     watching_ = true;
@@ -106,13 +106,13 @@ class PostCall final : public WebChannel {
   }
   void OnEnd() {
     if (goes_on_) return connection_->Close();
-    Gone();
+    OnDisconnect();
   }
 
   void Write(const grpc::ByteBuffer& message) override {
     message.Dump(&slices_);
     WebResponse response = ResponseOfCall(message.Length());
-    Dress(response);
+    AddCallHeaders(response);
     head_ = response.Text();
     std::vector<boost::asio::const_buffer> buffers = {boost::asio::buffer(head_)};
     for (const grpc::Slice& slice : slices_) buffers.emplace_back(slice.begin(), slice.size());
@@ -121,37 +121,37 @@ class PostCall final : public WebChannel {
                              [self = Self()](error_code error, std::size_t) {
                                self->slices_.clear();
                                self->Written(!error);
-                               if (error) self->Gone();
+                               if (error) self->OnDisconnect();
                              });
   }
 
-  void Tell(const absl::Status& status) override {
+  void SendEnd(const absl::Status& status) override {
     if (is_gone()) {
-      Over();
+      OnEndSent();
       return connection_->Close();
     }
     if (answered_) return GoOn();
     WebResponse response = ResponseTo(status);
     if (is_broken() && absl::IsResourceExhausted(status)) response.status = 413;
-    Dress(response);
+    AddCallHeaders(response);
     head_ = response.Text();
     connection_->CloseAfter(kWebCloseTime);
     boost::asio::async_write(stream_, boost::asio::buffer(head_),
                              [self = Self()](error_code error, std::size_t) {
-                               if (error) self->Gone();
+                               if (error) self->OnDisconnect();
                                self->GoOn();
                              });
   }
 
-  // One that has not read all of a request cannot read the next one.
-  void Dress(WebResponse& response) {
+  // If the request was not read completely, the connection cannot serve another.
+  void AddCallHeaders(WebResponse& response) {
     response.close = !parser_->is_done() || !parser_->keep_alive();
     if (!allowed_origin_.empty()) AllowOrigin(allowed_origin_, response);
   }
 
   void GoOn() {
     const bool keeps = !is_gone() && parser_->is_done() && parser_->keep_alive();
-    Over();
+    OnEndSent();
     if (!keeps) return connection_->CloseGently();
     connection_->slot.SetState(ConnectionSlots::State::kNoCall);
     goes_on_ = true;
@@ -165,7 +165,7 @@ class PostCall final : public WebChannel {
   const std::function<void()> next_;
   GatheredMessage gathered_;
   std::string head_;
-  std::vector<grpc::Slice> slices_;  // Of the answer.
+  std::vector<grpc::Slice> slices_;  // Slices of the response.
   bool answered_ = false, watching_ = false, goes_on_ = false;
 };
 

@@ -5,8 +5,10 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "common/address.h"
+#include "common/text.h"
 
 namespace partiemc::server {
 namespace {
@@ -25,35 +27,16 @@ constexpr std::array kRoutes = {
     Route{"/v1/frame", WebMethod::kFrame, false}, Route{"/v1/watch", WebMethod::kWatch, true},
     Route{"/v1/reconstruct", WebMethod::kReconstruct, true}};
 
-std::vector<std::string_view> Split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const std::size_t end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
-std::string_view Trim(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(" \t");
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t") + 1 - begin);
-}
+// HTTP's optional white space.
+constexpr std::string_view kSpace = " \t";
 
 std::string Lower(std::string_view text) { return absl::AsciiStrToLower(std::string(text)); }
-
-bool ConsumePrefix(std::string_view& text, std::string_view prefix) {
-  const bool has = text.starts_with(prefix);
-  if (has) text.remove_prefix(prefix.size());
-  return has;
-}
 
 WebAnswer RefusedAs(WebRefusal refusal, unsigned status, std::string rule, std::string allow = {}) {
   return {.what = WebRefused{refusal, status, std::move(rule), std::move(allow)}};
 }
 
-// Only the first of several would be seen by some.
+// Readers differ in which repeated header they use, so only a single one is accepted.
 std::optional<std::string> OnlyOne(const std::vector<std::string_view>& values) {
   if (values.size() != 1) return std::nullopt;
   return std::string(values.front());
@@ -88,7 +71,7 @@ bool IsFileCharacter(char c) {
          std::string_view("-_.~+@").find(c) != std::string_view::npos;
 }
 
-// "Host" or what stands behind "://" of an origin, without the port that is usual.
+// Normalizes "Host", or the part of an origin after "://", without the default port.
 std::optional<std::string> NormalHost(std::string_view text, std::string_view usual_port) {
   std::string host = Lower(text);
   if (host.empty() || host.size() > 300) return std::nullopt;
@@ -116,7 +99,7 @@ std::optional<std::string> NormalHost(std::string_view text, std::string_view us
 
 std::string_view UsualPort(std::string_view scheme) { return scheme == "https" ? "443" : "80"; }
 
-// Of a normal host, without its port; of a number in brackets with these.
+// The host without its port; an IPv6 address keeps its brackets.
 std::string_view NameOf(std::string_view host) {
   return host.substr(0, host.front() == '[' ? host.find(']') + 1 : host.find(':'));
 }
@@ -275,8 +258,8 @@ std::optional<std::string> FilePathOf(std::string_view target) {
   if (target == "/") return "index.html";
   auto path = DecodePercent(target.substr(1));
   if (!path) return std::nullopt;
-  // Names are split after decoding, so that an encoded '/' or '..' is one like any other.
-  for (const std::string_view name : Split(*path, '/')) {
+  // Names are split after decoding, so an encoded '/' or '..' is treated like any other.
+  for (const std::string_view name : Split(*path, '/', /*blanks=*/"")) {
     if (name.empty() || name.front() == '.' || !std::ranges::all_of(name, IsFileCharacter)) {
       return std::nullopt;
     }
@@ -287,8 +270,7 @@ std::optional<std::string> FilePathOf(std::string_view target) {
 OfferedProtocols ParseProtocols(const std::vector<std::string_view>& headers) {
   OfferedProtocols offered;
   for (const std::string_view header : headers) {
-    for (std::string_view name : Split(header, ',')) {
-      name = Trim(name);
+    for (std::string_view name : Split(header, ',', kSpace)) {
       if (name == kWebProtocol) offered.ours = true;
       if (!ConsumePrefix(name, kBearerProtocol)) continue;
       auto token = DecodeBase64Url(name);
@@ -300,35 +282,20 @@ OfferedProtocols ParseProtocols(const std::vector<std::string_view>& headers) {
 }
 
 std::optional<std::string> DecodeBase64Url(std::string_view text) {
-  if (text.size() % 4 == 1) return std::nullopt;
-  std::string out;
-  unsigned bits = 0;
-  int count = 0;
-  for (const char c : text) {
-    const auto value = [&]() -> int {
-      if (c >= 'A' && c <= 'Z') return c - 'A';
-      if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-      if (c >= '0' && c <= '9') return c - '0' + 52;
-      return c == '-' ? 62 : c == '_' ? 63 : -1;
-    }();
-    if (value < 0) return std::nullopt;
-    bits = bits << 6 | static_cast<unsigned>(value);
-    count += 6;
-    if (count < 8) continue;
-    count -= 8;
-    out += static_cast<char>(bits >> count & 0xFF);
-    bits &= (1u << count) - 1;
-  }
-  if (bits != 0) return std::nullopt;
-  return out;
+  const std::string encoded(text);
+  std::string decoded;
+  if (!absl::WebSafeBase64Unescape(encoded, &decoded)) return std::nullopt;
+  // abseil accepts blanks, padding and superfluous bits as well.
+  if (absl::WebSafeBase64Escape(decoded) != encoded) return std::nullopt;
+  return decoded;
 }
 
 bool AcceptsGzip(std::string_view accept_encoding) {
-  for (const std::string_view item : Split(accept_encoding, ',')) {
-    const auto parts = Split(item, ';');
-    if (Lower(Trim(parts.front())) != "gzip") continue;
+  for (const std::string_view item : Split(accept_encoding, ',', kSpace)) {
+    const auto parts = Split(item, ';', kSpace);
+    if (Lower(parts.front()) != "gzip") continue;
     if (parts.size() == 1) return true;
-    // "q=0", "q=0.000".
+    // False for "q=0" and "q=0.000".
     return parts[1].find_first_of("123456789") != std::string_view::npos;
   }
   return false;

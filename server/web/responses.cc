@@ -28,7 +28,7 @@ std::string WebResponse::Text() const {
   for (const auto& [name, value] : headers) absl::StrAppend(&text, name, ": ", value, "\r\n");
   absl::StrAppend(&text, "X-Content-Type-Options: nosniff\r\n");
   if (close) absl::StrAppend(&text, "Connection: close\r\n");
-  // 304 has no body, and its length would be that of the file.
+  // 304 has no body; a length would describe the file.
   if (status != 304) {
     absl::StrAppend(&text, "Content-Length: ", body_bytes > 0 ? body_bytes : body.size(), "\r\n");
   }

@@ -1,4 +1,4 @@
-// What the gateway answers where no call does.
+// Responses of the gateway that do not come from a call.
 #pragma once
 
 #include <cstdint>
@@ -15,34 +15,34 @@ namespace partiemc::server {
 
 struct WebResponse {
   unsigned status = 200;
-  /// Beside those that every response has.
+  /// In addition to the headers of every response.
   std::vector<std::pair<std::string, std::string>> headers = {};
   std::string body = {};
-  std::uint64_t body_bytes = 0;  ///< Of a body that is sent apart; else 0.
-  bool close = false;            ///< The connection ends with it.
-  bool head_only = false;        ///< The body is not sent.
+  std::uint64_t body_bytes = 0;  ///< Length of a body that is sent separately; otherwise 0.
+  bool close = false;            ///< The connection closes after the response.
+  bool head_only = false;        ///< Omit the body.
 
-  /// Status line and headers, and what follows them in `body` if it is sent.
+  /// Status line, headers and, unless it is omitted, `body`.
   std::string Text() const;
 };
 
 WebResponse ResponseTo(const WebRefused& refused);
 WebResponse ResponseTo(const WebHealth& health, bool draining);
 WebResponse ResponseToPreflight();
-/// The Content-Security-Policy of the page. `frame_ancestors` are origins that may show it in a
-/// frame, beside its own.
+/// The Content-Security-Policy of the page. `frame_ancestors` are other origins that may show it in
+/// a frame.
 std::string PagePolicy(const std::vector<std::string>& frame_ancestors);
-/// The head of a file, whose contents follow; 304 without them where `if_none_match` has its tag.
-/// `policy` is PagePolicy.
+/// The head of a file, whose contents follow. 304 without contents if `if_none_match` contains its
+/// tag. `policy` is PagePolicy.
 WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match,
                        const std::string& policy);
-/// Where a file is asked for that is not there; for the page itself it says how to get one.
+/// The response for a missing file. For the page itself it explains how to install it.
 WebResponse ResponseWithoutFile(const WebFile& asked, bool has_page);
-/// How a call ended that has no answer: JSON.
+/// JSON status of a call that ended without a response.
 WebResponse ResponseTo(const absl::Status& status);
-/// The head of the answer to a call.
+/// The head of a call's response.
 WebResponse ResponseOfCall(std::uint64_t bytes);
-/// Lets the page of another host, which may call, read it.
+/// Allows the page of another, allowed host to read the response.
 void AllowOrigin(const std::string& origin, WebResponse& response);
 
 }  // namespace partiemc::server

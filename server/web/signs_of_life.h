@@ -1,4 +1,4 @@
-// Whether the other end of a WebSocket is still there.
+// Detects a dead WebSocket.
 #pragma once
 
 #include <algorithm>
@@ -8,31 +8,32 @@
 
 namespace partiemc::server {
 
-/// Decides when to ask for a sign of life, and when to give up. A sign is whatever comes in, and
-/// that the client's machine takes what was sent.
+/// Decides when to send a ping and when to give up. A sign of life is a received byte or an
+/// acknowledgement of sent bytes by the client's machine.
 class SignsOfLife {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
   enum class Next { kWait, kPing, kGiveUp };
 
-  /// `write` is what the writing of one message may take.
+  /// `write`: time limit for writing one message.
   SignsOfLife(WebPings pings, std::chrono::milliseconds write, TimePoint now)
       : pings_(pings), write_(write), last_(now) {}
 
-  /// How often to ask Look.
+  /// Interval for calling Check.
   std::chrono::milliseconds interval() const {
     return std::max(std::min(pings_.interval, pings_.timeout) / 4, std::chrono::milliseconds(10));
   }
 
-  void Heard(TimePoint now) {
+  void OnSign(TimePoint now) {
     last_ = now;
     pinged_ = false;
   }
   void WriteBegan(TimePoint now) { write_began_ = now; }
 
-  /// `unsent`: bytes that the client's machine has not confirmed. Nobody hears anything where
-  /// nothing is read, and a ping waits behind what is being written.
-  Next Look(TimePoint now, bool reading, bool writing, long unsent) {
+  /// `unsent`: bytes that the client's machine has not acknowledged. The time does not run while
+  /// nothing is read, which hides signs of life, or while a message is being written, which delays
+  /// a ping.
+  Next Check(TimePoint now, bool reading, bool writing, long unsent) {
     if (writing && write_.count() > 0 && now - write_began_ > write_) return Next::kGiveUp;
     if (unsent != unsent_ || !reading || writing) {
       unsent_ = unsent;

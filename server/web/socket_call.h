@@ -1,4 +1,4 @@
-// A call over a WebSocket: one binary message is one request or answer.
+// A call over a WebSocket: each binary message is one request or one response.
 #pragma once
 
 #include <sys/ioctl.h>
@@ -27,8 +27,9 @@
 
 namespace partiemc::server {
 
-/// The WebSocket begins when the call asks for its first request, so when its caller is let in. One
-/// that is not is told by HTTP, or, where a browser would not show that, in a WebSocket after all.
+/// Completes the WebSocket handshake when the call reads its first request, that is, after its
+/// caller was admitted. Refuses other callers by HTTP; a browser would hide this, so it gets the
+/// refusal in a WebSocket.
 template <typename Stream>
 class SocketCall final : public WebChannel {
  public:
@@ -46,10 +47,9 @@ class SocketCall final : public WebChannel {
   using Now = std::chrono::steady_clock;
   enum Phase { kHttp, kUpgrading, kOpen };
 
-  // What is read ahead while the call wants nothing: so that a client that goes is noticed, and
-  // pings are answered.
+  // Bytes read ahead while the call reads nothing, to detect a disconnect and to answer pings.
   static constexpr std::size_t kReadAhead = 64 << 10;
-  static constexpr std::size_t kLongestText = 3;  // "end".
+  static constexpr std::size_t kLongestText = 3;  // The text message "end".
 
   std::shared_ptr<SocketCall> Self() {
     return std::static_pointer_cast<SocketCall>(this->shared_from_this());
@@ -71,10 +71,10 @@ class SocketCall final : public WebChannel {
                    boost::beast::string_view(kWebProtocol.data(), kWebProtocol.size()));
     }));
     socket_.auto_fragment(false);
-    socket_.read_message_max(0);  // Looked at here, where the client can be told.
+    socket_.read_message_max(0);  // Checked here, where the client can be informed.
     socket_.control_callback([this](websocket::frame_type kind, auto) {
-      signs_.Heard(Now::now());
-      if (kind == websocket::frame_type::close) Leaves();
+      signs_.OnSign(Now::now());
+      if (kind == websocket::frame_type::close) OnClientClose();
     });
     socket_.async_accept(parser_->get(),
                          [self = Self()](error_code error) { self->OnUpgraded(error); });
@@ -84,27 +84,26 @@ class SocketCall final : public WebChannel {
     parser_.reset();
     phase_ = kOpen;
     if (error) {
-      Gone();
-      if (is_finished()) LastWord();
+      OnDisconnect();
+      if (is_finished()) EndWithoutSending();
       return;
     }
     connection_->CloseNever();
-    if (is_finished()) return Say();
-    signs_.Heard(Now::now());
-    LookForLife();
+    if (is_finished()) return SendStatus();
+    signs_.OnSign(Now::now());
+    CheckLiveness();
     Pump();
   }
 
-  // The client has said goodbye without `end`: it hears the same, and its call ends at once,
-  // however long the client takes for the rest.
-  void Leaves() {
+  // The client closed the WebSocket without `end`: closes it, too, and ends the call at once.
+  void OnClientClose() {
     if (is_finished()) return;
-    leaves_ = true;
+    client_closed_ = true;
     connection_->CloseAfter(kWebCloseTime);
-    TellCancelled();
+    CancelCall();
   }
 
-  // Reads as long as somebody wants a message, or there is little of it.
+  // Reads while the call wants a message or little is read ahead.
   void Pump() {
     if (reading_ || is_gone() || is_finished() || is_broken()) return;
     if (half_closed_) {
@@ -125,15 +124,15 @@ class SocketCall final : public WebChannel {
   }
 
   void OnSome(error_code error, std::size_t bytes) {
-    if (leaves_) return connection_->Close();
+    if (client_closed_) return connection_->Close();
     if (is_finished()) return;
     if (error) {
       if (error != boost::beast::websocket::error::closed && IsProtocolError(error)) {
         connection_->context.refusals.Count(WebRefusal::kBadMessage);
       }
-      return Gone();
+      return OnDisconnect();
     }
-    signs_.Heard(Now::now());
+    signs_.OnSign(Now::now());
     gathered_.Filled(bytes);
     complete_ = socket_.is_message_done();
     if (half_closed_) return Misspoken("a message after `end`");
@@ -171,7 +170,7 @@ class SocketCall final : public WebChannel {
   }
 
   void Write(const grpc::ByteBuffer& message) override {
-    if (leaves_) return Written(false);
+    if (client_closed_) return Written(false);
     message.Dump(&slices_);
     std::vector<boost::asio::const_buffer> buffers;
     for (const grpc::Slice& slice : slices_) buffers.emplace_back(slice.begin(), slice.size());
@@ -180,19 +179,19 @@ class SocketCall final : public WebChannel {
     socket_.async_write(std::move(buffers), [self = Self()](error_code error, std::size_t) {
       self->slices_.clear();
       self->Written(!error);
-      if (error) self->Gone();
+      if (error) self->OnDisconnect();
     });
   }
 
-  // Every few seconds, or less.
-  void LookForLife() {
+  // Checks for signs of life every few seconds.
+  void CheckLiveness() {
     clock_.expires_after(signs_.interval());
     clock_.async_wait([weak = this->weak_from_this(), this](error_code error) {
       const auto self = weak.lock();
       if (error || self == nullptr || is_gone() || is_finished()) return;
       int unsent = 0;
       ioctl(boost::beast::get_lowest_layer(socket_).native_handle(), TIOCOUTQ, &unsent);
-      const auto next = signs_.Look(Now::now(), reading_, is_writing(), unsent);
+      const auto next = signs_.Check(Now::now(), reading_, is_writing(), unsent);
       if (next == SignsOfLife::Next::kGiveUp) {
         connection_->context.refusals.Count(WebRefusal::kTimeout);
         return connection_->Close();
@@ -200,63 +199,63 @@ class SocketCall final : public WebChannel {
       if (next == SignsOfLife::Next::kPing) {
         socket_.async_ping({}, [self](error_code) {});
       }
-      LookForLife();
+      CheckLiveness();
     });
   }
 
-  void Tell(const absl::Status& status) override {
+  void SendEnd(const absl::Status& status) override {
     last_status_ = status;
-    if (is_gone()) return LastWord();
-    if (leaves_) return Over();
-    if (phase_ == kOpen) return Say();
-    if (phase_ == kUpgrading) return;  // OnUpgraded goes on.
+    if (is_gone()) return EndWithoutSending();
+    if (client_closed_) return OnEndSent();
+    if (phase_ == kOpen) return SendStatus();
+    if (phase_ == kUpgrading) return;  // OnUpgraded continues.
     if (from_page_) return Upgrade();
     WebResponse response = ResponseTo(status);
     response.close = true;
     text_ = response.Text();
     boost::asio::async_write(socket_.next_layer(), boost::asio::buffer(text_),
                              [self = Self()](error_code, std::size_t) {
-                               self->Over();
+                               self->OnEndSent();
                                self->connection_->CloseGently();
                              });
   }
 
-  void Say() {
+  void SendStatus() {
     connection_->CloseAfter(kWebCloseTime);
     text_ = StatusJson(last_status_);
     socket_.text(true);
     socket_.async_write(boost::asio::buffer(text_), [self = Self()](error_code error, std::size_t) {
-      if (error) return self->LastWord();
-      self->Over();
-      self->SayGoodbye();
+      if (error) return self->EndWithoutSending();
+      self->OnEndSent();
+      self->CloseSocket();
     });
   }
 
-  void SayGoodbye() {
+  void CloseSocket() {
     const boost::beast::websocket::close_reason reason(
         static_cast<boost::beast::websocket::close_code>(CloseCodeOf(last_status_)),
         CloseReasonOf(last_status_));
     socket_.async_close(reason, [self = Self()](error_code) { self->connection_->Close(); });
   }
 
-  void LastWord() {
-    Over();
+  void EndWithoutSending() {
+    OnEndSent();
     connection_->Close();
   }
 
-  // Of a message of which nothing is known.
+  // First buffer of a message of unknown length.
   static constexpr std::size_t kFirstGuess = 4096;
 
   boost::beast::websocket::stream<Stream&, false> socket_;
-  std::unique_ptr<HttpParser> parser_;  // Of the request that this has begun with.
+  std::unique_ptr<HttpParser> parser_;  // The request that began the WebSocket.
   const bool from_page_;
   boost::asio::steady_timer clock_;
   SignsOfLife signs_{connection_->context.pings, connection_->context.limits.unary.answer,
                      Now::now()};
   Phase phase_ = kHttp;
   GatheredMessage gathered_;
-  bool reading_ = false, complete_ = false, half_closed_ = false, leaves_ = false;
-  std::vector<grpc::Slice> slices_;  // Of the message that is being written.
+  bool reading_ = false, complete_ = false, half_closed_ = false, client_closed_ = false;
+  std::vector<grpc::Slice> slices_;  // Slices of the message being written.
   std::string text_;
   absl::Status last_status_;
 };

@@ -11,7 +11,7 @@ namespace partiemc::server {
 namespace {
 
 constexpr std::uint16_t kNormalClose = 1000, kFirstOwnClose = 4000;
-constexpr std::size_t kMostCloseReason = 120;  // 123 would fit into a frame.
+constexpr std::size_t kMostCloseReason = 120;  // A close frame has room for 123.
 
 }  // namespace
 

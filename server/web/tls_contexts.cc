@@ -12,7 +12,7 @@ namespace {
 
 namespace ssl = boost::asio::ssl;
 
-// A client that offers protocols is given HTTP/1.1, or nothing: this gateway speaks no HTTP/2.
+// Selects HTTP/1.1 if the client offers protocols: this gateway does not support HTTP/2.
 int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_bytes,
                    const unsigned char* offered, unsigned int offered_bytes, void*) {
   static constexpr std::string_view kOurs = "\x08http/1.1";

@@ -1,4 +1,4 @@
-// TLS of the gateway, with the identity that gRPC has too.
+// TLS contexts of the gateway, with the same identity as gRPC.
 #pragma once
 
 #include <boost/asio/ssl/context.hpp>
@@ -9,20 +9,20 @@
 
 namespace partiemc::server {
 
-/// What a new connection begins with. Connections that are open keep what they began with.
+/// Provides the TLS context for new connections. Open connections keep theirs.
 class TlsContexts {
  public:
-  /// `current` has an identity by now, and lives longer. Whether clients need a certificate is
-  /// decided now, as for gRPC.
+  /// `current` must have an identity and outlive this object. Whether clients need a certificate is
+  /// decided here, as for gRPC.
   explicit TlsContexts(const CurrentTlsIdentity& current);
 
-  /// Of the identity in force; the one before, or none, where OpenSSL does not take it.
+  /// The context of the current identity. If OpenSSL rejects it, the previous context, or null.
   std::shared_ptr<boost::asio::ssl::context> Get();
 
  private:
   const CurrentTlsIdentity& current_;
   const bool asks_clients_;
-  std::uint64_t version_ = 0;  // Of context_.
+  std::uint64_t version_ = 0;  // Version of context_.
   std::shared_ptr<boost::asio::ssl::context> context_;
 };
 

@@ -6,8 +6,8 @@
 namespace partiemc::server {
 namespace {
 
-// Requests for information, and those of a watcher, are far smaller; what is slightly too large
-// for them is refused by the call, which says why.
+// Limit for methods with small requests. It is generous, so that the call itself refuses a slightly
+// oversized request, with a reason.
 constexpr std::uint64_t kMostSmallMessage = 64 << 10;
 
 std::uint64_t LimitOf(Methods::Method method, const ServerLimits& limits) {
@@ -22,7 +22,7 @@ void WebChannel::Begin(Methods::Method method, CallOrigin origin) {
   self_ = shared_from_this();
   message_limit_ = LimitOf(method, connection_->context.limits);
   connection_->WhenClosed([weak = weak_from_this()] {
-    if (const auto self = weak.lock()) self->Gone();
+    if (const auto self = weak.lock()) self->OnDisconnect();
   });
   call_ = connection_->context.methods.Begin(method, *this, origin);
 }
@@ -32,7 +32,7 @@ void WebChannel::StartRead(grpc::ByteBuffer* message) {
     wanted_ = message;
     if (cancelled_ || finished_) return ReadEnded();
     if (admitted_) return Read();
-    // A call that is refused may begin a read too, and ends at once: that has been posted by now.
+    // A refused call may also start a read; it ends at once, so its end has been posted before.
     Post([this] {
       if (wanted_ == nullptr) return;
       admitted_ = true;
@@ -53,9 +53,9 @@ void WebChannel::StartWrite(const grpc::ByteBuffer* message) {
 void WebChannel::Cancel() {
   cancelled_ = true;
   Post([this] {
-    // What is being written has its place in the connection: nothing can be sent after half of it.
+    // A half-written message leaves the connection unusable.
     if (writing_) return connection_->Close();
-    TellCancelled();
+    CancelCall();
   });
 }
 
@@ -64,9 +64,9 @@ void WebChannel::Finish(const absl::Status& status) {
     finished_ = true;
     if (admitted_) connection_->slot.SetState(ConnectionSlots::State::kPending);
     if (wanted_ != nullptr) ReadEnded();
-    const absl::Status& told = told_instead_ ? *told_instead_ : status;
+    const absl::Status& told = break_status_ ? *break_status_ : status;
     if (!admitted_ && !told.ok()) connection_->context.refusals.Count(WebRefusal::kCall);
-    Tell(told);
+    SendEnd(told);
   });
 }
 
@@ -85,31 +85,31 @@ void WebChannel::Written(bool ok) {
   call_->OnWriteDone(ok);
 }
 
-void WebChannel::TellCancelled() {
+void WebChannel::CancelCall() {
   if (call_ == nullptr) return;
   cancelled_ = true;
   ReadEnded();
-  if (!finished_ && !std::exchange(told_cancel_, true)) call_->OnCancel();
+  if (!finished_ && !std::exchange(cancel_reported_, true)) call_->OnCancel();
 }
 
-void WebChannel::Gone() {
+void WebChannel::OnDisconnect() {
   gone_ = true;
-  TellCancelled();
+  CancelCall();
 }
 
 void WebChannel::Break(WebRefusal refusal, absl::Status status) {
-  if (finished_ || told_instead_) return;
+  if (finished_ || break_status_) return;
   connection_->context.Refuse(refusal, connection_->peer, status);
-  told_instead_ = std::move(status);
+  break_status_ = std::move(status);
   connection_->CloseAfter(kWebCloseTime);
-  TellCancelled();
+  CancelCall();
 }
 
-void WebChannel::Over() {
+void WebChannel::OnEndSent() {
   connection_->WhenClosed(nullptr);
   call_->OnDone();
   call_.reset();
-  self_.reset();  // Whoever calls this holds it too.
+  self_.reset();  // The caller of this function holds another reference.
 }
 
 absl::Status WebChannel::TooLarge(std::uint64_t bytes) const {

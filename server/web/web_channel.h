@@ -1,4 +1,4 @@
-// A call that comes through the gateway, as far as it does not matter how.
+// Common part of calls through the gateway, independent of the transport.
 #pragma once
 
 #include <atomic>
@@ -16,15 +16,15 @@
 
 namespace partiemc::server {
 
-/// Brings what a state machine asks for, from whichever thread, to the connection's strand, and
-/// keeps the promises of a channel: each read and write is answered once, OnCancel comes once at
-/// most, OnDone last. Holds itself until then. Held by shared_ptr only.
+/// Posts a state machine's requests to the connection's strand. Keeps the contract of CallChannel:
+/// each read and write is answered once, OnCancel is called at most once, OnDone last. Keeps itself
+/// alive until then. Held by shared_ptr.
 class WebChannel : public CallChannel, public std::enable_shared_from_this<WebChannel> {
  public:
   explicit WebChannel(std::shared_ptr<WebConnection> connection)
       : connection_(std::move(connection)) {}
 
-  /// On the strand. What the call asks for comes after this has returned.
+  /// On the strand. The call's requests are handled after this returns.
   void Begin(Methods::Method method, CallOrigin origin);
 
   void StartRead(grpc::ByteBuffer* message) final;
@@ -35,35 +35,35 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
   std::string peer() const final { return connection_->peer; }
 
  protected:
-  // Of the transport, on the strand:
+  // Implemented by the transport, on the strand:
 
-  /// Brings the next message by Deliver, some time, or none by ReadEnded.
+  /// Later delivers the next message by Deliver, or the end by ReadEnded.
   virtual void Read() = 0;
-  /// Ends in Written.
+  /// Ends with Written.
   virtual void Write(const grpc::ByteBuffer& message) = 0;
-  /// Tells how the call ended; ends in Over. The connection may be gone.
-  virtual void Tell(const absl::Status& status) = 0;
+  /// Sends the end of the call; ends with OnEndSent. The connection may already be closed.
+  virtual void SendEnd(const absl::Status& status) = 0;
 
   // For the transport, on the strand:
 
   bool wanted() const { return wanted_ != nullptr; }
   void Deliver(grpc::ByteBuffer message);
-  /// No message comes any more: a half-close, or after Gone.
+  /// No message follows: after a half-close or Gone.
   void ReadEnded();
   void Written(bool ok);
-  /// Nobody is there any more; or nobody waits any more, and what is told may still arrive.
-  void Gone();
-  void TellCancelled();
-  /// The client has done what it must not: its call is cancelled, and this is what it is told.
+  /// The client has disconnected, or has stopped waiting while a status can still arrive.
+  void OnDisconnect();
+  void CancelCall();
+  /// The client broke the protocol: cancels the call and sends `status`.
   void Break(WebRefusal refusal, absl::Status status);
-  /// The end was told, or cannot be.
-  void Over();
+  /// The end was sent, or cannot be sent.
+  void OnEndSent();
 
   bool is_gone() const { return gone_; }
-  bool is_broken() const { return told_instead_.has_value(); }
+  bool is_broken() const { return break_status_.has_value(); }
   bool is_finished() const { return finished_; }
   bool is_writing() const { return writing_; }
-  /// Of one message of this method.
+  /// Size limit of one message of this method.
   std::uint64_t message_limit() const { return message_limit_; }
   absl::Status TooLarge(std::uint64_t bytes) const;
 
@@ -76,13 +76,14 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
                       [self = shared_from_this(), action = std::move(action)] { action(); });
   }
 
-  std::shared_ptr<WebChannel> self_;  // Until the call is over.
+  std::shared_ptr<WebChannel> self_;  // Keeps this object alive until the end of the call.
   std::unique_ptr<ByteCall> call_;
-  grpc::ByteBuffer* wanted_ = nullptr;  // Of the read that goes on.
+  grpc::ByteBuffer* wanted_ = nullptr;  // Destination of the pending read.
   std::atomic<bool> cancelled_ = false;
-  bool admitted_ = false, writing_ = false, gone_ = false, finished_ = false, told_cancel_ = false;
+  bool admitted_ = false, writing_ = false, gone_ = false, finished_ = false,
+       cancel_reported_ = false;
   std::uint64_t message_limit_ = 0;
-  std::optional<absl::Status> told_instead_;
+  std::optional<absl::Status> break_status_;
 };
 
 }  // namespace partiemc::server

@@ -27,7 +27,7 @@ namespace {
 using boost::asio::ip::tcp;
 
 constexpr int kThreads = 2;
-// Without a free descriptor each attempt fails at once.
+// Pause after a failed accept: without a free descriptor every attempt fails at once.
 constexpr std::chrono::milliseconds kRestAfterFailure(100);
 constexpr int kBacklog = 1024;
 
@@ -42,7 +42,7 @@ ConnectionSlots::Limits LimitsOf(const WebOptions& options) {
           .per_address = asked > 0 ? asked : std::max<std::size_t>(connections / 2, 1)};
 }
 
-// What Start has checked of WebOptions.
+// The checked form of WebOptions.
 struct CheckedOptions {
   WebRules rules;
   std::vector<std::string> frame_ancestors;
@@ -115,7 +115,7 @@ class WebGateway::Implementation {
 
   ~Implementation() { Stop(std::chrono::steady_clock::now()); }
 
-  // All addresses that a name has: which one of them a browser takes is not known.
+  // Listens on all addresses of a name, because browsers differ in which one they use.
   absl::Status Listen() {
     error_code error;
     tcp::resolver resolver(io_);
@@ -155,7 +155,7 @@ class WebGateway::Implementation {
     });
     context_.slots.EndUnused();
     if (!context_.slots.WaitUntilEmpty(deadline)) {
-      // Some may have come in meanwhile, but none after this.
+      // Runs after the connections that were accepted during the wait; none follows.
       boost::asio::post(accepting_, [this] { context_.slots.EndAll(); });
       context_.slots.WaitUntilEmpty();
     }
@@ -211,13 +211,13 @@ class WebGateway::Implementation {
   void Enter(WebSocket socket) {
     error_code error;
     const auto endpoint = socket.remote_endpoint(error);
-    if (error) return;  // It has gone already.
+    if (error) return;  // The connection is already closed.
     socket.set_option(tcp::no_delay(true), error);
     const WebExecutor executor = socket.get_executor();
     if (!tls_) {
       return Enter<WebSocket>(executor, PeerOf(endpoint), std::move(socket));
     }
-    // The connection keeps what its identity needs; the context itself may go.
+    // The connection keeps a reference to the identity it needs; the context may be released.
     const auto context = tls_->Get();
     if (context == nullptr) return context_.refusals.Count(WebRefusal::kMalformed);
     Enter<TlsWebSocket>(executor, PeerOf(endpoint), std::move(socket), *context);
@@ -246,7 +246,7 @@ class WebGateway::Implementation {
   Address address_;
   std::optional<TlsContexts> tls_;
   std::list<Acceptor> listeners_;
-  bool stopped_ = false;  // On accepting_.
+  bool stopped_ = false;  // Used on accepting_ only.
   std::vector<std::thread> threads_;
 };
 

@@ -1,4 +1,4 @@
-// The gateway of a server: its page, and its methods over WebSocket and POST.
+// HTTP gateway of a server: serves the page, and its methods over WebSocket and POST.
 #pragma once
 
 #include <chrono>
@@ -15,10 +15,10 @@
 
 namespace partiemc::server {
 
-/// Runs in threads of its own.
+/// Runs in its own threads.
 class WebGateway {
  public:
-  /// What is passed by reference lives longer. Without `tls` it speaks in the clear.
+  /// References must outlive the gateway. Without `tls` connections are not encrypted.
   struct Setup {
     const Methods& methods;
     const ServerLimits& limits;
@@ -28,21 +28,20 @@ class WebGateway {
     std::chrono::milliseconds ping_interval, ping_timeout;
   };
 
-  /// Listens and serves when it returns.
-  /// Errors: INVALID_ARGUMENT for a Unix socket and for what is no origin, UNAVAILABLE where it
-  /// cannot listen.
+  /// Listens and serves when it returns. Errors: INVALID_ARGUMENT for a Unix socket or an invalid
+  /// origin, UNAVAILABLE if it cannot listen.
   static absl::StatusOr<std::unique_ptr<WebGateway>> Start(const WebOptions& options,
                                                            const Setup& setup);
-  /// Stops at once if it was not stopped.
+  /// Stops at once unless stopped before.
   ~WebGateway();
   WebGateway(const WebGateway&) = delete;
   WebGateway& operator=(const WebGateway&) = delete;
 
-  /// With the port that it got.
+  /// With the actual port.
   const Address& address() const;
 
-  /// Takes no new connection, and returns when all calls are over and all connections are closed,
-  /// those that are not by then are cut.
+  /// Stops accepting, waits until all calls have ended and all connections are closed, and cuts the
+  /// others at the deadline.
   void Stop(std::chrono::steady_clock::time_point deadline);
 
  private:

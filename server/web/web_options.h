@@ -1,4 +1,4 @@
-// How the gateway of a server is set up.
+// Options of the gateway.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@ namespace partiemc::server {
 
 struct WebOptions {
   Address address;
-  /// The folder with the built page; empty: DefaultPageRoot(), where that is there.
+  /// Folder of the built page; empty: DefaultPageRoot(), if it exists.
   std::string root = {};
-  /// Beside pages of the host that is asked itself, pages of these may call: "https://host:port".
+  /// Origins of pages that may call, in addition to the server's own host: "https://host:port".
   std::vector<std::string> origins = {};
-  /// Host names that requests may name beside those of this machine, if the server listens on a
+  /// Host names that requests may use in addition to this machine's, if the server listens on a
   /// loopback address: "viewer.example".
   std::vector<std::string> hosts = {};
-  /// Origins whose pages may show the page in a frame, beside its own.
+  /// Other origins that may show the page in a frame.
   std::vector<std::string> frame_ancestors = {};
-  /// Connections, including those without a call, of all addresses and of one; at least 1.
+  /// Limits of connections, including those without a call, in total and per address; at least 1.
   std::uint32_t max_connections = 256;
   std::uint32_t max_per_address = 0;  ///< 0: half of max_connections.
 };

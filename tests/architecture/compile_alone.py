@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Checks that every source includes what it needs.
+"""Checks that every source includes the headers it needs.
 
-GCC's builds parse common headers once and compile small rooms together, which hides a missing include.
-This looks at each source of core, proto, server and client that BUILD, a build of Clang's, knows and
-has not compiled: its syntax alone. Headers that protoc makes must be there.
+GCC's builds parse common headers once and compile small rooms together, which hides missing includes.
+This script checks the syntax of each source of core, proto, server and client that BUILD, a build of
+Clang, lists but has not compiled. The headers made by protoc must exist.
 """
 import argparse
 import concurrent.futures

@@ -174,10 +174,11 @@ def main():
     arguments = parser.parse_args()
     rates = count(arguments.show)
     if arguments.refresh:
+        limits = lowered(rates, read_limits())  # Read before the file is truncated.
         with open(LIMITS, "w", encoding="utf-8") as file:
             file.write("room,places,long\n")
             file.writelines(f"{room},{places},{long}\n"
-                            for room, (places, long) in lowered(rates, read_limits()).items())
+                            for room, (places, long) in limits.items())
     if arguments.show or arguments.refresh:
         return
     if lines := excesses(rates, read_limits()):

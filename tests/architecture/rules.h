@@ -1,5 +1,5 @@
-// The rules of ARCHITECTURE.md that a compiler does not check. Each function looks at a whole
-// source tree and returns one line per violation, with the file that breaks the rule.
+// The rules of ARCHITECTURE.md that a compiler does not check. Each function checks a whole source
+// tree and returns one line per violation, with the file.
 #pragma once
 
 #include <string>
@@ -11,44 +11,41 @@ namespace partiemc::architecture {
 
 using Violations = std::vector<std::string>;
 
-/// The core knows no gRPC, Protobuf, logging, file, stream, clock or environment, and no other
-/// room.
+/// The core uses no gRPC, Protobuf, logging, file, stream, clock or environment, and no other room.
 Violations CoreIsPlain(const SourceTree& tree);
 
-/// Outside of the tests only core/src/base/parallel.cc, which is compiled without ThreadSanitizer,
-/// includes what makes tasks of oneTBB, so that the sanitizer is told about every fork and join.
+/// Except in tests, only core/src/base/parallel.cc includes oneTBB's task headers. It is compiled
+/// without ThreadSanitizer, and declares every fork and join to it.
 Violations TasksStartInOneFile(const SourceTree& tree);
 
-/// Every file of core/src, server and client lies in one of their rooms, or is one of the few
-/// beside them that put the rooms together; so do those of client/input and client/evaluation,
-/// which have rooms of their own. A file includes its own room and rooms above it, by its path.
+/// Every file of core/src, server and client is in one of their rooms, or is one of the few files
+/// that compose the rooms. The same holds for client/input, which has rooms of its own. A file
+/// includes its own room and the rooms above it, by path.
 Violations FilesKeepTheirRooms(const SourceTree& tree);
 
 /// No folder of core, proto, server and client has more than 18 stems.
 Violations NoFolderIsTooFull(const SourceTree& tree);
 
-/// Of the server, the rooms rpc and security, what starts it, and logging.cc, which takes gRPC's
-/// own lines, alone include gRPC and messages; calls messages and their bytes, nothing else of
-/// gRPC.
+/// In the server, only the rooms rpc and security, the top files and logging.cc include gRPC and
+/// messages. The rooms calls, web and relay include messages and their bytes only.
 Violations GrpcStaysInItsRooms(const SourceTree& tree);
 
-/// Each stage has its header and source; a stage reaches the headers of earlier
-/// stages only; no other source than reconstructor.cc reaches all of them.
+/// Each stage has a header and a source. A stage reaches only the headers of earlier stages. Only
+/// reconstructor.cc reaches all of them.
 Violations StagesKeepTheirOrder(const SourceTree& tree);
 
-/// The sources of partiemc_server_session and their headers (sessions, the flow and registry of
-/// streams, the pool that computes) reach neither gRPC nor Protobuf, so that they run under
-/// ThreadSanitizer.
+/// The sources of partiemc_server_session and their headers reach neither gRPC nor Protobuf, so
+/// that they can run under ThreadSanitizer.
 Violations SessionsAreFreeOfGrpc(const SourceTree& tree);
 
 /// Server and client never include each other, nor link to each other.
 Violations ServerAndClientAreStrangers(const SourceTree& tree);
 
-/// No file names a directory of somebody's own machine.
+/// No file contains a path of a developer's machine.
 Violations NoMachinePaths(const SourceTree& tree);
 
-/// What the CMake files look for is in the package sets of docker/packages: the core's in `core`,
-/// VTK in `vtk`, the tests' in `tests`, everything else in `service`.
+/// The packages that the CMake files require are in docker/packages: the core's in `core`, VTK in
+/// `vtk`, the tests' in `tests`, all others in `service`.
 Violations PackageSetsAreComplete(const SourceTree& tree);
 
 }  // namespace partiemc::architecture

@@ -1,4 +1,4 @@
-// The project's own text files, in memory, so that a test can plant a violation without a copy.
+// The project's text files in memory, so that a test can plant a violation without copying files.
 #pragma once
 
 #include <filesystem>
@@ -10,28 +10,28 @@
 
 namespace partiemc::architecture {
 
-/// Path relative to the project's root, with '/' -> content.
+/// Path relative to the project's root, with '/', to content.
 using SourceTree = std::map<std::string, std::string>;
 
-/// Every text file below `root`, but for version control, build trees and caches.
-/// Requires: `root` is a readable directory.
+/// All text files below `root`, except version control, build trees and caches. Requires: `root` is
+/// a readable directory.
 SourceTree ReadSourceTree(const std::filesystem::path& root);
 
-/// `text` with C++ comments, and the insides of string literals if wanted, replaced by blanks;
-/// lines stay where they are.
+/// `text` with C++ comments, and optionally the contents of string literals, replaced by blanks;
+/// lines keep their positions.
 enum class Literals { kKeep, kBlank };
 std::string WithoutComments(std::string_view text, Literals literals);
 
-/// What a file includes: the text between the quotes or brackets, in order.
+/// The includes of a file in order: the text between quotes or brackets.
 std::vector<std::string> Includes(std::string_view text);
 
-/// The file of the tree that `include` means in `includer`, empty if it is none of ours: the
-/// includer's directory comes first, then its room (first directory), then all others.
+/// The file that `include` means in `includer`: searched in the includer's directory, its room
+/// (first directory), then all others. Empty for foreign headers.
 std::string ResolveInclude(const SourceTree& tree, const std::string& includer,
                            const std::string& include);
 
-/// What `file` includes, directly or through files of the tree: our own files by their paths,
-/// foreign headers by the name in the #include.
+/// Files that `file` includes, directly or through files of the tree: ours by path, foreign headers
+/// by their names.
 struct Reached {
   std::set<std::string> ours;
   std::set<std::string> foreign;

@@ -1,5 +1,5 @@
-// Calls that end in the moment in which they are refused. gRPC aborts the process where a call is
-// finished twice.
+// Calls that end at the moment of their refusal. gRPC aborts the process if a call is finished
+// twice.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -18,12 +18,12 @@ namespace {
 
 constexpr std::chrono::seconds kPatience(20);
 
-// A call that is begun and cancelled at once, in the same packet as its neighbours.
+// A call that is begun and cancelled in the same packet as its neighbours.
 void QueueCancelled(Http2Client& client, const char* method, const Headers& more = {}) {
   client.Reset(client.Call(CallHeaders(method, more)));
 }
 
-// An open stream; its name and place are taken until the client goes.
+// An open stream; it holds its name and slot while the client is connected.
 void HoldStream(Http2Client& client, const std::string& name) {
   bool opened = false;
   client.OnFrame([&](const ReceivedFrame& frame) { opened |= frame.type == FrameType::kData; });
@@ -33,7 +33,7 @@ void HoldStream(Http2Client& client, const std::string& name) {
   client.OnFrame(nullptr);
 }
 
-// Cancels calls, `at_once` in a packet, until there were `calls` or the server has gone.
+// Cancels calls, `at_once` per packet, until `calls` were made or the server has died.
 std::uint64_t CancelCalls(AttackedServer& server, const char* method, std::uint64_t calls,
                           std::uint64_t at_once) {
   std::uint64_t begun = 0;
@@ -52,7 +52,7 @@ class FullServer : public ::testing::TestWithParam<const char*> {
   FullServer() {
     HoldStream(held_, "one");
     HoldStream(held_, "two");
-    // Watchers of a full house: refused as well.
+    // Watchers above the limit are refused, too.
     held_.Data(held_.Call(CallHeaders(kWatchStream)),
                Prefixed(Watch("one", 1).SerializeAsString()));
     held_.Flush(kPatience);
@@ -87,7 +87,7 @@ TEST_P(DrainingServer, RefusesAndCancelsAtOnce) {
       client.Flush(kPatience);
       client.Read(std::chrono::milliseconds(1));
     }
-    // Not by a second signal, which ends it at once.
+    // Not by a second signal, which would end it at once.
     EXPECT_EQ(server.process().WaitFor(kPatience), 0) << server.Output();
   }
 }

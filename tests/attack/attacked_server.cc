@@ -16,11 +16,12 @@
 #include <thread>
 
 #include "attack/http2_client.h"
+#include "attack/options.h"
 
 namespace partiemc::attack {
 namespace {
 
-// A port of loopback that nobody has at the moment.
+// A free loopback port.
 std::uint16_t FreePort() {
   const int file = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
@@ -68,28 +69,31 @@ std::string HttpGet(const std::string& address, const std::string& path) {
 
 }  // namespace
 
-AttackedServer::AttackedServer(std::vector<std::string> arguments) {
+AttackedServer::AttackedServer(std::vector<std::string> arguments,
+                               const server::Surroundings& surroundings) {
   if (std::find(arguments.begin(), arguments.end(), "--threads") == arguments.end()) {
     arguments.insert(arguments.end(), {"--threads", "2"});
   }
   if (std::find(arguments.begin(), arguments.end(), "--log-level") == arguments.end()) {
     arguments.insert(arguments.end(), {"--log-level", "off"});
   }
-  // What honest streams hold for their watchers would hide what attackers take.
+  // Histories of honest streams would hide the attackers' memory.
   if (std::find(arguments.begin(), arguments.end(), "--history-bytes") == arguments.end()) {
     arguments.insert(arguments.end(), {"--history-bytes", "1MB"});
   }
-  // On a busy machine four seconds may not be enough for what an attacker has left behind.
+  // On a busy machine, releasing an attack's resources may take more than four seconds.
   if (std::find(arguments.begin(), arguments.end(), "--grace-seconds") == arguments.end()) {
     arguments.insert(arguments.end(), {"--grace-seconds", "20"});
   }
-  // Somebody else may take the port before the server does.
+  // Another process may take the port before the server does.
   for (int attempt = 0; serving_ == nullptr; ++attempt) {
     metrics_address_ = "127.0.0.1:" + std::to_string(FreePort());
     auto all = arguments;
     all.insert(all.end(), {"--metrics", metrics_address_});
     try {
-      serving_ = std::make_unique<server::ServingProcess>(all);
+      server::Surroundings around = surroundings;
+      if (!GetOptions().server.empty()) around.program = GetOptions().server;
+      serving_ = std::make_unique<server::ServingProcess>(all, around);
     } catch (const std::runtime_error&) {
       if (attempt == 2) throw;
     }
@@ -153,12 +157,13 @@ int AttackedServer::Terminate(std::chrono::milliseconds time) {
   return code_ = *code;
 }
 
-Proxy::Proxy(const std::string& server) {
+Proxy::Proxy(const std::string& server, const std::string& certificate) {
   address_ = "127.0.0.1:" + std::to_string(FreePort());
   std::vector<std::string> arguments = {"/usr/sbin/haproxy", "-db", "-q", "-f",
                                         PARTIEMC_SOURCE_DIR "/docker/haproxy.cfg"};
   std::vector<std::string> environment = {"PARTIEMC_PROXY=" + address_,
                                           "PARTIEMC_SERVER=" + server};
+  if (!certificate.empty()) environment.push_back("PARTIEMC_PROXY_CERT=" + certificate);
   std::vector<char*> argv, envp;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   for (std::string& variable : environment) envp.push_back(variable.data());

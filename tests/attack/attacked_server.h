@@ -1,4 +1,4 @@
-// partiemc-server as a process that is attacked, and what tells whether it bears it.
+// A partiemc-server process to attack, and its figures.
 #pragma once
 
 #include <sys/types.h>
@@ -14,27 +14,28 @@ namespace partiemc::attack {
 
 class AttackedServer {
  public:
-  /// With metrics; unless `arguments` say otherwise, its log off, two threads, 20 s to drain.
-  explicit AttackedServer(std::vector<std::string> arguments = {});
+  /// Enables metrics. Unless `arguments` set them: log off, two threads, 20 s to drain.
+  explicit AttackedServer(std::vector<std::string> arguments = {},
+                          const server::Surroundings& surroundings = {});
 
   const std::string& address() const { return serving_->address(); }
   server::ServerProcess& process() { return serving_->process(); }
 
-  /// Whether the process is there.
+  /// True if the process runs.
   bool Lives();
-  /// Of a process that is there.
+  /// Requires that the process runs.
   double ResidentMib() const { return serving_->process().ResidentMib(); }
-  /// The most that it ever was.
+  /// Maximum resident memory.
   double PeakMib() const;
   /// Processor time of all of its threads.
   double ProcessorSeconds() const;
 
-  /// A metric without labels; -1 where the server gives none.
+  /// A metric without labels; -1 if it does not exist.
   double Gauge(const std::string& name) const;
-  /// Waits until nothing is open, nothing waits and nothing is held. Tells what is not at zero.
+  /// Waits until nothing is open, waiting or held. Returns the gauges that are not zero.
   std::string GaugesNotAtZero(std::chrono::milliseconds time) const;
 
-  /// SIGTERM; the exit code, -1 for a death by signal, -2 where it has not left in `time`.
+  /// SIGTERM. Returns the exit code, -1 after a signal, -2 if it has not exited within `time`.
   int Terminate(std::chrono::milliseconds time = std::chrono::seconds(30));
   std::string Output() { return process().Output(); }
 
@@ -45,29 +46,30 @@ class AttackedServer {
   int code_ = 0;
 };
 
-/// haproxy with docker/haproxy.cfg, as it is said there, in front of a server. Ended when it goes
-/// out of scope.
+/// haproxy with docker/haproxy.cfg in front of a server, during the lifetime of this object.
 class Proxy {
  public:
-  /// Serves when it returns. A missing program fails the test.
-  explicit Proxy(const std::string& server);
+  /// Serves when it returns. Fails the test if the program is missing. `certificate`: for TLS, the
+  /// file NAME.crt beside NAME.key.
+  explicit Proxy(const std::string& server, const std::string& certificate = "");
   ~Proxy();
   Proxy(const Proxy&) = delete;
   Proxy& operator=(const Proxy&) = delete;
 
   const std::string& address() const { return address_; }
+  pid_t process() const { return process_; }
 
  private:
   std::string address_;
   pid_t process_ = 0;
 };
 
-/// The resident memory of a process, looked at every 20 ms in a thread.
+/// Samples the resident memory of a process every 20 ms in a thread.
 class MemoryWatch {
  public:
   explicit MemoryWatch(pid_t process);
   ~MemoryWatch();
-  /// The most since the beginning.
+  /// Maximum since the start.
   double PeakMib() const;
 
  private:

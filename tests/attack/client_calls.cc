@@ -21,7 +21,7 @@ constexpr std::size_t kAtOnce = 24;
 
 using Stub = grpc::TemplatedGenericStub<grpc::ByteBuffer, grpc::ByteBuffer>;
 
-// Calls that have not ended.
+// Counts calls that have not ended.
 class Going {
  public:
   void Enter() {
@@ -45,8 +45,7 @@ class Going {
   std::size_t count_ = 0;
 };
 
-// Any method, as gRPC's wire has it: messages there, messages back. Ends by itself at its deadline
-// at the latest.
+// A call of any method with raw messages. Ends at its deadline at the latest.
 class RandomCall final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   RandomCall(Stub& stub, const char* method, std::vector<grpc::ByteBuffer> requests,
@@ -63,7 +62,7 @@ class RandomCall final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::
     WriteNext();
     StartCall();
   }
-  // At last.
+  // Ends the call.
   void Leave(bool cancels) {
     if (cancels) context_.TryCancel();
     RemoveHold();
@@ -125,7 +124,7 @@ void CallByClient(const Access& access, const CallMessages& messages, std::uint6
     };
     std::vector<grpc::ByteBuffer> requests;
     if (method == kReconstruct) {
-      // Mostly a stream that is opened and gets frames in order.
+      // Usually a stream that is opened and sends frames in order.
       if (random.Chance(0.8)) requests.push_back(Bytes(messages.opens[random.Below(8)]));
       for (std::size_t k = 0, frames = random.Below(6); k < frames; ++k) {
         requests.push_back(random.Chance(0.8) ? Bytes(messages.frames[k])

@@ -27,7 +27,7 @@ ReconstructionParameters Parameters() {
   return parameters;
 }
 
-// A jittered disc that drifts.
+// A jittered, drifting disc.
 std::vector<double> Positions(unsigned seed, std::uint64_t index) {
   constexpr int kRadius = 57;
   support::Random random(seed * 1'000'003ull + index);
@@ -112,16 +112,19 @@ struct HonestStream::State {
   Result expected;
 };
 
-HonestStream::HonestStream(const std::string& address, const std::string& token, unsigned seed)
+HonestStream::HonestStream(const std::string& address, const std::string& token, unsigned seed,
+                           const std::string& ca)
     : state_(std::make_unique<State>()) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetMaxReceiveMessageSize(-1);
   state_->seed = seed;
+  const auto credentials = ca.empty() ? grpc::InsecureChannelCredentials()
+                                      : grpc::SslCredentials({.pem_root_certs = ca});
   state_->stub = v1::ReconstructionService::NewStub(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+      grpc::CreateCustomChannel(address, credentials, arguments));
   if (!token.empty()) state_->context.AddMetadata("authorization", "Bearer " + token);
-  // Only against hanging.
+  // A timeout for hangs only.
   state_->context.set_deadline(std::chrono::system_clock::now() + std::chrono::hours(3));
   state_->stream = state_->stub->Reconstruct(&state_->context);
   EXPECT_TRUE(state_->Open()) << "an honest stream is not let in";

@@ -1,4 +1,4 @@
-// A producer that keeps to every rule, and what its answers have to be.
+// A producer that keeps all rules and checks its answers.
 #pragma once
 
 #include <atomic>
@@ -10,18 +10,20 @@
 
 namespace partiemc::attack {
 
-/// Streams frames of some ten thousand particles at a steady rate, one at a time, from its
-/// construction until Stop. Every answer is compared with what the core computes in this process;
-/// the first wrong one, or the end of the call, fails the test and ends it.
+/// Streams frames of about ten thousand particles at a steady rate, one at a time, from its
+/// construction until Stop. Compares every answer with the core in this process. The first wrong
+/// answer or the end of the call fails the test and stops it.
 class HonestStream {
  public:
-  /// Opened when it returns. An empty token sends none.
-  HonestStream(const std::string& address, const std::string& token, unsigned seed);
+  /// Opened when it returns. An empty token sends none. `ca`: the authority of the server's
+  /// certificate in PEM; empty: without TLS.
+  HonestStream(const std::string& address, const std::string& token, unsigned seed,
+               const std::string& ca = "");
   ~HonestStream();
 
   void Stop();
 
-  /// From sending to the answer, in milliseconds: since the last call of this.
+  /// Milliseconds from sending to the answer, since the last call.
   std::vector<double> TakeLatencies();
   std::uint64_t frames() const;
 

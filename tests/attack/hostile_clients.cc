@@ -19,7 +19,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kPatience(3'000);
-// Between two rounds of an attacker: several of them share two cores with the server.
+// Pause between two rounds of an attacker, because several share two cores with the server.
 constexpr milliseconds kPause(300);
 constexpr std::size_t kMegabyte = 1'000'000, kMebibyte = 1 << 20;
 
@@ -29,8 +29,7 @@ Headers Bearer(const Hostility& hostility) {
   return {{"authorization", "Bearer " + hostility.token}};
 }
 
-// One round after the other, each with a connection of its own. What a round leaves open stays open
-// for `kept` more rounds.
+// Runs rounds with one connection each. A round's connection stays open for `kept` more rounds.
 void Rounds(Hostility& hostility, std::size_t kept, const std::function<void(Http2Client&)>& round,
             const Http2Client::Options& options = {}) {
   std::deque<Client> open;
@@ -40,14 +39,14 @@ void Rounds(Hostility& hostility, std::size_t kept, const std::function<void(Htt
       round(*open.back());
       ++hostility.rounds;
     } catch (const std::runtime_error&) {
-      // No connection: the test looks whether the server lives.
+      // Without a connection, the test checks whether the server lives.
     }
     while (open.size() > kept) open.pop_front();
     std::this_thread::sleep_for(kPause);
   }
 }
 
-// Opens a stream and waits until it is open, or refused.
+// Opens a stream and waits until it is open or refused.
 std::uint32_t OpenStream(Http2Client& client, const Hostility& hostility,
                          const std::string& open = Open().SerializeAsString()) {
   const auto call = client.Call(CallHeaders(kReconstruct, Bearer(hostility)));
@@ -62,7 +61,7 @@ std::uint32_t OpenStream(Http2Client& client, const Hostility& hostility,
   return call;
 }
 
-// A frame of a few particles, and what else its message holds.
+// A frame of a few particles with additional fields.
 std::string FrameWith(std::uint64_t sequence, std::string_view more) {
   std::string frame = Blob(sequence, 1, 60).frame().SerializeAsString();
   return Prefixed(InField(2, frame.append(more)));
@@ -73,7 +72,7 @@ void UnknownFields(Hostility& hostility) {
   Rounds(hostility, 0, [&](Http2Client& client) {
     const auto call = OpenStream(client, hostility);
     for (std::uint64_t sequence = 1; sequence <= 60 && !hostility.stop; ++sequence) {
-      // In the frame or beside it: a request that is used again must not keep either.
+      // Inside or beside the frame: a reused request must keep neither.
       const std::string frame = Blob(sequence, 1, 60).frame().SerializeAsString();
       const std::string message =
           sequence % 2 == 0 ? InField(2, frame + unknown) : InField(2, frame) + unknown;
@@ -135,10 +134,10 @@ void UnfinishedCalls(Hostility& hostility) {
       const auto call = client.Call(
           CallHeaders(k % 2 == 0 ? kReconstruct : kReconstructFrame, Bearer(hostility)));
       client.Data(call, MessagePrefix(100 * kMegabyte));
-      // As much as it is let, and no more after it.
+      // Sends as much as the server allows, then nothing.
       client.SendData(call, part, false, milliseconds(300));
     }
-    // Headers without an end, too.
+    // Also endless headers.
     client.CallBlock(HeaderBlock(CallHeaders(kReconstruct, Bearer(hostility))), 0);
     client.Flush(kPatience);
   });
@@ -193,7 +192,7 @@ void KilledClients(Hostility& hostility) {
                         milliseconds(100));
       }
     }
-    // What kill -9 leaves of a client: its connection, cut.
+    // The state of a client after kill -9: a cut connection.
     client.Close(/*reset=*/hostility.random.Chance(0.5));
   });
 }
@@ -245,7 +244,7 @@ void FloodWithoutToken(Hostility& hostility, std::uint64_t calls, std::size_t co
     const auto call = client->Call(CallHeaders(kMethods[hostility.random.Below(kMethods.size())]));
     switch (hostility.random.Below(4)) {
       case 0:
-        break;  // Says nothing more.
+        break;  // Then stays silent.
       case 1:
         client->Data(call, Prefixed(""), true);
         break;

@@ -1,5 +1,4 @@
-// Clients that want the server's memory, its time or its places. Each goes round and round until it
-// is told to stop.
+// Clients that exhaust memory, time or slots of the server. Each runs in rounds until stopped.
 #pragma once
 
 #include <atomic>
@@ -13,7 +12,7 @@ namespace partiemc::attack {
 
 struct Hostility {
   std::string address;
-  std::string token;  ///< A good one, of those who have come by one.
+  std::string token;  ///< A valid token for attackers that have one.
   support::Random random;
   const std::atomic<bool>& stop;
   std::atomic<std::uint64_t>& rounds;
@@ -28,7 +27,7 @@ struct Attack {
 /// All there are.
 std::span<const Attack> Attacks();
 
-/// Calls and bodies of those who have no token: `calls` a minute over `connections`.
+/// Calls and bodies without a token: `calls` per minute over `connections`.
 void FloodWithoutToken(Hostility& hostility, std::uint64_t calls, std::size_t connections);
 
 }  // namespace partiemc::attack

@@ -1,5 +1,5 @@
-// Everything hostile at once beside two honest streams, and a flood of those who have no token.
-// A minute and ten seconds by default; on demand
+// Everything hostile at once beside two honest streams, and a flood without tokens. A minute and
+// ten seconds by default; on demand
 //   attack_test --gtest_filter='Hostile*' --minutes 60 --flood-seconds 60 --slowdown 2 --beside 64
 // and one attack alone: --attack unknown-fields.
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ double Percentile99(std::vector<double> values) {
   return values[values.size() * 99 / 100];
 }
 
-// Attackers, each a thread, until this goes out of scope.
+// Attackers with one thread each, during the lifetime of this object.
 class Attackers {
  public:
   Attackers(const std::string& address, const std::string& only) {
@@ -89,7 +89,7 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
   const std::chrono::seconds all(options.seconds),
       quiet = std::max(all / 9, std::chrono::seconds(5));
   HonestStream one(server_.address(), kHonestToken, 1), two(server_.address(), kHonestToken, 2);
-  std::this_thread::sleep_for(std::chrono::seconds(1));  // Warm.
+  std::this_thread::sleep_for(std::chrono::seconds(1));  // Warms up.
   const double undisturbed = QuietP99(one, two, quiet);
   MemoryWatch memory(server_.process().process());
   double disturbed = 0;
@@ -117,7 +117,7 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
 TEST_F(Hostile, AFloodWithoutATokenTakesLittle) {
   const Options& options = GetOptions();
   {
-    HonestStream honest(server_.address(), kHonestToken, 3);  // So that all is warm that will be.
+    HonestStream honest(server_.address(), kHonestToken, 3);  // Warms the server up.
     std::this_thread::sleep_for(std::chrono::seconds(2));
   }
   const double idle = server_.ResidentMib();

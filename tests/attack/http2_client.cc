@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <openssl/err.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <csignal>
 #include <cstring>
 #include <stdexcept>
 
@@ -31,6 +33,13 @@ std::uint64_t BigEndian(std::string_view bytes) {
   std::uint64_t value = 0;
   for (const char byte : bytes) value = value << 8 | static_cast<std::uint8_t>(byte);
   return value;
+}
+
+// Whether an operation of TLS goes on when the socket is ready. Anything else ends the connection.
+bool IsWaiting(SSL* tls, int code) {
+  const int error = SSL_get_error(tls, code);
+  ERR_clear_error();
+  return error == SSL_ERROR_WANT_READ || error == SSL_ERROR_WANT_WRITE;
 }
 
 }  // namespace
@@ -89,6 +98,12 @@ Http2Client::Http2Client(const std::string& address, const Options& options) {
   to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(colon + 1))));
   inet_pton(AF_INET, address.substr(0, colon).c_str(), &to.sin_addr);
   socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (socket_ >= 0 && !options.source.empty()) {
+    sockaddr_in from{};
+    from.sin_family = AF_INET;
+    inet_pton(AF_INET, options.source.c_str(), &from.sin_addr);
+    ::bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof from);
+  }
   if (socket_ < 0 || ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
     const std::string reason = std::strerror(errno);
     if (socket_ >= 0) ::close(socket_);
@@ -96,6 +111,7 @@ Http2Client::Http2Client(const std::string& address, const Options& options) {
   }
   const int on = 1;
   setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  if (options.tls) StartTls();
   fcntl(socket_, F_SETFL, fcntl(socket_, F_GETFL) | O_NONBLOCK);
   if (!options.greet) return;
   Bytes(kPreface);
@@ -106,6 +122,26 @@ Http2Client::Http2Client(const std::string& address, const Options& options) {
   AppendBigEndian(options.stream_window, 4, settings);
   Frame(FrameType::kSettings, 0, 0, settings);
   WindowUpdate(0, kMostWindow - 65'535);
+}
+
+// Waits for the handshake, for a limited time.
+void Http2Client::StartTls() {
+  static SSL_CTX* const context = [] {
+    std::signal(SIGPIPE, SIG_IGN);  // Raised by writes to a connection that was cut.
+    SSL_CTX* const made = SSL_CTX_new(TLS_client_method());
+    SSL_CTX_set_mode(made, SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
+    static constexpr unsigned char kProtocols[] = {2, 'h', '2'};
+    SSL_CTX_set_alpn_protos(made, kProtocols, sizeof kProtocols);
+    return made;
+  }();
+  const timeval patience{5, 0};
+  setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  tls_.reset(SSL_new(context));
+  SSL_set_fd(tls_.get(), socket_);
+  if (SSL_connect(tls_.get()) == 1) return;
+  ERR_clear_error();
+  ::close(std::exchange(socket_, -1));
+  throw std::runtime_error("no TLS handshake");
 }
 
 Http2Client::~Http2Client() { Close(false); }
@@ -174,8 +210,9 @@ std::int64_t Http2Client::WindowOf(std::uint32_t stream) const {
   return std::min(window_, first_window_ + (found == windows_.end() ? 0 : found->second));
 }
 
-// What of `events` is ready; 0 after the deadline.
+// The ready events among `events`; 0 after the deadline.
 short Http2Client::Wait(short events, Clock::time_point deadline) const {
+  if ((events & POLLIN) != 0 && tls_ && SSL_pending(tls_.get()) > 0) return POLLIN;
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
   pollfd ready{socket_, events, 0};
   if (::poll(&ready, 1, static_cast<int>(std::max<std::int64_t>(left, 0))) <= 0) return 0;
@@ -183,16 +220,36 @@ short Http2Client::Wait(short events, Clock::time_point deadline) const {
 }
 
 bool Http2Client::WriteSome() {
-  const auto sent = ::send(socket_, out_.data(), out_.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  if (sent < 0 && errno != EAGAIN && errno != EINTR) closed_ = true;
+  std::int64_t sent = 0;
+  if (tls_) {
+    std::size_t written = 0;
+    const int code = SSL_write_ex(tls_.get(), out_.data(), out_.size(), &written);
+    if (code != 1 && !IsWaiting(tls_.get(), code)) closed_ = true;
+    sent = static_cast<std::int64_t>(written);
+  } else {
+    sent = ::send(socket_, out_.data(), out_.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent < 0 && errno != EAGAIN && errno != EINTR) closed_ = true;
+  }
   if (sent > 0) out_.erase(0, static_cast<std::size_t>(sent));
   return !closed_;
 }
 
+// Bytes received; negative where there are none now, 0 at the end of the connection.
+std::int64_t Http2Client::ReadBytes(char* buffer, std::size_t bytes) {
+  if (!tls_) {
+    const auto got = ::recv(socket_, buffer, bytes, MSG_DONTWAIT);
+    return got < 0 && errno != EAGAIN && errno != EINTR ? 0 : got;
+  }
+  std::size_t got = 0;
+  const int code = SSL_read_ex(tls_.get(), buffer, bytes, &got);
+  if (code == 1) return static_cast<std::int64_t>(got);
+  return IsWaiting(tls_.get(), code) ? -1 : 0;
+}
+
 bool Http2Client::ReadSome() {
   char buffer[65'536];
-  const auto got = ::recv(socket_, buffer, sizeof buffer, MSG_DONTWAIT);
-  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) closed_ = true;
+  const auto got = ReadBytes(buffer, sizeof buffer);
+  if (got == 0) closed_ = true;
   if (got <= 0) return !closed_;
   in_.append(buffer, static_cast<std::size_t>(got));
   std::size_t at = 0;
@@ -287,6 +344,7 @@ void Http2Client::Close(bool reset) {
     const linger now{1, 0};
     setsockopt(socket_, SOL_SOCKET, SO_LINGER, &now, sizeof now);
   }
+  tls_.reset();
   ::close(socket_);
   socket_ = -1;
   closed_ = true;

@@ -1,7 +1,6 @@
-// What is publicly known about gRPC 1.51.1, which Debian 12 has, and about HTTP/2 servers at large,
-// tried on ours. Each is bounded, and the server must bear it: it lives, its memory stays, and
-// others are served. What gRPC itself does not bear is tried through the proxy of
-// docker/haproxy.cfg.
+// Publicly known attacks on gRPC 1.51.1 (Debian 12) and on HTTP/2 servers in general. The server
+// must survive each, with bounded memory, and serve others. Attacks that gRPC itself does not
+// survive are run through the proxy of docker/haproxy.cfg.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -29,10 +28,10 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kPatience(20);
-// What an attack may leave the process with beside what it had.
+// Maximum growth of the process by an attack.
 constexpr double kMaxGrowthMib = 32;
 
-// The status of one call of GetServerInfo over a connection of its own; -1: none came.
+// The status of one GetServerInfo call over a new connection; -1: none.
 int Serves(const std::string& address, const Headers& more = {}) {
   int status = -1;
   try {
@@ -67,7 +66,7 @@ class Known : public ::testing::Test {
   MemoryWatch memory_;
 };
 
-// CVE-2023-1428: such a header, then enough to be above the limit of 8 KiB for all headers.
+// CVE-2023-1428: such a header, then more than the limit of 8 KiB for all headers.
 TEST_F(Known, HeadersThatAbort) {
   const Headers culprits = {{"te", "x"},
                             {":scheme", "x"},
@@ -118,7 +117,7 @@ TEST_F(Known, TinyContinuations) {
   ExpectBorne("500,000 empty CONTINUATION");
 }
 
-// A large table of headers, each call refers to what is in it.
+// A large header table; each call refers to its entries.
 TEST_F(Known, ABombOfReferences) {
   Http2Client client(server_.address());
   std::string block = HeaderBlock(CallHeaders(kGetServerInfo));
@@ -135,10 +134,11 @@ TEST_F(Known, ABombOfReferences) {
   ExpectBorne("2,000 calls that refer 8,000 times to a header of 4 kB");
 }
 
-// 300,000 frames behind the headers of a call. Answers are not read, so that they would queue up.
+// 300,000 frames after the headers of a call. Responses are not read, so they would accumulate. The
+// attacker has its own address, because the server refuses the address of a flood.
 template <typename Queue>
 void Flood(const std::string& address, const Queue& queue) {
-  Http2Client client(address);
+  Http2Client client(address, {.source = "127.0.0.2"});
   const auto call = client.Call(CallHeaders(kReconstruct));
   client.Flush(kPatience, false);
   for (int k = 0; k < 300'000 && !client.closed(); ++k) {
@@ -175,7 +175,7 @@ TEST_F(Known, FloodsOfSmallFrames) {
   ExpectBorne("floods of small frames");
 }
 
-// Messages of nothing: each costs the server more than its client.
+// Empty messages: each costs the server more than its client.
 TEST_F(Known, AFloodOfEmptyMessages) {
   Http2Client client(server_.address());
   const auto call = client.Call(CallHeaders(kReconstruct));
@@ -187,7 +187,7 @@ TEST_F(Known, AFloodOfEmptyMessages) {
   ExpectBorne("up to 900,000 empty messages");
 }
 
-// Reflection is gRPC's own, and has a thread for each call that goes on.
+// gRPC's reflection uses a thread for each running call.
 TEST_F(Known, ReflectionThatSaysNothingTakesFewThreads) {
   const auto threads = [this] {
     const std::filesystem::path tasks =
@@ -207,7 +207,7 @@ TEST_F(Known, ReflectionThatSaysNothingTakesFewThreads) {
   ExpectBorne("reflection that says nothing");
 }
 
-// Sockets that say nothing, or not all: they end by themselves, those that owe TLS too.
+// Silent and incomplete connections end, also during a TLS handshake.
 TEST(KnownOfHandshakes, HalfOpenConnectionsEnd) {
   const support::TemporaryFolder folder;
   const CertificateAuthority authority("authority");
@@ -243,8 +243,8 @@ TEST(KnownOfHandshakes, HalfOpenConnectionsEnd) {
   EXPECT_EQ(tls.Terminate(), 0);
 }
 
-// CVE-2023-4785: where no descriptor is left, gRPC's listener ends for good. So the server raises
-// the limit that it was started with to the one that it may have.
+// CVE-2023-4785: without a free descriptor gRPC's listener stops for good. The server therefore
+// raises its limit to the maximum.
 TEST(KnownOfDescriptors, AServerTakesAllItMayHave) {
   rlimit own{};
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &own), 0);
@@ -265,8 +265,8 @@ TEST(KnownOfDescriptors, AServerTakesAllItMayHave) {
   EXPECT_EQ(server.Terminate(), 0);
 }
 
-// Sends `part` as CONTINUATION until there were `bytes` of it or the server ends the connection,
-// and tells how many.
+// Sends `part` as CONTINUATION until `bytes` were sent or the server closes the connection; returns
+// the number of bytes.
 std::uint64_t Continue(Http2Client& client, std::uint32_t call, const std::string& part,
                        std::uint64_t bytes) {
   std::uint64_t sent = 0;
@@ -309,13 +309,13 @@ TEST_F(BehindProxy, RapidReset) {
   ExpectBorne("50,000 calls reset at once");
 }
 
-// gRPC itself ends such a connection, but only after up to 64 MiB.
+// gRPC ends such a connection only after up to 64 MiB.
 TEST_F(BehindProxy, AFloodOfPings) {
   Flood(proxy_.address(), [](Http2Client& client, std::uint32_t) { client.Ping(1); });
   ExpectBorne("300,000 pings");
 }
 
-// CVE-2023-32732: binary headers that are no base64; the connection's other calls go on.
+// CVE-2023-32732: invalid base64 in binary headers; the connection's other calls continue.
 TEST_F(BehindProxy, ABadBinaryHeaderEndsItsCallAlone) {
   Http2Client client(proxy_.address());
   bool opened = false, ended = false;
@@ -340,8 +340,8 @@ TEST_F(BehindProxy, ABadBinaryHeaderEndsItsCallAlone) {
   ExpectBorne("headers that are no base64");
 }
 
-// CVE-2024-7246 and CVE-2023-32731: a header that does not parse must not stay in the table of the
-// connection with its error, nor may what comes after it be left out of the table.
+// CVE-2024-7246 and CVE-2023-32731: a malformed header must not stay in the connection's table with
+// its error, and later entries must not be skipped.
 TEST_F(BehindProxy, ABadHeaderDoesNotPoisonTheConnection) {
   Http2Client client(proxy_.address());
   std::vector<int> statuses;
@@ -359,7 +359,7 @@ TEST_F(BehindProxy, ABadHeaderDoesNotPoisonTheConnection) {
                    indexed("x-large", std::string(10'000, 'a')) + indexed("x-good", "2"));
   client.Flush(kPatience);
   client.Read(milliseconds(100));
-  // Somebody else's call, behind the same proxy: refers to the entry x-good.
+  // Another client's call behind the same proxy refers to the entry x-good.
   const auto call =
       client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)) + static_cast<char>(0x80 | 62));
   client.Data(call, Prefixed(""), true);
@@ -371,7 +371,7 @@ TEST_F(BehindProxy, ABadHeaderDoesNotPoisonTheConnection) {
   ExpectBorne("headers that poison the table");
 }
 
-// CVE-2023-33953, first: a string is buffered before its size is looked at.
+// CVE-2023-33953, first: a string is buffered before its size is checked.
 TEST_F(BehindProxy, AHeaderOfManyMegabytes) {
   Http2Client client(proxy_.address());
   std::string block = HeaderBlock(CallHeaders(kGetServerInfo));
@@ -390,7 +390,7 @@ TEST_F(BehindProxy, AnIntegerWithoutEnd) {
   EXPECT_LT(server_.ProcessorSeconds(), 5);
 }
 
-// Third: what CONTINUATION adds up to.
+// Third: the sum of CONTINUATION frames.
 TEST_F(BehindProxy, AFloodOfContinuations) {
   Http2Client client(proxy_.address());
   const auto call = client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)), 0);

@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   app.add_option("--attack", options.attack, "This one alone, instead of all at once");
   app.add_flag("--elsewhere", options.elsewhere,
                "Attack another server, to see what the attackers' own work costs");
+  app.add_option("--server", options.server, "Attack this program, such as an earlier build");
   app.add_option("--seed", options.seed, "Of what is random")->capture_default_str();
   app.add_option("--slowdown", options.slowdown, "The most of an honest stream's p99")
       ->capture_default_str();

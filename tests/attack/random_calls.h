@@ -1,5 +1,5 @@
-// Callers that do what no plan foresees: calls of every method, begun and cancelled, reset,
-// half-closed, timed out or left alone at random moments, with messages good and bad.
+// Random callers: calls of every method that are begun and cancelled, reset, half-closed, timed out
+// or abandoned at random moments, with valid and invalid messages.
 #pragma once
 
 #include <atomic>
@@ -12,42 +12,43 @@
 
 namespace partiemc::attack {
 
-/// How much there is to do, and what has been done.
+/// Number of calls to make, and counts.
 struct CallCounts {
-  std::atomic<std::int64_t> left = 0;  ///< Calls to begin.
+  std::atomic<std::int64_t> left = 0;  ///< Calls still to begin.
   std::atomic<bool> stop = false;
-  std::atomic<std::uint64_t> raw = 0, client = 0;  ///< Begun over HTTP/2 frames, by gRPC's client.
-  std::atomic<std::uint64_t> connections = 0;      ///< Of raw callers.
+  std::atomic<std::uint64_t> raw = 0,
+                             client = 0;  ///< Begun over raw HTTP/2 frames, and by gRPC's client.
+  std::atomic<std::uint64_t> connections = 0;  ///< Connections of raw callers.
 };
 
-/// What callers send, made once.
+/// Messages of callers, made once.
 struct CallMessages {
   CallMessages();
   std::vector<std::string> opens, frames, watches, credits, unary;
 };
 
-/// Begins raw calls until none are left or the server has gone.
+/// Begins raw calls until none are left or the server has died.
 void CallRaw(const std::string& address, const CallMessages& messages, std::uint64_t seed,
              CallCounts& counts);
-/// Where gRPC's client calls, and what it brings along.
+/// Address and credentials for gRPC's client.
 struct Access {
   std::string address;
-  std::string authority = {};  ///< PEM, for TLS; empty: in the clear.
+  std::string authority = {};  ///< PEM, for TLS; empty: no TLS.
   std::string token = {};      ///< Empty: none.
 };
 
-/// The same with gRPC's client, over one channel.
+/// Same as CallRaw with gRPC's client, over one channel.
 void CallByClient(const Access& access, const CallMessages& messages, std::uint64_t seed,
                   CallCounts& counts);
 
-/// Callers of both kinds at once, each with a connection of its own.
+/// Callers of both kinds at once, with one connection each.
 class Storm {
  public:
   Storm(std::string address, std::int64_t calls, std::uint64_t seed);
   ~Storm();
-  /// Until all calls are begun.
+  /// Returns when all calls have begun.
   void Wait();
-  /// Now.
+  /// Stops immediately.
   void Stop();
   const CallCounts& counts() const { return counts_; }
 

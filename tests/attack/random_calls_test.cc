@@ -1,5 +1,5 @@
-// A long row of random calls over real connections: `--calls 1000000` on demand, `--seed N` to see
-// a run again as far as time allows it.
+// Many random calls over real connections: `--calls 1000000` on demand; `--seed N` repeats a run,
+// except for timing.
 #include "attack/random_calls.h"
 
 #include <gtest/gtest.h>
@@ -41,13 +41,13 @@ void Tell(const char* what, const Storm& storm, std::uint64_t seed,
       static_cast<unsigned long>(counts.client), took.count(), static_cast<unsigned long>(seed));
 }
 
-// The storm passes over a server with these arguments and one honest stream.
+// Runs the calls on a server with these arguments and one honest stream.
 void ExpectBorne(const char* what, std::vector<std::string> arguments, double share) {
   const Options& options = GetOptions();
   const auto calls = static_cast<std::int64_t>(share * static_cast<double>(options.calls));
   AttackedServer server(std::move(arguments));
   {
-    HonestStream honest(server.address(), "", 1);  // Goes on all the while.
+    HonestStream honest(server.address(), "", 1);  // Runs all the time.
     const auto began = std::chrono::steady_clock::now();
     Storm storm(server.address(), calls, options.seed);
     storm.Wait();
@@ -112,7 +112,7 @@ TEST(RandomCalls, DrainingServersLeaveInOrder) {
     while (now() < share && server.Lives()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    EXPECT_EQ(server.Terminate(), 0) << server.Output();  // While calls go on coming.
+    EXPECT_EQ(server.Terminate(), 0) << server.Output();  // While further calls arrive.
     storm.Stop();
     begun += static_cast<std::uint64_t>(now());
   }

@@ -59,7 +59,7 @@ class RawCaller {
       client_ =
           std::make_unique<Http2Client>(address_, Http2Client::Options{.stream_window = window});
     } catch (const std::runtime_error&) {
-      return false;  // The server has gone; who began this storm tells whether it should have.
+      return false;  // The server has died; the test decides whether it should have.
     }
     ++counts_.connections;
     client_->OnFrame([this](const ReceivedFrame& frame) {
@@ -108,7 +108,7 @@ class RawCaller {
     }
   }
 
-  // False once this side has ended.
+  // False after this side has ended.
   bool Send(const Call& call) {
     if (random_.Chance(0.1)) {
       client_->Data(call.stream, "", true);
@@ -143,7 +143,7 @@ class RawCaller {
     if (!stays) open_.erase(open_.begin() + static_cast<std::ptrdiff_t>(at));
   }
 
-  // Mostly until the server has come to what was sent: a queue that only grows reaches few states.
+  // Usually until the server has processed the sent frames: a growing queue would reach few states.
   void Pause() {
     if (client_->closed()) return;
     if (random_.Chance(0.7)) {
@@ -217,7 +217,7 @@ CallMessages::CallMessages() {
   frames.push_back(
       std::string("\x01\0\0\0\x04"
                   "abcd",
-                  9));  // Compressed, it claims.
+                  9));  // Flagged as compressed.
   frames.push_back(MessagePrefix(1'000'000) + "and no more");
   frames.push_back(MessagePrefix(0xffffffff));
   for (const char* name : {"n0", "n1", "t0", "t1", "t2", "honest-1", "nobody"}) {

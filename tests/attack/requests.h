@@ -1,4 +1,4 @@
-// Messages of partiemc.v1 as an attacker's bytes.
+// Messages of partiemc.v1 as bytes for attackers.
 #pragma once
 
 #include <cstddef>
@@ -20,20 +20,20 @@ inline constexpr char kHealthWatch[] = "/grpc.health.v1.Health/Watch";
 inline constexpr char kReflection[] =
     "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo";
 
-/// A stream of moving blobs; with a `token` it resumes the stream of that token from its start.
+/// Opens a stream of moving blobs; with `token`, resumes the stream of this token from its start.
 v1::ReconstructRequest Open(const std::string& name = "", const std::string& token = "");
-/// Frame `sequence` with the first particles of the moving blob of `seed`.
+/// Frame `sequence` with the first particles of moving blob `seed`.
 v1::ReconstructRequest Blob(std::uint64_t sequence, unsigned seed, std::size_t particles);
 v1::ReconstructFrameRequest OneBlob(unsigned seed, std::size_t particles);
 v1::WatchStreamRequest Watch(const std::string& name, std::uint32_t credits);
 
-/// So many particles of which none is another's neighbour: answers are many times as large.
+/// `count` particles without neighbours: the response is many times larger.
 v1::ReconstructFrameRequest LoneParticles(std::uint64_t count);
 
-/// `field` of that many bytes, as no message has it.
+/// `field` with `bytes` bytes, unknown to every message.
 std::string UnknownField(int field, std::size_t bytes);
 
-/// Field `field`, a message, around `message`.
+/// Wraps `message` in field `field`.
 std::string InField(int field, std::string_view message);
 
 }  // namespace partiemc::attack

@@ -89,7 +89,7 @@ def core_metrics(measures):
 
 
 def peer_metrics(measures):
-    """How many times faster than VTK, by processor time."""
+    """Speedup over VTK by processor time."""
     contours = measures.median("vtk_contours/1024")
     return {
         "field_vs_vtk_sph_1m":

@@ -24,7 +24,7 @@ void Draw(const partiemc::Rings&) {}
 
 }  // namespace
 
-// Built, not run: nobody serves its address here.
+// Built, not run: no server listens on its address here.
 int main() {
   const double dx = 1;
   Simulation simulation;

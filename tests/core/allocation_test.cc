@@ -188,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                                   (tested.param.estimates_spacing ? "_spacing" : "");
                          });
 
-// Grants a number of requests, and notes what was asked for.
+// Grants a number of requests, and records the requested bytes.
 class Guard final : public MemoryGuard {
  public:
   explicit Guard(int granted) : granted_(granted) {}
@@ -211,7 +211,7 @@ struct MemoryCase {
   bool carries = false;  // Attributes.
 };
 
-// Frames that differ in what they need most memory for.
+// Frames that differ in their largest consumer of memory.
 std::vector<MemoryCase> MemoryCases() {
   std::vector<MemoryCase> cases;
   const auto add = [&](std::string name, const Particles& particles,
@@ -295,7 +295,7 @@ TEST(MemoryGuard, RefusesAFrameBeforeItsTilesTakeMemory) {
     EXPECT_EQ(violation->value, "32400 tiles of 32 x 32 cells");
     EXPECT_EQ(state, before);
     EXPECT_EQ(result, Result());
-    // The directory of the tiles and the particles' own places, but none of what lies on tiles.
+    // The directory of the tiles and the particles' positions in it, but nothing stored on tiles.
     if (granted == 0) {
       EXPECT_LE(live_bytes - live, 32'400 * 200u);
     }

@@ -22,18 +22,18 @@ using support::LevelSetPatch;
 using support::Random;
 using support::Stages;
 
-constexpr int kNodes = 8;     // Of a patch, each way.
-constexpr int kSamples = 24;  // Per cell, each way.
+constexpr int kNodes = 8;     // Size of a patch in each direction.
+constexpr int kSamples = 24;  // Samples of a cell in each direction.
 
 // Pairs of an inside and an outside region.
 using Borders = std::set<std::pair<int, int>>;
 
-// The regions of either sign of the interpolant over a square of cells. Along rows and columns of
-// samples it is linear: whoever follows one away from the other sign gets to a node, so that the
-// regions of samples are those of the interpolant, but for necks that slip between samples.
+// The regions of either sign of the interpolant over a square of cells. The interpolant is linear
+// along rows and columns of samples, so every region can be followed to a node. The regions of
+// samples therefore equal those of the interpolant, except for necks between samples.
 class Regions {
  public:
-  // The cells from node (column, row), `cells` each way.
+  // The cells from node (column, row), `cells` in each direction.
   Regions(const LevelSetPatch& patch, int column, int row, int cells)
       : column_(column), row_(row), side_(cells * kSamples + 1), parents_(side_ * side_) {
     std::iota(parents_.begin(), parents_.end(), 0);
@@ -83,8 +83,8 @@ class Regions {
   std::vector<int> parents_;
 };
 
-// Whether samples cannot tell how a saddle hangs together: in its cell neither the inside corners
-// are joined nor the outside ones.
+// True if the samples do not show how a saddle is connected: in its cell neither the inside nor the
+// outside corners are joined.
 bool IsUndecided(const LevelSetPatch& patch, int column, int row) {
   Regions cell(patch, column, row, 1);
   return cell.Of(column, row) != cell.Of(column + 1, row + 1) &&
@@ -113,7 +113,7 @@ Saddles SaddlesOf(const LevelSetPatch& patch) {
   return saddles;
 }
 
-// The regions on the left and right of a ring: those of the nodes of the edge that it begins on.
+// The regions on the left and right of a ring, at the nodes of its first edge.
 std::pair<int, int> SidesOf(const Stages& stages, std::size_t ring, int offset, Regions& regions) {
   const double x = stages.result.rings.RingPoints(ring)[0] - offset;
   const double y = stages.result.rings.RingPoints(ring)[1] - offset;
@@ -127,7 +127,7 @@ std::pair<int, int> SidesOf(const Stages& stages, std::size_t ring, int offset, 
   return low.second ? std::pair(low.first, high.first) : std::pair(high.first, low.first);
 }
 
-// The parent of each region: the one that it lies in. The outermost is its own.
+// The parent of each region: the region that contains it. The outermost is its own parent.
 std::map<int, int> ParentsOf(const Borders& borders, int outermost) {
   std::map<int, int> parents{{outermost, outermost}};
   for (bool has_grown = true; has_grown;) {
@@ -192,8 +192,8 @@ TEST(Bilinear, RingsAreTheBordersOfItsRegionsAndLieInEachOtherAsThoseDo) {
     rings += stages.result.rings.RingCount();
     for (const std::uint32_t outer : stages.result.rings.outer_of) holes += outer != kNoRing;
   }
-  // What was compared is what the test is about. Undecided are the flattest saddles and those of
-  // neighbours that differ by many orders of magnitude.
+  // Enough cases were compared. Undecided are the flattest saddles, and saddles with neighbours of
+  // very different magnitudes.
   EXPECT_GT(compared, 1'200u);
   EXPECT_GT(rings, 7'000u);
   EXPECT_GT(holes, 1'000u);

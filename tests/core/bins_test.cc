@@ -99,7 +99,7 @@ TEST_P(RandomBins, TilesReachACellAndTheRadiusOfASmallHoleBeyondEveryKernel) {
 TEST_P(RandomBins, PositionsAreRoundedToAFractionOfACell) {
   ForEachParticle([&](std::size_t, std::uint32_t e, double x, double y) {
     const std::uint32_t k = bins_.particles[e].source;
-    // To a multiple of 2^-17 cells, hence off by half of it at most.
+    // Rounded to a multiple of 2^-17 cells: the error is at most half of it.
     EXPECT_NEAR(x, particles_.x(k) / scale_.cell_size, 0x1p-18 + 1e-9);
     EXPECT_NEAR(y, particles_.y(k) / scale_.cell_size, 0x1p-18 + 1e-9);
     EXPECT_EQ(x * 0x1p17, std::floor(x * 0x1p17));
@@ -191,7 +191,7 @@ TEST(Bins, AParticleBeyondTwoToTheThirtyCellsIsRefusedByName) {
   }
 }
 
-// What CheckFrame says of one bad frame.
+// One bad frame, and the violation that CheckFrame reports.
 struct BadFrame {
   std::string name;
   std::vector<double> positions;

@@ -1,4 +1,4 @@
-// A frame that is cancelled on its way leaves nothing behind. Also under ThreadSanitizer.
+// A frame that is cancelled during the computation changes nothing. Also under ThreadSanitizer.
 #include "base/cancellation.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ Particles SceneAt(int frame) {
   return thinned;
 }
 
-// Counts what goes on in a frame and cancels it at the end of a stage.
+// Counts the stages of a frame and cancels it at the end of one.
 class CancelAfter final : public StageObserver {
  public:
   CancelAfter(Stage stage, std::atomic<bool>& flag) : stage_(stage), flag_(flag) {}
@@ -163,7 +163,7 @@ TEST_P(Cancellation, AtAnyMomentLeavesNoTrace) {
   EXPECT_GT(cancelled, 0) << whole << " were not";
 }
 
-/// What a task of a frame begins inside is told, too: oneTBB leaves out parts of it.
+/// Tasks inside a task are cancelled too: oneTBB skips some of them.
 TEST_P(Cancellation, ATaskThatIsGivenUpDoesNotGoOnWithHalfOfItsParts) {
   std::atomic<bool> went_on_with_half = false;
   const auto run = [&](const std::atomic<bool>* flag, const auto& at_piece) {

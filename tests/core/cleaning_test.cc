@@ -1,4 +1,4 @@
-// What cleaning and the limits of spray drop, and what becomes of its nodes and particles.
+// The rings that cleaning and the limits of spray drop, and the effect on nodes and particles.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -93,7 +93,7 @@ TEST(Cleaning, AComponentWithoutAParticleIsDroppedWithItsHoles) {
   EXPECT_TRUE(Validate(clean.result).ok()) << Validate(clean.result);
 }
 
-TEST(Cleaning, AnIslandInADroppedHoleGoesWithItAndItsParticlesCountForTheBody) {
+TEST(Cleaning, AnIslandInADroppedHoleIsDroppedAndCountsForTheBody) {
   // A single inside node in the middle of a small hole.
   const auto island = [](int x, int y) {
     return x == 32 && y == 32 ? -1.0 : Holed{32, 32, 1.36}(x, y);
@@ -185,7 +185,7 @@ TEST(Cleaning, SprayIsDroppedByParticlesAndIslandsCountForWhatHoldsThem) {
 }
 
 TEST(Cleaning, WhatLiesInDroppedSprayGoesWithItAndItsNodesAreOutside) {
-  // Rings within rings; the outer ones enclose five particles, beside them a body of six.
+  // Nested rings; the outer ones enclose five particles. A separate body has six.
   const auto nested = [](int x, int y) {
     return std::min({std::max(Circle(x, y, 20, 20, 13), -Circle(x, y, 20, 20, 10)),
                      std::max(Circle(x, y, 20, 20, 8), -Circle(x, y, 20, 20, 5)),
@@ -217,7 +217,8 @@ TEST(Cleaning, WhatLiesInDroppedSprayGoesWithItAndItsNodesAreOutside) {
     EXPECT_EQ(stages.crossings.tiles[tile].inside, body.crossings.tiles[tile].inside);
     EXPECT_EQ(stages.crossings.interior[tile], body.crossings.interior[tile]);
   }
-  // With one particle less to ask for, the outermost stays, and what is in it is judged by itself.
+  // If the limit is one lower, the outermost ring stays, and the rings inside it are judged
+  // separately.
   parameters.min_component_particles = 5;
   Stages judged;
   judged.RunOn(nested, kLow, kHigh, particles, parameters);

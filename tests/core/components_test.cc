@@ -16,7 +16,7 @@ struct Reach {
   double kernel_radius, cell_size;
 };
 
-// The farthest reach is that of the widest kernel on the finest cells: a whole tile.
+// The widest kernel on the finest cells has the farthest reach: a whole tile.
 class ParticlesOfComponents : public testing::TestWithParam<Reach> {};
 
 TEST_P(ParticlesOfComponents, AreCountedAsIfEachWereAskedForItsNearestInsideCorner) {

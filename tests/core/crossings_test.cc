@@ -79,7 +79,7 @@ std::array<double, 4> CornersOf(unsigned inside) {
   return corners;
 }
 
-TEST(Crossings, EachOfTheFourteenActiveCasesHasTheSegmentsThatKeepTheInsideOnTheirLeft) {
+TEST(Crossings, SegmentsOfAllFourteenCasesHaveTheInsideOnTheLeft) {
   // Drawn by hand: '#' inside, 'o' outside, lower row second.
   const std::map<unsigned, std::pair<int, int>> expected = {
       {1, {kBottom, kLeft}},    // oo / #o
@@ -115,7 +115,7 @@ TEST(Crossings, BothSaddlesAreJoinedOrPartedByTheSignOfTheirStationaryValue) {
       {{-1, 3, -1, 3}, {{kBottom, kLeft}, {kTop, kRight}}},
       {{1, -3, 1, -3}, {{kRight, kTop}, {kLeft, kBottom}}},
       {{3, -1, 3, -1}, {{kRight, kBottom}, {kLeft, kTop}}},
-      // Stationary value of exactly 0: outside, hence parted.
+      // A stationary value of exactly 0 counts as outside, so the corners are separated.
       {{-1, 1, -1, 1}, {{kBottom, kLeft}, {kTop, kRight}}},
       {{1, -1, 1, -1}, {{kRight, kBottom}, {kLeft, kTop}}},
       // Lopsided: -2 * -1 against 1 * 1.9 and 1 * 2.1.

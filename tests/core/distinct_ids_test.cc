@@ -27,7 +27,7 @@ void ExpectAsByMap(const std::vector<std::uint64_t>& ids, DistinctIdsScratch& sc
 }
 
 TEST(DistinctIds, TheFirstRepetitionIsFoundInAnyRange) {
-  DistinctIdsScratch scratch;  // What one call leaves there must not be seen by the next.
+  DistinctIdsScratch scratch;  // Reused, to check that a call leaves no trace in it.
   constexpr std::uint64_t kLargest = ~std::uint64_t{0};
   ExpectAsByMap({}, scratch);
   ExpectAsByMap({kLargest}, scratch);
@@ -55,7 +55,7 @@ TEST(DistinctIds, ThatShareABitAreComparedNotConfused) {
   DistinctIdsScratch scratch;
   for (const std::uint64_t step : {1u, 1u << 20}) {
     std::vector<std::uint64_t> ids(5000);
-    // All of the same leading part of the hash, which is what the bitmap has a bit for.
+    // Ids with the same leading part of the hash, which selects the bit of the bitmap.
     for (std::size_t k = 0; k < ids.size(); ++k) ids[k] = support::IdWithHash(step * k);
     ASSERT_EQ(HashOf(ids[3]), 3 * step);
     ExpectAsByMap(ids, scratch);

@@ -1,4 +1,4 @@
-// What speaks against an answer, and what a stream remembers of answers that are only a guess.
+// Doubts, and streams whose first results are provisional.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,7 +43,7 @@ Particles Shaken(Particles particles, double most) {
   return particles;
 }
 
-// What a stream may begin with before there is a body.
+// First frames of a stream before a body exists.
 std::vector<Particles> Beginnings() {
   support::Random random(32);
   Particles far_pair, near_pair;

@@ -152,7 +152,7 @@ TEST(Field, NodesThatNoParticleReachesHaveTheValueOfTheVoid) {
   EXPECT_EQ(stages.level_set.At(stages.bins.tiles, tile, 32, 32), stages.level_set.void_value);
 }
 
-TEST(Field, DensityInsideALatticeIsAboutOneSoThatOnlyTheBoundaryIsNearZero) {
+TEST(Field, OnlyTheBoundaryOfALatticeIsNearZero) {
   Stages stages;
   stages.Run(support::Lattice(21, 21), {.spacing = 1.0});
   const std::uint32_t tile = stages.bins.tiles.Find({0, 0});
@@ -346,7 +346,7 @@ TEST(Field, AShiftByWholeCellsShiftsItWhereTheIsolineCrossesAnEdge) {
 }
 
 // Where particles are few, the isoline passes between nodes of which the density has decided one.
-TEST(Field, EndsOfCrossedEdgesThatTheDensityDecidesHaveTheValueOfTheEquations) {
+TEST(Field, EndsOfCrossedEdgesDecidedByDensityMatchTheEquations) {
   support::Random random(5);
   int checked = 0;
   for (const double radius : {1.5, 2.0, 3.0}) {

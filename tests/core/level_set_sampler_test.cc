@@ -191,7 +191,7 @@ void RunCrowdedBlob(bool weighted, Stages& stages) {
   stages.Run(support::Snapped(particles, 1.0), {.spacing = 1.0});
 }
 
-// Of one point each, or of up to kPointsAtOnce.
+// Batches of one point each, or of up to kPointsAtOnce.
 std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   support::Random random(9);
   std::vector<FieldPoints> all;
@@ -210,7 +210,7 @@ std::vector<FieldPoints> NeighboursIn(const Stages& stages) {
   return all;
 }
 
-TEST(LevelSetSampler, SamplesHaveTheSameBitsOnEveryInstructionSetAndWhateverIsAskedAtOnce) {
+TEST(LevelSetSampler, SamplesHaveTheSameBitsForEveryInstructionSetAndBatch) {
   for (const bool weighted : {false, true}) {
     Stages stages;
     RunCrowdedBlob(weighted, stages);

@@ -80,7 +80,7 @@ support::Particles CrowdedScene(support::Random& random) {
   return particles;
 }
 
-TEST(MaskedParticles, AreThoseInTheMaskTileAfterTileInTheOrderOfTheFrameOnEveryInstructionSet) {
+TEST(MaskedParticles, FollowTilesAndFrameOrderOnEveryInstructionSet) {
   support::Random random(1);
   const ParticleBins bins = Bin(CrowdedScene(random));
   ASSERT_GE(bins.tiles.size(), 9u);

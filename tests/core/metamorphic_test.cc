@@ -1,4 +1,4 @@
-// What must not change when a frame is permuted, moved, scaled or written otherwise.
+// Invariants when a frame is permuted, moved, scaled or given in another format.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -97,7 +97,7 @@ TEST_P(Metamorphic, AWorkspaceMayServeOtherStreamsInBetween) {
 
 TEST_P(Metamorphic, AShiftByWholeCellsShiftsTheRings) {
   support::Random random(1);
-  // Multiples of 2^-17: every position is exact wherever it is moved to.
+  // Multiples of 2^-17: every position stays exact after a shift.
   const Particles particles = support::Snapped(support::Blob(random, 9), 1.0);
   const ReconstructionParameters parameters{.placement = GetParam(), .spacing = 1.0};
   const Result here = ReconstructOnce(parameters, particles);

@@ -46,7 +46,7 @@ TEST(Orientation, IsRightOnAllTriplesOfASmallLattice) {
   }
 }
 
-/// Points near a random line, with coordinates of all 53 bits: no filter can tell them apart.
+/// Points near a random line, with coordinates of all 53 bits, which no filter can decide.
 TEST(Orientation, AgreesWithIntegersForPointsThatAreNearlyCollinear) {
   Random random(1);
   int collinear = 0;

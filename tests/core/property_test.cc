@@ -28,7 +28,7 @@ std::uint64_t NumberFromEnvironment(const char* name, std::uint64_t otherwise) {
 }
 
 struct Trial {
-  std::vector<Particles> frames;  // Of one stream.
+  std::vector<Particles> frames;  // Figures of one stream.
   ReconstructionParameters parameters;
 };
 
@@ -65,8 +65,8 @@ Particles NextFrame(const Particles& before, double spacing, support::Random& ra
   return support::Permuted(after, random);
 }
 
-// The scene and what becomes of it: without ids it moves a little, so that the second frame has a
-// memory of normals; with ids particles move each by itself, come and go, in two more frames.
+// A scene and its later frames. Without ids it moves slightly, so that the second frame uses
+// remembered normals. With ids, particles move separately, appear and vanish, in two more frames.
 std::vector<Particles> MakeFrames(Particles scene, double spacing, std::uint64_t seed) {
   support::Random moves(seed ^ 0x5eed3);
   if (scene.size() == 0 || moves.Chance(0.4)) {
@@ -94,7 +94,7 @@ Trial MakeTrial(std::uint64_t seed) {
   // Noise and clusters have no spacing worth the name: most frames are given theirs, and those
   // with volumes always.
   if (!trial.frames[0].volumes.empty() || random.Chance(0.7)) trial.parameters.spacing = spacing;
-  // What changes the rings of a few frames only.
+  // Events that change the rings of few frames.
   support::Random rare(seed ^ 0x5eed2);
   if (rare.Chance(0.1)) trial.parameters.min_component_area = rare.Uniform(0, 40);
   if (rare.Chance(0.1)) trial.parameters.min_component_particles = rare.Below(20);
@@ -103,7 +103,7 @@ Trial MakeTrial(std::uint64_t seed) {
   return trial;
 }
 
-// What was seen of one placement.
+// Figures of one placement.
 struct Tally {
   std::uint64_t results = 0, refused = 0;
   std::map<std::string, std::uint64_t> broken;  // By guarantee: "R2", ...
@@ -171,7 +171,7 @@ TEST(Guarantees, HoldForRandomFramesAllPlacementsAndAllFills) {
     for (const Placement placement : AllPlacements()) {
       CheckPlacement(trial, placement, tallies[placement]);
     }
-    if (testing::Test::HasFailure()) break;  // The first seed tells more than a flood.
+    if (testing::Test::HasFailure()) break;  // The first failing seed is enough.
   }
   for (const auto& [placement, tally] : tallies) {
     std::cout << std::left << std::setw(18) << Name(placement) << tally << '\n';

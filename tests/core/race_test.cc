@@ -1,5 +1,5 @@
-// That ThreadSanitizer sees tasks as they are: a race between two of them is reported, although
-// oneTBB itself is hidden from it, and what a fork and a join order is not.
+// Checks that ThreadSanitizer sees tasks correctly: a race between two tasks is reported, although
+// oneTBB itself is hidden from it; work ordered by a fork and a join is not reported.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -17,7 +17,7 @@
 namespace partiemc {
 namespace {
 
-constexpr int kReported = 66;  // What the sanitizer makes of the exit code.
+constexpr int kReported = 66;  // The exit code that the sanitizer sets.
 
 // Orders in time what the sanitizer is to take for unordered.
 class Signal {
@@ -31,8 +31,8 @@ class Signal {
   std::atomic<int> given_{0};
 };
 
-// Runs `program` with tasks in two threads, on a machine of one processor as well; many times, as
-// the sanitizer may miss one race, such as that of two writes in the same instant.
+// Runs `program` with tasks in two threads, also on a machine with one processor. Repeats it,
+// because the sanitizer may miss a single race, such as two writes at the same instant.
 [[noreturn]] void RunOnTwoThreads(const std::function<void()>& program) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 2);
   tbb::task_arena arena(2);
@@ -40,7 +40,7 @@ class Signal {
   std::exit(EXIT_SUCCESS);
 }
 
-// Runs `first` and then `second` as tasks of one fork, each in a thread of its own.
+// Runs `first` and then `second` as tasks of one fork, in two threads.
 template <typename First, typename Second>
 void RunOneAfterTheOther(const First& first, const Second& second) {
   Signal first_is_over;

@@ -265,7 +265,7 @@ TEST(Reconstructor, TheSpacingOfEveryFrameChangesTheRadiiAndNotTheLattice) {
     EXPECT_NEAR(result.statistics.area, 400 * scale * scale, 0.02 * 400 * scale * scale);
     EXPECT_TRUE(Validate(result).ok()) << Validate(result);
   }
-  // A frame that has no spacing of its own takes the last one.
+  // A frame without a spacing uses the last one.
   const Particles lone = support::Lattice(1, 1);
   ASSERT_TRUE(reconstructor.Reconstruct(lone.AsFrame(), state, workspace, result).ok());
   EXPECT_EQ(result.statistics.spacing, 2);
@@ -279,8 +279,8 @@ TEST(Reconstructor, ASpacingThatIsGivenCountsAndNotTheParticles) {
 }
 
 TEST(Reconstructor, AnOutlineAsFarOutAsTheKernelReachesStillKeepsEveryPromise) {
-  // A featherweight particle takes the guard away, and a reference radius near the kernel's puts
-  // the inside wherever a kernel reaches, up to the ends of tiles.
+  // A particle with a tiny volume disables the guard. With a reference radius near the kernel's,
+  // the inside extends as far as a kernel reaches, up to the edges of tiles.
   for (int shift = 0; shift < 32; ++shift) {
     Particles particles = support::Shifted(support::Disc(3), shift + 0.25, 0.5 * shift);
     particles.Add(shift + 8, 0.5 * shift);

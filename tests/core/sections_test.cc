@@ -21,7 +21,7 @@ namespace {
 
 using support::Random;
 
-constexpr double kRadius = 3;  // Of the kernel, in spacings, which are 1.
+constexpr double kRadius = 3;  // Kernel radius in spacings of 1.
 
 // A shaken lattice in a disc around (x, 0).
 std::vector<double> Disc(double radius, double x, double jitter, std::uint64_t seed) {
@@ -141,7 +141,7 @@ TEST(Isoline, HasTheDensityOfSpaceInASlice) {
   }
 }
 
-// But for what the kernel takes off its bend.
+// Except where the kernel rounds its bend.
 TEST(Isoline, AtHalfTheDensityIsNearTheOutlineOfADisc) {
   const double radius = 20;
   const std::vector<double> xy = Disc(radius, 0, 0, 1);
@@ -231,7 +231,7 @@ TEST(Sections, CarryAttributesToo) {
   ASSERT_EQ(section.attributes.size(), 1u);
   ASSERT_GE(section.attributes[0].values.size(), section.rings.PointCount());
   for (std::size_t k = 0; k < section.rings.PointCount(); ++k) {
-    // Of a field of 18.
+    // Of a field with a range of 18.
     EXPECT_NEAR(section.attributes[0].values[k], section.rings.points[2 * k], 0.02);
   }
 }
@@ -261,7 +261,7 @@ TEST(Sections, OneThatIsRefusedLeavesNothingOfTheFrame) {
   EXPECT_EQ(state, before);
 }
 
-// What a guard is asked for.
+// Records the requests to a guard.
 class Reservations final : public MemoryGuard {
  public:
   bool Reserve(std::uint64_t bytes) override {

@@ -221,7 +221,7 @@ TEST(Slice, APlaneMayLieAnyWay) {
 }
 
 TEST(Slice, BodiesAboveAndBelowThePlaneAreNotInIt) {
-  // Two plates with a gap of four spacings, and a third one beside them that the plane cuts.
+  // Two plates with a gap of four spacings, and a third plate that the plane cuts.
   Cloud cloud = CloudOf(Box({-20, -20, 2}, {0, 20, 10}), 30, 1);
   for (const Cloud& other : {CloudOf(Box({-20, -20, -10}, {0, 20, -2}), 30, 2),
                              CloudOf(Box({8, -20, -10}, {28, 20, 10}), 40, 3)}) {
@@ -313,7 +313,7 @@ TEST(Slice, ALinearFieldIsReproducedAtVertices) {
     ASSERT_EQ(result.attributes[0].values.size(), points.size() / 2);
     for (std::size_t k = 0; 2 * k < points.size(); ++k) {
       const double is = linear(points[2 * k], points[2 * k + 1], z);
-      // Of the range over the body.
+      // Relative to the range over the body.
       EXPECT_NEAR(result.attributes[0].values[k], is, 0.01 * 30) << "vertex " << k;
     }
   }
@@ -364,7 +364,7 @@ TEST(Slice, ParticlesThatTheKernelDoesNotReachCostNothing) {
   EXPECT_EQ(slab.heights().size(), slab.AsFrame().ParticleCount());
   EXPECT_NEAR(static_cast<double>(slab.heights().size()), 20 * 20 * 6, 120);
   for (const double height : slab.heights()) EXPECT_LT(std::abs(height), 3);
-  // Beside everything the plane sees nothing, and that is no error.
+  // A plane away from all particles gives an empty result, not an error.
   const Result result = Reconstructed(cloud.AsFrame(), AtHeight(1000));
   EXPECT_EQ(result.rings.RingCount(), 0);
   EXPECT_EQ(result.statistics.particles, cloud.size());

@@ -109,7 +109,7 @@ TEST(Spacing, WhereBodiesAreThinIsTheMedianDistanceToTheNearestNeighbour) {
 TEST(Spacing, IgnoresSprayAndLoneParticles) {
   support::Random random(12);
   const Particles body = support::Blob(random, 12);
-  // Two fifths as many lone ones would shift the median of all.
+  // Adding two fifths of lone particles would shift the median of all.
   const int lone = static_cast<int>(body.size() * 2 / 5);
   const Particles spray =
       support::Shifted(support::Scaled(support::Lattice(lone, 1), 50), 100, 100);
@@ -170,7 +170,7 @@ TEST(Spacing, IsAgreedWhereABodyIsHoweverItsParticlesAreArranged) {
     if (random.Uniform(0, 1) < 0.5) thinned.Add(lattice.xy[2 * k], lattice.xy[2 * k + 1]);
   }
   EXPECT_TRUE(IsAgreed(thinned));
-  // Small ones, and beside as much spray.
+  // Small bodies beside the same number of spray particles.
   EXPECT_TRUE(IsAgreed(support::Disc(3)));
   EXPECT_TRUE(IsAgreed(support::Lattice(50, 4)));
   Particles with_spray = support::Lattice(20, 20);

@@ -1,5 +1,4 @@
-// What a stream gives does not depend on how many threads work on it. Also under ThreadSanitizer,
-// which is to see each kind of task of each stage: the body is large enough for all of them.
+// The results of a stream do not depend on the number of threads.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 

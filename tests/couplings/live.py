@@ -14,7 +14,7 @@ LINE = re.compile(r"t = (\S+): (\d+) rings, area (\S+), ([0-9a-f]{16} [0-9a-f]{1
 
 
 def skip_unless(*modules):
-    """Ends the test as skipped where one of `modules` is not installed."""
+    """Skips the test unless all `modules` are installed."""
     for name in modules:
         if importlib.util.find_spec(name) is None:
             print(f"skipped: Python has no module {name} (docker/install.sh couplings)")
@@ -22,7 +22,7 @@ def skip_unless(*modules):
 
 
 class Server:
-    """partiemc-server on a socket of its own, for `with`."""
+    """partiemc-server on a new socket, for `with`."""
 
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -54,7 +54,7 @@ class Server:
 
 
 class Answer:
-    """What a simulation printed of one result."""
+    """The line that a simulation printed for one result."""
 
     def __init__(self, line):
         time, rings, area, self.digests = LINE.fullmatch(line).groups()
@@ -62,8 +62,8 @@ class Answer:
 
 
 def run(command, server, kill_after=None, **environment):
-    """The answers that `command` prints, one a line. With `kill_after`, the server is killed after as
-    many, stays away for a while, and comes back."""
+    """The results that `command` prints, one per line. With `kill_after`, the server is killed after
+    this number of results and restarted a moment later."""
     running = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True,
                                env={**os.environ, **environment})
     with running, running.stdout:

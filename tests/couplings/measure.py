@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""What streaming costs a simulation, and what two workers of Dask gain. Not a test: no machine that is
-shared can promise a percent. Run from the root of the repository after a build:
+"""Measures the cost of streaming for a simulation, and the gain of two Dask workers. Not a test: a shared
+machine cannot resolve a percent. Run in the root of the repository after a build:
 
     tests/couplings/measure.py pysph [RUNS]     the dam break alone, with `latest`, with `block`
-    tests/couplings/measure.py lammps [RUNS]    the column, of 5,000 grains, likewise
+    tests/couplings/measure.py lammps [RUNS]    the same for the column with 5,000 grains
     tests/couplings/measure.py dask [RUNS]      20 recordings in one process and on two workers
 
-Runs alternate, so that what else the machine does meets all of them; medians are compared. The time
-is that of the simulation's loop: its wall clock, its thread's own processor time, and the part of the
-wall clock that passes in the callback, which a busy machine blurs least.
+Runs alternate, so that other load affects all of them; medians are compared. Three times of the
+simulation's loop are measured: wall clock, processor time of its thread, and wall clock in the
+callback, which other load disturbs least.
 """
 
 import functools
@@ -31,8 +31,8 @@ in_callback = 0.0
 
 
 def callback(function):
-    """`function`, its time added to in_callback."""
-    @functools.wraps(function)  # PySPH calls what has the name of a method of its own.
+    """Wraps `function` and adds its time to in_callback."""
+    @functools.wraps(function)  # PySPH selects callbacks by their names.
     def timed_callback(*arguments):
         global in_callback
         start = time.perf_counter()
@@ -42,11 +42,11 @@ def callback(function):
 
 
 def timed(function):
-    """Calls it and prints what it took: wall seconds, seconds of this thread, in the callback."""
+    """Calls `function` and prints its wall seconds, thread seconds and callback seconds."""
     wall, own = time.perf_counter(), time.thread_time()
     function()
     took = time.perf_counter() - wall, time.thread_time() - own, in_callback
-    print("took", *took, file=sys.stderr)  # Results are printed to the other one.
+    print("took", *took, file=sys.stderr)  # Standard output has the results.
 
 
 def run_pysph(way, options):
@@ -111,7 +111,7 @@ def interleaved(name, runs):
 
 
 def read_turning(seed):
-    """150 frames of a turning disc of 30,000 particles: made here, so that no disk is measured."""
+    """150 frames of a turning disc of 30,000 particles, made in memory to exclude the disk."""
     import numpy
 
     random = numpy.random.default_rng(seed)

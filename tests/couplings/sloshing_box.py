@@ -3,8 +3,8 @@
     PYTHONPATH=build/release/python python3 tests/couplings/sloshing_box.py
 
 Prints for each frame how far the areas of sixteen sections along x and along y, times their distance,
-are from the volume of the water, in percent, and the means and largest of these errors. By hand: it
-takes some minutes.
+differ from the volume of the water, in percent, and the means and maxima of these errors. Run by hand:
+it takes some minutes.
 """
 import tempfile
 

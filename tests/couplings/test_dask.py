@@ -1,4 +1,4 @@
-"""Recordings mapped over the workers of a cluster of Dask."""
+"""Recordings mapped over the workers of a Dask cluster."""
 
 import pathlib
 import sys
@@ -30,7 +30,7 @@ def read(path):
 
 
 def worst_bend(result):
-    """Not all of a result's numbers are scalars."""
+    """Some of a result's numbers are arrays."""
     return result.rings.area.copy()
 
 
@@ -44,17 +44,17 @@ class Cluster(unittest.TestCase):
         cls.paths = [str(pathlib.Path(folder.name, f"{k}.npz")) for k in range(20)]
         for seed, path in enumerate(cls.paths):
             recording(path, seed)
-        # Workers are processes of their own, as they are on other machines.
+        # Workers are separate processes, as on other machines.
         cls.cluster = dask.distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=folder.name)
         cls.addClassCleanup(cls.cluster.close)
         cls.client = dask.distributed.Client(cls.cluster)
         cls.addClassCleanup(cls.client.close)
-        # They know this file only by what is sent to them.
+        # They get the functions of this file as sent objects only.
         import cloudpickle
         cloudpickle.register_pickle_by_value(sys.modules[__name__])
 
-    def test_twenty_recordings_on_two_workers_are_those_of_one_process(self):
+    def test_two_workers_give_the_digests_of_one_process(self):
         found = partiemc.dask.bag(self.paths, read, spacing=1).compute()
         expected = [partiemc.dask.reconstruct(path, read, spacing=1) for path in self.paths]
         self.assertEqual(found, expected)

@@ -1,4 +1,4 @@
-"""LAMMPS, from Python and as a library of a C++ program, live through a server that is killed."""
+"""LAMMPS, from Python and as a library of a C++ program, streams while the server is killed."""
 
 import os
 import pathlib
@@ -42,7 +42,7 @@ def expected():
 
 
 def digests_of_dump(path):
-    """Of the frames that LAMMPS has written, each sorted by id."""
+    """Digests of the frames that LAMMPS has written, each sorted by id."""
     frames = re.split("ITEM: ATOMS id x y *\n", pathlib.Path(path).read_text())[1:]
     sequence = partiemc.Reconstructor(spacing=1.0)
     found = []
@@ -67,7 +67,7 @@ class Column(unittest.TestCase):
             self.assertAlmostEqual(answer.area / GRAINS, 1, delta=0.02)
         self.assertGreater(len({answer.area for answer in answers}), STEPS // EVERY // 2)
 
-    def test_from_python_nothing_is_missing_though_the_server_is_killed(self):
+    def test_from_python_no_frame_is_lost_when_the_server_is_killed(self):
         self.check([COUPLINGS / "lammps_column.py", "--server", None, "--every", EVERY, "--steps",
                     STEPS])
 
@@ -76,7 +76,7 @@ class Column(unittest.TestCase):
             self.skipTest("liblammps-dev is not installed")
         self.check([os.environ["LAMMPS_COLUMN"], COUPLINGS / "lammps_column.in", None, EVERY, STEPS])
 
-    def test_four_processes_give_the_digests_of_their_grains_as_one_frame(self):
+    def test_four_processes_give_the_digests_of_one_frame(self):
         if shutil.which("mpirun") is None:
             self.skipTest("Open MPI is not installed")
         with tempfile.TemporaryDirectory() as folder, Server() as server:

@@ -1,4 +1,4 @@
-"""The loop in NumPy, live through a server that is killed."""
+"""The NumPy loop streams while the server is killed."""
 
 import importlib.util
 import unittest

@@ -1,4 +1,4 @@
-"""PySPH's dam break, live through a server that is killed, and read from its files afterwards."""
+"""PySPH's dam break streams while the server is killed; its files are read afterwards."""
 
 import os
 import pathlib
@@ -21,7 +21,7 @@ EVERY, STEPS, SPACING = 8, 400, 0.03
 
 
 class Run:
-    """What the tests are about: the dam break, streamed with `latest` and with every frame."""
+    """Runs the dam break, streamed with `latest` and with every frame."""
 
 
 def setUpModule():

@@ -1,4 +1,4 @@
-"""The manifests of docker/kubernetes: that they agree with each other and with the server."""
+"""Checks that the manifests of docker/kubernetes agree with each other and with the server."""
 
 import copy
 import os
@@ -44,10 +44,11 @@ def merged(below, above):
 
 
 class Manifests:
-    """What kustomize makes of a folder: objects by kind and name, settings, and the files read."""
+    """The output of kustomize for a folder: objects by kind and name, settings, and the files read."""
 
     def __init__(self, folder):
         self.objects, self.settings, self.files = {}, {}, set()
+        self.proxy_configuration = None
         self.listed = set()
         self.read(folder)
 
@@ -64,6 +65,9 @@ class Manifests:
             for one in yaml.safe_load_all(path.read_text()):
                 self.objects[one["kind"], one["metadata"]["name"]] = one
         for generated in kustomization.get("configMapGenerator", []):
+            if generated["name"] == "partiemc-proxy":
+                self.proxy_configuration = (folder / generated["files"][0]).read_text()
+                continue
             if generated["name"] != "partiemc-settings":
                 raise ValueError(f"unknown settings {generated['name']}")
             self.settings.update(literal.split("=", 1) for literal in generated["literals"])
@@ -78,9 +82,21 @@ class Manifests:
     def pod(self):
         return self.objects["Deployment", "partiemc"]["spec"]["template"]
 
+    def container(self, name):
+        """None where the pod has no such container."""
+        return next((one for one in self.pod["spec"]["containers"] if one["name"] == name), None)
+
     @property
     def server(self):
-        return self.pod["spec"]["containers"][0]
+        return self.container("server")
+
+    @property
+    def proxy(self):
+        return self.container("proxy")
+
+    @property
+    def proxy_settings(self):
+        return {one["name"]: one["value"] for one in self.proxy["env"]} if self.proxy else {}
 
 
 def server_variables():
@@ -89,7 +105,7 @@ def server_variables():
 
 
 def planned_mib(settings, memory_budget, threads):
-    """What the server itself says that it may take."""
+    """The memory that the server reports as its maximum."""
     text = subprocess.run(
         [PROGRAM, "--print-memory-plan", "--memory-budget", str(memory_budget), "--threads",
          str(threads)], env={**os.environ, **settings}, capture_output=True, text=True,
@@ -101,8 +117,45 @@ def port_of(address):
     return int(address.rsplit(":", 1)[1])
 
 
+def problems_of_container(container, spec):
+    """Its privileges and memory."""
+    found = []
+    resources = container["resources"]
+    if resources["requests"]["memory"] != resources["limits"]["memory"]:
+        found.append("memory is promised that may not be there")
+    security = {**spec["securityContext"], **container["securityContext"]}
+    for key, wanted in (("runAsNonRoot", True), ("allowPrivilegeEscalation", False),
+                        ("readOnlyRootFilesystem", True), ("capabilities", {"drop": ["ALL"]}),
+                        ("seccompProfile", {"type": "RuntimeDefault"})):
+        if security.get(key) != wanted:
+            found.append(f"{key} is {security.get(key)}")
+    return found
+
+
+def problems_of_proxy(manifests):
+    """Of the proxy in front of the server: addresses, configuration, drain."""
+    settings, own, found = manifests.settings, manifests.proxy_settings, []
+    shipped = (FOLDER.parent / "haproxy.cfg").read_text()
+    if manifests.proxy_configuration != shipped:
+        found.append("haproxy.cfg differs from docker/haproxy.cfg")
+    for name in own:
+        if name not in shipped:
+            found.append(f"haproxy.cfg has no {name}")
+    for theirs, ours in (("PARTIEMC_SERVER", "PARTIEMC_ADDRESS"),
+                         ("PARTIEMC_SERVER_WEB", "PARTIEMC_WEB")):
+        if own[theirs] != settings[ours] or not own[theirs].startswith("127.0.0.1:"):
+            found.append(f"{theirs} is {own[theirs]}, {ours} {settings[ours]}")
+    for name in ("PARTIEMC_CONNECTIONS_PER_ADDRESS", "PARTIEMC_NEW_CONNECTIONS_PER_ADDRESS"):
+        if settings.get(name) != "0":
+            found.append(f"{name} limits all clients of the proxy together")
+    wait = manifests.proxy["lifecycle"]["preStop"]["exec"]["command"]
+    if wait != ["sleep", settings["PARTIEMC_DRAIN_DELAY"]]:
+        found.append(f"the proxy admits streams for {wait}")
+    return found
+
+
 def problems(manifests):
-    """What is wrong, a line each."""
+    """Errors, one line each."""
     found = [f"{path.name} is not listed" for path in manifests.files - manifests.listed]
     for (kind, name), one in manifests.objects.items():
         if VERSIONS.get(kind) != one["apiVersion"]:
@@ -122,10 +175,16 @@ def problems(manifests):
         select("the spread", constraint["labelSelector"]["matchLabels"])
 
     ports = {port["name"]: port["containerPort"] for port in server["ports"]}
-    for name, variable in (("grpc", "PARTIEMC_ADDRESS"), ("web", "PARTIEMC_WEB"),
+    # A port belongs to the pod, whichever container listens on it.
+    listening = {"PARTIEMC_PROXY": settings["PARTIEMC_ADDRESS"],
+                 "PARTIEMC_PROXY_WEB": settings["PARTIEMC_WEB"],
+                 "PARTIEMC_METRICS": settings["PARTIEMC_METRICS"]} | manifests.proxy_settings
+    for name, variable in (("grpc", "PARTIEMC_PROXY"), ("web", "PARTIEMC_PROXY_WEB"),
                            ("metrics", "PARTIEMC_METRICS")):
-        if ports.get(name) != port_of(settings[variable]):
-            found.append(f"port {name} is {ports.get(name)}, {variable} {settings[variable]}")
+        if ports.get(name) != port_of(listening[variable]):
+            found.append(f"port {name} is {ports.get(name)}, {variable} {listening[variable]}")
+    if manifests.proxy:
+        found += problems_of_proxy(manifests)
     asked = {port["port"] for rule in of["NetworkPolicy", "partiemc"]["spec"]["ingress"]
              for port in rule["ports"]}
     asked.add(server["livenessProbe"]["httpGet"]["port"])
@@ -155,8 +214,6 @@ def problems(manifests):
         found.append("the autoscaler scales something else")
     if ("ServiceAccount", spec["serviceAccountName"]) not in of:
         found.append("no such account")
-    if server["resources"]["requests"]["memory"] != server["resources"]["limits"]["memory"]:
-        found.append("memory is promised that may not be there")
     # Without flags the budget is half of the limit.
     limits = server["resources"]["limits"]
     mib = int(limits["memory"].removesuffix("Gi")) * 1024
@@ -164,23 +221,20 @@ def problems(manifests):
     if planned > mib:
         found.append(f"the server may take {planned:.0f} MiB, its limit is {mib}")
 
-    security = {**spec["securityContext"], **server["securityContext"]}
-    for key, wanted in (("runAsNonRoot", True), ("allowPrivilegeEscalation", False),
-                        ("readOnlyRootFilesystem", True), ("capabilities", {"drop": ["ALL"]}),
-                        ("seccompProfile", {"type": "RuntimeDefault"})):
-        if security.get(key) != wanted:
-            found.append(f"{key} is {security.get(key)}")
-
-    mounts = {mount["name"]: mount for mount in server.get("volumeMounts", [])}
+    mounts = {}
+    for container in spec["containers"]:
+        found += problems_of_container(container, spec)
+        mounts |= {mount["name"]: mount for mount in container.get("volumeMounts", [])}
     volumes = {volume["name"]: volume for volume in spec.get("volumes", [])}
     if set(mounts) != set(volumes):
         found.append(f"volumes {sorted(volumes)}, mounts {sorted(mounts)}")
-    files = {name: value for name, value in settings.items()
+    files = {name: value for name, value in (settings | manifests.proxy_settings).items()
              if re.search("_(CERT|KEY|FILE)$", name)}
     for name, path in files.items():
         if not any(path.startswith(mount["mountPath"] + "/") for mount in mounts.values()):
             found.append(f"{name} {path} is in no volume")
-    is_secure = {"PARTIEMC_TLS_CERT", "PARTIEMC_TLS_KEY"} <= set(files)
+    is_secure = "PARTIEMC_PROXY_CERT" in files or {"PARTIEMC_TLS_CERT",
+                                                   "PARTIEMC_TLS_KEY"} <= set(files)
     if is_secure == (settings["PARTIEMC_INSECURE"] == "true"):
         found.append("neither TLS nor --insecure, or both")
     return found
@@ -193,9 +247,11 @@ class Kubernetes(unittest.TestCase):
                 self.assertEqual(problems(Manifests(FOLDER / folder)), [])
 
     def test_production_is_secure(self):
-        settings = Manifests(FOLDER / "production").settings
-        for name in ("TLS_CERT", "TLS_KEY", "TOKEN_FILE", "CHECKPOINT_KEY_FILE"):
+        manifests = Manifests(FOLDER / "production")
+        settings = manifests.settings
+        for name in ("TOKEN_FILE", "CHECKPOINT_KEY_FILE"):
             self.assertIn("PARTIEMC_" + name, settings)
+        self.assertIn("PARTIEMC_PROXY_CERT", manifests.proxy_settings)
         self.assertEqual(settings["PARTIEMC_INSECURE"], "false")
 
     def test_each_violation_is_found(self):
@@ -216,7 +272,14 @@ class Kubernetes(unittest.TestCase):
         planted(lambda m: m.pod["metadata"].update(labels={"app": "other"}), "selects")
         planted(lambda m: spec("PodDisruptionBudget")(m).update(selector={"matchLabels": {}}),
                 "the budget selects")
-        planted(setting("PARTIEMC_ADDRESS", "0.0.0.0:50052"), "port grpc is 50051")
+        planted(setting("PARTIEMC_METRICS", "0.0.0.0:9465"), "port metrics is 9464")
+        planted(setting("PARTIEMC_ADDRESS", "127.0.0.1:50052"), "PARTIEMC_SERVER is 127.0.0.1:50061")
+        planted(setting("PARTIEMC_NEW_CONNECTIONS_PER_ADDRESS", "9"), "limits all clients")
+        planted(lambda m: m.proxy["env"][0].update(value=":1"), "port grpc is 50051")
+        planted(lambda m: m.proxy["env"][0].update(name="PARTIEMC_PROXI"), "no PARTIEMC_PROXI")
+        planted(lambda m: m.proxy["securityContext"].pop("capabilities"), "capabilities")
+        planted(lambda m: setattr(m, "proxy_configuration", ""), "haproxy.cfg differs")
+        planted(setting("PARTIEMC_DRAIN_DELAY", "11"), "the proxy admits streams")
         planted(lambda m: spec("Service")(m)["ports"][0].update(port=1), "port 1")
         planted(lambda m: spec("Service")(m)["ports"][0].update(targetPort="rpc"), "port rpc")
         planted(setting("PARTIEMC_MAX_STREEMS", "3"), "knows no PARTIEMC_MAX_STREEMS")

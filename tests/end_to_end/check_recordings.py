@@ -1,16 +1,16 @@
 #!/usr/bin/python3
-"""Replays recordings with every placement and checks the files that come out, frame by frame, with a
-geometry library that knows nothing of PartiEMC (GEOS, through Shapely).
+"""Replays recordings with every placement and checks the written files, frame by frame, with an
+independent geometry library (GEOS, through Shapely).
 
 For every frame and placement:
   - every GeoJSON polygon is valid, its outer ring counter-clockwise, its holes clockwise;
   - polygons do not overlap, and every hole lies in its polygon;
   - no triangle of the OBJ mesh is folded or degenerate, and the mesh has the rings' area to 1e-5;
-  - the statistics tell the same area and the same number of triangles as the files.
+  - the statistics have the same area and the same number of triangles as the files.
 `farthest-particle` may break the geometry, but only in frames whose statistics count it.
 
 usage: check_recordings.py --partiemc build/release/bin/partiemc [--data FOLDER]
-FOLDER holds recordings that the repository does not carry; without it only the bundled ones are
+FOLDER contains recordings outside of the repository; without it only the bundled ones are
 replayed. Exit code 0 only if every check passed.
 """
 import argparse
@@ -91,7 +91,7 @@ def signed_area(ring):
 
 
 def broken_polygons(polygons):
-    """What GEOS has to say against the polygons of one frame."""
+    """Errors that GEOS finds in the polygons of one frame."""
     words, shapes = [], []
     for rings in polygons:
         if any(ring[0] != ring[-1] for ring in rings):
@@ -111,7 +111,7 @@ def broken_polygons(polygons):
 
 
 def is_folded(corners):
-    """Exactly: slivers of a triangulation may be thinner than the rounding of their area."""
+    """Exact, because slivers may be thinner than the rounding of their area."""
     (ax, ay), (bx, by), (cx, cy) = [[Fraction(float(x)) for x in corner] for corner in corners]
     return (bx - ax) * (cy - ay) <= (cx - ax) * (by - ay)
 
@@ -148,7 +148,7 @@ def check_frame(directory, row, may_fold):
 
 
 def check_sequence(partiemc, source, arguments, placement):
-    """Returns frames, frames that count crossings or folds, and what is wrong."""
+    """Returns frames, frames with counted crossings or folds, and errors."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         command = [partiemc, "replay", str(source), "--local", "--quiet", "--placement", placement,

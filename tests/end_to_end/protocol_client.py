@@ -88,7 +88,7 @@ def check_example():
 # --- the client ----------------------------------------------------------------------------------
 
 class Stream:
-    """One producer's stream, through as many calls as it takes."""
+    """One producer's stream over any number of calls."""
 
     def __init__(self, pb, stub, name, token=""):
         self.pb, self.stub, self.name, self.token = pb, stub, name, token
@@ -115,7 +115,7 @@ class Stream:
         return opened.next_sequence
 
     def lose(self):
-        """As a connection that breaks: what is under way is lost."""
+        """Breaks the call like a lost connection: messages on the way are lost."""
         self.call.cancel()
         self.requests.put(None)
 
@@ -180,8 +180,8 @@ def stream_all(stream, frames, losses):
 # --- the test ------------------------------------------------------------------------------------
 
 def dam_break(pb, count):
-    """Frames of the bundled recording: messages behind their lengths (client/recordings/README.md),
-    of which the first is its header."""
+    """Frames of the bundled recording: length-delimited messages (client/recordings/README.md) after
+    its header."""
     path = ROOT / "client/recordings/dam_break.pemc"
     data = subprocess.run(["zstd", "-dcq", str(path)], check=True, capture_output=True).stdout
     messages, at = [], 0

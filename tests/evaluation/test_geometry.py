@@ -62,8 +62,10 @@ class OutlineTest(unittest.TestCase):
         self.assertAlmostEqual(annulus(10, 4).eroded(0.5).area, np.pi * (9.5 ** 2 - 4.5 ** 2), delta=0.05)
         square = Outline.of([np.array([(0.0, 0), (4, 0), (4, 4), (0, 4)])])
         self.assertAlmostEqual(square.eroded(0.5).area, 9, delta=1e-9)  # Convex corners stay sharp.
-        bell = make_shape("two-discs", 200, 0.25)
-        self.assertTrue(bell.eroded(0.5))
+        self.assertTrue(make_shape("two-discs", 200, 0.25).eroded(0.5))
+        # The eroded box of 40 without the box of 20 of its notch, whose corner became an arc.
+        exact = 39 ** 2 - 20 ** 2 + (1 - np.pi / 4) * 0.5 ** 2
+        self.assertAlmostEqual(make_shape("ell", 1200, 0.25).eroded(0.5).area, exact, delta=1e-3)
         self.assertFalse(Outline.of([np.array([(0.0, 0), (9, 0), (9, 0.9), (0, 0.9)])]).eroded(0.5))
 
 
@@ -106,6 +108,7 @@ class ShapesTest(unittest.TestCase):
             with self.subTest(name):
                 outline = make_shape(name, 900, 0.25)
                 self.assertTrue(outline.to_shapely().is_valid)
+                self.assertEqual(outline.count_crossings(), 0)
                 self.assertAlmostEqual(outline.to_shapely().area, outline.area, delta=1e-6)
                 self.assertAlmostEqual(outline.area, 900, delta=200 if fits_lattice(name) else 0.01)
 
@@ -138,16 +141,32 @@ class SamplersTest(unittest.TestCase):
                 self.assertTrue(region.contains(centers).all())
 
     def test_follow_from_their_seed(self):
-        region = Curve(disc(8), 1.0)
+        region = Curve(disc(4), 1.0)
         for name, sampler in SAMPLERS.items():
             one, same, other = (sampler(region, False, np.random.default_rng(seed)) for seed in (3, 3, 4))
             self.assertTrue(np.array_equal(one, same), name)
             self.assertFalse(np.array_equal(one, other), name)
 
-    def test_relaxed_centres_keep_half_a_spacing_from_the_boundary(self):
+    def test_relaxed_centres_keep_apart_from_the_boundary_and_each_other(self):
         region = Curve(annulus(10, 4), 1.0)
         centers = relax(region, throw_darts(region, 264, np.random.default_rng(3)), 10)
         self.assertGreater(region.nearest(centers)[0].min(), 0.499)
+        self.assertGreater(cKDTree(centers).query(centers, 2)[0][:, 1].min(), 0.5)
+        self.assertEqual(len(SAMPLERS["relaxed"](region, False, np.random.default_rng(3))), round(region.measure))
+
+    def test_clumps_keep_their_density_up_to_the_boundary(self):
+        region = Curve(make_shape("disc", 600, 0.25), 1.0)
+        depth = region.nearest(SAMPLERS["clumped"](region, False, np.random.default_rng(29)))[0]
+        radius = (600 / np.pi) ** 0.5 - np.arange(5)
+        counts = np.histogram(depth, np.arange(5))[0]
+        np.testing.assert_allclose(counts / (np.pi * (radius[:-1] ** 2 - radius[1:] ** 2)), 1, atol=0.12)
+
+    def test_ragged_centres_do_not_crowd_at_the_boundary(self):
+        region = Curve(make_shape("square", 2500, 0.25), 1.0)
+        depth = np.concatenate([region.nearest(SAMPLERS["ragged"](region, False, np.random.default_rng(seed)))[0]
+                                for seed in range(9, 13)])
+        self.assertAlmostEqual(len(depth) / (4 * 2500), 1, delta=0.02)
+        self.assertAlmostEqual((depth < 0.5).sum() / (4 * (2500 - 49 ** 2)), 1, delta=0.15)
 
     def test_darts_keep_their_distance_and_their_inset(self):
         region = Curve(disc(8), 1.0)

@@ -3,6 +3,8 @@
 import os
 import pathlib
 import unittest
+from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 
@@ -52,6 +54,18 @@ class MotionsTest(unittest.TestCase):
         np.testing.assert_allclose(points[1], [10, 0])
 
 
+    def test_bodies_apart_have_an_outline_each(self):
+        bodies = BodiesMotion([Body(5.0, 5.0, 0.0, np.zeros(2), np.zeros(2)),
+                               Body(5.0, 5.0, 0.0, np.array([20.0, 0.0]), np.array([-3.0, 0.0]))])
+        self.assertEqual([bodies.outline(t).loop_counts for t in (0, 4)], [(2, 0), (1, 0)])
+
+    def test_bodies_in_a_ring_leave_a_hole(self):
+        turn = 2 * np.pi * np.arange(5) / 5
+        centers = 10 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        bodies = BodiesMotion([Body(7.0, 7.0, 0.0, center, np.zeros(2)) for center in centers])
+        self.assertEqual(bodies.outline(0).loop_counts, (1, 1))
+
+
 class ScenesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -61,11 +75,11 @@ class ScenesTest(unittest.TestCase):
         committed = dict(reversed(line.split(None, 1)) for line in DIGESTS.read_text().splitlines()
                          if not line.startswith("#"))
         for scene in self.scenes:
-            self.assertEqual(digest(scene), committed[scene.name], scene.name)
-        for name, chosen in (("tuning", (3, 35, 40)), ("validation", (3, 38, 46))):
+            self.assertEqual(digest(scene), committed[f"smoke/{scene.name}"], scene.name)
+        for name, chosen in (("tuning", (3, 40)), ("validation", (3, 38))):
             recipes = make_set(name)
             for k in chosen:
-                self.assertEqual(digest(make_scene(recipes[k])), committed[recipes[k].name], recipes[k].name)
+                self.assertEqual(digest(make_scene(recipes[k])), committed[f"{name}/{recipes[k].name}"], k)
 
     def test_follow_from_their_recipe(self):
         recipe = Recipe("one", "growth", "disc", 7, "blue-noise", particles=200, frames=3)
@@ -90,17 +104,66 @@ class ScenesTest(unittest.TestCase):
                     self.assertLess(error, 1e-8, scene.name)
 
     def test_particles_of_an_id_follow_the_motion(self):
-        for scene in self.scenes:
-            if scene.group in ("noise", "growth"):
+        for scene, recipe in zip(self.scenes, make_set("smoke")):
+            if scene.group == "topology":
                 continue
+            # Noise is new in every frame. Where a region grows, its particles settle.
+            slack = {"noise": 12 * recipe.noise, "growth": 1.5}.get(scene.group, 1e-8)
             for t in range(len(scene.frames) - 1):
                 now, after = scene.frames[t], scene.frames[t + 1]
                 _, i, j = np.intersect1d(now.ids, after.ids, return_indices=True)
-                moved = scene.motion.carry(t, now.positions[i])
-                gap = np.linalg.norm(moved - after.positions[j], axis=1) / scene.spacing
-                # Deep inside merging bodies the nearest boundary may be another body's.
-                share = 0.8 if scene.group == "topology" else 1
-                self.assertGreaterEqual((gap < 1e-6).mean(), share, scene.name)
+                self.assertEqual(len(i), len(now.ids), scene.name)
+                gap = np.linalg.norm(scene.motion.carry(t, now.positions[i]) - after.positions[j], axis=1)
+                self.assertLess(gap.max(), slack * scene.spacing, scene.name)
+
+    def test_particles_of_merging_bodies_move_with_their_body(self):
+        for backwards in (False, True):
+            scene = make_scene(Recipe("chain", "topology", "disc-chain", 3, particles=400, backwards=backwards))
+            moves, counts = {}, set()
+            for now, after in zip(scene.frames, scene.frames[1:]):
+                _, i, j = np.intersect1d(now.ids, after.ids, return_indices=True)
+                counts.add(len(after.ids))
+                for name, move in zip(now.ids[i].tolist(), after.positions[j] - now.positions[i]):
+                    known = moves.setdefault(name, move)
+                    self.assertLess(np.abs(move - known).max(), 1e-9 * scene.spacing, name)
+            self.assertGreater(len(counts), 1)  # Particles vanish or appear.
+            kinds = np.unique(np.round(np.array(list(moves.values())) / scene.spacing, 6), axis=0)
+            self.assertEqual(len(kinds), 3)
+
+    def test_the_motion_of_merging_bodies_carries_their_boundaries(self):
+        # A point of the boundary moves with its own body, so it ends on the next boundary or in another body.
+        for name in ("smoke", "tuning", "validation"):
+            for recipe in make_set(name):
+                if recipe.group != "topology" or recipe.sampler not in ("lattice", "blue-noise", "hexagonal"):
+                    continue
+                scene = make_scene(replace(recipe, particles=400, sampler="hexagonal"))
+                for t in range(len(scene.frames) - 1):
+                    moved = scene.motion.carry(t, scene.frames[t].truth.points)
+                    region = Curve(scene.frames[t + 1].truth, scene.spacing)
+                    outside = moved[~region.contains(moved)]
+                    distance = region.nearest(outside)[0] if len(outside) else np.zeros(1)
+                    self.assertLess(distance.max(), 1e-3 * scene.spacing, recipe.name)
+
+    def test_bodies_that_merge_have_a_simple_truth_and_enough_particles(self):
+        for name in ("tuning", "validation"):
+            for recipe in make_set(name):
+                if recipe.group != "topology" or recipe.sampler != "hexagonal":
+                    continue
+                scene = make_scene(recipe)
+                for frame in scene.frames:
+                    self.assertTrue(frame.truth.to_shapely().is_valid, recipe.name)
+                    self.assertEqual(frame.truth.count_crossings(), 0, recipe.name)
+                    covered = len(frame.positions) * scene.spacing ** 2 / frame.area
+                    self.assertAlmostEqual(covered, 1, delta=0.015, msg=recipe.name)
+                components = {frame.truth.loop_counts[0] for frame in scene.frames}
+                self.assertGreaterEqual(len(components), 2, recipe.name)
+                self.assertEqual(min(components), 1, recipe.name)
+
+    def test_rigid_motion_and_flow_keep_the_area(self):
+        for scene in self.scenes:
+            if scene.group not in ("topology", "growth"):
+                for frame in scene.frames:
+                    self.assertAlmostEqual(frame.area / scene.frames[0].area, 1, delta=1e-5, msg=scene.name)
 
     def test_particles_lie_inside_the_truth(self):
         for scene in self.scenes:
@@ -126,6 +189,29 @@ class SetsTest(unittest.TestCase):
 
     def test_sizes(self):
         self.assertEqual([len(make_set(name)) for name in SETS], [7, 86, 114, 32])
+
+    def test_every_group_has_eight_judged_sequences_of_fair_size(self):
+        for name in ("tuning", "validation"):
+            judged = Counter(recipe.group for recipe in make_set(name) if recipe.kept_share > 0.4)
+            self.assertEqual(len(judged), 7)
+            self.assertGreaterEqual(min(judged.values()), 8)
+            for recipe in make_set(name):
+                self.assertEqual(recipe.frames, 8)
+                self.assertTrue(500 <= recipe.particles <= 3600, recipe.name)  # Thinned ones begin with 600 more.
+
+    def test_smoke_is_small_and_has_every_group(self):
+        self.assertEqual(len({recipe.group for recipe in make_set("smoke")}), 7)
+        self.assertLessEqual(max(recipe.particles for recipe in make_set("smoke")), 500)
+
+    def test_discs_are_relaxed_short_and_long_still_and_turning(self):
+        recipes = make_set("discs")
+        counts = Counter((recipe.shape, recipe.sampler, recipe.pace) for recipe in recipes)
+        self.assertEqual((len(counts), set(counts.values())), (8, {4}))
+        still, turning = (make_scene(replace(recipes[k], sampler="hexagonal")) for k in (0, 4))
+        self.assertEqual((still.frames[0].positions == still.frames[-1].positions).all(), True)
+        self.assertNotEqual((turning.frames[0].positions == turning.frames[-1].positions).all(), True)
+        drift = turning.frames[-1].truth.points.mean(axis=0) - turning.frames[0].truth.points.mean(axis=0)
+        self.assertLess(np.linalg.norm(drift), 1e-6 * turning.spacing)
 
     def test_validation_has_shapes_of_its_own(self):
         shapes = [{recipe.shape for recipe in make_set(name)} for name in ("tuning", "validation")]

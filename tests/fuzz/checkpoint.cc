@@ -1,5 +1,5 @@
-// A checkpoint that comes back from a client: as it comes, and with its header's checksum put
-// right. One that is accepted is gone on from.
+// A client's checkpoint: as it is, and with the checksum of its header corrected. A stream resumes
+// from an accepted one.
 #include "server/stream/checkpoint.h"
 
 #include <string>
@@ -36,8 +36,7 @@ std::optional<server::Checkpoint> Parse(std::string_view bytes,
   return std::nullopt;
 }
 
-// A header that is bound to `parameters`, before the number and the state that `bytes` has; signed
-// or not.
+// A header for `parameters`, followed by the number and the state in `bytes`; signed or not.
 std::string PutRight(std::string_view bytes, const ReconstructionParameters& parameters,
                      const server::CheckpointKeys* keys) {
   std::string number(bytes.substr(0, kSequenceBytes));

@@ -1,4 +1,5 @@
-// Fuzzed bytes taken as a list of choices, so that a mutation of bytes is a mutation of structure.
+// Reads fuzzed bytes as a list of choices, so that mutations of bytes become mutations of
+// structure.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 namespace partiemc::fuzz {
 
-/// Takes values from the front. Behind the end every value is zero.
+/// Takes values from the front. After the end every value is zero.
 class Choices {
  public:
   explicit Choices(Bytes bytes) : rest_(bytes) {}
@@ -29,7 +30,7 @@ class Choices {
   /// In [0, count). Requires: count is at most 256.
   std::size_t Below(std::size_t count) { return Take<std::uint8_t>() % count; }
 
-  /// The next `size` bytes, or as many as there are.
+  /// The next `size` bytes, or fewer at the end.
   std::string_view TakeText(std::size_t size) {
     size = std::min(size, rest_.size());
     const std::string_view text(reinterpret_cast<const char*>(rest_.data()), size);
@@ -37,7 +38,7 @@ class Choices {
     return text;
   }
   std::string_view TakeRest() { return TakeText(rest_.size()); }
-  /// Up to the next byte of this value, which is taken too, or to the end.
+  /// Up to the next byte with this value, which is consumed, or to the end.
   std::string_view TakeUntil(std::uint8_t end) {
     const auto at = std::find(rest_.begin(), rest_.end(), end);
     const std::string_view text = TakeText(static_cast<std::size_t>(at - rest_.begin()));

@@ -1,4 +1,4 @@
-// What a person writes on the command line: lines of text, each for another flag; or a times file.
+// Texts from the command line: each line for another flag; or a times file.
 #include <array>
 #include <string>
 #include <vector>

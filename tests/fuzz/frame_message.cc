@@ -1,4 +1,4 @@
-// A frame as a server gets it: bytes, message, view, result, message, and the client's result.
+// A frame as received by a server: bytes, message, view, result, message, and the client's result.
 #include "fuzz/hostile_frames.h"
 #include "fuzz/require.h"
 #include "fuzz/single_thread.h"
@@ -9,7 +9,7 @@
 namespace partiemc::fuzz {
 namespace {
 
-// What a client has of `result` after its way over the wire.
+// Requires that the client decodes `result` unchanged.
 void RequireArrives(const Result& result, wire::Outputs outputs) {
   v1::ReconstructedFrame sent, received;
   const absl::Status encoded = wire::EncodeResult(result, {}, outputs, sent);
@@ -51,7 +51,7 @@ void AttackFrameMessage(Bytes bytes) {
   for (const absl::Status& status : {parameters.status(), outputs.status(), frame.status()}) {
     if (!status.ok()) RequireViolation(status);
   }
-  // What one part breaks does not keep the others from being tried.
+  // Errors of one part do not prevent checks of the others.
   const auto reconstructor = Reconstructor::Create(
       parameters.ok() && Validate(*parameters).ok() ? *parameters : ReconstructionParameters{},
       kHostileLimits);

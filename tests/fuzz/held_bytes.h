@@ -1,4 +1,4 @@
-// How much of the heap is in use, so that a target can tell what stays behind.
+// Bytes of the heap in use, so that a target can detect growth.
 #pragma once
 
 #include <malloc.h>

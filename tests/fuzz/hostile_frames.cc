@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kMostParticles = 96;
 
-// A coordinate near `origin`, in one of the ways in which coordinates hurt: on nodes and half way
-// between them (ties), a hair beside them, anywhere, of any bits.
+// A difficult coordinate near `origin`: on nodes and halfway between them (ties), slightly beside
+// them, anywhere, or with arbitrary bits.
 double HostileCoordinate(Choices& choices, double origin, double spacing) {
   const auto kind = choices.Take<std::uint8_t>();
   const auto step = choices.Take<std::int8_t>();
@@ -58,8 +58,8 @@ double HostileRatio(Choices& choices, double low, double usual, double high) {
   }
 }
 
-// The id of particle `k`: mostly its number, so that successive frames share their particles; else
-// any byte, which repeats an id or belonged to another particle now and then.
+// The id of particle `k`: usually its number, so that successive frames share particles; otherwise
+// any byte, which may repeat an id or reuse another particle's.
 std::uint64_t HostileId(Choices& choices, std::size_t k) {
   const auto byte = choices.Take<std::uint8_t>();
   return byte % 16 == 15 ? byte : k;
@@ -105,12 +105,12 @@ HostileFrame::HostileFrame(Choices& choices, double spacing) {
   }
   if (!volumes_.empty() && choices.Flip())
     volumes_[choices.Below(volumes_.size())] = choices.Take<float>();
-  if ((shape & 64) && !doubles_.empty()) doubles_.pop_back();  // Half a particle.
+  if ((shape & 64) && !doubles_.empty()) doubles_.pop_back();  // An incomplete particle.
   if (choices.Below(16) == 5 && !ids_.empty()) ids_.pop_back();
   time_ = choices.Flip() ? choices.Take<std::int8_t>() : choices.Take<double>();
   if (!is_float_) return;
   for (const double value : doubles_) {
-    // Beyond its range a conversion to float is undefined.
+    // Outside of float's range the conversion is undefined.
     const bool fits = std::abs(value) <= std::numeric_limits<float>::max();
     floats_.push_back(fits ? static_cast<float>(value) : std::numeric_limits<float>::infinity());
   }

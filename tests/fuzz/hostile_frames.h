@@ -1,4 +1,4 @@
-// Frames that a simulator in trouble, or somebody with bad intentions, might send.
+// Frames of a faulty or malicious simulator.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace partiemc::fuzz {
 
-/// Small enough for thousands of frames a second.
+/// Small enough for thousands of frames per second.
 inline constexpr FrameLimits kHostileLimits{.max_particles = 256, .max_tiles = 48};
 
-/// A frame that owns its arrays, of numbers that are likely to hurt.
+/// A frame that owns its arrays of difficult numbers.
 class HostileFrame {
  public:
   HostileFrame(Choices& choices, double spacing);
-  /// Valid as long as this is.
+  /// Valid while this object exists.
   Frame AsFrame() const;
 
  private:
@@ -32,11 +32,11 @@ class HostileFrame {
   double time_ = 0;
 };
 
-/// Parameters of which most are legal.
+/// Parameters, mostly valid.
 ReconstructionParameters HostileParameters(Choices& choices);
 
-/// Reconstructs `frames` frames of `choices` as one stream that begins with `state` and requires
-/// all that Reconstruct, Serialize and Validate promise.
+/// Reconstructs `frames` frames of `choices` as one stream from `state` on; requires the guarantees
+/// of Reconstruct, Serialize and Validate.
 void AttackStream(Choices& choices, const ReconstructionParameters& parameters, State state,
                   int frames);
 

@@ -12,7 +12,7 @@ namespace {
 const partiemc::fuzz::Target* chosen = nullptr;
 }
 
-// Called by libFuzzer, which passes over arguments that begin with two dashes.
+// Called by libFuzzer, which ignores arguments with two dashes.
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   google::protobuf::SetLogHandler(nullptr);
   constexpr std::string_view kFlag = "--target=";

@@ -1,4 +1,4 @@
-// A file of given bytes that is on no disk.
+// A file in memory with given bytes.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ class MemoryFile {
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
 
-  /// Opens as a regular file, at its beginning, as often as one likes.
+  /// Opens as a regular file from its beginning, any number of times.
   const std::string& path() const { return path_; }
 
  private:

@@ -1,5 +1,5 @@
-// NPZ files: as they are, or arrays of fuzzed headers and elements in an archive that is right, so
-// that its checksums keep nothing away from the reader.
+// NPZ files: the bytes themselves, or arrays with fuzzed headers and elements in a valid archive,
+// so that checksums do not stop the reader.
 #include <zlib.h>
 
 #include <string>
@@ -14,7 +14,7 @@ void Put(std::uint64_t value, int bytes, std::string& out) {
   for (int k = 0; k < bytes; ++k) out.push_back(static_cast<char>(value >> (8 * k)));
 }
 
-// The common part of a local and a central header, from the version that is needed on.
+// The common part of a local and a central header, from the required version on.
 void PutEntry(std::string_view name, std::string_view content, std::string& out) {
   const auto crc =
       crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size()));

@@ -1,4 +1,4 @@
-// Packed files: whatever packs them, memory is bounded and the end comes.
+// Compressed files in each format: memory is bounded, and reading ends.
 #include <vector>
 
 #include "client/input/base/byte_source.h"
@@ -12,7 +12,7 @@ namespace {
 
 using namespace client::input;
 
-// zstd's best, runs of 128 KiB in four bytes, is within it.
+// Above zstd's best ratio: runs of 128 KiB in four bytes.
 constexpr std::size_t kMostUnpackedPerByte = std::size_t{1} << 16;
 
 void UnpackAll(Packing packing, const std::string& path, std::size_t packed_bytes) {

@@ -15,7 +15,7 @@ using client::input::ColumnRequest;
 using client::input::FrameReader;
 using client::input::ParticleRows;
 
-// More frames than bytes can hold in any format: a reader that gives them does not come to its end.
+// More frames than the bytes can hold in any format: a reader that exceeds this does not end.
 constexpr std::size_t kMaxFrames = 1 << 16;
 
 void RequireMessage(const absl::Status& status, const std::string& path) {
@@ -44,7 +44,7 @@ void RequireWhole(const RecordedFrame& frame) {
           "velocities of all particles, or none");
 }
 
-// To the end; `rows` null passes over the frames.
+// Reads to the end; skips the frames if `rows` is null.
 void ReadAll(FrameReader& reader, const std::string& path, ParticleRows* rows) {
   client::input::PlaneProjection plane;
   std::vector<std::string> notices;

@@ -1,4 +1,4 @@
-// What all readers of client/input are asked.
+// Common checks of all readers of client/input.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 
 namespace partiemc::fuzz {
 
-/// The file is all but the first byte, which chooses what is asked of it: which columns and
-/// condition, frames to be read or passed over, its format to be recognised first. Opens it with
-/// `open`, reads to the end or first error, and requires what FrameReader and ParticleRows promise.
+/// The first byte chooses columns, condition, whether frames are read or skipped, and whether the
+/// format is detected first; the rest is the file. Opens it with `open`, reads to the end or the
+/// first error, and requires the contracts of FrameReader and ParticleRows.
 void AttackReader(client::input::OpenReader& open, std::uint8_t choice, std::string_view file);
 
 }  // namespace partiemc::fuzz

@@ -1,5 +1,5 @@
-// Recordings: as they are, or fuzzed blocks packed as the writer packs them, so that zstd's
-// checksums keep nothing away from the reader.
+// Recordings: the bytes themselves, or fuzzed blocks compressed by the writer's code, so that
+// zstd's checksums do not stop the reader.
 #include "client/recording/recording.h"
 
 #include "client/recording/block.h"
@@ -10,8 +10,7 @@
 namespace partiemc::fuzz {
 namespace {
 
-// Blocks, each behind its length in two bytes, between marks that are right but for the frame
-// count, which is fuzzed.
+// Blocks with two-byte lengths between valid marks, except for the fuzzed frame count.
 std::string Recording(Choices& choices) {
   static auto* const packer = new client::recording::BlockPacker(1);
   std::string file =

@@ -1,5 +1,5 @@
-// What comes over the bus to a replica that shows the stream of another one: pieces, announcements,
-// results and ends in any order, late, twice or not at all, while somebody watches.
+// Messages for a replica that shows another replica's stream: pieces, announcements, results and
+// ends in any order, late, repeated or missing, with a watcher.
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -25,7 +25,7 @@ constexpr std::size_t kMaxBytes = 4096;
 constexpr std::size_t kMaxSteps = 256;
 constexpr char kStreamId[] = "s-1";
 
-// A watcher who takes every frame that comes, at once.
+// A watcher that accepts every frame at once.
 class Watch final : private server::WatchTransport {
  public:
   Watch(std::shared_ptr<server::ResultBroadcaster> broadcaster,
@@ -44,7 +44,7 @@ class Watch final : private server::WatchTransport {
     Require(finished_, "a watch comes to its end");
   }
 
-  // Whether there was one going on.
+  // True if a write was pending.
   bool WriteDone() {
     if (!std::exchange(writing_, false)) return false;
     machine_->WriteDone(true);
@@ -78,7 +78,7 @@ class Watch final : private server::WatchTransport {
       static_cast<server::WatchTransport&>(*this), kMaxBytes);
 };
 
-// Takes what an ImportedStream asks for.
+// Receives the requests of an ImportedStream.
 class Port final : public server::RelayPort {
  public:
   void Post(std::function<void()> action) override { action(); }
@@ -91,7 +91,7 @@ class Port final : public server::RelayPort {
   std::uint64_t last_fetch = 0;
 };
 
-// Small numbers are what matters, and those at the end of their range.
+// Small numbers, and numbers at the end of their range.
 std::uint64_t Number(Choices& choices) {
   const auto small = choices.Take<std::uint8_t>();
   return small < 240 ? small % 16 : std::uint64_t{0} - (small % 4);
@@ -164,9 +164,9 @@ void AttackRelayMessages(Bytes bytes) {
       default:
         stream.FetchAgain(now);
     }
-    if (message.has_result()) stream.Came(*message.mutable_result(), now);
-    if (message.has_fetch_end()) stream.Came(message.fetch_end(), now);
-    if (message.has_stream_end()) stream.Came(message.stream_end(), now);
+    if (message.has_result()) stream.OnMessage(*message.mutable_result(), now);
+    if (message.has_fetch_end()) stream.OnMessage(message.fetch_end(), now);
+    if (message.has_stream_end()) stream.OnMessage(message.stream_end(), now);
     if (message.has_announcement()) {
       (void)directory.Announced("one", message.announcement(), now);
     }
@@ -177,7 +177,7 @@ void AttackRelayMessages(Bytes bytes) {
               "clients are sent to addresses only");
     }
     do {
-      dispatcher->Flush();  // So that the same bytes do the same again.
+      dispatcher->Flush();  // Makes runs reproducible.
     } while (watch != nullptr && watch->WriteDone());
   }
   watch.reset();

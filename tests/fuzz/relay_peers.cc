@@ -1,5 +1,5 @@
-// What several hostile replicas send to one: announcements, fetches and pieces in any order,
-// through the queues and the directory that the relay keeps of them.
+// Messages of several hostile replicas for one: announcements, fetches and pieces in any order,
+// through the relay's queues and directory.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -50,7 +50,7 @@ class Bus final : public server::MessageBus {
 
 std::string PeerName(std::size_t peer) { return std::string(1, static_cast<char>('a' + peer)); }
 
-// One replica that receives what its peers send.
+// One replica that receives the messages.
 class Receiver {
  public:
   Receiver() {
@@ -72,7 +72,7 @@ class Receiver {
     Require(queued_bytes_[lane] <= kQueueBytes[lane], "a lane is bounded");
   }
 
-  // Takes the next messages.
+  // Handles the next messages.
   void Receive(Clock::time_point now) {
     RelayQueue::Work work;
     queue_->Take(std::chrono::milliseconds(0), work);
@@ -152,7 +152,7 @@ class Receiver {
   server::StreamDirectory directory_;
   server::FetchQueue fetches_;
   std::array<std::size_t, RelayQueue::kLanes> queued_{}, queued_bytes_{};
-  std::map<std::string, std::size_t> waiting_;  // Fetches that are not answered yet.
+  std::map<std::string, std::size_t> waiting_;  // Unanswered fetches.
 };
 
 // Few names, lineages and times, so that replicas contradict each other.

@@ -1,5 +1,4 @@
-// The corpus of the fuzzers, fed to the same targets in an ordinary build: what was found once is
-// tried for ever.
+// Replays the fuzzers' corpus on the same targets in an ordinary build, as a regression test.
 #include <google/protobuf/stubs/logging.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +31,7 @@ std::vector<std::uint8_t> Read(const std::filesystem::path& path) {
 class Corpus : public testing::TestWithParam<Target> {};
 
 TEST_P(Corpus, BreaksNoPromise) {
-  google::protobuf::SetLogHandler(nullptr);  // Messages that do not parse are meant not to.
+  google::protobuf::SetLogHandler(nullptr);  // Malformed messages are expected.
   GetParam().attack({});
   const auto files = CorpusOf(GetParam().name);
   ASSERT_FALSE(files.empty());
@@ -41,7 +40,7 @@ TEST_P(Corpus, BreaksNoPromise) {
     RecordProperty("input", file.filename().string());
     const std::vector<std::uint8_t> bytes = Read(file);
     GetParam().attack(bytes);
-    // What is cut off is the commonest damage of all.
+    // Truncation is the most common damage.
     GetParam().attack(Bytes(bytes).first(bytes.size() / 2));
   }
 }

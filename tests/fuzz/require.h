@@ -1,4 +1,4 @@
-// How a target says that a promise is broken.
+// Reports violated contracts of a target.
 #pragma once
 
 #include <string_view>
@@ -7,14 +7,14 @@
 
 namespace partiemc::fuzz {
 
-/// Ends the process with a line about the broken promise unless it holds, also in a build without
+/// Ends the process with a line about the violated promise unless `holds`, also in a build without
 /// assertions.
 void Require(bool holds, std::string_view promise);
 
 /// Requires that `status` is OK.
 void RequireOk(const absl::Status& status, std::string_view promise);
 
-/// Requires that a refusal tells which field has which value against which rule.
+/// Requires that a refusal has field, value and rule.
 void RequireViolation(const absl::Status& status);
 
 }  // namespace partiemc::fuzz

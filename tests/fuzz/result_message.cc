@@ -1,4 +1,4 @@
-// A server's answer as the client gets it: whatever it says, what is accepted is whole.
+// A server's response as decoded by the client: any accepted response is consistent.
 #include <cmath>
 
 #include "fuzz/require.h"
@@ -9,7 +9,7 @@
 namespace partiemc::fuzz {
 namespace {
 
-// What writers and callers index with what.
+// Checks all arrays that writers and callers index by.
 void RequireWhole(const Result& result) {
   const Rings& rings = result.rings;
   Require(rings.offsets.size() == rings.RingCount() + 1 || rings.RingCount() == 0,
@@ -54,7 +54,7 @@ void AttackResultMessage(Bytes bytes) {
     return;
   }
   RequireWhole(frame.result);
-  // What --check and the writers do with it must not depend on a server that means well.
+  // --check and the writers must not rely on a benign server.
   if (Validate(frame.result).ok()) CountTJunctions(frame.result);
   v1::ReconstructedFrame again;
   RequireOk(wire::EncodeResult(frame.result, frame.times, {.normals = true}, again),

@@ -1,26 +1,25 @@
 #!/bin/bash
-# Attacks every target in turn with libFuzzer and prints how many inputs each was given. Fails at
-# the first finding and tells where it lies.
+# Attacks every target in turn with libFuzzer and prints the number of inputs. Fails at the first
+# finding and prints its path.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 1
 
 usage() {
   cat <<'USAGE'
 usage: tests/fuzz/run.sh [--seconds N | --executions N] [--keep] [TARGET...]
-  --seconds N      N seconds in all, the same for each target (60 if nothing is said)
-  --executions N   rounds of 30 seconds for each target until there were N executions in all
-  --keep           afterwards, add what reaches new code to tests/fuzz/corpus, if it is small
-Built before: cmake --preset asan && cmake --build build/asan --target partiemc_fuzz. What is learned
-stays in build/asan/learned, so that a later run goes on from there. The seed of each run is printed.
+  --seconds N      N seconds in total, divided equally between the targets (default 60)
+  --executions N   rounds of 30 seconds for each target until N executions in total
+  --keep           afterwards, add small inputs that reach new code to tests/fuzz/corpus
+Build first: cmake --preset asan && cmake --build build/asan --target partiemc_fuzz. Inputs that were
+found stay in build/asan/learned, where a later run continues. Prints the seed of each run.
 USAGE
 }
 
 readonly program=build/asan/bin/partiemc_fuzz corpus=tests/fuzz/corpus
 readonly learned=build/asan/learned findings=build/asan/findings
 readonly round_seconds=30
-# Bytes of files and messages come in any size. Where a few bytes make a frame to reconstruct, inputs
-# stay small: what they break is rarely a matter of size, and small ones are fast. Those that are kept
-# are as many and as large as a repository bears.
+# Maximum sizes of inputs. Targets that make frames from a few bytes get small inputs, which are fast
+# and find nearly the same. Kept inputs are few and small, because the repository stores them.
 readonly large_bytes=1048576 small_bytes=2048 kept_bytes=400 kept_files=60
 readonly small_targets=' checkpoint expressions frames relay_peers sections state watch_requests '
 
@@ -48,11 +47,11 @@ fi
 declare -A counts
 sum=0
 
-# attack TARGET SECONDS: leaves its executions in counts and sum.
+# attack TARGET SECONDS: adds its executions to counts and sum.
 attack() {
   local target=$1 log executed seed=$((RANDOM * 32768 + RANDOM + 1)) max_bytes=$large_bytes
   [[ $small_targets == *" $target "* ]] && max_bytes=$small_bytes
-  # VTK's own readers lose some memory of a damaged file.
+  # VTK's readers leak memory for damaged files.
   local leaks=1
   [[ $target == vtk ]] && leaks=0
   log=$(mktemp)
@@ -63,8 +62,8 @@ attack() {
     "$learned/$target" "$corpus/$target" >"$log" 2>&1; then
     tail -n 60 "$log"
     rm -f "$log"
-    echo "FOUND in $target (-seed=$seed): fix it, then keep the input under a name that tells what"
-    echo "it was: $program --target=$target $findings/$target-..., cp ... $corpus/$target/NAME"
+    echo "FOUND in $target (-seed=$seed): fix it, then keep the input under a descriptive name:"
+    echo "$program --target=$target $findings/$target-..., cp ... $corpus/$target/NAME"
     exit 1
   fi
   executed=$(awk '/^stat::number_of_executed_units:/ { print $2 }' "$log")

@@ -1,4 +1,4 @@
-// Frames with attributes, of streams with sections: through the core, and through the codec.
+// Frames with attributes in streams with sections: through the core, and through the codec.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -40,7 +40,7 @@ std::optional<double> HostileIsovalue(Choices& choices) {
   return choices.Below(4) == 3 ? HostileNumber(choices) : choices.Take<std::uint8_t>() / 200.0;
 }
 
-// Mostly few, sometimes more than are allowed.
+// Usually few, sometimes more than allowed.
 std::vector<Section> HostileSections(Choices& choices) {
   std::vector<Section> sections(choices.Below(16) == 15 ? 17 : choices.Below(4));
   for (Section& section : sections) {
@@ -76,7 +76,7 @@ class HostileAttributes {
   std::vector<Attribute> attributes_;
 };
 
-// The points of a mesh begin with those of the rings.
+// The points of a mesh begin with the points of the rings.
 std::size_t PointCount(const Result& result) {
   return std::max(result.rings.PointCount(), result.mesh.PointCount());
 }
@@ -103,7 +103,7 @@ void RequireSound(const Result& result, const Frame& frame,
   RequireAttributes(result, frame);
 }
 
-// Each section is the outline of a stream that has its plane and isovalue and no sections.
+// Each section equals the outline of a stream with its plane and isovalue and without sections.
 void RequireIndependent(const Result& result, const Frame& frame,
                         const ReconstructionParameters& parameters) {
   for (std::size_t k = 0; k < result.sections.size(); ++k) {
@@ -139,7 +139,7 @@ void RequireArrives(const Result& result) {
   }
 }
 
-// What the codec takes from `frame` and `parameters` is what they were.
+// Requires that the codec restores `frame` and `parameters`.
 void RequireSameOverTheWire(const Frame& frame, const ReconstructionParameters& parameters,
                             const Result& result) {
   v1::ReconstructionParameters parameter_message;

@@ -1,4 +1,4 @@
-// One thread for everything: what a fuzzer sees has to repeat itself.
+// Limits the process to one thread, so that runs are reproducible.
 #pragma once
 
 #include <tbb/global_control.h>

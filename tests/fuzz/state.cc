@@ -1,5 +1,5 @@
-// A serialised state: as it comes, and with the magic number, version and checksum put right, so
-// that they keep nothing away from what follows them. A state that is accepted is gone on from.
+// A serialised state: the bytes themselves, and with magic number, version and checksum corrected,
+// so that these do not stop the reader. A stream continues from an accepted state.
 #include "partiemc/state.h"
 
 #include <string>
@@ -40,7 +40,7 @@ std::optional<State> Parse(std::string_view bytes) {
 void AttackState(Bytes bytes) {
   Choices choices(bytes);
   const ReconstructionParameters parameters = HostileParameters(choices);
-  // The frames come first, so that the state is all of the rest.
+  // The frames come first, so that the state is the rest.
   const std::string_view frames = choices.TakeText(choices.Take<std::uint8_t>());
   const std::string_view rest = choices.TakeRest();
   Parse(rest);

@@ -1,5 +1,5 @@
-// What a producer sends: message after message, of a stream's first call on, into the buffers that
-// the stream and its worker use again.
+// A producer's messages from the first of a stream on, into the buffers that stream and worker
+// reuse.
 #include <spdlog/spdlog.h>
 
 #include <memory>
@@ -20,13 +20,13 @@ namespace {
 using server::Outgoing;
 using server::RequestKind;
 
-// A message may come again as often; what the first ones leave warm is not counted.
+// Number of repetitions of a message; growth during the first ones is not counted.
 constexpr int kMostRepeats = 32;
 constexpr int kWarmingRepeats = 8;
 constexpr std::size_t kMostMessages = 64;
-// What the heap may have grown by for other reasons than the messages.
+// Allowed growth of the heap for other reasons.
 constexpr std::size_t kSlackBytes = 64 << 10;
-// What a worker may keep of messages, beside a few times the largest.
+// Bytes of messages that a worker may keep, besides a few times the largest.
 constexpr std::size_t kKeptBytes = 6 << 20;
 constexpr std::size_t kKeptPerByte = 4;
 
@@ -40,7 +40,7 @@ const server::ServerLimits& Limits() {
   return limits;
 }
 
-// Stands where a call would: nothing is read or written but by the target itself.
+// Replaces a call: only the target itself reads and writes.
 class NoTransport final : public server::StreamTransport {
  public:
   void StartRead(std::size_t) override {}
@@ -49,7 +49,7 @@ class NoTransport final : public server::StreamTransport {
   void Finish(const absl::Status&) override {}
 };
 
-// What all streams of the process share. No job ever comes to the pool.
+// Shared by all streams of the process. The pool gets no jobs.
 struct Shared {
   server::ComputePool pool{1};
   server::MemoryBudget budget{1 << 30};
@@ -104,7 +104,7 @@ class Stream {
     }
   }
 
-  // As the client gets it.
+  // Checks the response as the client receives it.
   v1::ReconstructResponse Response(Outgoing what, std::size_t slot) {
     grpc::ByteBuffer bytes = messages_.response(what, slot);
     messages_.Written(what, slot);
@@ -128,7 +128,7 @@ class Stream {
 void AttackStreamRequests(Bytes bytes) {
   const SingleThread single_thread;
   static auto* const shared = new Shared;
-  spdlog::set_level(spdlog::level::off);  // A line for each stream that opens.
+  spdlog::set_level(spdlog::level::off);  // Opening a stream would write a line.
   shared->worker.message_buffers.reset();
   Stream stream(*shared);
   Choices choices(bytes);

@@ -13,6 +13,7 @@ std::span<const Target> AllTargets() {
       {"npy", AttackNpy},
       {"npz", AttackNpz},
       {"packed", AttackPacked},
+      {"parts_over_connections", AttackPartsOverConnections},
       {"recording", AttackRecording},
       {"relay_messages", AttackRelayMessages},
       {"relay_peers", AttackRelayPeers},

@@ -18,7 +18,7 @@ void AttackTokens(Bytes bytes) {
   }
   Require(!tokens->clients().empty(), "a token file that is taken has a token");
   Require(tokens->Find("") == nullptr, "no token is nobody's");
-  // The first word of a file without comments is a token of it.
+  // The first word of a file without comments is one of its tokens.
   const std::string_view word = text.substr(0, text.find_first_of(" \t\r\n\v\f"));
   if (word.empty() || word.front() == '#') return;
   const auto* const client = tokens->Find(word);

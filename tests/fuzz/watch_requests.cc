@@ -1,4 +1,4 @@
-// What a watcher sends, message after message, while results come and writes end at any moment.
+// A watcher's messages while results arrive and writes end at any moment.
 #include <memory>
 #include <string>
 
@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMaxWatcherBytes = 4096;
 constexpr std::size_t kMaxSteps = 256;
 
-// A watch without a connection: its writes end when the target says so.
+// A watch without a connection: its writes end on request.
 class Watch final : private server::WatchTransport {
  public:
   explicit Watch(std::shared_ptr<server::ResultBroadcaster> broadcaster)
@@ -30,7 +30,7 @@ class Watch final : private server::WatchTransport {
     Require(finished_, "a watch comes to its end");
   }
 
-  // As the server's reactor does it.
+  // Handles a message like the server's reactor.
   void Take(std::string_view bytes) {
     if (!reading_) return;
     server::WatchRequest request;
@@ -57,7 +57,7 @@ class Watch final : private server::WatchTransport {
   void CutOff() { machine_->Cut(); }
   void GiveUp() { machine_->GiveUp(absl::ResourceExhaustedError("no memory")); }
   void RequireBounded() const {
-    // In mode `latest` two results at most, each within the limit: one is being written.
+    // In mode `latest` at most two results, each within the limit: one of them is being written.
     Require(machine_->held_bytes() <= (is_every_ ? 1 : 2) * kMaxWatcherBytes,
             "a watcher holds no more than it may");
   }
@@ -162,7 +162,7 @@ void AttackWatchRequests(Bytes bytes) {
             broadcaster->End(server::WatchEnd::OfStream(absl::OkStatus()));
           }
       }
-      dispatcher->Flush();  // So that the same bytes do the same again.
+      dispatcher->Flush();  // Makes runs reproducible.
       watch.RequireBounded();
     }
   }

@@ -1,5 +1,4 @@
-// What strangers send to the gateway: the header of a request as it comes over the connection, or
-// its fields one by one.
+// Untrusted requests to the gateway: a whole request header, or its fields one by one.
 #include <boost/beast/http/error.hpp>
 #include <string>
 #include <vector>
@@ -55,7 +54,7 @@ void RequireSound(const server::WebRequest& request, const server::WebAnswer& an
   }
 }
 
-// The inverse, for what was decoded.
+// The inverse, for checking decoded bytes.
 std::string EncodeBase64Url(std::string_view bytes) {
   static constexpr std::string_view kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";

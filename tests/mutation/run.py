@@ -1,15 +1,15 @@
 #!/usr/bin/python3
-"""Puts each change of mutations.toml into a copy of the sources, one at a time, and tells whether
-a test fails.
+"""Applies each change of mutations.toml to a copy of the sources, one at a time, and reports whether a
+test fails.
 
-  tests/mutation/run.py              all of them; needs hours of processor time
-  tests/mutation/run.py --check      only whether each still finds its place: seconds
-  tests/mutation/run.py --only ID... those, or those of a room: core, server, client
+  tests/mutation/run.py              all mutations; takes hours of processor time
+  tests/mutation/run.py --check      only checks that each still finds its place: seconds
+  tests/mutation/run.py --only ID... these mutations, or those of a room: core, server, client
 
-What is changed is a copy in build/mutation/tree with a build of its own, so that the work goes on
-beside it. A mutation is caught if a test program that passes without it fails or does not come to
-its end. The programs that are named with it run first, then the others of its room until one fails.
-Exit code: 0 if at least --share of the mutations were caught, 1 otherwise or where one is stale.
+The copy is in build/mutation/tree, with its own build. A mutation is caught if a test program that
+passes without it fails or does not end. The programs named in its entry run first, then the others of
+its room until one fails. Exit code: 0 if at least --share of the mutations were caught, 1 otherwise
+or if one is stale.
 """
 
 import argparse
@@ -41,9 +41,9 @@ ROOMS = {
         "client_resume_test", "latest_sender_test", "client_credentials_test",
         "client_local_stream_test", "client_real_server_test"],
 }
-# Half of a minute's work in a few tests: run last, where no other test fails.
+# A few tests that take half of the time: run last, if no other test has failed.
 SLOW = {"core_test": "Guarantees.*:Roots.*:Bilinear.*:TrackedTurmoil*:TJunctions.*"}
-# Under ThreadSanitizer only what is built for it.
+# Programs built for ThreadSanitizer.
 TSAN_ROOM = ["compute_pool_test", "watch_state_machine_test", "stream_registry_test",
              "session_test", "stream_state_machine_test", "message_orders_test"]
 
@@ -69,7 +69,7 @@ def programs_of(mutation):
 
 
 def steps_of(mutation, quick):
-    """Programs with a filter of their tests, in the order in which they are run."""
+    """Programs with a filter of their tests, in the order of running."""
     programs = programs_of(mutation)
     steps = [(program, "-" + SLOW[program] if program in SLOW else "*") for program in programs]
     if not quick:
@@ -81,19 +81,19 @@ def read_list():
     mutations = tomllib.loads(LIST.read_text())["mutation"]
     ids = [mutation["id"] for mutation in mutations]
     for twice in {one for one in ids if ids.count(one) > 1}:
-        fail(f"{twice} is there twice")
+        fail(f"{twice} occurs twice")
     return mutations
 
 
 def stale(mutations):
-    """Tells those whose place cannot be found."""
+    """Reports mutations whose text is not found exactly once."""
     found = []
     for mutation in mutations:
         path = ROOT / mutation["file"]
         count = path.read_text().count(mutation["old"]) if path.is_file() else 0
         if count != 1 or mutation["old"] == mutation["new"]:
             found.append(mutation["id"])
-            print(f"stale: {mutation['id']}: its text is there {count} times in {mutation['file']}")
+            print(f"stale: {mutation['id']}: its text occurs {count} times in {mutation['file']}")
     return found
 
 
@@ -132,14 +132,14 @@ class Tree:
             fail(f"cmake --preset {preset} fails")
 
     def build(self, preset, programs):
-        """The words of the compiler if it fails, else nothing."""
+        """Output of the compiler if it fails, otherwise None."""
         done = subprocess.run(
             ["ninja", "-C", str(self.build_folder(preset)), "-j", str(self.jobs), *programs],
             capture_output=True, text=True)
         return None if done.returncode == 0 else done.stdout[-3000:]
 
     def run(self, preset, program, tests, seconds):
-        """What has failed, and how, or nothing."""
+        """The failed test and a description, or None."""
         log = self.folder / "build" / f"{program}.log"
         with open(log, "w") as out:
             try:
@@ -160,7 +160,7 @@ class Tree:
 
 
 def baseline(tree, preset, programs):
-    """Every program passes without a mutation; tells how long each may take with one."""
+    """Checks that every program passes without a mutation; returns their time limits."""
     words = tree.build(preset, programs)
     if words:
         fail(f"the sources do not build without a mutation:\n{words}")

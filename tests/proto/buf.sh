@@ -1,7 +1,7 @@
 #!/bin/bash
 # usage: tests/proto/buf.sh BUF
-# The public contract as `buf` sees it: its lint, and that nothing breaks whoever speaks what was
-# released (proto/released). Then violations are planted, which it must find.
+# Checks the public contract with `buf`: its lint, and compatibility with the released contract
+# (proto/released). Then plants violations, which buf must find.
 set -euo pipefail
 buf=$(realpath "$1")
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)/proto
@@ -14,7 +14,7 @@ breaking() { (cd "$1" && "$buf" breaking --against "$here/released/reconstructio
 lint "$here"
 breaking "$here"
 
-# planted CHECK SED: the contract with one line changed is refused.
+# planted CHECK SED: expects that the contract with one changed line is refused.
 planted() {
   local tree=$work/planted
   rm -rf "$tree"

@@ -129,13 +129,13 @@ TEST(FrameMessage, AttributesAreChosenByName) {
   expect(0, "pressure", 1, pressure);
   expect(1, "velocity", 2, velocities);
   expect(2, "stress", 3, stress);
-  // Those of the frame before are gone where a message is used again.
+  // Encoding again into the same message clears the previous frame's values.
   EncodeFrame({.positions = positions}, message);
   EXPECT_EQ(message.scalars_size(), 0);
   EXPECT_TRUE(DecodeFrame(message).ok());
   const auto lacking = DecodeFrame(message, names, views);
   EXPECT_EQ(ViolationOf(lacking.status()).reason, kReasonNoSuchAttribute);
-  // A frame without particles lacks nothing.
+  // A frame without particles is complete.
   EncodeFrame({}, message);
   EXPECT_TRUE(DecodeFrame(message, names, views).ok());
 }
@@ -172,7 +172,7 @@ TEST(OutputsMessage, AttributesComeBackInTheirOrder) {
   EXPECT_EQ(*decoded, outputs);
 }
 
-// Such a client would get statistics and wait for geometry.
+// Such a client would wait for geometry and get statistics only.
 TEST(OutputsMessage, NormalsAndFormatsWithoutGeometryAreRefused) {
   v1::Outputs normals;
   normals.set_normals(true);
@@ -192,7 +192,7 @@ TEST(OutputsMessage, NormalsAndFormatsWithoutGeometryAreRefused) {
     format.set_mesh(true);
     EXPECT_TRUE(DecodeOutputs(format, /*present=*/true).ok());
   }
-  // Statistics and digests alone may be what somebody wants.
+  // A client may request statistics and digests only.
   EXPECT_TRUE(DecodeOutputs({}, /*present=*/true).ok());
 }
 
@@ -207,7 +207,7 @@ TEST(OutputsMessage, WhatTheServerCannotDoIsRefusedAndNotIgnored) {
 template <typename T>
 void ExpectFrameComesBack(int components) {
   SCOPED_TRACE(::testing::Message() << components << " components of " << sizeof(T) << " bytes");
-  // From nothing over one particle, which a string keeps inside itself, to several.
+  // From none, over one particle, which fits into a string object, to several.
   for (std::size_t particles = 0; particles < 4; ++particles) {
     std::vector<T> positions(particles * static_cast<std::size_t>(components));
     for (std::size_t i = 0; i < positions.size(); ++i)

@@ -15,7 +15,7 @@ using google::protobuf::ServiceDescriptor;
 
 std::string Name(const OneofDescriptor* oneof) { return oneof == nullptr ? "" : oneof->name(); }
 
-// What a field is to code and on the wire.
+// The type of a field in code and on the wire.
 std::string TypeOf(const FieldDescriptor& field) {
   std::string type = field.type_name();
   if (field.message_type() != nullptr) type += " " + field.message_type()->full_name();

@@ -1,4 +1,5 @@
-// What would break whoever speaks a released contract, bytes or generated code.
+// Finds changes that break programs written for a released contract, on the wire or in generated
+// code.
 #pragma once
 
 #include <google/protobuf/descriptor.h>
@@ -8,8 +9,8 @@
 
 namespace partiemc {
 
-/// A line for each break of `released` in `now`: what is gone, renamed, renumbered, or has another
-/// type, and numbers that are reserved no more. What is added is none.
+/// One line for each break from `released` to `now`: removed, renamed, renumbered or retyped
+/// elements, and numbers that are no longer reserved. Additions are allowed.
 std::vector<std::string> ContractBreaks(const google::protobuf::FileDescriptor& released,
                                         const google::protobuf::FileDescriptor& now);
 

@@ -1,4 +1,4 @@
-// The contract of today against what was released (proto/released).
+// Compares the contract with the released one (proto/released).
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -42,7 +42,7 @@ const FileDescriptor& Released() {
 
 const FileDescriptor& Today() { return *v1::ParticleFrame::descriptor()->file(); }
 
-// The breaks of what was released with a change made to it.
+// The breaks after `change` is applied to the released contract.
 std::vector<std::string> BreaksOf(const std::function<void(FileDescriptorProto&)>& change) {
   FileDescriptorProto file;
   Released().CopyTo(&file);
@@ -71,7 +71,7 @@ auto& Field(FileDescriptorProto& file, const std::string& message, const std::st
   return *owner.add_field();
 }
 
-// Another name of the same length, wherever it stands: else the file would not build.
+// Replaces a name by one of the same length everywhere, so that the file still builds.
 void RenameEverywhere(FileDescriptorProto& file, const std::string& name,
                       const std::string& other) {
   ASSERT_EQ(name.size(), other.size());

@@ -1,5 +1,5 @@
-// Messages as bytes: what is written without a message reads as one, and what is no message is
-// told.
+// Messages as bytes: bytes written without Protobuf parse as a message, and malformed bytes are
+// refused.
 #include "wire/message_bytes.h"
 
 #include <grpcpp/support/slice.h>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kLast = v1::ReconstructRequest::kFrameFieldNumber;
 
-// In pieces of `piece` bytes, as a connection may deliver them.
+// Split into pieces of `piece` bytes, as a connection may deliver them.
 grpc::ByteBuffer InPieces(const std::string& text, std::size_t piece) {
   std::vector<grpc::Slice> slices;
   for (std::size_t at = 0; at < text.size(); at += piece)
@@ -39,7 +39,7 @@ std::vector<T> Numbers(std::size_t count) {
   return numbers;
 }
 
-// A frame with every array, in every format, is the message that EncodeFrame makes.
+// A frame with every array in every format equals the message of EncodeFrame.
 template <typename T>
 void ExpectSameAsMessage(int components, std::size_t particles) {
   const auto positions = Numbers<T>(particles * static_cast<std::size_t>(components));
@@ -115,7 +115,7 @@ TEST(SequenceOf, IsWhatAParserReads) {
   other.mutable_frame()->set_sequence(7);
   const std::string open_text = open.SerializeAsString(), frame_text = frame.SerializeAsString();
   const std::string unknown = "\x18\x05\x22\x02hi";    // Field 3, a number; field 4, two bytes.
-  const std::string no_number = "\x12\x04\x0a\x02hi";  // A frame whose `sequence` is bytes.
+  const std::string no_number = "\x12\x04\x0a\x02hi";  // A frame with bytes as `sequence`.
   for (const std::size_t piece : {1, 7, 4096}) {
     for (const std::string& text :
          {frame_text, open_text + frame_text, frame_text + unknown, std::string("\x12\x00", 2),
@@ -160,7 +160,7 @@ TEST(MergeBytes, TellsWhatIsNoMessage) {
   }
 }
 
-// "field: bytes", length-delimited, for fields of less than 16 and contents of less than 128 bytes.
+// A length-delimited field, for fields below 16 and contents below 128 bytes.
 std::string Field(int number, const std::string& contents) {
   return std::string{static_cast<char>(number << 3 | 2), static_cast<char>(contents.size())} +
          contents;
@@ -182,13 +182,13 @@ TEST(MessageBytes, FieldsAreCountedWithThoseOfMessagesAndUnknownOnes) {
   const std::string unknown = Field(15, "x");
   EXPECT_TRUE(RequestHasFewFields(Repeated(unknown, kMaxFields)));
   EXPECT_FALSE(RequestHasFewFields(Repeated(unknown, kMaxFields + 1)));
-  // Within the frame: fields of the frame beside the frame's own.
+  // Inside the frame: unknown fields beside its own.
   v1::ReconstructRequest request;
   for (int i = 0; i < kMaxFields - 1; ++i) request.mutable_frame()->add_scalars();
   EXPECT_TRUE(RequestHasFewFields(request.SerializeAsString()));
   request.mutable_frame()->add_scalars();
   EXPECT_FALSE(RequestHasFewFields(request.SerializeAsString()));
-  // A string's contents are not looked at, whatever they look like.
+  // The contents of a string are not parsed.
   request.mutable_frame()->clear_scalars();
   request.mutable_frame()->set_positions(Repeated(unknown, 2 * kMaxFields));
   EXPECT_TRUE(RequestHasFewFields(request.SerializeAsString()));
@@ -206,7 +206,7 @@ TEST(MessageBytes, WhatIsNoMessageIsCountedAsFarAsAParserComes) {
 
 TEST(MessageBytes, ReadableSequenceIsFoundBeforeTheDamage) {
   const auto readable = [](const std::string& frame, const std::string& after = "") {
-    std::string text = "\x12";  // `frame`, of less than 2^14 bytes.
+    std::string text = "\x12";  // `frame`, shorter than 2^14 bytes.
     text += static_cast<char>(0x80 | (frame.size() & 127));
     text += static_cast<char>(frame.size() >> 7);
     grpc::ByteBuffer bytes = InPieces(text + frame + after, 50);

@@ -9,13 +9,13 @@
 namespace partiemc {
 namespace {
 
-// Nothing where `text` is not one character.
+// Empty unless `text` is one character.
 std::optional<char32_t> Only(std::string_view text) {
   const auto character = TakeCharacter(text);
   return text.empty() ? character : std::nullopt;
 }
 
-// By the definition of UTF-8 (RFC 3629).
+// Follows the definition of UTF-8 (RFC 3629).
 std::string Encode(char32_t c) {
   const auto tail = [c](int shift) { return static_cast<char>(0x80 | ((c >> shift) & 0x3f)); };
   if (c < 0x80) return {static_cast<char>(c)};

@@ -1,4 +1,4 @@
-// Results on the wire: what comes back is what was sent, and a hostile answer is refused.
+// Results on the wire: decoding restores the encoded result, and a hostile response is refused.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -78,7 +78,7 @@ TEST(ResultMessage, EachDoubtIsToldOnceAndThoseOfALaterServerArePassedOver) {
     Result result = SquareWithHole();
     result.statistics.doubts = {};
     result.statistics.doubts.Add(doubt);
-    // Into the same message each time: the doubt of the frame before is gone.
+    // Into the same message: the previous frame's doubt is cleared.
     ASSERT_TRUE(EncodeResult(result, SomeTimes(), kAll, message).ok());
     ASSERT_EQ(message.statistics().doubts_size(), 1);
     EXPECT_NE(message.statistics().doubts(0), v1::DOUBT_UNSPECIFIED);
@@ -117,13 +117,13 @@ TEST(ResultMessage, SectionsComeBackAsTheyWere) {
   EXPECT_EQ(frame.result, result);
   EXPECT_EQ(frame.section_digests, DigestSections(result));
   EXPECT_NE(frame.section_digests[0], frame.section_digests[1]);
-  // The same messages again, for fewer.
+  // The same message again, with fewer sections.
   result.sections.pop_back();
   ASSERT_TRUE(EncodeResult(result, SomeTimes(), kAll, message).ok());
   EXPECT_EQ(message.SerializeAsString(), Encoded(result, kAll).SerializeAsString());
   ASSERT_TRUE(DecodeResult(message, frame).ok());
   EXPECT_EQ(frame.result, result);
-  // What is wrong with one is wrong with the frame.
+  // A malformed section refuses the frame.
   message.mutable_sections(0)->mutable_rings()->mutable_offsets()->pop_back();
   EXPECT_EQ(DecodeResult(message, frame).code(), absl::StatusCode::kDataLoss);
   EXPECT_TRUE(frame.result.sections.empty());
@@ -153,7 +153,7 @@ TEST(ResultMessage, AnEmptyResultComesBackEmpty) {
 
 TEST(ResultMessage, WhatWasNotAskedForIsLeftOutAndTheDigestsStay) {
   const Result result = SquareWithHole();
-  // The message is used again, as the server does it.
+  // The message is reused, as in the server.
   v1::ReconstructedFrame message = Encoded(result, kAll);
   ASSERT_TRUE(EncodeResult(result, {}, {.rings = true, .mesh = false}, message).ok());
   EXPECT_FALSE(message.has_mesh());

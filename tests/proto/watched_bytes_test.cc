@@ -1,4 +1,4 @@
-// What watchers get of a producer's answer: its frame, byte for byte, and nothing else.
+// Watchers receive the frame of a producer's response, byte for byte, and nothing else.
 #include "wire/watched_bytes.h"
 
 #include <google/protobuf/unknown_field_set.h>
@@ -14,12 +14,12 @@ namespace {
 v1::ReconstructedFrame FrameWithRings() {
   v1::ReconstructedFrame frame;
   frame.set_sequence(7);
-  frame.mutable_rings()->set_points(std::string(3'000'000, 'p'));  // In several pieces of memory.
+  frame.mutable_rings()->set_points(std::string(3'000'000, 'p'));  // In several slices.
   frame.set_mesh_digest(42);
   return frame;
 }
 
-// As one that a later version writes.
+// As written by a later version.
 v1::ReconstructedFrame FrameOfALaterVersion() {
   v1::ReconstructedFrame frame = FrameWithRings();
   google::protobuf::UnknownFieldSet& unknown = *frame.GetReflection()->MutableUnknownFields(&frame);
@@ -83,7 +83,7 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   EXPECT_EQ(seen.particle_volumes(), "volumes");
   EXPECT_EQ(seen.particle_velocities(), std::string(10, 'v'));
   EXPECT_GE(bytes.memory(), bytes.size());
-  EXPECT_LE(bytes.memory(), answer.Length() + sent.Length() + 100);  // Nothing is counted twice.
+  EXPECT_LE(bytes.memory(), answer.Length() + sent.Length() + 100);  // No slice is counted twice.
   seen.clear_particle_format();
   seen.clear_particles();
   seen.clear_particle_ids();

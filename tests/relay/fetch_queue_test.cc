@@ -1,4 +1,4 @@
-// Fetches of replicas that take turns.
+// Replicas take turns in the queue of fetches.
 #include "server/relay/fetch_queue.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ TEST(FetchQueue, IsBoundedInReplicasAndBytes) {
     queue.Add(std::to_string(k), FetchOf(k));
   }
   EXPECT_EQ(queue.dropped(), 2 + FetchQueue::kReplicas);
-  queue.Add("0", FetchOf(1));  // One of those that are there.
+  queue.Add("0", FetchOf(1));  // A known replica.
   std::size_t count = 0;
   while (queue.TakeNext()) ++count;
   EXPECT_EQ(count, FetchQueue::kReplicas + 1);

@@ -1,4 +1,4 @@
-// A bus in memory, with the faults that a real one has.
+// An in-memory bus that can lose messages and connections.
 #pragma once
 
 #include <functional>
@@ -12,10 +12,10 @@
 
 namespace partiemc::server {
 
-/// What ends of the bus are connected to. Safe from any thread; lives longer than its ends.
+/// Connects the ends of the bus. Thread-safe; outlives its ends.
 class MemoryHub {
  public:
-  /// Whether a message to this subject is lost on its way.
+  /// True if the message to this subject is lost.
   using Loses = std::function<bool(const std::string& subject, std::string_view message)>;
 
   class End;
@@ -37,7 +37,7 @@ class MemoryHub {
   Loses loses_;
 };
 
-/// One replica's. What it publishes does not come to itself.
+/// One replica's end. Does not receive its own messages.
 class MemoryHub::End final : public MessageBus {
  public:
   explicit End(MemoryHub& hub) : hub_(hub) {}
@@ -47,14 +47,14 @@ class MemoryHub::End final : public MessageBus {
   std::unique_ptr<Subscription> Subscribe(const std::string& subject, Handler handler) override;
   void Flush() override {}
 
-  /// While it is not, nothing comes and goes.
+  /// A disconnected end neither sends nor receives.
   void SetConnected(bool connected);
 
  private:
   friend class MemoryHub;
 
   MemoryHub& hub_;
-  bool connected_ = true;  // Guarded by the hub's.
+  bool connected_ = true;  // Guarded by the hub's mutex.
 };
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// A replica in memory: streams, watchers and the relay, without gRPC and without a core.
+// An in-memory replica: streams, watchers and the relay, without gRPC and core.
 #pragma once
 
 #include <cstdint>
@@ -15,31 +15,31 @@
 
 namespace partiemc::server {
 
-/// What a frame of this sequence number and size holds: the same wherever it is made.
+/// The bytes of a frame with this sequence number and size; the same on every replica.
 std::string FrameBytes(std::uint64_t sequence, std::size_t bytes);
 
 class MemoryReplica {
  public:
   static constexpr std::size_t kWatcherBytes = std::size_t{1} << 20;
 
-  /// Its streams hold as much for who goes back; 0: nothing. Where clients find it, if told.
+  /// `history_bytes`: history per stream; 0: none. `advertised`: address for clients; empty: none.
   explicit MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes = std::uint64_t{8} << 20,
                          const std::string& address = {});
   ~MemoryReplica();
 
-  // A producer's side. `token` tells a stream that goes on from any other.
+  // Producer's side. `token` identifies a resumed stream.
   void Open(const std::string& name, const std::string& token, std::uint64_t next_sequence = 1);
   void Publish(const std::string& name, std::uint64_t sequence, std::size_t bytes = 1000);
   void Close(const std::string& name, const absl::Status& status = absl::OkStatus());
 
-  // A watcher's.
+  // Watcher's side.
   absl::StatusOr<Relay::Found> Find(const std::string& name,
                                     std::optional<std::uint64_t> from = std::nullopt);
-  /// Of a stream of another replica; null where it is not found.
+  /// A watcher of another replica's stream; null if it is not found.
   std::unique_ptr<MemoryWatcher> Watch(const std::string& name, WatchMode mode = WatchMode::kEvery,
                                        std::optional<std::uint64_t> from = std::nullopt,
                                        std::uint64_t credit = std::uint64_t{1} << 40);
-  /// Of a stream of its own.
+  /// A watcher of a local stream.
   std::unique_ptr<MemoryWatcher> WatchOwn(const std::string& name);
 
   Relay& relay() { return *relay_; }

@@ -1,4 +1,4 @@
-// The bus with a real server of NATS.
+// The bus with a real NATS server.
 #include "server/relay/nats_bus.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::unique_ptr<MessageBus> Connect(const std::string& url) {
   return *std::move(bus);
 }
 
-// What came, by any thread.
+// Received messages; thread-safe.
 struct Heard {
   std::mutex mutex;
   std::vector<std::string> messages;
@@ -49,7 +49,7 @@ struct Heard {
   }
 };
 
-TEST(NatsBus, MessagesOfASenderKeepTheirOrderAcrossSubjectsAndDoNotComeBack) {
+TEST(NatsBus, KeepsASendersOrderAcrossSubjectsWithoutEchoes) {
   const NatsProcess nats;
   const auto one = Connect(nats.url()), other = Connect(nats.url());
   Heard heard, echoes;

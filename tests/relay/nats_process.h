@@ -1,4 +1,4 @@
-// nats-server as Debian has it, on a port of loopback that it keeps.
+// Debian's nats-server on a fixed loopback port.
 #pragma once
 
 #include <sys/types.h>
@@ -9,7 +9,7 @@ namespace partiemc::server {
 
 class NatsProcess {
  public:
-  /// Serves when it returns. A missing program fails the test.
+  /// Serves when it returns. Fails the test if the program is missing.
   NatsProcess();
   ~NatsProcess() { Stop(); }
   NatsProcess(const NatsProcess&) = delete;
@@ -19,7 +19,7 @@ class NatsProcess {
 
   /// kill -9.
   void Stop();
-  /// Again, at the same port.
+  /// Starts it again at the same port.
   void Start();
 
  private:

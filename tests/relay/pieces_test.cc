@@ -64,7 +64,7 @@ TEST(Pieces, OfManySendersTogetherTakeNoMoreThanThereIsRoomFor) {
     EXPECT_LE(joiner.held_bytes(), 16 * kPieceBytes);
   }
   EXPECT_GE(joiner.held_bytes(), 15 * kPieceBytes);
-  // Those that were begun come out, and make room.
+  // Messages that were begun can be completed, which frees capacity.
   const auto first = PiecesOf("0", 1, std::string(4 * kPieceBytes, 'a'));
   EXPECT_TRUE(joiner.Add(first[3]));
   for (int sender = 0; sender < 100; ++sender) joiner.Forget(std::to_string(sender));

@@ -1,5 +1,5 @@
-// A peer on the bus that floods: watchers elsewhere get all results and the end, and no drain
-// waits.
+// A replica that floods the bus: watchers elsewhere get all results and the end, and no drain is
+// delayed.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -48,7 +48,7 @@ class RelayFlood : public testing::Test {
     const std::lock_guard lock(mutex_);
     return asked_;
   }
-  // Publishes `make(k)` for k = 1, 2, ... until the test is over.
+  // Publishes `make(k)` for k = 1, 2, ... until the test ends.
   void Flood(const std::string& subject,
              std::function<relay::v1::RelayMessage(std::uint64_t k)> make) {
     flood_ = std::thread([this, subject, make = std::move(make)] {
@@ -60,7 +60,7 @@ class RelayFlood : public testing::Test {
         if (++sent_ % 64 == 0) std::this_thread::yield();
       }
     });
-    // More than a relay answers at a time.
+    // More than a relay answers at once.
     ASSERT_TRUE(Eventually([this] { return sent_ > 20'000; }));
   }
   static relay::v1::RelayMessage FetchAll(const std::string& stream_id, std::uint64_t number) {
@@ -71,7 +71,7 @@ class RelayFlood : public testing::Test {
     message.mutable_fetch()->set_sequence(1);
     return message;
   }
-  // The watcher has every frame, and the end that its stream had.
+  // The watcher has every frame, and the end of its stream.
   void ExpectFinished(MemoryWatcher& watcher, std::uint64_t frames) {
     EXPECT_TRUE(Eventually([&] { return !watcher.end_reason().empty(); }));
     EXPECT_EQ(watcher.end_reason(), "FINISHED");
@@ -81,7 +81,7 @@ class RelayFlood : public testing::Test {
 
   MemoryHub hub_;
   std::mutex mutex_;
-  std::string asked_;  // Guarded by it.
+  std::string asked_;  // Guarded by the mutex.
   std::unique_ptr<MemoryReplica> has_ = std::make_unique<MemoryReplica>(hub_);
   MemoryReplica shows_{hub_};
   std::atomic<bool> flooding_ = true;
@@ -99,7 +99,7 @@ TEST_F(RelayFlood, FetchesDelayNeitherResultsNorTheEndNorADrain) {
     has_->Publish("dam", k, 1000);
     std::this_thread::sleep_for(milliseconds(1));
   }
-  // A watcher that comes now is answered, too.
+  // A new watcher is served, too.
   const auto late = shows_.Watch("dam", WatchMode::kEvery, 1);
   ASSERT_NE(late, nullptr);
   has_->Close("dam");

@@ -1,4 +1,4 @@
-// Watchers at one replica of streams that another one has.
+// Watchers at one replica of another replica's streams.
 #include "server/relay/relay.h"
 
 #include <gmock/gmock.h>
@@ -41,7 +41,7 @@ std::string ReasonOf(const absl::Status& status) {
   return violation ? violation->reason : status.ToString();
 }
 
-// All of them, in order, from `first` to `last`.
+// Expects all frames from `first` to `last`, in order.
 void ExpectAll(const std::vector<SeenFrame>& seen, std::uint64_t first, std::uint64_t last) {
   ASSERT_EQ(seen.size(), last - first + 1);
   for (std::size_t k = 0; k < seen.size(); ++k) {
@@ -49,7 +49,7 @@ void ExpectAll(const std::vector<SeenFrame>& seen, std::uint64_t first, std::uin
   }
 }
 
-// Each frame is later than the one before by one more than were dropped between them.
+// Expects that the numbers of consecutive frames differ by one plus the dropped frames.
 void ExpectAccounted(const MemoryWatcher& watcher, std::uint64_t last) {
   const auto seen = watcher.seen();
   ASSERT_FALSE(seen.empty());
@@ -122,7 +122,7 @@ TEST_F(RelayTest, WhoGoesBackGetsWhatItsReplicaHoldsAndWhoGoesFurtherBackToo) {
   ExpectAll(all->seen(), 1, 101);
 }
 
-// More than one answer to a fetch has room for.
+// More than one response to a fetch can hold.
 TEST_F(RelayTest, AHistoryOfManyMegabytesComesInParts) {
   constexpr std::size_t kBytes = 200'000;
   Publish(1, 38, kBytes);
@@ -147,7 +147,8 @@ TEST_F(RelayTest, WhatTheBusLosesIsFetched) {
     has_.Publish("dam", k);
     if (k % 10 == 0) std::this_thread::sleep_for(milliseconds(1));
   }
-  watcher->WaitForFrames(300);  // The last one too: replicas ask each other what the last one was.
+  watcher->WaitForFrames(
+      300);  // Including the last one: replicas request the number of the last result.
   ExpectAll(watcher->seen(), 1, 300);
   EXPECT_GT(lost, 10);
 }
@@ -221,14 +222,14 @@ TEST_F(RelayTest, AStreamThatGoesOnElsewhereIsTakenOverForAllItsWatchers) {
   const auto own = has_.WatchOwn("dam"), elsewhere = shows_.Watch("dam");
   ASSERT_NE(elsewhere, nullptr);
   elsewhere->WaitForFrames(1);
-  std::this_thread::sleep_for(milliseconds(3));  // Clocks tell milliseconds.
+  std::this_thread::sleep_for(milliseconds(3));  // Clocks have milliseconds.
   third.Open("dam", token_, 11);
   third.Publish("dam", 11);
   for (const auto* const watcher : {&own, &elsewhere}) {
     EXPECT_TRUE((*watcher)->status().ok());
     EXPECT_EQ((*watcher)->end_reason(), kReasonTakenOver);
   }
-  // The former one has not gone yet, and is found nowhere.
+  // The former stream has not ended yet, and is not found.
   for (MemoryReplica* const replica : {&has_, &shows_}) {
     const auto again = replica->Watch("dam", WatchMode::kEvery, 11);
     ASSERT_NE(again, nullptr);
@@ -341,7 +342,7 @@ TEST_F(RelayTest, ThatItLeavesIsTheLastThatIsHeardOfAReplica) {
   ASSERT_TRUE(Eventually([&] { return shows_.relay().replicas() == 2; }));
   leaves.relay().Drain();
   leaves.Open("late", NewStreamToken());
-  std::this_thread::sleep_for(milliseconds(1200));  // Longer than announcements are apart.
+  std::this_thread::sleep_for(milliseconds(1200));  // Longer than the interval of announcements.
   EXPECT_EQ(shows_.relay().replicas(), 1u);
   EXPECT_EQ(shows_.relay().remote_streams(), 1u);
 }
@@ -409,7 +410,8 @@ TEST_F(RelayTest, ManyWatchersShareWhatIsPublishedOnce) {
   EXPECT_EQ(results - before, 10);
 }
 
-// A peer that forges a takeover is obeyed: it can break what is shown, but nothing else.
+// A replica that forges a take-over succeeds: it can replace the shown results, but affects nothing
+// else.
 bool IsForgedTakeover(const std::string& message, const relay::v1::LiveStream& stream) {
   PieceJoiner joiner(message.size());
   relay::v1::RelayMessage forged;
@@ -430,7 +432,7 @@ TEST_F(RelayTest, GarbageOnTheBusHarmsNobody) {
   const auto stranger = hub_.Connect();
   support::Random random(3);
   std::mutex mutex;
-  std::vector<std::string> heard;  // Guarded by it.
+  std::vector<std::string> heard;  // Guarded by the mutex.
   auto listens = stranger->Subscribe(kReplicasSubject, [&](std::string_view message) {
     const std::lock_guard lock(mutex);
     heard.emplace_back(message);

@@ -1,5 +1,5 @@
-// Streams over a network that cuts, resets, delays, slows, forgets and falsifies; a server that is
-// well all the time.
+// Streams over a network that cuts, resets, delays, slows, silently drops and corrupts connections;
+// the server itself is healthy.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -40,7 +40,7 @@ class Chaos : public testing::Test {
     std::size_t window = 0;
   };
 
-  // Streams while `disturb` goes on.
+  // Streams while `disturb` runs.
   Outcome Stream(const Workload& workload, double rate, const std::function<void()>& disturb) {
     client::StreamOptions options{
         .name = workload.name, .parameters = workload.parameters, .credentials = credentials_};
@@ -99,11 +99,12 @@ TEST_F(Chaos, ASlowAndLateNetworkOnlyTakesLonger) {
   ExpectAll(outcome, "delayed by 40 ms, 1 MB/s");
 }
 
-TEST_F(Chaos, AConnectionThatIsSilentlyDeadIsNoticedAndTheStreamTakesOverFromItself) {
+TEST_F(Chaos, DetectsASilentlyDeadConnectionAndTakesOverTheStream) {
   const auto outcome = Stream(Blob(), 20, [&] {
     std::this_thread::sleep_for(milliseconds(300));
     proxy_->HalfOpen();
-    // Until the client has found out and come back, by its own token: the server holds the name.
+    // Waits until the client has detected the loss and taken over by its token, because the server
+    // still holds the name.
     while (proxy_->accepted() < 2) std::this_thread::sleep_for(milliseconds(10));
     std::this_thread::sleep_for(milliseconds(300));
   });
@@ -111,9 +112,8 @@ TEST_F(Chaos, AConnectionThatIsSilentlyDeadIsNoticedAndTheStreamTakesOverFromIts
   EXPECT_EQ(outcome.history.reconnections.size(), 1u);
 }
 
-// Without TLS nothing protects the bytes of a frame, so that a falsified one may be another frame
-// to the server. But no answer is lost, doubled or out of order: the stream goes on, or it ends
-// with an error that its user is told.
+// Without TLS a corrupted frame may look like another valid frame to the server. But no answer is
+// lost, doubled or out of order: the stream continues, or ends with a reported error.
 TEST_F(Chaos, FlippedBitsNeverLoseDoubleOrReorderInSilence) {
   const std::uint64_t faults = GetOptions().faults;
   support::Random random(GetOptions().seed);
@@ -133,7 +133,7 @@ TEST_F(Chaos, FlippedBitsNeverLoseDoubleOrReorderInSilence) {
   EXPECT_GT(proxy_->flipped(), 0u);
 }
 
-// With TLS a falsified byte ends the connection, and the stream goes on in another one.
+// With TLS a corrupted byte ends the connection, and the stream reconnects.
 TEST_F(Chaos, FlippedBitsUnderTlsAreSeenInNoAnswer) {
   const CertificateAuthority authority("authority");
   const IssuedCertificate identity = authority.Issue("server");
@@ -159,7 +159,7 @@ TEST_F(Chaos, FlippedBitsUnderTlsAreSeenInNoAnswer) {
               outcome.history.reconnections.size(), outcome.history.answers.size());
 }
 
-// The proof that the validators can fail.
+// Checks that the validators can fail.
 TEST(History, TheValidatorsFindWhatTheyAreNamedAfter) {
   const auto answer = [](std::uint64_t sequence, std::uint64_t digest) {
     return Answer{.sequence = sequence, .is_result = true, .rings_digest = digest};

@@ -20,7 +20,7 @@ const server::StreamTerms kTerms{.lineage = server::LineageOf(std::string(32, '7
 
 constexpr FrameLimits kLimits{.max_particles = 100'000, .max_tiles = 10'000};
 
-// What one frame became, and the checkpoint after it.
+// The result of one frame, and the checkpoint after it.
 struct Step {
   std::uint64_t rings = 0, mesh = 0;
   std::vector<std::uint64_t> identities;
@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(Of, EveryFrame, testing::Values(&DamBreak, &Blob, &Leap
                          [](const auto& test) { return "Sequence" + std::to_string(test.index); });
 
 TEST_P(EveryFrame, ANewSessionGoesOnFromItBitForBit) {
-  // From each frame to the end: every pair of a place to resume at and a frame after it.
+  // Resumes after each frame and continues to the end.
   for (std::size_t after = 1; after < undisturbed_.size(); ++after) {
     Session session = Resume(after);
     server::Worker worker;
@@ -97,7 +97,7 @@ TEST_P(EveryFrame, ACheckpointWithAFlippedByteOrALostEndIsRefused) {
     std::string damaged = good;
     damaged[k] = static_cast<char>(damaged[k] ^ (1 << (k % 8)));
     EXPECT_FALSE(Parse(damaged).ok()) << "byte " << k;
-    // None at all begins a new stream.
+    // An empty checkpoint begins a new stream.
     if (k > 0) {
       EXPECT_FALSE(Parse(good.substr(0, k)).ok()) << k << " bytes";
     }

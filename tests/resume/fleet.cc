@@ -44,8 +44,8 @@ bool Connects(const std::string& path) {
   return result == 0;
 }
 
-// A server that is down is not chosen for a while, and a stream that cannot be opened at one goes
-// to the next.
+// A lost server is skipped for a while; a stream that cannot be opened at one server goes to the
+// next.
 std::string HaproxyFile(const std::string& socket, const std::vector<std::string>& servers) {
   std::string text =
       "defaults\n"
@@ -70,8 +70,8 @@ std::string HaproxyFile(const std::string& socket, const std::vector<std::string
   return text;
 }
 
-// Without these limits and times nginx ends a stream after one megabyte, or one minute; and it
-// would leave a server out for a while that is back at once.
+// With its default limits nginx would end a stream after one megabyte or one minute, and skip a
+// restarted server for a while.
 std::string NginxFile(const std::string& folder, const std::string& socket,
                       const std::vector<std::string>& servers) {
   std::string text = "daemon off;\nmaster_process off;\npid " + folder + "/pid;\nerror_log " +
@@ -125,7 +125,7 @@ void Fleet::Start(std::size_t server, const std::string& address) {
       server::Surroundings{.program = is_other ? GetOptions().other_server : ""});
   WaitFor([&] { return std::filesystem::exists(port_file); }, "a server");
   addresses_[server] = server::FileText(port_file);
-  if (!addresses_[server].empty()) addresses_[server].pop_back();  // The end of the line.
+  if (!addresses_[server].empty()) addresses_[server].pop_back();  // Removes the newline.
 }
 
 void Fleet::KillAndRestart(std::size_t server) {
@@ -169,7 +169,7 @@ ProxyProcess::ProxyProcess(Route route, const std::vector<std::string>& servers)
                                           "-e",
                                           folder_.Path("error.log")}
                : std::vector<std::string>{"haproxy", "-db", "-q", "-f", file};
-  // Debian has both where a plain user's search path does not look.
+  // Debian installs both outside of a user's search path.
   arguments.front() = "/usr/sbin/" + arguments.front();
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());

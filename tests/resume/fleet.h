@@ -1,4 +1,4 @@
-// Several servers as processes that come back where they were, and a proxy in front of them.
+// Several server processes that restart at the same address, and a proxy in front of them.
 #pragma once
 
 #include <sys/types.h>
@@ -17,19 +17,20 @@ namespace partiemc::resume {
 
 class Fleet {
  public:
-  /// Each with these arguments beside its address. Every other start is one of the other program
-  /// that the options name.
+  /// Starts each server with these arguments and its address. With --other-server every second
+  /// start uses that program.
   explicit Fleet(std::size_t count, std::vector<std::string> arguments = {});
 
   std::size_t size() const { return servers_.size(); }
-  /// Stay the same.
+  /// Constant.
   const std::vector<std::string>& addresses() const { return addresses_; }
-  /// What a server has logged since it was started last.
+  /// The server's log since its last start.
   std::string Output(std::size_t server) const { return servers_[server]->Output(); }
 
-  /// kill -9, and once it has gone the same again at the same address.
+  /// kill -9, then starts it again at the same address.
   void KillAndRestart(std::size_t server);
-  /// SIGTERM likewise; gives the exit code, nothing where it did not go within `grace`.
+  /// SIGTERM, then a new start; returns the exit code, or nothing if it did not exit within
+  /// `grace`.
   std::optional<int> TerminateAndRestart(std::size_t server, std::chrono::seconds grace);
 
  private:
@@ -41,16 +42,16 @@ class Fleet {
   std::size_t starts_ = 0;
 };
 
-/// What stands between clients and servers.
+/// Connection between clients and servers.
 enum class Route { kList, kHaproxy, kNginx };
 
 /// "List", "Haproxy" or "Nginx".
 std::string RouteName(Route route);
 
-/// A proxy as Debian has it, on a Unix socket. Ended when it goes out of scope.
+/// A proxy of Debian on a Unix socket, during the lifetime of this object.
 class ProxyProcess {
  public:
-  /// Serves when it returns. A missing program fails the test.
+  /// Serves when it returns. Fails the test if the program is missing.
   ProxyProcess(Route route, const std::vector<std::string>& servers);
   ~ProxyProcess();
   ProxyProcess(const ProxyProcess&) = delete;

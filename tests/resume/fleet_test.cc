@@ -1,5 +1,4 @@
-// Real servers that are killed or told to go, behind a list of addresses or a real proxy, while
-// streams go on.
+// Servers that are killed or terminated behind a list of addresses or a proxy while streams run.
 #include "resume/fleet.h"
 
 #include <gtest/gtest.h>
@@ -20,10 +19,10 @@ namespace partiemc::resume {
 namespace {
 
 constexpr std::size_t kServers = 3;
-// Frames a second of one stream: a simulation's, and little enough for a shared machine.
+// Frames per second of one stream: typical for a simulation, and affordable on a shared machine.
 constexpr double kRate = 40;
 constexpr std::chrono::seconds kGrace(20);
-// From a disturbance to the next answer (tests/PROMISES.md).
+// Limit from a disturbance to the next answer (tests/PROMISES.md).
 constexpr double kMaxRecoveryMs = 1000;
 
 class FleetTest : public testing::TestWithParam<Route> {
@@ -48,7 +47,7 @@ class FleetTest : public testing::TestWithParam<Route> {
     return proxy_ ? proxy_->address() : fleet_.addresses()[number % kServers];
   }
 
-  // Streams while `disturb` goes on, and judges what was seen.
+  // Streams while `disturb` runs, and checks the histories.
   std::vector<History> Stream(const std::vector<Workload>& workloads,
                               const std::function<void()>& disturb) {
     std::atomic<bool> over = false;
@@ -84,8 +83,7 @@ INSTANTIATE_TEST_SUITE_P(Behind, FleetTest,
                          testing::Values(Route::kList, Route::kHaproxy, Route::kNginx),
                          [](const auto& test) { return RouteName(test.param); });
 
-// From each loss that a stream has told back to the disturbance before it and on to its next
-// answer: how long its user was without.
+// For each loss that a stream reports: the time from the disturbance before it to the next answer.
 std::vector<double> RecoveriesMs(const std::vector<History>& histories,
                                  const std::vector<Clock::time_point>& disturbances) {
   std::vector<double> recoveries;
@@ -103,8 +101,7 @@ std::vector<double> RecoveriesMs(const std::vector<History>& histories,
   return recoveries;
 }
 
-// The longest time between two answers of a stream that lost nothing in between: what the machine
-// itself makes streams wait.
+// The longest time between two answers without a loss in between: a delay by the machine.
 double LongestPauseMs(const std::vector<History>& histories) {
   double longest = 0;
   for (const History& history : histories) {
@@ -119,9 +116,8 @@ double LongestPauseMs(const std::vector<History>& histories) {
   return longest;
 }
 
-// Prints what was seen, and judges how long users were without: 99 of 100 of them at most a second,
-// beside what the machine makes them wait anyway. Of less than a hundred recoveries one may be
-// longer.
+// Prints the figures and checks the recoveries: 99 of 100 within a second, or within the machine's
+// own delays. Of fewer than a hundred recoveries one may be longer.
 void Judge(Route route, const char* what, std::uint64_t count,
            const std::vector<double>& recoveries, const std::vector<History>& histories) {
   std::uint64_t frames = 0;

@@ -1,4 +1,4 @@
-// What the user of a stream has seen, and the guarantees that it is judged by afterwards.
+// The events that the user of a stream has seen, and the guarantees for them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,11 +20,11 @@ struct Answer {
   std::uint64_t sequence = 0;
   bool is_result = false;
   std::uint64_t rings_digest = 0, mesh_digest = 0;
-  std::vector<std::uint64_t> identities;  ///< Of the rings, which digests leave out.
+  std::vector<std::uint64_t> identities;  ///< Identities of the rings, which digests do not cover.
   double time = 0;
   Clock::time_point at;
 
-  /// But for when it came.
+  /// Equal except for the time of arrival.
   bool SameAs(const Answer& other) const {
     return sequence == other.sequence && is_result == other.is_result &&
            rings_digest == other.rings_digest && mesh_digest == other.mesh_digest &&
@@ -32,27 +32,27 @@ struct Answer {
   }
 };
 
-/// One stream from its user's side.
+/// One stream as seen by its user.
 struct History {
   std::uint64_t sent = 0;
-  std::vector<Answer> answers;                   ///< As delivered.
-  std::vector<Clock::time_point> reconnections;  ///< When they were told.
+  std::vector<Answer> answers;                   ///< In the order of delivery.
+  std::vector<Clock::time_point> reconnections;  ///< Times of the reports.
   std::size_t most_in_flight = 0;
-  absl::Status end;  ///< OK for a stream that ended as it should.
+  absl::Status end;  ///< OK if the stream ended normally.
 };
 
-/// Every frame that was sent has been answered, and the stream has ended well.
+/// Every sent frame was answered, and the stream ended normally.
 testing::AssertionResult Complete(const History& history);
-/// Answers came in the order of the frames.
+/// Answers arrived in the order of the frames.
 testing::AssertionResult Ordered(const History& history);
 /// No frame was answered twice.
 testing::AssertionResult Unique(const History& history);
-/// Each answer is that of a run that nothing has disturbed.
+/// Each answer equals the answer of an undisturbed run.
 testing::AssertionResult Identical(const History& history, const History& undisturbed);
-/// Never more frames in flight than were allowed.
+/// Never more frames in flight than allowed.
 testing::AssertionResult Bounded(const History& history, std::size_t window);
 
-/// All of them, named when they fail.
+/// Checks all of them; failures name the guarantee.
 void ExpectGuarantees(const History& history, const History& undisturbed, std::size_t window,
                       const std::string& what);
 

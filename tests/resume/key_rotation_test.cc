@@ -1,5 +1,5 @@
-// The key that signs checkpoints is changed while a stream goes on: from A to B and A to B alone.
-// In each step the stream loses its server and goes on at the other one.
+// The key for checkpoints is changed while a stream runs: from A to B and A to B alone. In each
+// step the stream loses its server and resumes at the other one.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -24,13 +24,13 @@ constexpr std::uint64_t kFramesEach = 6;
 
 class KeyRotation : public testing::Test {
  protected:
-  // Whole or not at all.
+  // Atomically.
   std::string Write(const std::string& keys) const {
     const std::string next = folder_.Write("next", keys), path = folder_.Path("keys");
     std::filesystem::rename(next, path);
     return path;
   }
-  // Until every server that is running has taken them.
+  // Changes the keys; returns when every running server has loaded them.
   void Change(const std::string& keys) {
     std::vector<std::size_t> before;
     for (std::size_t k = 0; k < fleet_.size(); ++k) before.push_back(Reloads(k));
@@ -46,7 +46,7 @@ class KeyRotation : public testing::Test {
     return count;
   }
 
-  // Sends the next frames, one after the other, each after the answer to the one before.
+  // Sends the next frames, each after the answer to the previous one.
   void Exchange(client::Stream& stream, History& history) {
     client::Event event;
     for (std::uint64_t k = 0; k < kFramesEach; ++k) {

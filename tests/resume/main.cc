@@ -16,7 +16,7 @@ Options& GetOptions() {
 
 namespace {
 
-// Takes `--name N`, as often as there are; false for anything else.
+// Reads options `--name N`; false for anything else.
 bool Parse(int argc, char** argv) {
   Options& options = GetOptions();
   for (int k = 1; k < argc; k += 2) {

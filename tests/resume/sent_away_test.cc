@@ -1,5 +1,5 @@
-// A replica that drains tells its streams where the others are: clients that knew nobody but it go
-// on there.
+// A draining replica sends its streams the addresses of the others; clients that knew only this
+// replica resume there.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -27,7 +27,7 @@ class SentAway : public testing::Test {
  protected:
   SentAway() {
     for (std::size_t k = 0; k < kReplicas; ++k) {
-      // One that has just been left free.
+      // A port that was just released.
       addresses_.push_back(server::ServingProcess().address());
       replicas_.push_back(std::make_unique<server::ServerProcess>(std::vector<std::string>{
           "--address", addresses_[k], "--nats", nats_.url(), "--advertise", addresses_[k]}));
@@ -45,7 +45,7 @@ class SentAway : public testing::Test {
     return client::Watcher::Open(addresses_[replica], stream, {}).ok();
   }
 
-  // How many of the streams a replica has had.
+  // Number of streams opened at a replica.
   std::size_t Opened(std::size_t replica) const {
     std::istringstream log(replicas_[replica]->Output());
     std::size_t count = 0;

@@ -1,5 +1,5 @@
-// Three replicas that share their streams by NATS, behind a real proxy: whoever watches asks any of
-// them, while they are updated or killed, and NATS goes away and comes back.
+// Three replicas that share streams over NATS behind a proxy. Watchers use any of them, while they
+// are updated or killed and NATS restarts.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,19 +28,19 @@ using std::chrono::milliseconds;
 constexpr std::size_t kServers = 3, kProducers = 8, kWatchers = 16;
 constexpr double kRate = 30;
 constexpr std::chrono::seconds kGrace(20);
-// From a disturbance to the next frame (tests/PROMISES.md).
+// Limits from a disturbance to the next frame (tests/PROMISES.md).
 constexpr double kMaxProducerGapMs = 1000, kMaxWatcherGapMs = 2000;
 
 double Milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
-// What happened, and when.
+// Disturbances and their times.
 struct Disturbances {
   std::vector<Clock::time_point> at;
 
   void Now() { at.push_back(Clock::now()); }
-  // The time from the last one before `told` to `until`; 0 if there is none.
+  // Time from the last disturbance before `told` to `until`; 0 if there is none.
   double MsUntil(Clock::time_point told, Clock::time_point until) const {
     const auto after = std::ranges::upper_bound(at, told);
     return after == at.begin() ? 0 : Milliseconds(until - *(after - 1));
@@ -63,7 +63,7 @@ class WatchAnywhere : public testing::TestWithParam<Route> {
     }
   }
 
-  // Eight produce and sixteen watch while `disturb` goes on; judges what they have seen.
+  // Eight producers and sixteen watchers run while `disturb` runs; checks their histories.
   void Run(const char* what, const std::function<void(Disturbances&)>& disturb) {
     const ProxyProcess proxy(GetParam(), fleet_.addresses());
     std::atomic<bool> over = false;
@@ -117,8 +117,8 @@ class WatchAnywhere : public testing::TestWithParam<Route> {
     Judge(what, disturbances, histories, seen);
   }
 
-  // Prints what was seen, and judges how long producers and watchers were without: 99 of 100 no
-  // longer than is promised, beside what the machine made them wait without any loss.
+  // Prints the figures and checks the gaps: 99 of 100 within the limits, or within the machine's
+  // own delays.
   static void Judge(const char* what, const Disturbances& disturbances,
                     const std::vector<History>& histories, const std::vector<WatchHistory>& seen) {
     std::vector<double> producers, watchers;
@@ -144,7 +144,7 @@ class WatchAnywhere : public testing::TestWithParam<Route> {
       for (std::size_t k = 0; k < one.seen.size(); ++k) {
         dropped += one.seen[k].dropped;
         gaps += one.seen[k].gap;
-        // Nothing was missing until the last frame before had come.
+        // The gap begins with the previous frame.
         if (!one.seen[k].rejoined || k == 0) continue;
         watchers.push_back(std::min(Milliseconds(one.seen[k].at - one.seen[k - 1].at),
                                     disturbances.MsUntil(one.seen[k].at, one.seen[k].at)));

@@ -1,4 +1,4 @@
-// What a watcher has seen, and the guarantees that it is judged by afterwards.
+// The frames that a watcher has seen, and the guarantees for them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,26 +16,26 @@ namespace partiemc::resume {
 struct WatchedAnswer {
   std::uint64_t sequence = 0, dropped = 0, gap = 0;
   std::uint64_t rings_digest = 0, mesh_digest = 0;
-  bool rejoined = false;  ///< The first after the watch had been lost.
+  bool rejoined = false;  ///< The first frame after the watch was lost.
   Clock::time_point at;
 };
 
 struct WatchHistory {
   std::vector<WatchedAnswer> seen;
   std::uint64_t dropped_at_end = 0;
-  std::string reason;  ///< Of the end that was told.
-  absl::Status end;    ///< OK where one was told.
+  std::string reason;  ///< Reason of the reported end.
+  absl::Status end;    ///< OK if an end was reported.
 };
 
-/// Receives until the watch is over.
+/// Receives until the watch ends.
 WatchHistory WatchAll(client::Watcher& watcher);
 
-/// Sequence numbers rise: nothing is out of order or shown twice.
+/// Sequence numbers increase: no frame is out of order or repeated.
 testing::AssertionResult Rising(const WatchHistory& history);
-/// Of a stream of `sent` frames of which none was refused, each from the first that was seen on was
-/// seen, was counted as dropped, or lies in a gap; and a gap is told only after a loss.
+/// For a stream of `sent` frames without refusals: from the first seen frame on, each frame was
+/// seen, counted as dropped, or is in a gap. Gaps occur only after a loss.
 testing::AssertionResult Accounted(const WatchHistory& history, std::uint64_t sent);
-/// Each frame is that of a run that nothing has disturbed.
+/// Each frame equals the frame of an undisturbed run.
 testing::AssertionResult Identical(const WatchHistory& history, const History& undisturbed);
 
 }  // namespace partiemc::resume

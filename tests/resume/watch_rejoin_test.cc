@@ -1,4 +1,4 @@
-// Watchers whose stream goes from server to server, or is taken over, or does not come back.
+// Watchers of a stream that moves between servers, is taken over, or does not return.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -26,7 +26,7 @@ std::vector<std::string> Others(const std::vector<std::string>& addresses) {
   return {addresses.begin() + 1, addresses.end()};
 }
 
-TEST(WatchRejoin, WatchersOfAStreamWhoseServersAreKilledSeeEachFrameOnceOrAreToldOfAGap) {
+TEST(WatchRejoin, KilledServersShowEachFrameOnceOrReportAGap) {
   constexpr std::size_t kServers = 3;
   constexpr double kRate = 40;
   std::printf("seed %llu\n", static_cast<unsigned long long>(GetOptions().seed));
@@ -98,7 +98,7 @@ class WatchTakenOver : public testing::Test {
     EXPECT_TRUE(watcher.ok()) << watcher.status();
     return watcher.ok() ? *std::move(watcher) : nullptr;
   }
-  // Frames up to `count`, from the first on.
+  // Frames 1 to `count`.
   static void Produce(server::StreamClient& producer, std::uint64_t count) {
     for (std::uint64_t k = 1; k <= count; ++k) {
       ASSERT_TRUE(producer.SendAndReceive(server::BlobRequest(k, 1, k)).has_frame());
@@ -123,7 +123,7 @@ class WatchTakenOver : public testing::Test {
   std::shared_ptr<grpc::Channel> channel_ = server::Connect(*server_, server::Transport::kTcp);
 };
 
-TEST_F(WatchTakenOver, AStreamThatBeginsAgainAfterAResumeShowsWhatIsNewAndNothingTwice) {
+TEST_F(WatchTakenOver, AStreamRestartedAfterAResumeShowsNoFrameTwice) {
   auto open = server::OpenRequest("tank");
   server::StreamClient first(channel_), second(channel_);
   const auto opened = first.SendAndReceive(open).opened();
@@ -137,7 +137,7 @@ TEST_F(WatchTakenOver, AStreamThatBeginsAgainAfterAResumeShowsWhatIsNewAndNothin
   }
   WatchHistory history;
   std::thread receiver([&] { history = WatchAll(*watcher); });
-  // Without a checkpoint: from the first frame on.
+  // Without a checkpoint, so it starts with the first frame.
   open.mutable_open()->mutable_resume()->set_stream_token(opened.stream_token());
   EXPECT_TRUE(second.SendAndReceive(open).has_opened());
   WaitUntilWatched();
@@ -158,7 +158,7 @@ TEST_F(WatchTakenOver, AnotherStreamOfTheNameIsNotTakenForIt) {
   const auto watcher = Watch(milliseconds(200));
   ASSERT_NE(watcher, nullptr);
   Produce(*producer, 2);
-  do {  // The name is free once the server has heard that the former producer has gone.
+  do {  // The name is free when the server has detected that the former producer is lost.
     producer = std::make_unique<server::StreamClient>(channel_);
   } while (!producer->SendAndReceive(server::OpenRequest("tank")).has_opened());
   Produce(*producer, 5);
@@ -195,7 +195,7 @@ TEST_F(WatchTakenOver, AServerThatDoesNotComeBackEndsTheWatchAndCancelEndsTheSea
   canceller.join();
 }
 
-// The proof that the validators can fail.
+// Checks that the validators can fail.
 TEST(WatchHistory, TheValidatorsFindWhatTheyAreNamedAfter) {
   const WatchHistory good{.seen = {{.sequence = 2, .rings_digest = 20},
                                    {.sequence = 4, .dropped = 1, .rings_digest = 40},

@@ -10,7 +10,7 @@
 namespace partiemc::resume {
 namespace {
 
-// Simulation time between frames; frame by frame also where a sequence begins again.
+// Simulation time between frames, also where a sequence repeats.
 constexpr double kTimeStep = 0.01;
 
 void Receive(client::FrameStream& stream, History& history) {
@@ -100,7 +100,7 @@ History RunThrough(client::FrameStream& stream, const Workload& workload, double
     const Frame frame{.positions = std::span<const double>(particles.positions),
                       .ids = particles.ids};
     const auto sequence = stream.Send(frame, kTimeStep * static_cast<double>(sent));
-    if (!sequence.ok()) break;  // The receiver is told, too.
+    if (!sequence.ok()) break;  // The receiver gets the error, too.
     EXPECT_EQ(*sequence, sent + 1);
     ++sent;
     most_in_flight = std::max(most_in_flight, stream.InFlight());

@@ -1,4 +1,4 @@
-// Sequences of frames that tests stream, for as long as they like.
+// Sequences of frames of any length for tests.
 #pragma once
 
 #include <atomic>
@@ -14,12 +14,12 @@
 
 namespace partiemc::resume {
 
-/// Frame `index`, from 0; it begins again when it is through.
+/// Frame `index`, from 0; the sequence repeats.
 struct Workload {
   struct Particles {
     std::vector<double> positions;
     std::vector<std::uint64_t> ids;
-    bool is_bad = false;  ///< The server will refuse it.
+    bool is_bad = false;  ///< The server refuses it.
   };
 
   std::string name;
@@ -31,13 +31,13 @@ struct Workload {
 
 /// The bundled dam break: 75 frames of 2D SPH.
 Workload DamBreak();
-/// A drifting disc with a hole and spray; every eleventh frame is one that is refused.
+/// A drifting disc with a hole and spray; every eleventh frame is refused.
 Workload Blob();
-/// A body and a drop that leaps over it, told apart by ids alone.
+/// A body and a drop that leaps over it; only ids distinguish them.
 Workload Leap();
 
-/// Sends frames, `per_second` at most (0: as fast as it goes), until `enough` is true of the number
-/// sent, and receives beside it until the stream ends.
+/// Sends frames, at most `per_second` (0: no limit), until `enough` returns true for the number
+/// sent; receives concurrently until the stream ends.
 History RunThrough(client::FrameStream& stream, const Workload& workload, double per_second,
                    const std::function<bool(std::uint64_t)>& enough);
 

@@ -1,5 +1,4 @@
-// When the worker does what an answer leaves to do: telling watchers, whose writes must not come
-// before the producer's own.
+// When a worker serves watchers: after the producer's response has been written.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -17,7 +16,7 @@ constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 
 class AnswerAfterwards : public ::testing::Test {
  protected:
-  // What was being written when the worker came to what an answer had left.
+  // The write in progress when the worker ran the work after an answer.
   struct Moment {
     std::optional<Outgoing> what;
     std::uint64_t sequence = 0;
@@ -42,7 +41,7 @@ class AnswerAfterwards : public ::testing::Test {
 };
 
 TEST_F(AnswerAfterwards, ComesOnceTheAnswerIsOnItsWay) {
-  transport_.EndWrite(true);  // `opened`.
+  transport_.EndWrite(true);  // Ends the write of `opened`.
   for (std::uint64_t k = 1; k <= 3; ++k) {
     SendFrame(k);
     pool_.Step();
@@ -54,7 +53,7 @@ TEST_F(AnswerAfterwards, ComesOnceTheAnswerIsOnItsWay) {
 }
 
 TEST_F(AnswerAfterwards, DoesNotWaitForAClientThatTakesNoAnswers) {
-  ASSERT_EQ(transport_.writing()->what, Outgoing::kOpened);  // And stays so.
+  ASSERT_EQ(transport_.writing()->what, Outgoing::kOpened);  // Stays in progress.
   for (std::uint64_t k = 1; k <= 4; ++k) {
     SendFrame(k);
     pool_.Step();

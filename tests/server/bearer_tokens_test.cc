@@ -1,4 +1,4 @@
-// Token files, and who comes in with which token.
+// Token files, and which client a token identifies.
 #include "server/security/bearer_tokens.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ std::string File(const std::string& text) {
   return tokens.ok() ? "accepted" : std::string(tokens.status().message());
 }
 
-// Of the client that has the token; "nobody" where there is none.
+// The name of the client with the token; "nobody" for an unknown token.
 std::string ClientOf(const BearerTokens& tokens, const std::string& token) {
   const auto* const client = tokens.Find(token);
   return client == nullptr ? "nobody" : client->terms->name;

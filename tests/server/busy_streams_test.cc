@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kLate(10);
-constexpr BusyStreams::Clock::time_point kStart{seconds(1000)};  // Where a period begins.
+constexpr BusyStreams::Clock::time_point kStart{seconds(1000)};  // Start of a period.
 
 TEST(BusyStreams, CountsEachStreamOnceHoweverManyFramesItSends) {
   BusyStreams busy(kLate);

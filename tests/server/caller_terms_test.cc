@@ -1,4 +1,4 @@
-// What the words behind a token say, and which names a pattern stands for.
+// Permissions in a line of the token file, and patterns of names.
 #include "server/security/caller_terms.h"
 
 #include <gmock/gmock.h>
@@ -103,7 +103,7 @@ TEST(CallerTerms, ThatAreWrongAreToldByWordAndRuleWithoutShowingIt) {
   }
 }
 
-// By the definition, letter by letter.
+// Implements the definition letter by letter.
 bool MatchesByDefinition(std::string_view pattern, std::string_view name) {
   if (pattern.empty()) return name.empty();
   if (pattern[0] == '*') {
@@ -131,7 +131,7 @@ TEST(NamePattern, StandsForTheNamesThatItsDefinitionSays) {
 TEST(NamePattern, OfManyStarsEndsAtOnce) {
   std::string pattern;
   for (int i = 0; i < 63; ++i) pattern += "*a";
-  // By the definition this would take longer than anybody waits.
+  // Exponential for a matcher that follows the definition.
   EXPECT_FALSE(MatchesPattern(pattern + "*b", std::string(128, 'a')));
   EXPECT_TRUE(MatchesPattern(pattern + "*", std::string(128, 'a')));
 }

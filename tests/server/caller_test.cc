@@ -1,4 +1,4 @@
-// What a caller may and holds; also under ThreadSanitizer.
+// Permissions and accounts of callers; also under ThreadSanitizer.
 #include "server/security/caller.h"
 
 #include <gtest/gtest.h>
@@ -169,7 +169,7 @@ TEST(PeerAccounts, AreForgottenWithTheLastWhoHoldsThem) {
   EXPECT_EQ(peers->size(), 0u);
   place = *peers->Of("ipv4:192.0.2.7:1")->Take(Kind::kCall);
   peers.reset();
-  place.reset();  // An account may outlive them.
+  place.reset();  // Slots may be released after their account.
 }
 
 TEST(PeerAccounts, ComeAndGoFromManyThreads) {

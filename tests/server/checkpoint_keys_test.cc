@@ -1,4 +1,4 @@
-// The keys of checkpoints: what a file of them may hold, and what they sign.
+// Key files for checkpoints, and signatures.
 #include "server/security/checkpoint_keys.h"
 
 #include <gmock/gmock.h>

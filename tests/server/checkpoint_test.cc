@@ -1,5 +1,5 @@
-// Checkpoints: a session that goes on from one gives the bits of one that never stopped, and bytes
-// that are none are refused.
+// Checkpoints: a session resumed from one gives the bits of an uninterrupted one; malformed bytes
+// are refused.
 #include "server/stream/checkpoint.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::string ReasonOf(const absl::Status& status) {
   return violation ? violation->reason : status.ToString();
 }
 
-// Answers the frame that comes next; its particles have ids or none.
+// Answers the next frame; its particles may have ids.
 Digests Answer(Session& session, Worker& worker, bool has_ids = false) {
   const std::uint64_t sequence = session.next_sequence();
   const std::vector<double> positions = MovingBlob(kSeed, sequence);
@@ -129,7 +129,7 @@ TEST(Checkpoint, AnyFlippedByteIsRefused) {
     const auto session = Resume(flipped);
     ASSERT_FALSE(session.ok()) << "byte " << k;
     ASSERT_TRUE(FindViolation(session.status())) << session.status();
-    // Another version is none that this server can judge.
+    // Another version is refused with another code.
     ASSERT_EQ(session.status().code(), k >= 4 && k < 8 ? absl::StatusCode::kFailedPrecondition
                                                        : absl::StatusCode::kInvalidArgument)
         << session.status();
@@ -169,7 +169,7 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
     EXPECT_EQ(ReasonOf(refused.status()), kReasonCheckpointMismatch);
   }
   ReconstructionParameters default_told = BlobParameters();
-  default_told.clean = true;  // What `virtual-plane` does by default.
+  default_told.clean = true;  // The default of `virtual-plane`.
   const auto session = Session::Open(default_told, kLimits);
   EXPECT_TRUE(ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr).ok());
 }

@@ -1,4 +1,4 @@
-// A transport that is never opened: a registry needs machines only by their identity.
+// A transport that is never opened, for a registry that only compares machines.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
-// The pool that computes: which worker a task gets, and how long a worker keeps its buffers. Also
-// under ThreadSanitizer.
+// The compute pool: which worker a task gets, and how long a worker keeps its buffers. Also under
+// ThreadSanitizer.
 #include "server/compute/compute_pool.h"
 
 #include <gtest/gtest.h>
@@ -46,9 +46,10 @@ TEST(WarmSize, OutlivesItsUseWhenNothingOfAQuarterOfItComes) {
   EXPECT_TRUE(size.Outlived(start + seconds(19), seconds(10)));
 }
 
-// Submits `task` and waits until it is through.
+// Submits `task` and waits until it has ended.
 void RunAndWait(ComputePool& pool, const ComputePool::Job& task) {
-  // Shared, because the thread that keeps the promise may still be in it when the other goes on.
+  // Shared, because the thread that sets the promise may still use it when the waiting thread
+  // continues.
   const auto done = std::make_shared<std::promise<void>>();
   pool.Submit(task, [done] { done->set_value(); });
   done->get_future().wait();
@@ -58,8 +59,8 @@ TEST(ComputePool, ATaskAfterAnotherGetsTheSameWorkerOnAnyThread) {
   std::set<const Worker*> workers;
   std::promise<void> done;
   std::function<void(int)> submit;
-  ComputePool pool(4);  // Ends before what its tasks use.
-  // As a stream does it: the next frame is submitted when the one before is through.
+  ComputePool pool(4);  // Destroyed before the objects that its tasks use.
+  // Like a stream, submits the next frame when the previous one has ended.
   submit = [&](int left) {
     pool.Submit([&](Worker& worker) { workers.insert(&worker); },
                 [&, left] {
@@ -76,8 +77,8 @@ TEST(ComputePool, TasksAtTheSameTimeHaveWorkersOfTheirOwn) {
   std::promise<const Worker*> first, second;
   const auto first_worker = first.get_future().share();
   const auto second_worker = second.get_future().share();
-  ComputePool pool(2);  // Ends before what its tasks use.
-  // Each task ends only when the other one has begun.
+  ComputePool pool(2);  // Destroyed before the objects that its tasks use.
+  // Each task ends only after the other has begun.
   pool.Submit([&](Worker& worker) {
     first.set_value(&worker);
     second_worker.wait();
@@ -89,12 +90,12 @@ TEST(ComputePool, TasksAtTheSameTimeHaveWorkersOfTheirOwn) {
   EXPECT_NE(first_worker.get(), second_worker.get());
 }
 
-// Who had the turns of a pool of one thread, in their order. What is submitted before Order runs
-// after all of it has been.
+// Records the order of turns in a pool of one thread. Jobs submitted before Order run after all of
+// them have been submitted.
 class Turns {
  public:
   Turns() {
-    // Shared, because the thread that keeps the promise may still be in it when this one goes on.
+    // Shared, because the thread that sets the promise may still use it when this one continues.
     const auto begun = std::make_shared<std::promise<void>>();
     pool_->Submit([this, begun](Worker&) {
       begun->set_value();
@@ -102,19 +103,19 @@ class Turns {
     });
     begun->get_future().wait();
   }
-  // Jobs that wait at once, as calls of ReconstructFrame do.
+  // Jobs that wait at the same time, like calls of ReconstructFrame.
   void Calls(char name, int count, const CallerAccount* caller) {
     for (int i = 0; i < count; ++i) {
       pool_->Submit([this, name](Worker&) { order_ += name; }, [] {}, nullptr, caller);
     }
   }
-  // Frames of which each waits when the one before is done, as those of a stream do.
+  // Frames submitted one after the other, like those a stream sends.
   void Stream(char name, int frames, const CallerAccount* caller) {
     Next(name, frames, caller, &marks_.emplace_back());
   }
   std::string Order() {
     all_submitted_.set_value();
-    pool_.reset();  // Runs all that was submitted.
+    pool_.reset();  // Runs all submitted jobs.
     return order_;
   }
 
@@ -129,7 +130,7 @@ class Turns {
   std::string order_;
   std::deque<BusyStreams::Mark> marks_;
   std::optional<ComputePool> pool_{1};
-  ComputePool* const running_ = &*pool_;  // Also while the pool runs its last jobs.
+  ComputePool* const running_ = &*pool_;  // Also used while the pool runs its last jobs.
 };
 
 TEST(Turns, OfAllCallsOfACallerAreThoseOfOneStream) {
@@ -203,8 +204,8 @@ TEST(ComputePool, LongJobsOfOneCallerLeaveAThreadToOthers) {
   std::promise<void> held_up;
   const auto go_on = held_up.get_future().share();
   std::atomic<int> running = 0, most = 0, free_places = 0;
-  ComputePool pool(2);               // Ends before what its tasks use.
-  RunAndWait(pool, [](Worker&) {});  // By nobody in particular, so that callers share.
+  ComputePool pool(2);               // Destroyed before the objects that its tasks use.
+  RunAndWait(pool, [](Worker&) {});  // Belongs to no caller, so that callers share.
   for (int k = 0; k < 3; ++k) {
     pool.Submit(
         [&](Worker&) {
@@ -247,7 +248,7 @@ TEST(ComputePool, ACallerAloneHasAllThreadsAgainAfterAWhile) {
   EXPECT_EQ(places, 2);
 }
 
-// Nothing else happens at the end of that time: no job comes, and none ends.
+// No job arrives and none ends when the time has passed.
 TEST(ComputePool, AJobThatWaitsForACallerWhoHasGoneRunsAfterAWhile) {
   const CallerAccount gone, stays;
   std::promise<void> held_up, through;
@@ -263,7 +264,7 @@ TEST(ComputePool, AJobThatWaitsForACallerWhoHasGoneRunsAfterAWhile) {
   held_up.set_value();
 }
 
-// Tells when it is destroyed.
+// Sets a promise when it is destroyed.
 class Mourned final : public MessageBuffers {
  public:
   explicit Mourned(std::promise<void> gone) : gone_(std::move(gone)) {}
@@ -273,7 +274,7 @@ class Mourned final : public MessageBuffers {
   std::promise<void> gone_;
 };
 
-// Has a worker work on a large frame; the future is there when its buffers are gone.
+// A worker computes a large frame; the future is ready when its buffers are freed.
 std::future<void> WorkOnALargeFrame(ComputePool& pool) {
   std::promise<void> gone;
   std::future<void> future = gone.get_future();
@@ -298,7 +299,7 @@ TEST(ComputePool, AWorkerThatIsTooLargeForItsFramesIsDroppedAfterAWhile) {
   ComputePool pool(1, milliseconds(50));
   const std::future<void> gone = WorkOnALargeFrame(pool);
   const TimePoint give_up = WarmSize::Clock::now() + kLongEnough;
-  // Never idle for as long as it would take.
+  // Never idle for the whole time limit.
   while (gone.wait_for(milliseconds(1)) != std::future_status::ready) {
     ASSERT_LT(WarmSize::Clock::now(), give_up);
     RunAndWait(pool, [](Worker& worker) { worker.particles.Used(1000, WarmSize::Clock::now()); });
@@ -323,8 +324,8 @@ TEST(ComputePool, WhatIdleWorkersHoldIsGivenBackWhenSomebodyWantsIt) {
   budget.GiveBack(20 * kMib);
 }
 
-// Has two workers work on large frames at once; each future is there when the buffers of one are
-// gone.
+// Two workers compute large frames at the same time; each future is ready when its worker's buffers
+// are freed.
 std::array<std::future<void>, 2> WorkOnTwoLargeFramesAtOnce(ComputePool& pool) {
   std::array<std::future<void>, 2> gone;
   const auto begun = std::make_shared<std::latch>(2), done = std::make_shared<std::latch>(2);
@@ -351,10 +352,9 @@ std::size_t CountWaiting(const std::array<std::future<void>, 2>& futures) {
   });
 }
 
-// Two workers are warm, then calls or so many streams take turns, so that one worker is enough.
-// Returns how many are still warm after much longer than an idle one is kept, and no more than
-// `expected` if that can be waited for; nothing if the machine itself let them idle for so long
-// that they had to go.
+// Two workers are warm, then calls or `streams` streams take turns, so that one worker is enough.
+// Returns the number of workers still warm much later than the idle time, after waiting for at most
+// `expected`. Empty if the machine itself let them idle too long.
 std::optional<std::size_t> KeptWhileTheyTakeTurns(std::size_t streams, std::size_t expected) {
   std::vector<BusyStreams::Mark> marks(streams);
   ComputePool pool(2, milliseconds(200));
@@ -376,7 +376,7 @@ std::optional<std::size_t> KeptWhileTheyTakeTurns(std::size_t streams, std::size
 
 class WorkersOfStreams : public ::testing::TestWithParam<std::size_t> {};
 
-TEST_P(WorkersOfStreams, StayAsTheyAreUsedAndAsManyAsMayBeNeededAtOnceThoughNoFramesMeet) {
+TEST_P(WorkersOfStreams, KeepsAsManyWorkersAsStreamsMayNeedAtOnce) {
   const std::size_t expected = std::max<std::size_t>(GetParam(), 1);
   const TimePoint give_up = WarmSize::Clock::now() + kLongEnough;
   std::optional<std::size_t> kept;

@@ -1,4 +1,4 @@
-// How callers share a room.
+// How callers share a limit.
 #include "server/compute/fair_share.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ using Fit = FairShare::Fit;
 
 class Room : public ::testing::Test {
  protected:
-  // As much as `caller` gets, one by one.
+  // Takes one unit at a time until refused; returns the number.
   std::uint64_t TakeAll(const CallerAccount& caller, std::uint64_t most = FairShare::kNoLimit) {
     while (room_.Fits(&caller, 1, most) == Fit::kYes) room_.Take(&caller, 1);
     return room_.held_by(&caller);
@@ -39,7 +39,7 @@ TEST_F(Room, GreedyCallersLeaveSomeForTheNextWhoeverCameFirst) {
     before = own;
   }
   EXPECT_GT(room_.room() - room_.held(), 0u);
-  // Once those who came first have less, all have the same.
+  // After the first callers have released some, all have the same.
   for (int round = 0; round < 100; ++round) {
     for (const CallerAccount& caller : callers_) {
       if (room_.Fits(&caller, 1) == Fit::kMoreThanShare) room_.GiveBack(&caller, 1);
@@ -49,6 +49,21 @@ TEST_F(Room, GreedyCallersLeaveSomeForTheNextWhoeverCameFirst) {
   for (const CallerAccount& caller : callers_) {
     EXPECT_NEAR(static_cast<double>(room_.held_by(&caller)), 20, 1);
   }
+}
+
+TEST_F(Room, BytesBeyondTheRoomTakeNoneFromOthers) {
+  room_.AddBeyond(100);
+  room_.Take(&callers_[0], 100);
+  EXPECT_EQ(room_.Fits(&callers_[1], 120), Fit::kYes);
+  EXPECT_EQ(room_.Fits(&callers_[1], 121), Fit::kNoRoom);
+  EXPECT_EQ(room_.Fits(&callers_[0], 11), Fit::kMoreThanShare) << "they are the caller's own";
+  EXPECT_TRUE(room_.FitsWithout(20, &callers_[0], FairShare::kNoLimit));
+  EXPECT_FALSE(room_.FitsWithout(21, &callers_[0], FairShare::kNoLimit));
+  room_.Take(&callers_[1], 1);
+  room_.RemoveBeyond(100);
+  EXPECT_EQ(room_.Fits(&callers_[1], 20), Fit::kMoreThanShare);
+  EXPECT_EQ(room_.Fits(&callers_[2], 19), Fit::kYes);
+  EXPECT_EQ(room_.Fits(&callers_[2], 20), Fit::kNoRoom);
 }
 
 TEST_F(Room, WhoHoldsNothingGetsWhatFits) {

@@ -1,5 +1,4 @@
-// Frames out of parts, in every order of their coming, and whatever is wrong with a part. Also
-// under ThreadSanitizer.
+// Frames in parts: every order of arrival, and every defect of a part. Also under ThreadSanitizer.
 #include "server/stream/frame_assembler.h"
 
 #include <gmock/gmock.h>
@@ -44,7 +43,7 @@ std::string ReasonOf(const absl::Status& status) {
   return violation ? violation->reason : std::string(status.message());
 }
 
-// An assembler with a member for each part; member 0 is the leader.
+// An assembler with one member per part; member 0 is the leader.
 class FrameAssemblerTest : public ::testing::Test {
  protected:
   void Begin(std::uint32_t parts, FrameAssembler::Terms terms = {}) {
@@ -63,7 +62,7 @@ class FrameAssemblerTest : public ::testing::Test {
   }
   absl::Status Offer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10) {
     return assembler_->Offer(seats_[part], sequence, bytes,
-                             std::make_shared<NumberedPart>(part, sequence));
+                             std::make_shared<NumberedPart>(part, sequence), begin_);
   }
   std::string Refusal(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10) {
     return ReasonOf(Offer(part, sequence, bytes));
@@ -71,7 +70,7 @@ class FrameAssemblerTest : public ::testing::Test {
   bool IsReady(std::uint64_t sequence, milliseconds age = milliseconds(0)) const {
     return assembler_->IsReady(sequence, begin_, begin_ + age);
   }
-  // Takes frame `sequence`, which is complete, and expects its parts in their order.
+  // Takes frame `sequence`, which must be complete, and checks its parts.
   void ExpectWhole(std::uint64_t sequence) {
     const auto taken = assembler_->Take();
     ASSERT_TRUE(taken.ok()) << taken.status();
@@ -90,7 +89,7 @@ class FrameAssemblerTest : public ::testing::Test {
 };
 
 TEST_F(FrameAssemblerTest, AFrameIsWholeWhenAllPartsHaveComeWhateverTheirOrder) {
-  // Events: parts 1 to 3 of frames 1 and 2; frame 2 may be whole before frame 1 is.
+  // Events: parts 1 to 3 of frames 1 and 2. Frame 2 may be complete before frame 1.
   std::vector<int> order(6);
   std::iota(order.begin(), order.end(), 0);
   do {
@@ -144,7 +143,8 @@ TEST_F(FrameAssemblerTest, AMissingPartIsNamedOnceItsTimeIsOverAndTheNextFrameGo
   EXPECT_FALSE(IsReady(1, milliseconds(99)));
   EXPECT_TRUE(IsReady(1, milliseconds(100)));
   const auto taken = assembler_->Take();
-  EXPECT_EQ(taken.status().message(), "parts: 1, 3; must come within 100 ms of part 0");
+  EXPECT_EQ(taken.status().message(),
+            "parts: 1, 3; must come within 100 ms of the first part of their frame");
   EXPECT_EQ(ReasonOf(taken.status()), kReasonPartsMissing);
   EXPECT_EQ(Refusal(1, 1), kReasonPartLate);  // Not answered yet, but too late.
   assembler_->Answered(2, false);
@@ -210,15 +210,49 @@ TEST_F(FrameAssemblerTest, ACallTakesOverAPartFromAnotherWhichThenCannotTakeItAw
   EXPECT_TRUE(second->left.empty());
 }
 
+TEST_F(FrameAssemblerTest, TheTimeoutBeginsWithTheFirstPartThatIsHeld) {
+  Begin(3);
+  ASSERT_TRUE(Offer(1, 1).ok());
+  const auto later = begin_ + milliseconds(60);  // Part 0 arrives.
+  assembler_->LeaderSent(1);
+  EXPECT_FALSE(assembler_->IsReady(1, later, begin_ + milliseconds(99)));
+  EXPECT_TRUE(assembler_->IsReady(1, later, begin_ + milliseconds(100)));
+}
+
+TEST_F(FrameAssemblerTest, PartsAreNotHeldForAPart0ThatDoesNotCome) {
+  Begin(3);
+  ASSERT_TRUE(Offer(1, 1, 900).ok());
+  EXPECT_FALSE(assembler_->IsOver(1, begin_ + milliseconds(99)));
+  EXPECT_TRUE(assembler_->IsOver(1, begin_ + milliseconds(100)));
+  EXPECT_EQ(assembler_->BytesOfNext(), 0u);
+  EXPECT_EQ(ReasonOf(assembler_->OutcomeOf(1)), kReasonPartsMissing);
+  EXPECT_EQ(FindViolation(assembler_->OutcomeOf(1))->value, "0, 1, 2");
+  EXPECT_EQ(Refusal(2, 1), kReasonPartLate);
+  EXPECT_EQ(Refusal(1, 2), "") << "the next frame is another one";
+  // Part 0 arrives too late.
+  assembler_->LeaderSent(1);
+  EXPECT_TRUE(IsReady(1));
+  EXPECT_EQ(ReasonOf(assembler_->Take().status()), kReasonPartsMissing);
+}
+
+TEST_F(FrameAssemblerTest, APartThatIsWithdrawnCanComeAgain) {
+  Begin(2);
+  ASSERT_TRUE(Offer(1, 1).ok());
+  assembler_->Withdraw(seats_[1], 1);
+  EXPECT_FALSE(IsReady(1));
+  EXPECT_EQ(Refusal(1, 1), "");
+  EXPECT_TRUE(IsReady(1));
+}
+
 TEST_F(FrameAssemblerTest, MembersAreToldOfAnswersAndOfTheEnd) {
   Begin(3);
-  EXPECT_FALSE(assembler_->IsOver(1));
+  EXPECT_FALSE(assembler_->IsOver(1, begin_));
   ASSERT_TRUE(Offer(1, 1).ok());
   ASSERT_TRUE(Offer(2, 1).ok());
   ExpectWhole(1);
   assembler_->TellMembers();
   EXPECT_EQ(members_[1]->looks, 1);
-  EXPECT_TRUE(assembler_->IsOver(1));
+  EXPECT_TRUE(assembler_->IsOver(1, begin_));
   EXPECT_TRUE(assembler_->OutcomeOf(1).ok());
   ASSERT_TRUE(Offer(1, 2).ok());
   assembler_->End(absl::OkStatus());
@@ -226,7 +260,7 @@ TEST_F(FrameAssemblerTest, MembersAreToldOfAnswersAndOfTheEnd) {
   EXPECT_TRUE(members_[1]->left[0].ok());
   EXPECT_EQ(ReasonOf(assembler_->OutcomeOf(2)), kReasonPartLate);
   EXPECT_EQ(ReasonOf(assembler_->Join(1, members_[1]).status()), kReasonLeaderGone);
-  assembler_->End(absl::OkStatus());  // Is told once.
+  assembler_->End(absl::OkStatus());  // Reported once.
   EXPECT_EQ(members_[1]->left.size(), 1u);
 }
 
@@ -237,14 +271,14 @@ TEST_F(FrameAssemblerTest, MembersOfALeaderThatIsLostAreToldToComeBack) {
   EXPECT_TRUE(absl::IsUnavailable(members_[1]->left[0]));
 }
 
-TEST_F(FrameAssemblerTest, PartsAreGivenUpOnceTheCheckpointThatCoversThemHasSurelyArrived) {
+TEST_F(FrameAssemblerTest, DropsPartsWhenACheckpointThatCoversThemHasArrived) {
   Begin(1, {.has_checkpoints = true});
   EXPECT_EQ(assembler_->resume_sequence(), 1u);
   for (std::uint64_t sequence = 1; sequence <= 4; ++sequence) {
     ASSERT_TRUE(assembler_->Take().ok());
     assembler_->Answered(sequence + 1, sequence == 2);
   }
-  assembler_->LeaderSent(5);  // Has received the answer to 1.
+  assembler_->LeaderSent(5);  // The client has received answer 1.
   EXPECT_EQ(assembler_->resume_sequence(), 1u);
   assembler_->LeaderSent(6);
   EXPECT_EQ(assembler_->resume_sequence(), 3u);

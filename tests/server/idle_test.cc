@@ -1,5 +1,5 @@
-// Streams that keep the server waiting. Times are told to the machine, not waited for, except where
-// the timer itself is asked.
+// Streams that keep the server waiting. Tests pass times to the machine instead of waiting, except
+// for the timer itself.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -24,7 +24,7 @@ constexpr IdleLimits kIdle{.opening = minutes(1), .streaming = minutes(10)};
 
 class Idle : public ::testing::Test {
  protected:
-  // Of the machine, as if that much time had passed.
+  // EndIfIdle of the machine as if `later` had passed.
   steady_clock::time_point EndIfIdle(milliseconds later, const IdleLimits& limits = kIdle) {
     return transport_.machine().EndIfIdle(limits, steady_clock::now() + later);
   }
@@ -65,7 +65,7 @@ TEST_F(Idle, AClientThatTakesNoAnswersIsCut) {
   transport_.Open();
   for (std::uint64_t i = 1; i <= 6; ++i) transport_.Send(i, MovingBlob(1, i));
   transport_.WaitUntilRead(2);
-  // Until both are computed, which is waiting for nobody but ourselves.
+  // Waits until both are computed; this wait is the server's, not the client's.
   while (transport_.machine().counts().frames < 2) std::this_thread::yield();
   EndIfIdle(minutes(10));
   ExpectIdle("takes no answer for 600 s");
@@ -78,7 +78,7 @@ TEST_F(Idle, WaitingForAWorkerDoesNotCount) {
   ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
   transport_.Send(1, MovingBlob(1, 0));
   transport_.Send(2, MovingBlob(1, 1));
-  transport_.WaitUntilRead(2);  // So the machine knows of the first one.
+  transport_.WaitUntilRead(2);  // So the machine has accepted the first one.
   EndIfIdle(minutes(100));
   go.set_value();
   EXPECT_EQ(transport_.Receive()->sequence, 1u);
@@ -104,7 +104,7 @@ TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
   ServerLimits limits;
   limits.idle = {.opening = milliseconds(20), .streaming = minutes(10)};
   const IdleTimer timer(registry, watchers, calls, limits);
-  // It sleeps already when they come.
+  // The timer already sleeps when they arrive.
   for (int round = 0; round < 3; ++round) {
     MemoryTransport transport(pool, 2, BlobParameters(), kLimits);
     ASSERT_TRUE(registry.Enter(transport.machine().shared_from_this()).ok());

@@ -1,4 +1,4 @@
-// One frame out of parts: which particles, in which order, and parts that do not fit each other.
+// Joining parts to one frame: particles, their order, and parts that do not fit.
 #include "server/calls/joined_frame.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ std::vector<Particle> RandomParticles(std::size_t count, std::uint64_t id_mask) 
   std::mt19937_64 random(3);
   std::vector<Particle> particles(count);
   for (std::size_t k = 0; k < count; ++k) {
-    // Different ids whose differing bytes are those of the mask.
+    // Distinct ids that differ only in the bytes of the mask.
     particles[k] = {.id = (k * 0x9e3779b97f4a7c15u) & id_mask,
                     .x = static_cast<float>(k),
                     .y = static_cast<float>(random() % 1000),
@@ -63,7 +63,7 @@ v1::ParticleFrame FrameOf(const std::vector<Particle>& particles, bool ids = tru
   return frame;
 }
 
-// Joined from `count` parts, each particle in a part that `part_of` tells.
+// Joins `count` parts; particle k is in part part_of(k).
 template <typename PartOf>
 v1::ParticleFrame Join(const std::vector<Particle>& particles, std::size_t count, bool ids,
                        PartOf part_of) {
@@ -80,7 +80,7 @@ v1::ParticleFrame Join(const std::vector<Particle>& particles, std::size_t count
   return frame;
 }
 
-TEST(JoinParts, ParticlesWithIdsMakeTheSameFrameHoweverTheyAreSpreadOverParts) {
+TEST(JoinParts, ParticlesWithIdsMakeTheSameFrameForAnyDistribution) {
   for (const std::uint64_t mask :
        {std::uint64_t{0xffff}, std::uint64_t{0xff00ff0000000000}, ~std::uint64_t{0}}) {
     auto particles = RandomParticles(5000, mask);

@@ -1,4 +1,4 @@
-// The log holds nobody up, tells what it left out, and has its last lines written.
+// The log never blocks, counts dropped lines, and writes its last lines.
 #include "server/telemetry/logging.h"
 
 #include <fcntl.h>
@@ -21,7 +21,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Only against hanging.
+// A timeout for hangs only.
 constexpr std::chrono::seconds kPatience(60);
 
 // A pipe of 4 KiB.
@@ -39,7 +39,7 @@ struct Pipe {
     if (ends[0] >= 0) close(ends[0]);
     ends[0] = -1;
   }
-  // Until these words have come.
+  // Reads until `words` have arrived.
   std::string ReadUntil(const std::string& words) {
     std::string text;
     char buffer[4096];
@@ -127,7 +127,7 @@ TEST(RateLimit, LetsSoManyThroughASecondAndCountsTheOthers) {
   EXPECT_EQ(limit.held_back_in_all(), 5u);
 }
 
-// The text of the log of `act`, which another process does and then leaves.
+// Runs `act` in another process and checks its log.
 #define EXPECT_LOG(act, ends, matcher)          \
   EXPECT_EXIT(                                  \
       {                                         \
@@ -139,7 +139,7 @@ TEST(RateLimit, LetsSoManyThroughASecondAndCountsTheOthers) {
 TEST(LoggingDeathTest, AFloodOfRefusalsIsTwentyLinesAndTheirNumber) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto flood = [] {
-    // Few seconds begin while this goes on.
+    // Takes few seconds, so few new periods begin.
     for (int k = 0; k < 10'000; ++k) {
       LogRefusal("call refused", "somebody", absl::InternalError(std::to_string(k)));
     }
@@ -190,7 +190,7 @@ TEST(LoggingDeathTest, AnExitHasWhatWasLoggedBeforeItWritten) {
       testing::ExitedWithCode(0), "line 999");
 }
 
-// The thread that is left behind logs while the process tears itself down.
+// The remaining thread logs while the process ends.
 TEST(LoggingDeathTest, AThreadMayLogUntilTheProcessIsGone) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_LOG(
@@ -228,7 +228,7 @@ TEST(LoggingDeathTest, WhatATerminalWouldObeyIsEscaped) {
                          "e\""));
 }
 
-// A client's name must not pass for a field of its own, or break a line into two.
+// A client's name must not look like another field or break a line.
 TEST(LoggingDeathTest, ValuesThatAreNoSingleWordAreQuoted) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_LOG(

@@ -1,4 +1,4 @@
-// Who gets memory when, how much a machine has, and what streams do when there is none.
+// The memory budget: who gets memory, how much a machine has, and how streams behave without it.
 #include "server/compute/memory_budget.h"
 
 #include <gmock/gmock.h>
@@ -154,13 +154,13 @@ TEST(MemoryOfStreams, WithoutAnyBudgetEveryStreamStillGoesOnFrameByFrame) {
   other.join();
   EXPECT_EQ(of_two, 12u);
   EXPECT_TRUE(one.status().ok() && two.status().ok());
-  // One answer is in the transport, neither inside the server nor received.
+  // One answer is in the transport, neither in the server nor received.
   EXPECT_LE(one.most_inside(), 2u);
   EXPECT_EQ(budget.held(), 0u);
 }
 
-// A stream that takes no answers pins what it has; the others do not stand still for it, and when
-// it goes they have the whole budget again.
+// A stream that does not receive pins its memory. The others continue, and get the whole budget
+// when it ends.
 TEST(MemoryOfStreams, AStreamThatPinsTheBudgetStopsNobody) {
   ComputePool pool(2);
   MemoryBudget budget(FrameBytes() * 3);
@@ -197,7 +197,7 @@ TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
     }
     for (std::thread& client : clients) client.join();
     transports.clear();
-    pool.reset();  // Its threads may be about to tell a stream of memory that it wanted once.
+    pool.reset();  // Its threads may still notify streams of free memory.
     EXPECT_EQ(budget.held(), 0u) << "round " << round;
   }
 }

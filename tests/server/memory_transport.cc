@@ -187,7 +187,7 @@ void MemoryTransport::WriteLoop() {
     bool written = false;
     {
       std::unique_lock lock(mutex_);
-      // A client that has not received the answer before keeps this one waiting.
+      // Waits until the client has received the previous answer.
       changed_.wait(
           lock, [this] { return finished_ || (being_written_ && (cancelled_ || !to_receive_)); });
       if (finished_) return;

@@ -1,5 +1,5 @@
-// A transport in memory: the client's and the server's end of one stream, without gRPC. Requests
-// and answers travel on threads of their own, as they do in gRPC.
+// An in-memory transport: both ends of one stream, without gRPC. As in gRPC, requests and responses
+// travel on their own threads.
 #pragma once
 
 #include <condition_variable>
@@ -29,7 +29,7 @@ struct MemoryRequest {
 struct MemoryAnswer {
   Outgoing what = Outgoing::kAnswer;
   std::uint64_t sequence = 0;
-  std::string reason;  // Of a frame error; empty for a result.
+  std::string reason;  // Reason of a frame error; empty for a result.
   std::pair<std::uint64_t, std::uint64_t> digests;
 
   friend bool operator==(const MemoryAnswer&, const MemoryAnswer&) = default;
@@ -39,31 +39,30 @@ class MemoryTransport final : private StreamTransport, private StreamHandler {
  public:
   MemoryTransport(ComputePool& pool, std::size_t window, const ReconstructionParameters& parameters,
                   const FrameLimits& limits);
-  /// With the others of `budget`. A request counts 16 bytes a particle, an answer nothing.
+  /// Shares `budget`. A request counts 16 bytes per particle, a response nothing.
   MemoryTransport(ComputePool& pool, MemoryBudget& budget, std::size_t window,
                   const ReconstructionParameters& parameters, const FrameLimits& limits);
-  /// Cancels what goes on and waits for the end.
+  /// Cancels pending work and waits for the end.
   ~MemoryTransport() override;
 
-  // The client's end. Sending never blocks; what the server does not read waits here.
+  // The client's end. Sending never blocks; requests wait here until the server reads them.
   void Open();
   void Send(std::uint64_t sequence, std::vector<double> positions);
   void SendRequest(MemoryRequest request);
   void HalfClose();
   void Cancel();
-  /// The next answer, which the server then knows to be taken, or nothing once the stream has
-  /// finished.
+  /// The next answer, which then counts as received; empty when the stream has finished.
   std::optional<MemoryAnswer> Receive();
-  /// Once finished; waits for it.
+  /// Waits until the stream has finished.
   absl::Status status();
 
-  /// Called by the worker before it answers a frame. To be set before the first one is sent.
+  /// Called by the worker before it answers a frame. Set it before the first frame.
   std::function<void()> when_answering = [] {};
 
   StreamStateMachine& machine() { return *machine_; }
-  /// The most frames that were inside the server at once: read, and their answer not received.
+  /// Maximum number of frames in the server at once: read, but their answers not received.
   std::size_t most_inside() const;
-  /// Waits until as many frames have been read.
+  /// Waits until `frames` frames have been read.
   void WaitUntilRead(std::size_t frames);
 
  private:
@@ -80,8 +79,8 @@ class MemoryTransport final : private StreamTransport, private StreamHandler {
   const ReconstructionParameters parameters_;
   const FrameLimits limits_;
   std::vector<MemoryRequest>
-      requests_;                       // By slot; handed over by StreamStateMachine's rules alone.
-  std::vector<MemoryAnswer> answers_;  // Likewise.
+      requests_;                       // By slot; guarded only by the rules of StreamStateMachine.
+  std::vector<MemoryAnswer> answers_;  // As above.
   std::optional<Session> session_;
   std::shared_ptr<StreamStateMachine> machine_;
 
@@ -92,7 +91,7 @@ class MemoryTransport final : private StreamTransport, private StreamHandler {
   std::optional<std::size_t> read_slot_;
   std::optional<MemoryAnswer> being_written_;
   std::optional<MemoryAnswer> to_receive_;
-  bool telling_ = false;  // The machine that a write is done.
+  bool telling_ = false;  // A thread is in OnWriteDone.
   std::optional<absl::Status> finished_;
   std::size_t frames_read_ = 0, frames_received_ = 0, most_inside_ = 0;
 

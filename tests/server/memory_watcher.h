@@ -1,5 +1,5 @@
-// A watcher in memory: the client's and the server's end of one watch, without gRPC. Requests and
-// frames travel on a thread of their own, as they do in gRPC.
+// An in-memory watcher: both ends of one watch, without gRPC. As in gRPC, requests and frames
+// travel on their own threads.
 #pragma once
 
 #include <condition_variable>
@@ -18,7 +18,7 @@
 
 namespace partiemc::server {
 
-/// A frame that knows which one it is.
+/// A frame with its number.
 class NumberedFrame final : public WatchFrame {
  public:
   NumberedFrame(std::uint64_t frame_number, std::size_t bytes)
@@ -34,32 +34,32 @@ struct SeenFrame {
 
 class MemoryWatcher final : private WatchTransport {
  public:
-  /// Opens at once.
+  /// Opens immediately.
   MemoryWatcher(std::shared_ptr<ResultBroadcaster> broadcaster, WatchMode mode,
                 std::uint64_t credit, std::size_t max_bytes,
                 std::optional<std::uint64_t> from_sequence = std::nullopt);
-  /// Cancels what goes on and waits for the end.
+  /// Cancels the watch and waits for the end.
   ~MemoryWatcher() override;
 
   // The client's end.
   void Credit(std::uint64_t frames);
   void Cancel();
-  /// What is written from here on is not taken: one write stays under way.
+  /// Stops accepting writes: one write stays in progress.
   void StopReading();
-  /// Waits until it is told that it is in.
+  /// Waits for `opened`.
   void WaitUntilOpened();
-  /// Of the answer to its `open`, once it is told that it is in.
+  /// The history range in `opened`; requires that it has arrived.
   HeldFrames held() const;
-  /// Waits until as many frames have come in all, or the watch has ended.
+  /// Waits until `count` frames have arrived in total, or the watch has ended.
   void WaitForFrames(std::size_t count);
   /// Waits for the end.
   absl::Status status();
 
   std::vector<SeenFrame> seen() const;
-  /// Of the last message, once the watch has ended with one.
+  /// Reason in the last message of an ended watch; empty if there is none.
   std::string end_reason() const;
   std::uint64_t end_dropped() const;
-  /// Frames that came without credit for them; two writes at once throw.
+  /// Frames received without credit. Two concurrent writes throw.
   std::uint64_t unpaid() const;
 
   WatchStateMachine& machine() { return *machine_; }

@@ -1,6 +1,6 @@
-// Streams of random orders of messages and events, legal and illegal, each step of which is held
-// against a small model. PARTIEMC_ORDERS sets how many: the default is for every day, 1000000 for a
-// release. An order prints its seed when it fails; PARTIEMC_SEED starts from that one.
+// Streams with random orders of legal and illegal messages and events. Each step is compared with a
+// small model. PARTIEMC_ORDERS sets the number of orders: the default is for daily runs, 1000000
+// for a release. A failing order prints its seed; PARTIEMC_SEED starts from it.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -10,6 +10,7 @@
 #include <string>
 
 #include "partiemc/status.h"
+#include "server/reached_states.h"
 #include "server/scripted_transport.h"
 #include "server/stream_model.h"
 #include "support/random.h"
@@ -30,7 +31,7 @@ ReconstructionParameters Parameters(bool legal) {
       .placement = Placement::kMarchingSquares, .spacing = 1, .kernel_radius = legal ? 2.0 : 99.0};
 }
 
-// The good frame that comes after `index` other good ones: a few particles that move.
+// Good frame number `index`: a few moving particles.
 std::vector<double> GoodFrame(std::size_t index) {
   std::vector<double> positions;
   for (int k = 0; k < 9; ++k) {
@@ -51,17 +52,19 @@ std::vector<StreamModel::Digests> ResultsOfAnUndisturbedStream() {
   return results;
 }
 
-// One order: a client, a network and a server in trouble, all of them from one seed.
+// One order of events between a client, a network and a server, determined by one seed.
 class Order {
  public:
   Order(std::uint64_t seed, SteppedPool& pool, MemoryBudget& budget,
-        const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen)
+        const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen,
+        ReachedStates& reached)
       : random_(seed),
         window_(1 + random_.Below(4)),
         legal_(!random_.Chance(0.03)),
         slow_reader_(random_.Chance(0.3)),
         pool_(pool),
         seen_(seen),
+        reached_(reached),
         model_(window_, legal_, results),
         transport_(pool, budget, window_, Parameters(legal_), kLimits) {}
 
@@ -81,7 +84,7 @@ class Order {
         FAIL() << "stands still";
       }
     }
-    if (transport_.reading()) EndReads();  // What a transport may still do after the end.
+    if (transport_.reading()) EndReads();  // Allowed for a transport after the end.
     transport_.machine().Cancelled();
     transport_.machine().Drain();
     transport_.machine().TakenOver();
@@ -106,8 +109,12 @@ class Order {
     }
   }
 
-  // What may happen at any moment, also in the middle of opening and answering.
+  // Events that may occur at any moment, also during opening and answering.
   void SomethingMeanwhile() {
+    SomeEvent();
+    reached_.Add(transport_.machine().state());
+  }
+  void SomeEvent() {
     switch (random_.Below(4)) {
       case 0:
         return Cancel();
@@ -136,7 +143,7 @@ class Order {
   }
 
   std::pair<MemoryRequest, std::string> RandomRequest() {
-    // Nearly always `open` first and frames behind it, so that streams get somewhere.
+    // Usually `open` first and frames after it, so that streams progress.
     const bool first = std::exchange(first_, false);
     if (first != random_.Chance(0.04)) return {{RequestKind::kOpen, 0, {}}, ""};
     if (random_.Chance(0.01)) return {{RequestKind::kMalformed, 0, {}}, ""};
@@ -210,6 +217,7 @@ class Order {
 
   void ExpectAsPredicted(const char* after) {
     SCOPED_TRACE(testing::Message() << "after " << after);
+    reached_.Add(transport_.machine().state());
     EXPECT_EQ(transport_.reading(), model_.reading());
     EXPECT_EQ(transport_.writing() == model_.writing(), true)
         << "sequence " << (transport_.writing() ? transport_.writing()->sequence : 0) << " and "
@@ -233,6 +241,7 @@ class Order {
   const bool legal_, slow_reader_;
   SteppedPool& pool_;
   std::map<std::string, int>& seen_;
+  ReachedStates& reached_;
   StreamModel model_;
   ScriptedTransport transport_;
   bool first_ = true, half_closed_ = false;
@@ -245,15 +254,18 @@ TEST(MessageOrders, AreAnsweredAsTheModelSays) {
   SteppedPool pool;
   MemoryBudget budget(std::uint64_t{1} << 40);
   std::map<std::string, int> seen;
+  ReachedStates reached;
   for (std::uint64_t seed = first; seed < first + orders; ++seed) {
     SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed << " PARTIEMC_ORDERS=1");
-    Order(seed, pool, budget, results, seen).Run();
+    Order(seed, pool, budget, results, seen, reached).Run();
     EXPECT_EQ(budget.held(), 0u);
-    if (HasFailure()) return;  // The first order tells more than a flood.
+    if (HasFailure()) return;  // The first failure is enough.
   }
   for (const auto& [what, count] : seen) std::cout << what << ": " << count << '\n';
   if (orders < 1000) return;
-  // The script reaches everything that it is about.
+  std::cout << "states reached: " << reached.count() << '\n';
+  reached.ExpectAllRowsOf(MachineKind::kStream);
+  // All kinds of events must have occurred.
   for (const char* end :
        {"OK ", "CANCELLED ", "INVALID_ARGUMENT PROTOCOL", "UNAVAILABLE DRAINING",
         "DEADLINE_EXCEEDED IDLE", "ABORTED TAKEN_OVER", "INVALID_ARGUMENT OUT_OF_RANGE"}) {

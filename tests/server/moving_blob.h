@@ -1,5 +1,5 @@
-// A sequence of frames for tests: a jittered disc with a hole that drifts and turns, of which some
-// particles fly off. The same bits for the same arguments.
+// A reproducible sequence of frames for tests: a jittered disc with a hole that drifts and turns
+// and loses some particles.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ inline ReconstructionParameters BlobParameters() {
   return parameters;
 }
 
-/// Interleaved x, y of frame `index` of the sequence that `seed` names; about 1,200 particles.
+/// Interleaved x, y of frame `index` of sequence `seed`; about 1,200 particles.
 inline std::vector<double> MovingBlob(unsigned seed, std::uint64_t index) {
-  // Not a standard distribution: its values are the library's own choice.
+  // Not a standard distribution: its values differ between libraries.
   std::mt19937_64 random(seed * 1000003ull + index);
   const auto jitter = [&] {
     return (static_cast<double>(random() >> 11) * 0x1p-53 - 0.5) * 0.4 * kBlobSpacing;

@@ -1,4 +1,4 @@
-// Which of the calls that have not opened gives way; also under ThreadSanitizer.
+// Which unopened call is evicted; also under ThreadSanitizer.
 #include "server/stream/opening_calls.h"
 
 #include <gtest/gtest.h>
@@ -24,10 +24,10 @@
 namespace partiemc::server {
 namespace {
 
-// Calls by number, and what became of them.
+// Calls by number, with their ends.
 class Calls : public ::testing::Test {
  protected:
-  // Numbered from 0 on.
+  // Numbers the calls from 0.
   int Begin(const CallerAccount& caller) {
     const int number = static_cast<int>(places_.size());
     places_.push_back(opening_.Enter(caller, [this, number](const absl::Status& status) {
@@ -36,7 +36,7 @@ class Calls : public ::testing::Test {
     }));
     return number;
   }
-  // One that is open and waits for a request.
+  // An open watch that waits for a request.
   int Watch(const CallerAccount& caller) {
     const int number = static_cast<int>(places_.size());
     places_.push_back(opening_.EnterWatcher(caller, [this, number](const absl::Status& status) {
@@ -45,7 +45,7 @@ class Calls : public ::testing::Test {
     }));
     return number;
   }
-  // Its request has come, or it is over.
+  // Its request has arrived, or it has ended.
   void Opens(int number) { places_[static_cast<std::size_t>(number)] = {}; }
 
   OpeningCalls opening_{4};
@@ -71,7 +71,7 @@ TEST_F(Calls, GiveWayToOthersTheOldestOfWhoHasMostFirst) {
 }
 
 TEST_F(Calls, OfOneCallerGiveWayToItsOwn) {
-  // As behind a proxy, where all have its address.
+  // As behind a proxy, where all calls have its address.
   for (int i = 0; i < 10; ++i) Begin(mallory_);
   EXPECT_EQ(gone_, (std::vector<int>{0, 1, 2, 3, 4, 5}));
 }
@@ -110,12 +110,12 @@ TEST_F(Calls, ThatWatchGiveWayWhereMemoryIsShort) {
   EXPECT_EQ(FindViolation(status_)->field, "watchers");
 }
 
-// A process whose memory the test sets.
+// A process with simulated memory.
 class Guarded : public Calls {
  protected:
   static constexpr std::uint64_t kMost = 1000;
 
-  // Until that is so, or it takes too long.
+  // Waits until the condition holds or a timeout expires.
   template <typename Condition>
   static bool Eventually(Condition condition) {
     for (int k = 0; k < 2'000 && !condition(); ++k) {
@@ -161,19 +161,19 @@ TEST_F(Guarded, CallsStayWhereStreamsHaveBeenGrantedMore) {
   const int looked = looks_;
   ASSERT_TRUE(Eventually([&] { return looks_ > looked + 3; }));
   EXPECT_EQ(opening_.count(), 1u);
-  more_ = kMost;  // Watchers have as much.
+  more_ = kMost;  // Held by watchers.
   most_ = kMost;
   const int looked_again = looks_;
   ASSERT_TRUE(Eventually([&] { return looks_ > looked_again + 3; }));
   EXPECT_EQ(opening_.count(), 1u);
-  more_ = kMost - 1;  // They have given it back, and somebody else has it.
+  more_ = kMost - 1;  // Freed by them and taken by another.
   EXPECT_TRUE(Eventually([&] { return opening_.count() == 0; }));
 }
 
 TEST_F(Guarded, WatchersGiveWayToo) {
   resident_ = kMost + 1;
   Watch(mallory_);
-  // Looks no more once nobody is left.
+  // Stops checking when no call is left.
   ASSERT_TRUE(Eventually([&] {
     const int looked = looks_;
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -233,12 +233,12 @@ TEST_F(Calls, ThatAreOverWhileTheyGiveWayAreOverOnce) {
   EXPECT_EQ(opening_.count(), 0u);
 }
 
-// By the definition, looking at all.
+// Straightforward implementation that searches all calls.
 class SlowOpeningCalls {
  public:
   explicit SlowOpeningCalls(std::size_t places) : places_(places) {}
 
-  // The number of the call that gives way, or -1.
+  // The number of the evicted call, or -1.
   int Enter(int caller, int number) {
     int gone = -1;
     if (calls_.size() == places_) {
@@ -260,7 +260,7 @@ class SlowOpeningCalls {
 
  private:
   const std::size_t places_;
-  std::vector<std::pair<int, int>> calls_;  // Caller and number, in the order in which they came.
+  std::vector<std::pair<int, int>> calls_;  // Caller and number, in the order of arrival.
 };
 
 TEST(OpeningCalls, ChooseAsTheirDefinitionSays) {

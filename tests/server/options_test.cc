@@ -1,4 +1,4 @@
-// The command line, the environment and the config file of the server; addresses.
+// Command line, environment and config file of the server; addresses.
 #include "server/options.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,7 @@ CommandLine Parsed(std::vector<const char*> arguments) {
   return early == nullptr ? std::get<CommandLine>(parsed) : CommandLine{};
 }
 
-// The one line with which the arguments are refused.
+// The error line for these arguments.
 std::string Refused(std::vector<const char*> arguments) {
   const auto parsed = Parse(std::move(arguments));
   const auto* early = std::get_if<EarlyExit>(&parsed);
@@ -40,7 +40,7 @@ std::string Refused(std::vector<const char*> arguments) {
   return early->text;
 }
 
-// Set for the length of a test.
+// Sets a variable during a test.
 class Environment {
  public:
   Environment(const char* name, const char* value) : name_(name) { setenv(name, value, 1); }
@@ -59,8 +59,10 @@ TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
   EXPECT_THAT(early->text, HasSubstr("      48 MiB  3 compute threads"));
   EXPECT_THAT(early->text, HasSubstr("       8 MiB  results for who goes back"));
   EXPECT_THAT(early->text, HasSubstr("    1016 MiB  requests and answers"));
-  // 24 + 48 + 8 + 1016 + 2 x 63.5 + 64
-  EXPECT_THAT(early->text, HasSubstr("    1287 MiB  in all"));
+  EXPECT_THAT(early->text, HasSubstr("     640 MiB  frames of 2 streams beyond that"));
+  EXPECT_THAT(early->text, HasSubstr("     305 MiB  computing one frame beyond that"));
+  // 24 + 48 + 8 + 1016 + 640 + 305 + 63.5 + 64 + 66
+  EXPECT_THAT(early->text, HasSubstr("    2235 MiB  in all"));
 }
 
 TEST(CommandLineOptions, WhatIsAdvertisedIsAnAddressThatOthersReach) {

@@ -1,4 +1,4 @@
-// What a stream holds for watchers that go back: bounds, order, drops, and the shares of many.
+// A stream's history: limits, order, drops, and shares of several streams.
 #include "server/watch/result_history.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(ResultHistory, KeepsAsManyOfTheNewestAsFitInTheirOrder) {
   constexpr std::uint64_t kMost = 20'000;
   HistoryRoom room(kMost, 1'000'000);
   ResultHistory history(room);
-  std::deque<std::uint64_t> numbers, costs;  // The same, written down plainly.
+  std::deque<std::uint64_t> numbers, costs;  // The same as a plain list.
   std::uint64_t sum = 0;
   for (std::uint64_t number = 1; number <= 3000; ++number) {
     const std::size_t bytes = random() % 8 == 0 ? random() % 40'000 : random() % 3000;
@@ -54,7 +54,7 @@ TEST(ResultHistory, HasNoHole) {
   ResultHistory history(room);
   for (const std::uint64_t number : {1, 2, 3, 5}) history.Add(Frame(number));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{5}));
-  history.Add(Frame(6, 101 * kCost));  // Too large, and what comes after it has a hole before it.
+  history.Add(Frame(6, 101 * kCost));  // Too large, so the next result has a gap before it.
   EXPECT_TRUE(history.empty());
   history.Add(Frame(7));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{7}));
@@ -73,14 +73,14 @@ TEST(ResultHistory, ManyHaveEqualSharesAndNeverMoreThanThereIs) {
     ResultHistory third(room);
     EXPECT_TRUE(room.is_scarce());
     EXPECT_EQ(room.share(), 4 * kCost);
-    third.Add(Frame(1));  // The others have not heard of it yet.
+    third.Add(Frame(1));  // The others have not been notified yet.
     EXPECT_TRUE(third.empty());
     EXPECT_EQ(room.held(), 12 * kCost);
     first.Shrink();
     EXPECT_EQ(NumbersOf(first), (std::vector<std::uint64_t>{6, 7, 8, 9}));
     third.Add(Frame(2));
     third.Add(Frame(3));
-    third.Add(Frame(4));  // The second still has more than its share: in place of an own one.
+    third.Add(Frame(4));  // The second still exceeds its share, so one of its results is dropped.
     EXPECT_EQ(NumbersOf(third), (std::vector<std::uint64_t>{3, 4}));
     EXPECT_EQ(room.held(), 12 * kCost);
     second.Add(Frame(10));

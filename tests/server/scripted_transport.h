@@ -1,6 +1,6 @@
-// A transport in which nothing happens by itself: a test decides when a read brings what, when a
-// write has gone out and when a worker takes its next job, and sees what the machine asks for next.
-// The same script gives the same run, however many threads are behind it.
+// A transport controlled step by step: the test decides when a read delivers, when a write ends and
+// when a worker takes a job, and observes the machine's requests. The same script gives the same
+// run for any number of threads.
 #pragma once
 
 #include <functional>
@@ -17,13 +17,13 @@
 
 namespace partiemc::server {
 
-/// A pool whose only thread takes one job at a time, when it is told to.
+/// A pool whose only thread runs jobs on request.
 class SteppedPool {
  public:
   SteppedPool() { Hold(); }
   ~SteppedPool() { go_on_.release(); }
 
-  /// Runs what was submitted so far, with what follows each job, and returns when that is done.
+  /// Runs all submitted jobs and the work after them; returns when they have ended.
   void Step() {
     pool_.Submit([this](Worker&) { WaitHere(); });
     go_on_.release();
@@ -50,20 +50,20 @@ class ScriptedTransport final : private StreamTransport, private StreamHandler {
   ScriptedTransport(SteppedPool& pool, MemoryBudget& budget, std::size_t window,
                     const ReconstructionParameters& parameters, const FrameLimits& limits);
 
-  // What the machine has asked for and not been told the end of.
+  // Pending operations of the machine.
   bool reading() const { return read_slot_.has_value(); }
   const std::optional<MemoryAnswer>& writing() const { return writing_; }
   bool cut() const { return cut_; }
   const std::optional<absl::Status>& finished() const { return finished_; }
 
-  // What happens next. Require what they end to be going on.
+  // Events. Each requires that the operation it ends is pending.
   void BringRequest(MemoryRequest request);
   void EndReads();
   void EndWrite(bool ok);
 
-  /// Called in the middle of opening or answering, once.
+  /// Called once during opening or answering.
   std::function<void()> meanwhile;
-  /// What each answer leaves to do.
+  /// Work left after each answer.
   std::function<void()> afterwards;
 
   StreamStateMachine& machine() { return *machine_; }
@@ -89,7 +89,7 @@ class ScriptedTransport final : private StreamTransport, private StreamHandler {
   std::shared_ptr<StreamStateMachine> machine_;
 };
 
-/// A session's answer to `request`, as tests in memory compare it.
+/// A session's answer to `request` in the form that in-memory tests compare.
 MemoryAnswer AnswerInMemory(const MemoryRequest& request, Session& session, Worker& worker);
 
 }  // namespace partiemc::server

@@ -51,7 +51,7 @@ class Stream {
   absl::Status Answer(std::uint64_t sequence, const std::vector<double>& positions) {
     return Answer(sequence, FrameOf(positions));
   }
-  // Reconstructs frame `index` of the sequence under the number that comes next.
+  // Reconstructs frame `index` of the sequence under the next number.
   Digests Good(std::uint64_t index) {
     const auto status = Answer(session_.next_sequence(), MovingBlob(kSeed, index));
     EXPECT_TRUE(status.ok()) << status;
@@ -90,7 +90,7 @@ TEST(Session, RefusesParametersThatTheCoreRefuses) {
   EXPECT_EQ(FindViolation(session.status())->field, "parameters.kernel_radius");
 }
 
-TEST(Session, ABadFrameIsRefusedAndTheNextOneIsReconstructedAsIfItHadNeverCome) {
+TEST(Session, ARefusedFrameDoesNotChangeTheNextResult) {
   Stream undisturbed, spoiled;
   std::vector<double> nan = MovingBlob(kSeed, 1);
   nan[7] = std::numeric_limits<double>::quiet_NaN();
@@ -177,7 +177,7 @@ TEST(Session, MemoryThatRunsOutIsAnErrorOfTheFrameAndTheStreamGoesOn) {
   EXPECT_EQ(stream.Good(1), undisturbed.Good(1));
 }
 
-// Particles in four tiles each, of which none is shared.
+// Particles at corners of tiles, each in four tiles that no other particle uses.
 std::vector<double> CornersOfTiles(int side) {
   std::vector<double> positions;
   for (int k = 0; k < side * side; ++k) {
@@ -187,7 +187,7 @@ std::vector<double> CornersOfTiles(int side) {
   return positions;
 }
 
-TEST(Session, TilesThatTheBudgetHasNoRoomForAreAnErrorOfTheFrameAndTheStreamGoesOn) {
+TEST(Session, TilesBeyondTheBudgetRefuseTheFrameOnly) {
   MemoryBudget budget(std::uint64_t{20} << 20);
   Worker worker(nullptr, &budget);
   Session session =
@@ -245,7 +245,7 @@ TEST(Session, TheWorkerThatComputesMakesNoDifference) {
     const Digests expected = one.Good(i);
     const std::vector<double> positions = MovingBlob(kSeed, i);
     Digests digests;
-    // Each worker has seen other frames than the other.
+    // The workers have computed different frames.
     const auto status =
         two.Answer(i + 1, FrameOf(positions), workers[i % 2], [&](const Result& result, auto&) {
           digests = {DigestRings(result.rings), DigestMesh(result.mesh)};
@@ -282,7 +282,7 @@ TEST(Session, AStreamHoldsNothingOfALargerOneThatHadTheSameWorker) {
   Session large = *Session::Open(BlobParameters(), kLarge);
   std::size_t before = 0;
   for (std::size_t k = 0; k <= kSessions; ++k) {
-    if (k == 1) before = HeldBytes();  // All is warm.
+    if (k == 1) before = HeldBytes();  // Warm from now on.
     ASSERT_TRUE(large.Answer(k + 1, FrameOf(spray), worker, ignore).ok());
     ASSERT_TRUE(small[k].Answer(1, FrameOf(pair), worker, ignore).ok());
   }

@@ -80,7 +80,7 @@ void StreamModel::Drained() {
   GoOn();
 }
 
-// A stream that waits for us, not for its client, is not idle.
+// A stream that waits for the server is not idle.
 void StreamModel::WaitedTooLong() {
   if (phase_ == Phase::kAbandoned || phase_ == Phase::kFinished || opening_ || computing_) return;
   if (writing_) {
@@ -123,7 +123,7 @@ void StreamModel::Abandon(StreamEnd end) {
   end_ = std::move(end);
 }
 
-// Begins everything that can begin.
+// Begins every operation that can begin.
 void StreamModel::GoOn() {
   const std::size_t inside = answers_.size() - written_;
   const bool reads = phase_ == Phase::kOpening || (phase_ == Phase::kStreaming && inside < window_);

@@ -1,5 +1,5 @@
-// What a stream does, told as shortly as PROTOCOL.md tells it and without any of the server's code:
-// the tests hold StreamStateMachine and Session against it.
+// A small model of a stream by PROTOCOL.md, without any server code: the reference for
+// StreamStateMachine and Session.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace partiemc::server {
 
-/// Why a stream ended.
+/// Reason of a stream's end.
 struct StreamEnd {
   absl::StatusCode code = absl::StatusCode::kOk;
   std::string reason;
@@ -27,8 +27,8 @@ class StreamModel {
   using Digests = std::pair<std::uint64_t, std::uint64_t>;
   StreamModel(std::size_t window, bool may_open, const std::vector<Digests>& results);
 
-  // What happens, in the order in which it takes effect.
-  /// `fault`: the reason for which the frame would be refused whatever its number; empty: none.
+  // Events in the order in which they take effect.
+  /// `fault`: the reason for which the frame would be refused with any number; empty: none.
   void RequestCame(const MemoryRequest& request, const std::string& fault);
   void OpeningDone();
   void ReadsEnded();
@@ -37,11 +37,11 @@ class StreamModel {
   void Drained();
   void WaitedTooLong();
   void TakenOver();
-  /// A worker takes the next frame; false where nobody waits for its answer any more.
+  /// A worker takes the next frame; false if no client waits for its answer.
   bool TakeUp();
   void Computed(bool answered);
 
-  // What has to be going on then.
+  // Operations that must then be pending.
   bool reading() const { return reading_; }
   bool opening() const { return opening_; }
   bool computing() const { return computing_; }
@@ -52,7 +52,7 @@ class StreamModel {
   std::uint64_t errors() const { return errors_; }
   std::uint64_t last_sequence() const { return last_sequence_; }
 
-  /// The number that a frame has to have now, and how many good ones came before.
+  /// The number that the next frame must have, and the number of good frames before it.
   std::uint64_t next_sequence() const { return next_sequence_; }
   std::size_t good_frames() const { return good_frames_; }
 
@@ -69,8 +69,8 @@ class StreamModel {
   const std::vector<Digests>& digests_;
   Phase phase_ = Phase::kOpening;
   StreamEnd end_;
-  std::vector<MemoryAnswer> answers_;     // To the frames that were read.
-  std::vector<std::uint64_t> sequences_;  // The last one used up, after each of them.
+  std::vector<MemoryAnswer> answers_;     // Answers to the frames that were read.
+  std::vector<std::uint64_t> sequences_;  // The last used number after each answer.
   std::size_t computed_ = 0, written_ = 0;
   bool reading_ = false, opening_ = false, computing_ = false, cut_ = false;
   bool owes_opened_ = false, owes_notice_ = false;

@@ -1,4 +1,4 @@
-// Who may open a stream, and how all are sent home.
+// Who may open a stream, and how streams end in a drain.
 #include "server/stream/stream_registry.h"
 
 #include <gmock/gmock.h>
@@ -60,7 +60,7 @@ TEST_F(Registry, OneStreamTooManyIsRefusedAtOnceWithTheLimitAndTheWayOut) {
   EXPECT_TRUE(Open(*late, "late").ok());
 }
 
-// A caller with a token of this line.
+// A caller with a token with these terms.
 Caller CallerWith(const CallerTerms& terms) {
   return Caller(std::make_shared<const CallerTerms>(terms),
                 std::make_shared<CallerAccount>(terms.quota));
@@ -89,7 +89,7 @@ TEST_F(Registry, AStreamThatIsTakenOverPassesItsPlaceOn) {
   registry_.Close(*first);
   EXPECT_EQ(caller.account()->held(CallerAccount::Kind::kStream), 1u);
   EXPECT_FALSE(Open(*third, "").ok());
-  // To another caller, who has the stream's token: that one's quota counts.
+  // Resumed by another caller with the stream's token: that caller's quota applies.
   const Caller other = CallerWith({.quota = {.streams = 1}});
   const auto fourth = Enter(other);
   ASSERT_TRUE(registry_.Open(*fourth, {.name = "", .labels = {}, .parameters = {}}, token).ok());

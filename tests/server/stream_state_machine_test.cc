@@ -1,5 +1,5 @@
-// The machine of messages through a stream, over a transport in memory: order, window, ends, and
-// results that do not depend on who else computes. Also under ThreadSanitizer.
+// StreamStateMachine over an in-memory transport: order, window, ends, and results that do not
+// depend on other streams. Also under ThreadSanitizer.
 #include "server/stream/stream_state_machine.h"
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ using ::testing::ElementsAre;
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 constexpr std::size_t kWindow = 4;
 
-// Holds up a pool's only thread until it is let go.
+// Blocks a pool's only thread until opened.
 class Gate {
  public:
   explicit Gate(ComputePool& pool) {
@@ -50,7 +50,7 @@ std::vector<MemoryAnswer> ReceiveAll(MemoryTransport& transport) {
   return answers;
 }
 
-// The answers of a whole stream of the blob of `seed`, opened and half-closed.
+// The answers of a whole stream of blob `seed`, opened and half-closed.
 std::vector<MemoryAnswer> RunStream(ComputePool& pool, unsigned seed, std::uint64_t frames) {
   MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
   transport.Open();
@@ -84,21 +84,21 @@ TEST(StreamStateMachine, ReadsNoFurtherAheadThanTheWindowWhenTheClientDoesNotRec
     transport.Open();
     for (std::uint64_t i = 1; i <= 20; ++i) transport.Send(i, MovingBlob(1, i));
     transport.HalfClose();
-    // The transport itself holds `opened`; behind it the window fills, and no more.
+    // The transport holds `opened`; the window fills behind it, and no more.
     transport.WaitUntilRead(window);
     EXPECT_EQ(ReceiveAll(transport).size(), 21u);
-    // The transport holds one answer that is neither inside the server nor received.
+    // The transport holds one answer that is neither in the server nor received.
     EXPECT_LE(transport.most_inside(), window + 1);
     EXPECT_GE(transport.most_inside(), window);
   }
 }
 
-TEST(StreamStateMachine, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoiledHadNeverCome) {
+TEST(StreamStateMachine, SpoiledFramesDoNotChangeTheOtherResults) {
   ComputePool pool(2);
   const auto undisturbed = RunStream(pool, 5, 20);
   MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
   transport.Open();
-  std::vector<std::string> expected;  // By answer; empty for a result.
+  std::vector<std::string> expected;  // Reason by answer; empty for a result.
   std::uint64_t sequence = 0;
   const auto send = [&](std::uint64_t number, std::vector<double> positions,
                         std::string_view reason) {
@@ -134,7 +134,7 @@ TEST(StreamStateMachine, ASpoiledStreamAnswersEachFrameAndTheOthersAsIfTheSpoile
 }
 
 TEST(StreamStateMachine, ResultsAreTheSameForOneTwoAndSevenThreads) {
-  // One pool at a time: each limits the whole process to its threads.
+  // One pool at a time, because each limits the threads of the process.
   const auto answers_with = [](unsigned threads) {
     ComputePool pool(threads);
     return RunStream(pool, 6, 8);
@@ -183,7 +183,7 @@ TEST(StreamStateMachine, ParametersThatAreRefusedEndTheStreamWithTheirReason) {
   EXPECT_EQ(FindViolation(transport.status())->reason, kReasonOutOfRange);
 }
 
-TEST(StreamStateMachine, ASecondOpenAndAnEmptyRequestEndTheStreamOnceWhatCameBeforeIsAnswered) {
+TEST(StreamStateMachine, ASecondOpenOrEmptyRequestEndsTheStreamAfterItsAnswers) {
   ComputePool pool(2);
   for (const RequestKind kind : {RequestKind::kOpen, RequestKind::kEmpty}) {
     MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
@@ -211,7 +211,7 @@ TEST(StreamStateMachine, ADrainTellsTheClientAnswersWhatWasReadAndEndsUnavailabl
   transport.machine().Drain();
   gate.Open();
   const auto answers = ReceiveAll(transport);
-  // A read that had been delivered, but not yet told to the machine, may have been dropped by it.
+  // The machine may drop a read that was delivered but not yet reported.
   ASSERT_GE(answers.size(), kWindow);
   ASSERT_LE(answers.size(), kWindow + 1);
   EXPECT_EQ(answers[0].what, Outgoing::kDraining);
@@ -228,7 +228,7 @@ TEST(StreamStateMachine, ADrainEndsAStreamThatHasNotOpened) {
   EXPECT_EQ(transport.status().code(), absl::StatusCode::kUnavailable);
 }
 
-// The transport throws where it is used after the end, when it may be gone.
+// The transport throws if it is used after the end.
 TEST(StreamStateMachine, WhatComesAfterTheEndReachesNoTransport) {
   ComputePool pool(1);
   MemoryTransport transport(pool, kWindow, BlobParameters(), kLimits);
@@ -259,8 +259,8 @@ TEST(StreamStateMachine, ACancelledStreamComputesNothingThatWasOnlyQueued) {
   EXPECT_EQ(transport.machine().counts().frames, 0u);
 }
 
-// The transport throws where the machine breaks its word: two reads or writes at once, or anything
-// after the end.
+// The transport throws if the machine violates its contract: two concurrent reads or writes, or any
+// use after the end.
 TEST(StreamStateMachine, MayBeCancelledAndDrainedAtAnyMoment) {
   constexpr unsigned kSeed = 31;
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
@@ -285,7 +285,7 @@ TEST(StreamStateMachine, MayBeCancelledAndDrainedAtAnyMoment) {
     }
     outside.join();
     const auto code = transport.status().code();
-    // Before `open`, a read that ends because nobody is there looks like a half-close.
+    // Before `open`, a read that ends with the connection looks like a half-close.
     EXPECT_TRUE(code == absl::StatusCode::kOk || code == absl::StatusCode::kCancelled ||
                 code == absl::StatusCode::kUnavailable ||
                 (cancel && code == absl::StatusCode::kInvalidArgument))
@@ -302,13 +302,13 @@ TEST(ComputePool, RunsWhatWasSubmittedBeforeItGoes) {
   EXPECT_EQ(ran, 100);
 }
 
-// A stream of large frames beside twenty of small ones, by the order of turns and not by time: each
-// waits for at most one frame of each other stream, whatever those have waiting.
+// A stream of large frames beside twenty of small ones. Counts turns instead of time: each stream
+// waits for at most one frame of every other stream.
 TEST(StreamStateMachine, OneOfLargeFramesDelaysEachSmallFrameByOneOfItsOwn) {
   constexpr int kStreams = 21;
   ComputePool pool(1);
   Gate gate(pool);
-  std::vector<int> turns;  // Of the pool's only thread.
+  std::vector<int> turns;  // Turns of the pool's only thread.
   std::vector<std::unique_ptr<MemoryTransport>> transports;
   std::vector<std::thread> clients;
   for (int i = 0; i < kStreams; ++i) {
@@ -318,14 +318,14 @@ TEST(StreamStateMachine, OneOfLargeFramesDelaysEachSmallFrameByOneOfItsOwn) {
     transport.when_answering = [&turns, i] { turns.push_back(i); };
     transport.Open();
     for (std::uint64_t k = 1; k <= 3 * kWindow; ++k) {
-      // The first stream's frames are thirty times as large.
+      // The first stream's frames are thirty times larger.
       std::vector<double> positions = MovingBlob(1, k);
       if (i > 0) positions.resize(80);
       transport.Send(k, std::move(positions));
     }
     transport.HalfClose();
   }
-  // Every stream has its window full when the first turn begins.
+  // Every window is full when the first turn begins.
   for (const auto& transport : transports) transport->WaitUntilRead(kWindow);
   gate.Open();
   for (const auto& transport : transports) {
@@ -334,7 +334,7 @@ TEST(StreamStateMachine, OneOfLargeFramesDelaysEachSmallFrameByOneOfItsOwn) {
   }
   for (std::thread& client : clients) client.join();
   ASSERT_EQ(turns.size(), kStreams * 3 * kWindow);
-  // As long as all have frames waiting, rounds in which each stream has one turn.
+  // While all have waiting frames, each stream has one turn per round.
   for (std::size_t round = 0; round < kWindow - 1; ++round) {
     std::set<int> in_round;
     for (int i = 0; i < kStreams; ++i) in_round.insert(turns[round * kStreams + i]);
@@ -347,7 +347,7 @@ TEST(ComputePool, GivesEveryStreamATurnBeforeAnyHasASecond) {
   Gate gate(pool);
   std::vector<int> order;
   std::promise<void> done;
-  // Each stream submits its next frame when the one before is done, as StreamStateMachine does.
+  // Each stream submits its next frame when the previous one has ended, like StreamStateMachine.
   std::function<void(int, int)> submit = [&](int stream, int frames) {
     pool.Submit([&, stream, frames](Worker&) {
       order.push_back(stream);

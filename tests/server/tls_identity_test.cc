@@ -1,4 +1,4 @@
-// Files of certificates and keys: what is wrong with them is told when they are read.
+// Certificate and key files: errors are found when they are read.
 #include "server/security/tls_identity.h"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// Calls of one request and one answer: whatever happens in whatever order, they end once, hold
-// memory until the connection has taken the answer, and give it back.
+// Calls with one request and one response: for any order of events they end once, hold memory until
+// the connection has accepted the response, and release it.
 #include "server/stream/unary_state_machine.h"
 
 #include <gtest/gtest.h>
@@ -13,6 +13,7 @@
 
 #include "partiemc/status.h"
 #include "server/base/call_errors.h"
+#include "server/reached_states.h"
 #include "server/stream/stream_state_machine.h"
 #include "server/stream/unary_registry.h"
 
@@ -25,7 +26,7 @@ using std::chrono::steady_clock;
 constexpr std::uint64_t kBudget = 1000;
 constexpr UnaryLimits kLimits{.request = seconds(30), .answer = seconds(120)};
 
-// A call whose other side is the test. What the machine must never do throws.
+// A call driven by the test. Throws if the machine violates its contract.
 class ScriptedCall final : private UnaryTransport {
  public:
   ScriptedCall(MemoryBudget& budget, ComputePool* pool, absl::Status admission = {},
@@ -138,7 +139,7 @@ TEST(UnaryStateMachine, ARequestForInformationNeedsNoRoom) {
   EXPECT_EQ(budget.held(), kBudget);
 }
 
-TEST(UnaryStateMachine, OneThatIsNotLetInReadsNothingAndEndsOnceAlthoughItIsCancelled) {
+TEST(UnaryStateMachine, ARefusedCallReadsNothingAndEndsOnceDespiteACancel) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr, DrainingError());
   EXPECT_FALSE(call.reading);
@@ -208,10 +209,11 @@ TEST(UnaryStateMachine, OneThatIsCancelledWhileItIsWorkedOnEndsWhenTheWorkDoes) 
   EXPECT_EQ(budget.held(), 0u);
 }
 
-// Everything that may happen to a call, in random orders, some of it while it is worked on.
+// All events of a call in random orders, some of them while it is computed.
 TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
   constexpr unsigned kSeed = 20261122;
   std::mt19937 random(kSeed);
+  ReachedStates reached;
   for (int order = 0; order < 20'000; ++order) {
     SCOPED_TRACE(::testing::Message() << "seed " << kSeed << ", order " << order);
     MemoryBudget budget(kBudget);
@@ -221,8 +223,15 @@ TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
     const std::vector<std::function<void()>> outside = {
         [&] { call.machine->Cancelled(); }, [&] { call.machine->GiveWay(DrainingError()); },
         [&] { call.machine->EndIfIdle(kLimits, steady_clock::now() + seconds(random() % 200)); }};
-    if (random() % 2 == 0) call.while_answering = outside[random() % outside.size()];
+    call.while_answering = [&] { reached.Add(call.machine->state()); };
+    if (random() % 2 == 0) {
+      call.while_answering = [&, happens = outside[random() % outside.size()]] {
+        happens();
+        reached.Add(call.machine->state());
+      };
+    }
     for (int step = 0; step < 6; ++step) {
+      reached.Add(call.machine->state());
       switch (random() % 5) {
         case 0:
           if (call.reading) call.Bring(random() % 1500);
@@ -238,11 +247,14 @@ TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
       }
     }
     call.machine->Cancelled();
+    reached.Add(call.machine->state());
     if (call.reading) call.EndRead();
     if (call.writing) call.EndWrite(false);
+    reached.Add(call.machine->state());
     ASSERT_TRUE(call.finished.has_value());
     ASSERT_EQ(budget.held(), 0u);
   }
+  reached.ExpectAllRowsOf(MachineKind::kUnary);
 }
 
 TEST(UnaryStateMachine, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
@@ -255,7 +267,7 @@ TEST(UnaryStateMachine, AWorkerAnswersItAndCancellingMeanwhileIsNoRace) {
       call->Bring(1);
       call->machine->Cancelled();
     }
-  }  // All work is done.
+  }  // Waits for all work.
   for (const auto& call : calls) {
     if (call->writing) call->EndWrite(true);
     EXPECT_TRUE(call->finished.has_value());
@@ -279,10 +291,10 @@ TEST(UnaryRegistry, EachKindOfCallsHasPlacesOfItsOwn) {
   EXPECT_EQ(FindViolation(registry.TakePlace(*last.machine, late))->reason, kReasonTooManyCalls);
   EXPECT_TRUE(registry.Enter(probe.machine, UnaryKind::kInformation).ok());
   EXPECT_TRUE(registry.TakePlace(*probe.machine, greedy).ok());
-  registry.Leave(*never.machine);  // Was never in.
+  registry.Leave(*never.machine);  // Was never admitted.
   EXPECT_EQ(registry.count(), 5u);
   registry.GiveBackPlace(*first.machine);
-  // A request that comes while its call ends takes a place, and no call takes one away for good.
+  // A request that arrives while its call ends takes a slot; no call keeps a slot.
   EXPECT_TRUE(registry.TakePlace(*first.machine, greedy).ok());
   registry.Leave(*first.machine);
   EXPECT_TRUE(registry.TakePlace(*second.machine, greedy).ok());

@@ -1,5 +1,5 @@
-// Watchers that go back in a stream, over a transport in memory: what is held comes first, in its
-// order, then what comes live, without a gap or a double. Also under ThreadSanitizer.
+// Watchers that go back in a stream, over an in-memory transport: first the history in order, then
+// live frames, without gaps or doubles. Also under ThreadSanitizer.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kFrameBytes = 1000;
 constexpr std::uint64_t kCost = kFrameBytes + kPublishedBytes;
 constexpr std::size_t kMaxBytes = 4 * kCost;
-constexpr std::uint64_t kMany = 1000;  // Credit for all.
+constexpr std::uint64_t kMany = 1000;  // Credit for all frames.
 
 class WatchBack : public ::testing::TestWithParam<WatchMode> {
  protected:
@@ -32,7 +32,7 @@ class WatchBack : public ::testing::TestWithParam<WatchMode> {
     broadcaster->BeginHistory(room_, former, next);
     return broadcaster;
   }
-  // Frame `number` of the stream; its sequence number is the same.
+  // Publishes frame `number`; its sequence number is the same.
   void Publish(std::uint64_t number) { PublishTo(*broadcaster_, number); }
   static void PublishTo(ResultBroadcaster& broadcaster, std::uint64_t number) {
     if (broadcaster.Publish(std::make_shared<NumberedFrame>(number, kFrameBytes), number)) {
@@ -68,7 +68,7 @@ class WatchBack : public ::testing::TestWithParam<WatchMode> {
 
 TEST_P(WatchBack, ALateOneGetsAllThatIsHeldThenWhatComesLive) {
   PublishAll(1, 15);
-  for (const std::uint64_t from : {0, 1, 6}) {  // 1: too old.
+  for (const std::uint64_t from : {0, 1, 6}) {  // 1 is too old.
     const auto watcher = Join(kMany, from);
     EXPECT_TRUE(watcher->held().any);
     EXPECT_EQ(watcher->held().oldest, 6u);
@@ -78,7 +78,7 @@ TEST_P(WatchBack, ALateOneGetsAllThatIsHeldThenWhatComesLive) {
   }
   const auto watcher = Join(kMany, 12);
   watcher->WaitForFrames(4);
-  for (std::uint64_t k = 16; k <= 18; ++k) {  // One by one, so that `latest` drops none.
+  for (std::uint64_t k = 16; k <= 18; ++k) {  // One at a time, so that `latest` drops none.
     Publish(k);
     watcher->WaitForFrames(k - 11);
   }
@@ -87,7 +87,7 @@ TEST_P(WatchBack, ALateOneGetsAllThatIsHeldThenWhatComesLive) {
 }
 
 TEST_P(WatchBack, OneFromBeyondTheNewestGetsWhatComesLiveAlone) {
-  const auto before = Join(kMany, 0);  // Nothing has come yet.
+  const auto before = Join(kMany, 0);  // Before the first frame.
   EXPECT_FALSE(before->held().any);
   PublishAll(1, 3);
   before->WaitForFrames(1);
@@ -124,7 +124,7 @@ TEST_P(WatchBack, WhatIsNoLongerHeldIsToldOrEndsTheWatch) {
   const auto watcher = Join(3, 1);
   watcher->WaitForFrames(3);
   PublishAll(11, 17);
-  dispatcher_.Flush();  // 8 to 17 are held.
+  dispatcher_.Flush();  // Frames 8 to 17 are held.
   watcher->Credit(kMany);
   if (GetParam() == WatchMode::kEvery) {
     const absl::Status status = watcher->status();
@@ -180,7 +180,7 @@ TEST_P(WatchBack, AnEndedStreamHoldsNothingForThoseWhoDoNotGoBack) {
   PublishAll(1, 8);
   const auto watcher = Join(1, std::nullopt);
   watcher->WaitForFrames(1);
-  Publish(9);  // For which it has no credit.
+  Publish(9);  // Without credit for it.
   EndStream();
   dispatcher_.Flush();
   EXPECT_EQ(room_.held(), 0u);
@@ -191,7 +191,8 @@ TEST_P(WatchBack, AnEndedStreamHoldsNothingForThoseWhoDoNotGoBack) {
 
 TEST_P(WatchBack, AStreamThatIsTakenOverKeepsItsHistoryUpToWhereItGoesOn) {
   PublishAll(1, 10);
-  for (const bool watched : {false, true}) {  // The second time somebody still reads the former's.
+  for (const bool watched :
+       {false, true}) {  // The second time the former history still has a reader.
     std::unique_ptr<MemoryWatcher> reading;
     if (watched) {
       reading = Join(1, 1);
@@ -199,7 +200,7 @@ TEST_P(WatchBack, AStreamThatIsTakenOverKeepsItsHistoryUpToWhereItGoesOn) {
     }
     const auto former = std::exchange(broadcaster_, Begin(broadcaster_.get(), watched ? 6 : 8));
     former->End(WatchEnd::OfStream(absl::OkStatus()));
-    PublishAll(watched ? 6 : 8, 9);  // Made again.
+    PublishAll(watched ? 6 : 8, 9);  // Computed again.
     const auto watcher = Join(kMany, 0);
     watcher->WaitForFrames(9);
     EXPECT_EQ(NumbersOf(*watcher), From(1, 9));
@@ -227,7 +228,7 @@ TEST_P(WatchBack, OthersGetAllWhileOneReadsSlowly) {
   EXPECT_LE(room_.held(), 10 * kCost);
 }
 
-TEST_P(WatchBack, WatchersComeAndGoBackAndDawdleAndMissNothingThatTheyAreNotToldOf) {
+TEST_P(WatchBack, RandomWatchersMissNoFrameThatIsNotReported) {
   constexpr std::uint64_t kFrames = 20'000;
   std::atomic<std::uint64_t> published = 0, went_back = 0;
   std::atomic<bool> over = false;
@@ -267,10 +268,10 @@ TEST_P(WatchBack, WatchersComeAndGoBackAndDawdleAndMissNothingThatTheyAreNotTold
     if (k % 16 == 0) std::this_thread::yield();
   }
   over = true;
-  EndStream();  // For those who wait for a frame.
+  EndStream();  // For watchers that wait for a frame.
   for (std::thread& watcher : audience) watcher.join();
   EXPECT_LE(room_.held(), 10 * kCost);
-#ifndef PARTIEMC_SANITIZED  // Their allocators wait.
+#ifndef PARTIEMC_SANITIZED  // Sanitizers' allocators delay this.
   EXPECT_EQ(broadcaster_->producer_waits(), 0u);
 #endif
 }
@@ -284,7 +285,7 @@ using WatchBehind = WatchBack;
 
 TEST_P(WatchBehind, OneOfEveryThatMayHoldNoMoreWaitsInTheHistory) {
   const auto watcher = Join(1, std::nullopt);
-  PublishAll(1, 10);  // Of which it may hold four.
+  PublishAll(1, 10);  // It may hold four of them.
   watcher->WaitForFrames(1);
   dispatcher_.Flush();
   watcher->Credit(kMany);

@@ -1,5 +1,5 @@
-// Watching over a transport in memory: what passes from a producer to its watchers, in which order,
-// at whose pace. Also under ThreadSanitizer.
+// WatchStateMachine over an in-memory transport: what watchers receive from a producer, in which
+// order and at which rate. Also under ThreadSanitizer.
 #include "server/watch/watch_state_machine.h"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ constexpr std::size_t kMaxBytes = 10 * (kFrameBytes + kPublishedBytes);
 
 class WatchTest : public ::testing::Test {
  protected:
-  // Frame `number` of the stream.
+  // Publishes frame `number`.
   void Publish(std::uint64_t number, std::size_t bytes = kFrameBytes) {
     if (broadcaster_->Publish(std::make_shared<NumberedFrame>(number, bytes), number))
       broadcaster_->Announce();
@@ -82,11 +82,11 @@ TEST_F(WatchTest, EveryHoldsAsMuchAsItMayAndEndsWithTheFirstFrameBeyond) {
   const auto watcher = Join(WatchMode::kEvery, 1);
   Publish(1);
   watcher->WaitForFrames(1);
-  for (std::uint64_t k = 2; k <= 10; ++k) Publish(k);  // Nine, without credit.
+  for (std::uint64_t k = 2; k <= 10; ++k) Publish(k);  // Nine frames without credit.
   watcher->Credit(2);
   watcher->WaitForFrames(3);
   EXPECT_EQ(watcher->seen().back(), (SeenFrame{3, 0}));
-  for (std::uint64_t k = 11; k <= 14; ++k) Publish(k);  // Seven are held: not all of these fit.
+  for (std::uint64_t k = 11; k <= 14; ++k) Publish(k);  // Seven are held, and these do not all fit.
   EXPECT_EQ(watcher->status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(watcher->end_reason(), kReasonFellBehind);
   EXPECT_EQ(watcher->seen().size(), 3u);
@@ -108,8 +108,8 @@ TEST_F(WatchTest, OneThatTakesNothingHoldsUpNobody) {
   EXPECT_LE(stuck->seen().size(), 1u);
 }
 
-// Nothing but the clock orders the end after the dispatcher has served the broadcaster, so that
-// ThreadSanitizer sees whether both hold its lock.
+// Only the clock orders the end after the dispatcher's work, so ThreadSanitizer can see whether
+// both hold the broadcaster's lock.
 TEST_F(WatchTest, AStreamEndsWhileItsWatchersAreServed) {
   const auto watcher = Join(WatchMode::kLatest, 1);
   while (broadcaster_->watcher_count() == 0) std::this_thread::yield();
@@ -154,7 +154,7 @@ TEST_F(WatchTest, ADrainEndsThoseWithoutCreditAndCutsThoseWhoTakeNothing) {
             absl::StatusCode::kUnavailable);
 }
 
-// A transport whose writes end when the test says so; it keeps what was written.
+// A transport whose writes end on request; it records them.
 class StepTransport final : public WatchTransport {
  public:
   explicit StepTransport(WatchTerms terms_of_open) : terms(std::move(terms_of_open)) {}
@@ -181,7 +181,7 @@ class StepTransport final : public WatchTransport {
   std::optional<absl::Status> status;
 };
 
-// The watcher asks, and its stream is found.
+// Sends `open`; the stream is found.
 void Open(WatchStateMachine& machine, const StepTransport& transport) {
   machine.ReadDone({WatchRequest::Kind::kOpen, 0});
   EXPECT_TRUE(transport.opening);
@@ -194,7 +194,7 @@ TEST_F(WatchTest, OfWhatIsPublishedAfterItIsInAWatcherOfEveryMissesNothing) {
     watcher->WaitUntilOpened();
     const std::uint64_t first = 10 * round + 1;
     for (std::uint64_t k = first; k < first + 4; ++k) Publish(k);
-    const std::size_t newest = round == 0 ? 0 : 1;  // Of the round before.
+    const std::size_t newest = round == 0 ? 0 : 1;  // From the previous round.
     watcher->WaitForFrames(newest + 4);
     const auto seen = watcher->seen();
     ASSERT_EQ(seen.size(), newest + 4) << "round " << round;
@@ -202,7 +202,7 @@ TEST_F(WatchTest, OfWhatIsPublishedAfterItIsInAWatcherOfEveryMissesNothing) {
   }
 }
 
-// Under ThreadSanitizer: the stream may end on another thread than that which serves its watchers.
+// For ThreadSanitizer: the stream may end on another thread than the one that serves its watchers.
 TEST_F(WatchTest, AnEndWhileWatchersAreServedIsNoRace) {
   for (int round = 0; round < 200; ++round) {
     broadcaster_ = std::make_shared<ResultBroadcaster>(
@@ -262,7 +262,7 @@ TEST_F(WatchTest, ASilentOneGivesWayAndOneThatHasOpenedDoesNot) {
   EXPECT_TRUE(open.status.has_value());
 }
 
-TEST_F(WatchTest, WhereMemoryIsShortAnOpenOneEndsWithoutItsFramesAndOneThatIsWrittenToIsCut) {
+TEST_F(WatchTest, WithoutMemoryEndsOpenWatchesAndCutsThoseBeingWritten) {
   StepTransport idle({broadcaster_, WatchMode::kEvery, 1}),
       writing({broadcaster_, WatchMode::kEvery, 1}), silent({broadcaster_, WatchMode::kLatest, 1});
   std::vector<std::shared_ptr<WatchStateMachine>> machines;
@@ -317,11 +317,11 @@ TEST_F(WatchTest, OneThatNeverSaysWhatItWantsToWatchEndsAndItsPlaceIsFree) {
   broadcaster_->Leave(*other);
 }
 
-// What a watcher should get, written down as plainly as possible.
+// The frames that a watcher should receive, computed as simply as possible.
 struct Reference {
   WatchMode mode;
   std::uint64_t credit;
-  bool writing = true;  // `opened`.
+  bool writing = true;  // Writes `opened`.
   bool stream_ended = false, fell_behind = false, end_written = false;
   std::vector<std::uint64_t> waiting = {};
   std::uint64_t in_write = 0, lost = 0, told = 0;
@@ -368,7 +368,7 @@ TEST_F(WatchTest, RandomOrdersGiveWhatAPlainReferenceSays) {
     const auto pick = [&](unsigned n) { return static_cast<unsigned>(random() % n); };
     const WatchMode mode = pick(2) == 0 ? WatchMode::kLatest : WatchMode::kEvery;
     const std::uint64_t credit = 1 + pick(4);
-    const unsigned generosity = 1 + pick(6);  // Of credit and of the connection.
+    const unsigned generosity = 1 + pick(6);  // Of credit and connection.
     StepTransport transport({broadcaster_, mode, credit});
     const auto machine = std::make_shared<WatchStateMachine>(transport, kMaxBytes);
     machine->Start();
@@ -417,7 +417,7 @@ TEST_F(WatchTest, RandomOrdersGiveWhatAPlainReferenceSays) {
   EXPECT_GT(fell_behind, 0u);
 }
 
-// Told and counted drops agree, numbers rise without a hole that was not told.
+// Checks that reported and counted drops agree, and that every gap in the numbers was reported.
 void ExpectSound(const MemoryWatcher& watcher, bool every) {
   EXPECT_EQ(watcher.unpaid(), 0u);
   const auto seen = watcher.seen();
@@ -464,11 +464,11 @@ TEST_F(WatchTest, WatchersComeAndGoAndDawdleWhileTheProducerNeverWaits) {
   for (std::thread& watcher : audience) watcher.join();
   ExpectSound(*last, /*every=*/false);
   ASSERT_FALSE(last->seen().empty());
-  EXPECT_EQ(last->seen().back().number, kFrames);  // The last one is never missed.
+  EXPECT_EQ(last->seen().back().number, kFrames);  // The last frame is never missed.
   const SeenFrame first = last->seen().front();
   EXPECT_EQ(last->seen().size() + last->machine().counts().dropped,
             kFrames - (first.number - first.dropped) + 1);
-#ifndef PARTIEMC_SANITIZED  // Their allocators wait.
+#ifndef PARTIEMC_SANITIZED  // Sanitizers' allocators delay this.
   EXPECT_EQ(broadcaster_->producer_waits(), 0u);
 #endif
 }

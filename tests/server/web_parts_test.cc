@@ -1,4 +1,4 @@
-// The parts of the gateway that know no connection: slots, signs of life, messages in pieces.
+// Parts of the gateway without connections: slots, signs of life, gathered messages.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using State = ConnectionSlots::State;
 
 struct Guests {
   explicit Guests(ConnectionSlots::Limits limits) : slots(limits) {}
-  // Whether the new one may do everything.
+  // True if the new connection may make all calls.
   bool Come(const std::string& address, const std::string& name) {
     bool evicted = false;
     const std::size_t before = ended.size();
@@ -51,9 +51,9 @@ TEST(ConnectionSlots, EvictsOldestIdleOfTheAddressWithMost) {
   EXPECT_TRUE(guests.Come("c", "c1"));
   EXPECT_EQ(guests.ended, (std::vector<std::string>{"b2"}));
   guests.held.erase("b2");
-  EXPECT_TRUE(guests.Come("c", "c2"));  // Each has one: the oldest of all.
+  EXPECT_TRUE(guests.Come("c", "c2"));  // Each has one: evicts the oldest of all.
   EXPECT_EQ(guests.ended, (std::vector<std::string>{"b2", "a1"}));
-  guests.held["b1"].SetState(State::kNoCall);  // Its call is over.
+  guests.held["b1"].SetState(State::kNoCall);  // Its call has ended.
   EXPECT_TRUE(guests.Come("c", "c3"));
   EXPECT_EQ(guests.ended.back(), "b1");
 }
@@ -110,7 +110,7 @@ TEST(ConnectionSlots, EndsUnusedOnesThenAllAndWaitsForThem) {
   EXPECT_EQ(guests.slots.count(), 0u);
 }
 
-// Against a model with plain counts, with connections that come, go and change at random.
+// Compares with a model with plain counts, for random connections, ends and states.
 TEST(ConnectionSlots, KeepsItsLimitsInAnyOrder) {
   std::mt19937 random(7);
   const auto below = [&](std::size_t count) { return random() % count; };
@@ -152,21 +152,21 @@ TEST(SignsOfLife, AsksAfterTheIntervalAndGivesUpAfterTheTimeout) {
   const SignsOfLife::TimePoint start{};
   const auto at = [&](int ms) { return start + milliseconds(ms); };
   SignsOfLife signs({milliseconds(100), milliseconds(50)}, milliseconds(1000), start);
-  EXPECT_EQ(signs.Look(at(99), true, false, 0), Next::kWait);
-  EXPECT_EQ(signs.Look(at(100), true, false, 0), Next::kPing);
-  EXPECT_EQ(signs.Look(at(149), true, false, 0), Next::kWait);
-  EXPECT_EQ(signs.Look(at(150), true, false, 0), Next::kGiveUp);
-  signs.Heard(at(140));
-  EXPECT_EQ(signs.Look(at(239), true, false, 0), Next::kWait);
-  EXPECT_EQ(signs.Look(at(240), true, false, 0), Next::kPing);
-  // Whoever takes what was sent is there, and whoever is not read from cannot be heard.
-  EXPECT_EQ(signs.Look(at(280), true, false, 500), Next::kWait);
-  EXPECT_EQ(signs.Look(at(400), false, false, 500), Next::kWait);
-  EXPECT_EQ(signs.Look(at(499), true, false, 500), Next::kWait);
-  // One that takes a message has more time, but no more than that.
+  EXPECT_EQ(signs.Check(at(99), true, false, 0), Next::kWait);
+  EXPECT_EQ(signs.Check(at(100), true, false, 0), Next::kPing);
+  EXPECT_EQ(signs.Check(at(149), true, false, 0), Next::kWait);
+  EXPECT_EQ(signs.Check(at(150), true, false, 0), Next::kGiveUp);
+  signs.OnSign(at(140));
+  EXPECT_EQ(signs.Check(at(239), true, false, 0), Next::kWait);
+  EXPECT_EQ(signs.Check(at(240), true, false, 0), Next::kPing);
+  // Acknowledged bytes are a sign of life, and silence counts only while the server reads.
+  EXPECT_EQ(signs.Check(at(280), true, false, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(400), false, false, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(499), true, false, 500), Next::kWait);
+  // A message being written extends the time, up to its own limit.
   signs.WriteBegan(at(500));
-  EXPECT_EQ(signs.Look(at(1500), true, true, 500), Next::kWait);
-  EXPECT_EQ(signs.Look(at(1501), true, true, 500), Next::kGiveUp);
+  EXPECT_EQ(signs.Check(at(1500), true, true, 500), Next::kWait);
+  EXPECT_EQ(signs.Check(at(1501), true, true, 500), Next::kGiveUp);
 }
 
 TEST(GatheredMessage, IsWhatCameAndTakesMemoryAsItComes) {
@@ -176,7 +176,7 @@ TEST(GatheredMessage, IsWhatCameAndTakesMemoryAsItComes) {
     for (char& c : sent) c = static_cast<char>(random());
     GatheredMessage message;
     for (std::size_t at = 0; at < size;) {
-      const auto room = message.Room(std::size_t{1} << 40);  // What is announced does not matter.
+      const auto room = message.Room(std::size_t{1} << 40);  // The announced length is ignored.
       ASSERT_LE(room.size(), std::max<std::size_t>(message.size(), 16'384));
       const std::size_t count =
           std::min({room.size(), size - at, 1 + random() % (1 + room.size())});

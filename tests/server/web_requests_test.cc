@@ -1,4 +1,4 @@
-// What requests to the gateway ask for, and what they must not.
+// Interpreting requests to the gateway, including forbidden ones.
 #include <gtest/gtest.h>
 
 #include <string>

@@ -1,4 +1,4 @@
-// What a worker's buffers may hold, and who gives it back.
+// Limits of a worker's buffers, and when they are released.
 #include "server/compute/worker_memory.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(WorkerMemory, CountsWhatIsBeyondTheShareThatEveryWorkerHas) {
 
 TEST(WorkerMemory, RefusesWhatTheBudgetHasNoRoomFor) {
   MemoryBudget budget(100 * kMib);
-  budget.Take(60 * kMib);  // Requests and answers.
+  budget.Take(60 * kMib);  // Requests and responses.
   WorkerMemory memory(&budget), other(&budget);
   EXPECT_FALSE(memory.Reserve(kWorkerBytes + 41 * kMib, 0));
   EXPECT_EQ(budget.held(), 60 * kMib);
@@ -48,7 +48,8 @@ TEST(WorkerMemory, GrantsWhatParticlesNeedHoweverSmallTheBudgetIs) {
   const std::uint64_t most = kWorkerBytes + kWorkerBytesPerParticle * kParticles;
   EXPECT_TRUE(memory.Reserve(most, kParticles));
   EXPECT_EQ(budget.held(), most - kWorkerBytes) << "it counts all the same";
-  EXPECT_FALSE(memory.Reserve(most + 1, kParticles));
+  EXPECT_TRUE(memory.Reserve(most + 1, kParticles)) << "the budget's byte is still free";
+  EXPECT_FALSE(memory.Reserve(most + 2, kParticles));
 }
 
 TEST(WorkerMemory, WithoutABudgetGrantsEverything) {

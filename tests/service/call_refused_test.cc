@@ -1,5 +1,5 @@
-// Each row of "A call is refused or ended" in proto/PROTOCOL.md: a test named as the row's reason,
-// with the exact code, reason and words (error_table_test.cc looks for rows without).
+// The rows of "A call is refused or ended" in proto/PROTOCOL.md: one test per row, named by its
+// reason, with exact code, reason and words. error_table_test.cc finds rows without a test.
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ class CallRefused : public ErrorTable {
     EXPECT_EQ(status.error_message(), message);
     ExpectDetails(status, reason);
   }
-  // Of a stream whose first request is `open`.
+  // Expects this end of a stream with the first request `open`.
   void ExpectOfOpen(const v1::ReconstructRequest& open, grpc::StatusCode code,
                     const std::string& reason, const std::string& message) {
     if (!server_) Serve();
@@ -47,7 +47,7 @@ class CallRefused : public ErrorTable {
     *request.mutable_frame() = BlobRequest(0, 1, 0).frame();
     return request;
   }
-  // Of a call of ReconstructFrame with a good frame.
+  // Expects this end of a ReconstructFrame call with a good frame.
   void ExpectOfCall(grpc::StatusCode code, const std::string& reason, const std::string& message) {
     Serve();
     grpc::ClientContext context;
@@ -64,7 +64,8 @@ class CallRefused : public ErrorTable {
     SetDeadline(context);
     context.AddMetadata("authorization", std::string("Bearer ") + kToken);
   }
-  // Of a second stream, "dam", of a caller with these terms, beside its "tank-1".
+  // Expects this end of a second stream, "dam", of a caller with these terms that has the stream
+  // "tank-1".
   void ExpectOfTerms(const std::string& terms, grpc::StatusCode code, const std::string& reason,
                      const std::string& message) {
     WantToken(terms);
@@ -81,7 +82,7 @@ class CallRefused : public ErrorTable {
     Expect(status, ReasonOf(second_context), code, reason, message);
     first_context.TryCancel();
   }
-  // Of GetServerInfo on a server that wants a token.
+  // Expects this end of GetServerInfo on a server that requires a token.
   void ExpectOfCaller(const std::string& authorization, const std::string& reason,
                       const std::string& message) {
     WantToken();
@@ -99,7 +100,7 @@ class CallRefused : public ErrorTable {
     open.mutable_open()->mutable_resume()->set_stream_token(token);
     return open;
   }
-  // What a server sent after one frame of the stream whose token is kToken.
+  // The checkpoint after one frame of the stream with the token kToken.
   std::string Checkpoint() {
     Serve();
     StreamClient client(channel_);
@@ -122,7 +123,7 @@ TEST_F(CallRefused, OUT_OF_RANGE) {
   open.mutable_open()->mutable_parameters()->set_kernel_radius(20);
   ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
                "parameters.kernel_radius: 20; must be in [1.5, 8] spacings");
-  // Nothing of what these name would come.
+  // These outputs require others that are off.
   auto normals = OpenRequest();
   normals.mutable_open()->mutable_outputs()->set_normals(true);
   ExpectOfOpen(
@@ -277,7 +278,7 @@ TEST_F(CallRefused, TOO_MANY_OPENING) {
   options_.limits.max_watchers = 0;
   Serve();
   std::vector<std::unique_ptr<StreamClient>> clients;
-  // The first to come gives way; which one that is is the network's choice.
+  // The oldest call is evicted; the network decides which one that is.
   std::vector<std::thread> waiting;
   std::mutex mutex;
   int gave_way = 0;
@@ -333,7 +334,7 @@ TEST_F(CallRefused, NOT_PERMITTED) {
 
 TEST_F(CallRefused, MEMORY_BUDGET) {
   options_.limits.memory_budget = 100;
-  options_.limits.history_bytes = 0;  // Which has a part of it.
+  options_.limits.history_bytes = 0;  // It shares the budget.
   ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET",
                "request: " + std::to_string(CallRequest().ByteSizeLong()) +
                    " bytes; must fit with what is being worked on into 100 bytes; try again later, "

@@ -1,10 +1,13 @@
-// Several callers of one server: what each may, and that none of them locks the others out.
+// Several callers of one server: permissions, and that no caller blocks the others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -19,7 +22,7 @@ using ::testing::HasSubstr;
 
 constexpr char kAlice[] = "alice-0123456789abcdef";
 constexpr char kMallory[] = "mallory-0123456789abcdef";
-// More than there are places for calls without a request.
+// More than the slots for calls without a request.
 constexpr int kMany = 200;
 
 template <typename Request, typename Response>
@@ -32,7 +35,7 @@ struct Bidi {
   }
   Bidi() = default;
   Bidi(Bidi&&) = default;
-  // The first answer; one without a case where the call has ended.
+  // The first response; empty if the call has ended.
   Response Ask(const Request& request) {
     Response response;
     rpc->Write(request);
@@ -47,6 +50,13 @@ struct Bidi {
     return ReasonOf(*context);
   }
 };
+
+// Calls of one connection do not begin in the order in which their client made them.
+template <typename Call>
+std::ptrdiff_t CountEnded(std::vector<Call>& calls, std::string_view reason) {
+  return std::ranges::count(calls, reason, [](Call& call) { return call.EndReason(); });
+}
+
 using Stream = Bidi<v1::ReconstructRequest, v1::ReconstructResponse>;
 using Watch = Bidi<v1::WatchStreamRequest, v1::WatchStreamResponse>;
 
@@ -63,10 +73,10 @@ class Callers : public ::testing::Test {
     SetDeadline(context);
     context.AddMetadata("authorization", std::string("Bearer ") + token);
   }
-  Stream BeginStream(const char* token) {
+  Stream BeginStream(const char* token, v1::ReconstructionService::Stub* stub = nullptr) {
     Stream stream;
     Identify(*stream.context, token);
-    stream.rpc = stub_->Reconstruct(stream.context.get());
+    stream.rpc = (stub == nullptr ? stub_.get() : stub)->Reconstruct(stream.context.get());
     return stream;
   }
   Watch BeginWatch(const char* token) {
@@ -81,7 +91,7 @@ class Callers : public ::testing::Test {
     request.mutable_open()->set_credits(1);
     return request;
   }
-  // The reason; "OK" where there was an answer.
+  // The reason of the refusal; "OK" for a result.
   std::string CallFrame(const char* token) {
     v1::ReconstructFrameRequest request;
     *request.mutable_parameters() = OpenRequest().open().parameters();
@@ -113,8 +123,8 @@ TEST_F(Callers, MuteStreamsOfOneKeepNobodyOut) {
   for (int i = 0; i < kMany; ++i) mute.push_back(BeginStream(kMallory));
   Stream stream = BeginStream(kAlice);
   EXPECT_TRUE(stream.Ask(OpenRequest()).has_opened()) << stream.EndReason();
-  EXPECT_EQ(mute[0].EndReason(), "TOO_MANY_OPENING");
-  // Nor others of the same caller, as all are behind a proxy.
+  EXPECT_GE(CountEnded(mute, "TOO_MANY_OPENING"), 1);
+  // Nor other calls of the same caller, as behind a proxy.
   Stream own = BeginStream(kMallory);
   EXPECT_TRUE(own.Ask(OpenRequest()).has_opened()) << own.EndReason();
 }
@@ -127,7 +137,7 @@ TEST_F(Callers, MuteWatchersOfOneKeepNobodyOut) {
   for (int i = 0; i < kMany; ++i) mute.push_back(BeginWatch(kMallory));
   Watch watch = BeginWatch(kAlice);
   EXPECT_TRUE(watch.Ask(OpenWatch("tank")).has_opened()) << watch.EndReason();
-  EXPECT_EQ(mute[0].EndReason(), "TOO_MANY_OPENING");
+  EXPECT_GE(CountEnded(mute, "TOO_MANY_OPENING"), 1);
 }
 
 TEST_F(Callers, StreamsThatTakeNoAnswersLeaveMemoryForOthers) {
@@ -153,7 +163,7 @@ TEST_F(Callers, StreamsThatTakeNoAnswersLeaveMemoryForOthers) {
       }
     });
   }
-  // Until the server has taken from each as much as it takes.
+  // Until the server has read from each as far as it does.
   EXPECT_TRUE(
       Eventually([&] { return Info(kAlice).load().memory_held() >= kStreams * frame / 2; }));
   for (int i = 0; i < 50; ++i) EXPECT_EQ(CallFrame(kAlice), "OK") << i;
@@ -196,18 +206,20 @@ TEST_F(Callers, WhoHearsOfAnEndHasThePlaceAgainAtOnce) {
   }
 }
 
-// A watcher may send a request at any time, and nobody sees how large before all of it has come.
+// A watcher may send a request at any time, and its size is known only when all of it has arrived.
 TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
   options_.limits.memory_budget = std::uint64_t{160} << 20;
   Serve("alice", "mallory");
-  Stream stream = BeginStream(kAlice);
+  // A connection whose messages are far too large is cut, so the producer has another one.
+  const auto alices = v1::ReconstructionService::NewStub(Connect(*server_, Transport::kTcp));
+  Stream stream = BeginStream(kAlice, alices.get());
   ASSERT_TRUE(stream.Ask(OpenRequest("tank")).has_opened());
   std::vector<Watch> watches;
   for (int i = 0; i < 4; ++i) {
     watches.push_back(BeginWatch(kMallory));
     ASSERT_TRUE(watches.back().Ask(OpenWatch("tank")).has_opened());
   }
-  // The client's memory counts, too, as it is the same process.
+  // Client and server share this process, so the client's memory counts too.
   v1::WatchStreamRequest large;
   large.mutable_open()->set_stream_name(std::string(64 << 20, 'x'));
   ASSERT_EQ(Info(kAlice).load().watchers(), 4u);
@@ -222,6 +234,17 @@ TEST_F(Callers, WatchersThatSendTooMuchGiveWay) {
   for (std::thread& sender : senders) sender.join();
   EXPECT_GE(gave_way, 1);
   EXPECT_TRUE(stream.Ask(BlobRequest(1, 1, 0)).has_frame());
+}
+
+TEST_F(Callers, HearWhenAMessageIsTooLarge) {
+  Serve("alice", "mallory");
+  Stream stream = BeginStream(kAlice), other = BeginStream(kAlice);
+  ASSERT_TRUE(stream.Ask(OpenRequest()).has_opened() && other.Ask(OpenRequest()).has_opened());
+  v1::ReconstructRequest large = BlobRequest(1, 1, 0);
+  large.mutable_frame()->mutable_positions()->resize(60 << 20);
+  EXPECT_EQ(stream.Ask(large).response_case(), v1::ReconstructResponse::RESPONSE_NOT_SET);
+  EXPECT_EQ(stream.rpc->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(other.Ask(BlobRequest(1, 1, 0)).has_frame()) << "its connection is not cut";
 }
 
 TEST_F(Callers, MayDoAndSeeWhatTheirLineSays) {

@@ -1,4 +1,4 @@
-// The server's log, kept in memory while a test runs.
+// Captures the server's log during a test.
 #pragma once
 
 #include <spdlog/sinks/base_sink.h>
@@ -14,7 +14,7 @@
 
 namespace partiemc::server {
 
-/// Everything that the server and gRPC say at any level, from its making to its end.
+/// Lines of the server and of gRPC at all levels, during the lifetime of this object.
 class CapturedLog {
  public:
   explicit CapturedLog(LogFormat format = LogFormat::kText) : before_(spdlog::default_logger()) {
@@ -28,7 +28,7 @@ class CapturedLog {
 
   std::string Text() const { return sink_->Text(); }
 
-  /// How often it says so.
+  /// Number of occurrences of `words`.
   std::size_t Count(const std::string& words) const {
     const std::string text = Text();
     std::size_t count = 0;

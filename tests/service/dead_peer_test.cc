@@ -1,4 +1,4 @@
-// Clients that vanish without a word: what was theirs is free again.
+// Clients that disappear without closing their connection: their resources are freed.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -48,7 +48,7 @@ TEST(DeadPeer, TheNameOfAProducerThatVanishedIsFree) {
   watcher.Cancel();
 }
 
-// One that is there is not taken for dead, however long it has nothing to say.
+// A live client is kept, however long it is idle.
 TEST(DeadPeer, AnIdleProducerGoesOn) {
   ServerOptions options = TestOptions();
   options.keepalive = {.interval = std::chrono::milliseconds(50),

@@ -1,9 +1,12 @@
-// SIGTERM at bad moments: while streams open, with full windows, with clients that never read, in
-// frames that outlast the grace time, twice. What clients got is whole, and the server leaves in
-// time. Ten servers are drained under load by default, `--drains 100` for more.
+// SIGTERM at bad moments: while streams open, with full windows, with clients that never read,
+// during frames longer than the grace time, twice. Clients receive complete data, and the server
+// stops in time. Drains ten servers under load by default; `--drains 100` for more.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -30,7 +33,7 @@ namespace health = grpc::health::v1;
 
 std::uint64_t drains = 10;
 
-// Only against hanging: far beyond any grace time here.
+// A timeout for hangs only, longer than any grace time here.
 constexpr std::chrono::seconds kPatience(60);
 
 class Drain : public ::testing::Test {
@@ -57,8 +60,8 @@ class Drain : public ::testing::Test {
   std::unique_ptr<ServingProcess> server_;
 };
 
-// What a client of a server that goes away has to get: answers from the first frame on, none left
-// out, the notice once, the answers to what had been read, and UNAVAILABLE.
+// Checks what a client of a draining server receives: answers from the first frame on without gaps,
+// one notice, the answers to all frames that were read, and UNAVAILABLE.
 void StreamUntilTheEnd(const std::shared_ptr<grpc::Channel>& channel, unsigned seed,
                        std::atomic<int>& streaming) {
   const auto expected = LocalDigests(seed, 4);
@@ -92,8 +95,7 @@ void StreamUntilTheEnd(const std::shared_ptr<grpc::Channel>& channel, unsigned s
   EXPECT_EQ(notices, 1);
 }
 
-// The server's own word, or that nobody listens any more, or gRPC's for a call that comes in the
-// moment in which it stops.
+// The status of the server, of a closed port, or gRPC's for a call at the moment of the shutdown.
 void ExpectTurnedAway(const grpc::Status& status) {
   EXPECT_THAT(status.error_code(),
               AnyOf(grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::CANCELLED))
@@ -160,7 +162,7 @@ TEST_F(Drain, ACallThatHasNotOpenedIsToldToGoElsewhere) {
   ExpectGoodEnd();
 }
 
-// Streams that are told to go one after the other, while whoever comes is served.
+// Streams are redirected one after the other, while new ones are served.
 TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
   constexpr unsigned kStreams = 5;
   Serve("30", {"--drain-delay", "3"});
@@ -179,9 +181,9 @@ TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
   ASSERT_TRUE(is_serving());
   Terminate();
   while (is_serving()) std::this_thread::yield();
-  // It is not ready any more, and serves.
+  // Not ready, but still serving.
   EXPECT_TRUE(clients.back()->SendAndReceive(BlobRequest(1, 3, 0)).has_frame());
-  // Each in its turn, in the order in which they came.
+  // In the order in which they were opened.
   StreamClient late(Channel());
   std::atomic<unsigned> gone = 0;
   std::vector<std::thread> readers;
@@ -205,7 +207,7 @@ TEST_F(Drain, ADelaySendsStreamsAwayOneByOneAndServesOn) {
   ExpectGoodEnd();
 }
 
-// Clients whose windows are full and who never read an answer.
+// Clients with full windows that never read a response.
 TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
   for (const char* budget : {"1GB", "1"}) {
     Serve("0.5", {"--memory-budget", budget});
@@ -219,7 +221,7 @@ TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
         for (std::uint64_t k = 1; client.Send(BlobRequest(k, i, k % 3)); ++k) ++sent;
       });
     }
-    // Full once nothing more is taken for a while; the test is good whether it is or not.
+    // Counts as full when no more is accepted for a while. The test is valid in either case.
     for (std::uint64_t last = 0; last != sent || sent == 0;) {
       last = sent;
       std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -231,7 +233,7 @@ TEST_F(Drain, ClientsThatNeverReadAreCutInTime) {
   }
 }
 
-// A frame that takes long: all its particles lie within reach of every point of its outline.
+// A frame that takes long: each vertex is within reach of all its particles.
 v1::ReconstructRequest LongFrame() {
   constexpr std::size_t kParticles = 4'000'000;
   std::mt19937 random(1);
@@ -254,7 +256,7 @@ v1::ReconstructRequest OpenForLongFrames() {
   return open;
 }
 
-// Nothing may hold the server beyond its grace time: neither this frame nor who waits for it.
+// Neither this frame nor its client delays the server beyond the grace time.
 TEST_F(Drain, AFrameThatOutlastsTheGraceTimeDoesNotHoldTheServer) {
   Serve("0.2", {"--max-particles", "4000000", "--max-frame-bytes", "100MB"});
   StreamClient client(Channel());
@@ -262,14 +264,14 @@ TEST_F(Drain, AFrameThatOutlastsTheGraceTimeDoesNotHoldTheServer) {
   const auto frame = LongFrame();
   const double before_ms = ProcessCpuMs(server_->process().process());
   ASSERT_TRUE(client.Send(frame));
-  // To be sure that it is being computed: reading it takes a tenth of a second.
+  // Ensures that it is being computed: reading it takes a tenth of a second.
   while (ProcessCpuMs(server_->process().process()) < before_ms + 500) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   Terminate();
   const auto code = server_->process().WaitFor(kPatience);
   ASSERT_TRUE(code.has_value()) << "it hangs";
-  // 0 where the frame could be cancelled in time; 1 where the process was cut off.
+  // 0 if the frame was cancelled in time, 1 if the process was cut off.
   if (*code != 0) {
     EXPECT_EQ(*code, 1);
     EXPECT_THAT(server_->process().Output(), HasSubstr("cut off"));
@@ -284,7 +286,7 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
     Serve("3600");
     StreamClient client(Channel());
     ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
-    // Its answer is not taken, so that the drain waits for an hour.
+    // Its response is not read, so the drain would wait for an hour.
     std::atomic<bool> stop = false;
     std::thread writer([&] {
       for (std::uint64_t k = 1; !stop && client.Send(BlobRequest(k, 1, k % 3)); ++k) {
@@ -303,7 +305,7 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
   }
 }
 
-// Clients without a call that nobody looks after.
+// Idle clients without a call.
 TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
   Serve("3600");
   const auto idle = Channel();
@@ -314,6 +316,42 @@ TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
   ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
   Terminate();
   ExpectGoodEnd();
+}
+
+// Peers that send SETTINGS and do not read the acknowledgements, so that gRPC cannot write.
+TEST_F(Drain, PeersThatReadNoAcknowledgementsAreNotWaitedFor) {
+  Serve("4");
+  const std::string address = server_->address();
+  const auto port = static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
+  std::atomic<bool> stop = false;
+  std::vector<std::thread> peers;
+  for (int i = 0; i < 3; ++i) {
+    peers.emplace_back([&] {
+      const std::string header("\0\0\6\4\0\0\0\0\0", 9), setting("\0\3\0\0\0\x64", 6);
+      std::string all = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + std::string("\0\0\0\4\0\0\0\0\0", 9);
+      for (int k = 0; k < 200'000; ++k) all += header + setting;
+      const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+      const int little = 4096;
+      setsockopt(file, SOL_SOCKET, SO_RCVBUF, &little, sizeof(little));
+      sockaddr_in to{};
+      to.sin_family = AF_INET;
+      to.sin_port = htons(port);
+      to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      connect(file, reinterpret_cast<const sockaddr*>(&to), sizeof(to));
+      for (std::size_t sent = 0; !stop;) {
+        const auto count =
+            send(file, all.data() + sent, all.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (count > 0) sent += static_cast<std::size_t>(count);
+        if (count <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+      close(file);
+    });
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  Terminate();
+  ExpectGoodEnd();
+  stop = true;
+  for (auto& peer : peers) peer.join();
 }
 
 TEST_F(Drain, CallsOfOneFrameThatGoOnAreAnswered) {

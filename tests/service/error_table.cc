@@ -43,7 +43,7 @@ std::vector<std::string> ReasonsOf(const std::string& cell) {
 
 using Table = std::vector<std::vector<std::string>>;
 
-// The tables under the heading that begins so, without the names of their columns.
+// The tables under the heading with this beginning, without their header rows.
 std::vector<Table> TablesUnder(const std::string& heading) {
   std::istringstream page(Read(Root() / "proto" / "PROTOCOL.md"));
   std::vector<Table> tables;
@@ -76,7 +76,7 @@ std::vector<std::string> PartsOf(const std::string& path) {
   return parts;
 }
 
-// Bytes hold numbers, or points of x, y and z.
+// Bytes contain numbers, or points of x, y and z.
 bool IsPath(const google::protobuf::Descriptor* message, const std::vector<std::string>& parts) {
   static const std::regex kPart("([a-z_]+)(\\[[0-9]+\\])?");
   const google::protobuf::FieldDescriptor* field = nullptr;
@@ -95,7 +95,8 @@ bool IsPath(const google::protobuf::Descriptor* message, const std::vector<std::
   return field != nullptr;
 }
 
-// "Beside fields these are spoken of: `client`, `streams`." -> {"client", "streams"}.
+// Parses the sentence "Beside fields these are spoken of: `client`, `streams`." to {"client",
+// "streams"}.
 std::vector<std::string> Subjects() {
   static const std::regex kWord("`([^`]+)`");
   const std::string page = Read(Root() / "proto" / "PROTOCOL.md");
@@ -118,7 +119,7 @@ bool IsFieldOrSubject(const std::string& field) {
   if (std::smatch match; std::regex_match(field, match, kPart)) return IsFieldOrSubject(match[1]);
   const auto subjects = Subjects();
   if (std::find(subjects.begin(), subjects.end(), field) != subjects.end()) return true;
-  // Those that errors are about, and parts of them that a caller fills in.
+  // Messages that errors refer to, and their parts that a caller fills in.
   for (const google::protobuf::Descriptor* message :
        {v1::ReconstructRequest::descriptor(), v1::OpenStream::descriptor(),
         v1::ParticleFrame::descriptor(), v1::ReconstructFrameRequest::descriptor(),

@@ -1,4 +1,4 @@
-// The error tables of proto/PROTOCOL.md, as tests read them.
+// Reads the error tables of proto/PROTOCOL.md for tests.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@ namespace partiemc::server {
 
 struct ErrorRow {
   std::string reason;  ///< Empty for "(none)".
-  std::string code;    ///< Of a call: "INVALID_ARGUMENT"; empty for a frame.
+  std::string code;    ///< Code of a call: "INVALID_ARGUMENT"; empty for a frame.
 
-  /// Of the test that tries it: "NAME", or "NoReason_UNIMPLEMENTED" where there is no reason.
+  /// Name of the row's test: "NAME", or "NoReason_UNIMPLEMENTED" without a reason.
   std::string TestName() const { return reason.empty() ? "NoReason_" + code : reason; }
 };
 
@@ -22,18 +22,17 @@ std::vector<ErrorRow> CallErrorRows();
 /// The rows of the table "A part is refused".
 std::vector<ErrorRow> PartErrorRows();
 
-/// The rows of the table of watches behind it.
+/// The rows of the table of watches after it.
 std::vector<ErrorRow> WatchErrorRows();
 
-/// The reasons of all tables of the page, those of ends that are no errors too.
+/// The reasons of all tables of the page, including ends that are not errors.
 std::vector<std::string> ReasonsInTables();
 
-/// Every reason that a constant `kReason... = "..."` of core, proto or server gives.
+/// All values of constants `kReason... = "..."` in core, proto and server.
 std::vector<std::string> ReasonsInCode();
 
-/// Whether an error may speak of this field: a path of the .proto, from a message that carries it
-/// ("open.labels", "positions[3].y", "parameters.spacing"), or one of the subjects that PROTOCOL.md
-/// names ("streams").
+/// True if errors may name this field: a path of the .proto, starting at a message ("open.labels",
+/// "positions[3].y", "parameters.spacing"), or a subject that PROTOCOL.md names ("streams").
 bool IsFieldOrSubject(const std::string& field);
 
 }  // namespace partiemc::server

@@ -1,5 +1,5 @@
-// Reads the error tables of proto/PROTOCOL.md and the code: a row without a test fails, and so does
-// a reason that no table has.
+// Compares the error tables of proto/PROTOCOL.md with code and tests: every row needs a test, every
+// reason a row.
 #include "service/error_table.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace partiemc::server {
 namespace {
 
-// Tells every row that has no test. Others are found by name.
+// Reports rows without a test, by the names of the tests.
 void ExpectTests(const std::string& suite, const std::vector<ErrorRow>& rows) {
   std::set<std::string> tests;
   const auto& unit_test = *testing::UnitTest::GetInstance();
@@ -67,7 +67,8 @@ TEST(ErrorTables, AFieldIsAPathOfTheProtoOrANamedSubject) {
   }
 }
 
-// By hand from the public definitions of google.rpc.Status, ErrorInfo and google.protobuf.Any.
+// Written by hand from the public definitions of google.rpc.Status, ErrorInfo and
+// google.protobuf.Any.
 TEST(ErrorDetails, AreTheBytesOfThePublicMessages) {
   const auto status =
       ViolationError(absl::StatusCode::kNotFound, {"NO_SUCH_STREAM", "a", "\xff", "c"});

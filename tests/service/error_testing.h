@@ -1,4 +1,4 @@
-// A server to be refused by, as the tests of the error tables need it.
+// Test server for the tests of the error tables.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,8 +13,7 @@
 
 namespace partiemc::server {
 
-/// That the status says the same to programs that know Google's error model, and speaks of a field
-/// that there is.
+/// Expects the same information in Google's error model, and an existing field.
 inline void ExpectDetails(const grpc::Status& status, const std::string& reason) {
   if (reason.empty()) {
     EXPECT_TRUE(status.error_details().empty());

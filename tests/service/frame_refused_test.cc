@@ -1,5 +1,5 @@
-// Each row of "A frame is refused" in proto/PROTOCOL.md: a test named as the row's reason, with the
-// exact reason and words, and the stream that goes on (error_table_test.cc looks for rows without).
+// The rows of "A frame is refused" in proto/PROTOCOL.md: one test per row, named by its reason,
+// with exact reason and words. The stream continues. error_table_test.cc finds rows without a test.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -23,7 +23,7 @@ class FrameRefused : public ErrorTable {
     Serve();
   }
 
-  // The answer to `frame` on a stream that `open` opens, and then that the stream goes on.
+  // Expects this answer to `frame` on a stream opened by `open`, and that the stream continues.
   void Expect(const v1::ReconstructRequest& frame, const std::string& reason,
               const std::string& message, std::uint64_t next_sequence = 2,
               const v1::ReconstructRequest& open = OpenRequest()) {
@@ -48,14 +48,14 @@ class FrameRefused : public ErrorTable {
     open.mutable_open()->mutable_outputs()->add_attributes(attribute);
     return open;
   }
-  // Gives the particles of `request` zeros of that name.
+  // Adds the attribute `name` with zeros to the particles of `request`.
   static v1::NamedScalar& Carry(const std::string& name, v1::ReconstructRequest& request) {
     v1::NamedScalar& scalar = *request.mutable_frame()->add_scalars();
     scalar.set_name(name);
     scalar.set_values(std::string(request.frame().positions().size() / 16 * sizeof(float), '\0'));
     return scalar;
   }
-  // A good frame whose number at `index` of `positions` is `value`.
+  // A good frame with `value` as number `index` of `positions`.
   static v1::ReconstructRequest WithCoordinate(std::size_t index, double value) {
     auto request = BlobRequest(1, 1, 0);
     std::memcpy(request.mutable_frame()->mutable_positions()->data() + 8 * index, &value, 8);
@@ -94,14 +94,14 @@ TEST_F(FrameRefused, MALFORMED) {
 
 class FrameOfManyFields : public FrameRefused {};
 
-// Also the first frame, whose number no other one has used.
+// Also for the first frame of a stream.
 TEST_F(FrameOfManyFields, IsMalformed) {
   auto scalars = BlobRequest(1, 1, 0);
   while (scalars.frame().scalars_size() <= 4096) scalars.mutable_frame()->add_scalars();
   Expect(scalars, "MALFORMED",
          "frame: " + std::to_string(scalars.ByteSizeLong()) +
              " bytes; must be a ParticleFrame of at most 4096 fields");
-  // A number behind too many fields is not read, and none is used up.
+  // The number after too many fields is not read and not used up.
   std::string unknown;
   for (int i = 0; i < 4097; ++i) unknown += std::string("\x7a\0", 2);
   const std::string message = std::string("\x12\x84\x40", 3) + unknown + "\x08\x01";
@@ -191,7 +191,7 @@ TEST_F(FrameRefused, NOT_PLANAR) {
          "positions[2].z: 0.5; particles must lie in the xy plane, but z ranges over [0, 0.5]");
 }
 
-// As float32, so far from the origin that steps are many spacings.
+// float32 positions so far from the origin that a step is many spacings.
 v1::ReconstructRequest CoarseRequest() {
   std::vector<float> far;
   for (const double coordinate : MovingBlob(1, 0)) {
@@ -227,7 +227,7 @@ TEST_F(FrameRefused, RESOLUTION) {
   EXPECT_EQ(coarse.error().next_sequence(), 3u);
 }
 
-// Beyond what a message can say: the codec has looked at all counts before the core does.
+// Larger than any message: the codec checks all counts before the core.
 TEST_F(FrameRefused, COUNT) {
   Session session = *Session::Open({.spacing = 1}, {});
   Worker worker;

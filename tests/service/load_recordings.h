@@ -1,4 +1,4 @@
-// What producers replay whose load is measured.
+// Recordings that producers replay in load tests.
 #pragma once
 
 #include <cstdint>
@@ -6,11 +6,11 @@
 
 namespace partiemc::server {
 
-/// `count` frames of the bundled dam break, over and over. A failure is one of the test.
+/// Writes `count` frames of the bundled dam break, repeated. Fails the test on errors.
 void RecordDamBreak(const std::string& path, std::uint64_t count);
 
-/// `count` frames of a square of fluid of about as many particles, whose surface waves. A failure
-/// is one of the test.
+/// Writes `count` frames of a square of fluid with a wavy surface and about `particles` particles.
+/// Fails the test on errors.
 void RecordSquare(const std::string& path, std::uint64_t particles, std::uint64_t count);
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// The log of the server as a process: what it never holds, and that nobody waits for it.
+// The log of the server process: it contains no secrets, and nothing waits for it.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,15 +21,14 @@ using ::testing::Not;
 
 constexpr char kToken[] = "alice-secret-0123456789";
 
-// Only against hanging.
+// A timeout for hangs only.
 constexpr std::chrono::seconds kPatience(60);
 
 std::shared_ptr<grpc::Channel> Channel(const ServingProcess& server) {
   return grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials());
 }
 
-// A stream is opened with the token, answers a frame, and is resumed by its stream token, which
-// this gives.
+// Opens a stream with the token, answers a frame, resumes by the stream token; returns that token.
 std::string Stream(const ServingProcess& server, const char* token) {
   const auto stub = v1::ReconstructionService::NewStub(Channel(server));
   std::string stream_token;
@@ -50,7 +49,7 @@ std::string Stream(const ServingProcess& server, const char* token) {
   return stream_token;
 }
 
-// gRPC prints metadata and bytes, as text and in hexadecimal.
+// gRPC prints metadata and bytes as text and in hexadecimal.
 TEST(Log, HasNoTokenAlthoughEveryTraceOfGrpcIsAskedFor) {
   const support::TemporaryFolder folder;
   const std::string tokens = folder.Write("tokens", std::string(kToken) + "\n");
@@ -65,14 +64,14 @@ TEST(Log, HasNoTokenAlthoughEveryTraceOfGrpcIsAskedFor) {
     EXPECT_THAT(log, AllOf(HasSubstr("stream opened"), HasSubstr("GRPC_TRACE ignored")));
     for (const std::string& secret : {std::string(kToken), stream_token}) {
       EXPECT_THAT(log, Not(HasSubstr(secret)));
-      std::string bytes;  // As gRPC dumps them: "61 6c 69 ".
+      std::string bytes;  // In gRPC's format: "61 6c 69 ".
       for (const char c : secret) {
         for (const int half : {c >> 4, c & 15}) bytes += "0123456789abcdef"[half];
         bytes += ' ';
       }
       EXPECT_THAT(log, Not(HasSubstr(bytes.substr(0, 24))));
     }
-    EXPECT_LT(log.size(), 5'000u);  // Nothing of the traces at all.
+    EXPECT_LT(log.size(), 5'000u);  // Contains no traces.
   }
 }
 
@@ -90,7 +89,7 @@ class LogPipe : public ::testing::Test {
   int ends_[2] = {-1, -1};
 };
 
-// A hundred lines of more than a hundred bytes into a pipe of 4 KiB.
+// A hundred lines of more than a hundred bytes, into a pipe of 4 KiB.
 TEST_F(LogPipe, ThatNobodyReadsHoldsUpNeitherStreamsNorTheDrain) {
   ServingProcess server({"--grace-seconds", "60"}, {.standard_error = ends_[1]});
   const auto channel = Channel(server);

@@ -1,5 +1,5 @@
 // A watcher that gives all credit and reads nothing: mute_watcher ADDRESS STREAM. After SIGTERM it
-// reads what is left, tells how many frames were dropped for it, and leaves.
+// reads the rest, prints the number of dropped frames, and exits.
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
 
@@ -11,7 +11,7 @@
 int main(int argc, char** argv) {
   using namespace partiemc::v1;
   if (argc != 3) return 2;
-  // Before gRPC starts threads, so that the signal waits for sigwait.
+  // Blocks the signal before gRPC starts threads, so that only sigwait receives it.
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);

@@ -1,5 +1,5 @@
-// What happens where the system has no memory left while a frame is parsed: the frame is refused,
-// and everything goes on.
+// The system has no memory left while a frame is parsed: the frame is refused, and the server
+// continues.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,14 +17,14 @@ namespace {
 
 constexpr std::size_t kLarge = std::size_t{1} << 19;
 
-// While it is set, no other thread than this one gets so much memory in one piece.
+// While set, other threads cannot allocate blocks above kLarge.
 std::atomic<bool> nothing_left = false;
 std::atomic<std::uint64_t> refused = 0;
 const std::thread::id kClient = std::this_thread::get_id();
 
 }  // namespace
 
-// In place of the library's, for the whole program.
+// Replaces the library's operator in the whole program.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   if (nothing_left && size >= kLarge && std::this_thread::get_id() != kClient) {
     ++refused;
@@ -44,7 +44,7 @@ using ::testing::HasSubstr;
 constexpr int kSide = 300;
 constexpr std::uint64_t kParticles = kSide * kSide;
 
-// Of which the positions alone are larger than kLarge.
+// Its positions alone are larger than kLarge.
 v1::ParticleFrame LargeFrame() {
   std::vector<float> positions;
   for (int k = 0; k < kSide * kSide; ++k) {

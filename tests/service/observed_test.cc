@@ -1,4 +1,4 @@
-// What is seen of a server from outside: metrics as Prometheus reads them, the log, and `info`.
+// The server seen from outside: Prometheus metrics, log, and `info`.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using Json = nlohmann::json;
 
-// What GET answers, header and body.
+// The response to GET, header and body.
 std::string Get(const Address& address, const std::string& path) {
   const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in name{};
@@ -50,8 +50,8 @@ std::string Get(const Address& address, const std::string& path) {
   return answer;
 }
 
-// A scrape, held to the text format: each sample of a family whose type was told before it, no
-// sample twice.
+// A scrape, checked against the text format: each sample has a family with a type before it, and no
+// sample occurs twice.
 using Samples = std::map<std::string, double>;
 
 Samples Scrape(const Server& server) {
@@ -85,8 +85,7 @@ Samples Scrape(const Server& server) {
   return samples;
 }
 
-// The gauges of ours that tell what goes on at the moment: all but those that tell a limit or a
-// fact.
+// Gauges of current activity: all except limits and facts.
 std::set<std::string> GaugesOfWhatGoesOn(const Server& server) {
   static const std::set<std::string> kFacts = {"partiemc_build_info",
                                                "partiemc_memory_budget_bytes"};
@@ -109,7 +108,7 @@ class Observed : public ::testing::Test {
     channel_ = Connect(*server_, Transport::kTcp);
   }
 
-  // Of our service, its labels in the order in which they are written.
+  // A sample of a call, with labels in their written order.
   static std::string Call(const std::string& name, const std::string& method,
                           const std::string& code = "") {
     return name + "{" + (code.empty() ? "" : "grpc_code=\"" + code + "\",") + "grpc_method=\"" +
@@ -156,7 +155,7 @@ TEST_F(Observed, CountersEqualWhatTheClientDid) {
   EXPECT_EQ(samples["partiemc_frame_errors_total{reason=\"SEQUENCE_GAP\"}"], 1);
   EXPECT_EQ(samples["partiemc_frame_errors_total{reason=\"BYTE_COUNT\"}"], 1);
   EXPECT_EQ(samples["partiemc_frame_seconds_count"], 3);
-  // In seconds: stages are parts of their frames, and frames were answered one after the other.
+  // In seconds. Stages are parts of their frames, and frames were answered one after the other.
   double stage_seconds = 0;
   for (std::size_t k = 0; k < kStageCount; ++k) {
     stage_seconds += samples["partiemc_stage_seconds_sum{stage=\"" +
@@ -185,7 +184,7 @@ TEST_F(Observed, CountersEqualWhatTheClientDid) {
 
 TEST_F(Observed, EveryGaugeHasMovedAndIsAtZeroAfterEverythingHasClosed) {
   const std::set<std::string> gauges = GaugesOfWhatGoesOn(*server_);
-  // Each must have been seen above zero, so that zero says something.
+  // Each must have been above zero, so that zero is meaningful.
   std::set<std::string> still = {"partiemc_streams", "partiemc_watchers",
                                  "partiemc_compute_queue_length", "partiemc_memory_held_bytes",
                                  "partiemc_watched_bytes"};
@@ -193,7 +192,7 @@ TEST_F(Observed, EveryGaugeHasMovedAndIsAtZeroAfterEverythingHasClosed) {
   {
     StreamClient watched(channel_);
     ASSERT_TRUE(watched.SendAndReceive(OpenRequest("watched")).has_opened());
-    WatchClient watcher(channel_);  // Has credit for one, so that the next ones wait for it.
+    WatchClient watcher(channel_);  // Has credit for one frame, so that the next ones wait.
     watcher.Open("watched", v1::WATCH_MODE_LATEST, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
     std::vector<std::unique_ptr<StreamClient>> busy;
@@ -239,7 +238,7 @@ TEST_F(Observed, TheNumberOfSeriesDoesNotGrowWithStreamsAndTheirNames) {
     ASSERT_TRUE(client.Finish().ok());
   };
   stream("first");
-  Scrape(*server_);  // The endpoint counts its own readings from the first one on.
+  Scrape(*server_);  // The endpoint counts its own scrapes from the first one.
   const std::size_t before = Scrape(*server_).size();
   for (int i = 0; i < 20; ++i) stream("stream-" + std::to_string(i));
   const Samples samples = Scrape(*server_);
@@ -258,7 +257,7 @@ TEST_F(Observed, AnEndpointThatCannotListenIsToldWithItsFlag) {
   EXPECT_EQ(Server::Start(options).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-// The lines that have this message.
+// The lines with this message.
 std::vector<Json> Events(const CapturedLog& log, const std::string& message) {
   std::vector<Json> events;
   std::istringstream lines(log.Text());

@@ -1,4 +1,4 @@
-// What an operator sees: unary calls, health, reflection, drain, addresses.
+// The server for operators: unary calls, health, reflection, drain, addresses.
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
@@ -188,7 +188,7 @@ TEST_F(Operation, ReflectionListsTheService) {
   queue.Shutdown();
 }
 
-TEST_F(Operation, DrainingDeliversFinishedFramesTellsEveryStreamAndRefusesNewOnes) {
+TEST_F(Operation, DrainingDeliversFramesNotifiesStreamsAndRefusesNewOnes) {
   constexpr int kStreams = 6;
   const auto expected = LocalDigests(2, 400);
   std::vector<std::thread> clients;
@@ -232,7 +232,7 @@ TEST_F(Operation, DrainingDeliversFinishedFramesTellsEveryStreamAndRefusesNewOne
 }
 
 TEST_F(Operation, AClientThatNeverReceivesHoldsUpADrainForNoLongerThanTheGrace) {
-  // In process nothing is buffered: the first answer waits for its reader.
+  // In process nothing is buffered: the first response waits for its reader.
   StreamClient client(server_->InProcessChannel());
   ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
   std::thread writer([&] {
@@ -245,7 +245,7 @@ TEST_F(Operation, AClientThatNeverReceivesHoldsUpADrainForNoLongerThanTheGrace) 
     SetDeadline(context);
     ASSERT_TRUE(stub_->ListStreams(&context, {}, &streams).ok());
   }
-  // Returning at all is the point; the deadline of the test tells if it does not.
+  // Must return; otherwise the test's deadline fails it.
   server_->Drain(std::chrono::milliseconds(200));
   writer.join();
   EXPECT_NE(client.Finish().error_code(), grpc::StatusCode::OK);

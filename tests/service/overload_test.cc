@@ -1,4 +1,5 @@
-// What a server does not take: streams, calls and bytes too many, clients that keep it waiting.
+// Excess that the server refuses: too many streams, calls and bytes, and clients that keep it
+// waiting.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A time in which nothing comes. Longer than a busy machine keeps a client from its turn.
+// A silent period, longer than a busy machine delays a client.
 constexpr milliseconds kIdle(500);
 using ::testing::HasSubstr;
 
@@ -78,11 +79,11 @@ TEST_P(Overload, AClientThatTakesNoAnswersIsCut) {
   Serve(limits_);
   StreamClient client(channel_);
   ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
-  // Until no buffer takes any more, and then until the server has had enough.
+  // Sends until no buffer accepts more, and then until the server ends the stream.
   for (std::uint64_t i = 1; client.Send(BlobRequest(i, 1, i % 3)); ++i) {
   }
   EXPECT_EQ(client.Finish().error_code(), grpc::StatusCode::CANCELLED);
-  // It may see that before the server has seen it through.
+  // The client may see the end before the server has finished it.
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (Info().open_streams() > 0) ASSERT_LT(std::chrono::steady_clock::now(), give_up);
 }
@@ -100,7 +101,7 @@ TEST_P(Overload, WithoutAnyBudgetStreamsGoOnFrameByFrameWithTheSameResults) {
 
 TEST_P(Overload, ACallThatTheBudgetHasNoRoomForIsRefusedAtOnceWithTheWayOut) {
   limits_.memory_budget = 100;
-  limits_.history_bytes = 0;  // Which has a part of it.
+  limits_.history_bytes = 0;  // It shares the budget.
   Serve(limits_);
   v1::ReconstructFrameRequest request;
   *request.mutable_parameters() = OpenRequest().open().parameters();
@@ -116,7 +117,7 @@ TEST_P(Overload, ACallThatTheBudgetHasNoRoomForIsRefusedAtOnceWithTheWayOut) {
   EXPECT_THAT(status.error_message(), HasSubstr("--memory-budget"));
 }
 
-// Calls that are begun and cancelled at once, on both kinds of streams, several at a time.
+// Begins calls of both kinds of streams and cancels them at once, several at a time.
 void BeginAndCancel(const std::shared_ptr<grpc::Channel>& channel, int calls) {
   std::vector<std::thread> clients;
   for (int k = 0; k < 4; ++k) {
@@ -132,12 +133,12 @@ void BeginAndCancel(const std::shared_ptr<grpc::Channel>& channel, int calls) {
   for (std::thread& client : clients) client.join();
 }
 
-// A refusal and a cancellation once both ended the call: gRPC aborts the process at the second end.
+// A refusal and a cancellation once both ended the call; gRPC aborts the process at the second end.
 TEST_P(Overload, CallsThatAreCancelledWhileTheyGiveWayEndOnce) {
   limits_.max_streams = 1;
   limits_.max_watchers = 0;
   Serve(limits_);
-  // Take all places of calls without a request, so that each that comes has another give way.
+  // Takes all slots of calls without a request, so that each new call evicts another.
   std::vector<std::unique_ptr<StreamClient>> opening(limits_.MaxOpeningCalls());
   for (auto& client : opening) client = std::make_unique<StreamClient>(channel_);
   BeginAndCancel(channel_, 500);
@@ -152,7 +153,7 @@ TEST_P(Overload, CallsThatAreCancelledWhileTheServerDrainsEndOnce) {
   Serve(limits_);
   StreamClient held(channel_);
   ASSERT_TRUE(held.SendAndReceive(OpenRequest()).has_opened());
-  // gRPC's own in-process channel does not survive calls after its server has gone.
+  // gRPC's in-process channel does not survive calls after its server was destroyed.
   const auto calling = Connect(*server_, Transport::kTcp);
   std::atomic<bool> stop = false;
   std::thread caller([&] {

@@ -1,11 +1,13 @@
-// Each row of "A part is refused" in proto/PROTOCOL.md: a test named as the row's reason, with the
-// exact reason and words (error_table_test.cc looks for rows without).
+// The rows of "A part is refused" in proto/PROTOCOL.md: one test per row, named by its reason, with
+// exact reason and words. error_table_test.cc finds rows without a test.
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <string>
 
 #include "service/error_testing.h"
 #include "service/parts_testing.h"
+#include "support/temporary_folder.h"
 
 namespace partiemc::server {
 namespace {
@@ -44,7 +46,71 @@ class PartRefused : public ErrorTable {
 TEST_F(PartRefused, PARTS_MISSING) {
   Ranks ranks(*server_, "tank", 3, 50);
   ranks.Send(0, 1);
-  ExpectError(ranks[0].Receive(), "PARTS_MISSING", "parts: 1, 2; must come within 50 ms of part 0");
+  ExpectError(ranks[0].Receive(), "PARTS_MISSING",
+              "parts: 1, 2; must come within 50 ms of the first part of their frame");
+}
+
+// One Reconstruct call, optionally with a token.
+class TokenCall {
+ public:
+  TokenCall(v1::ReconstructionService::Stub& stub, const std::string& token) {
+    SetDeadline(context_);
+    if (!token.empty()) context_.AddMetadata("authorization", "Bearer " + token);
+    call_ = stub.Reconstruct(&context_);
+  }
+  v1::ReconstructResponse Exchange(const v1::ReconstructRequest& request) {
+    v1::ReconstructResponse response;
+    EXPECT_TRUE(call_->Write(request) && call_->Read(&response));
+    return response;
+  }
+  ~TokenCall() {
+    context_.TryCancel();
+    call_->Finish();
+  }
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::ReconstructRequest, v1::ReconstructResponse>> call_;
+};
+
+// The answer to a part of a call that was idle while another stream waited for the only slot.
+v1::ReconstructResponse AnswerAfterIdling(v1::ReconstructionService::Stub& stub,
+                                          const std::string& token,
+                                          const v1::ReconstructRequest& part) {
+  TokenCall leader(stub, token), member(stub, token), other(stub, token);
+  EXPECT_TRUE(leader.Exchange(OpenPart("tank", 0, 2)).has_opened());
+  EXPECT_TRUE(member.Exchange(OpenPart("tank", 1, 2)).has_opened());
+  EXPECT_TRUE(other.Exchange(OpenRequest("other")).has_opened());
+  // Each of these takes the slot of the idle calls.
+  EXPECT_TRUE(other.Exchange(BlobRequest(1, 1, 0)).has_frame());
+  EXPECT_TRUE(other.Exchange(BlobRequest(2, 1, 1)).has_frame());
+  return member.Exchange(part);
+}
+
+TEST_F(PartRefused, MEMORY_BUDGET) {
+  options_.limits.memory_budget = 100;
+  options_.limits.history_bytes = 0;  // It shares the budget.
+  options_.limits.streams_beyond_budget = 1;
+  Serve();
+  const auto part = PartRequest(1, 2, 1, 1, 0, true);
+  ExpectError(AnswerAfterIdling(*stub_, "", part), "MEMORY_BUDGET",
+              "frame: " + std::to_string(part.ByteSizeLong()) +
+                  " bytes; must fit with what is being worked on into 100 bytes; try again later, "
+                  "or start the server with a larger --memory-budget");
+}
+
+TEST_F(PartRefused, CALLER_BYTES) {
+  constexpr char kToken[] = "parts-0123456789abcdef";
+  const support::TemporaryFolder folder;
+  options_.token_file = folder.Write("tokens", std::string(kToken) + " ranks bytes=100B\n");
+  options_.limits.streams_beyond_budget = 1;
+  Serve();
+  const auto part = PartRequest(1, 2, 1, 1, 0, true);
+  ExpectError(AnswerAfterIdling(*stub_, kToken, part), "CALLER_BYTES",
+              "caller.bytes: " + std::to_string(part.ByteSizeLong()) +
+                  " more; must not make it more than is free, nor more than the `bytes=` of one "
+                  "caller, which is a token or, without tokens, an address; try again when a call "
+                  "of it has ended");
 }
 
 TEST_F(PartRefused, PART_MISMATCH) {

@@ -1,5 +1,5 @@
-// Frames that come in parts over gRPC: the same digests for any number of parts in any order, and
-// ranks that lose, double, delay, mistake and die.
+// Frames in parts over gRPC: the same digests for any number of parts in any order, and ranks that
+// lose, repeat, delay or confuse parts, or die.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,13 +31,13 @@ class Parts : public ::testing::Test {
   const std::vector<Digests> expected_ = LocalDigests(1, 12);
 };
 
-TEST_F(Parts, DigestsAreThoseOfWholeFramesForAnyNumberOfPartsInAnyOrderOfComing) {
+TEST_F(Parts, DigestsEqualWholeFramesForAnyPartsInAnyOrder) {
   std::mt19937 random(11);
   for (const bool ids : {true, false}) {
     for (const std::uint32_t parts : {1u, 4u, 16u, 64u}) {
       SCOPED_TRACE(testing::Message() << parts << " parts, ids " << ids);
       Ranks ranks(*server_, "tank", parts);
-      // Each rank sends its parts in order; ranks take turns at random, up to the window ahead.
+      // Each rank sends its parts in order; ranks take turns at random, up to a window ahead.
       std::vector<std::uint32_t> turns;
       for (std::uint32_t part = 0; part < parts; ++part) turns.insert(turns.end(), 4, part);
       std::ranges::shuffle(turns, random);
@@ -84,7 +84,7 @@ TEST_F(Parts, ALostPartIsOneErrorAndTheStreamGoesOn) {
   EXPECT_EQ(answer.frame().statistics().particles(), MovingBlob(1, 1).size() / 2);
 }
 
-TEST_F(Parts, ADoubledPartALateOneAndOneOfAnotherFrameAreRefusedAndTheStreamGoesOn) {
+TEST_F(Parts, RefusesDoubledLateAndForeignPartsAndContinues) {
   Ranks ranks(*server_, "tank", 2, 1000);
   ranks.Send(1, 1);
   ranks.Send(1, 1);
@@ -130,7 +130,7 @@ TEST_F(Parts, ARankThatDiesCostsOneErrorAFrameUntilItComesBack) {
   EXPECT_TRUE(ranks[0].Receive().has_frame());
 }
 
-TEST_F(Parts, ARankThatComesBackInTimeSendsItsPartsAgainAndNothingIsMissing) {
+TEST_F(Parts, AReconnectedRankResendsItsParts) {
   Ranks ranks(*server_, "tank", 3);
   ranks.Send(2, 1);
   ranks.Send(2, 2);
@@ -155,7 +155,7 @@ TEST_F(Parts, ARankTakesItsPartOverFromACallThatNobodyKnowsToBeDead) {
   EXPECT_EQ(answer.frame().rings_digest(), expected_[0].rings);
 }
 
-TEST_F(Parts, WhenPartZeroDiesTheOthersComeBackAndGoOnWithTheStreamThatItResumes) {
+TEST_F(Parts, WhenPartZeroDiesTheOthersRejoinTheStreamItResumes) {
   Ranks ranks(*server_, "tank", 3, 0, 2);
   v1::ResumeStream resume;
   resume.set_stream_token(ranks.opened().stream_token());
@@ -166,7 +166,7 @@ TEST_F(Parts, WhenPartZeroDiesTheOthersComeBackAndGoOnWithTheStreamThatItResumes
     if (!answer.checkpoint().empty()) resume.set_checkpoint(answer.checkpoint());
     for (const std::uint32_t part : {1u, 2u}) {
       const auto taken = ranks[part].Receive();
-      // Of the window of 4: what was sent with frame 6 tells that the answer to frame 2 was there.
+      // With a window of 4, sending frame 6 implies that the answer to frame 2 was received.
       EXPECT_EQ(taken.part().resume_sequence(), sequence < 6 ? 1u : 3u);
     }
   }

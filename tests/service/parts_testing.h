@@ -1,4 +1,4 @@
-// The ranks of a simulator as plain clients of one stream, each with a connection of its own.
+// The ranks of a simulator as plain clients of one stream, each with its own connection.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -25,8 +25,8 @@ inline v1::ReconstructRequest OpenPart(const std::string& name, std::uint32_t pa
   return request;
 }
 
-/// What part `part` has of frame `index` of the moving blob of `seed`. With ids, which are places
-/// in the blob, particle k belongs to part k % parts; without, each part has a stretch of the blob.
+/// Part `part` of frame `index` of blob `seed`. With ids (indices in the blob), particle k belongs
+/// to part k % parts; without ids, each part is a contiguous range of the blob.
 inline v1::ReconstructRequest PartRequest(std::uint32_t part, std::uint32_t parts,
                                           std::uint64_t sequence, unsigned seed,
                                           std::uint64_t index, bool ids) {
@@ -44,7 +44,7 @@ inline v1::ReconstructRequest PartRequest(std::uint32_t part, std::uint32_t part
   return request;
 }
 
-/// Opened one after the other, part 0 first.
+/// Opens the parts in order, part 0 first.
 class Ranks {
  public:
   Ranks(Server& server, std::string name, std::uint32_t parts, std::uint32_t timeout_ms = 0,
@@ -60,13 +60,13 @@ class Ranks {
     }
   }
 
-  /// What part 0 was told first.
+  /// The first response to part 0.
   const v1::StreamOpened& opened() const { return opened_; }
 
   StreamClient& operator[](std::uint32_t part) { return *ranks_[part]; }
   std::uint32_t count() const { return static_cast<std::uint32_t>(ranks_.size()); }
 
-  /// Gives the connection of `part` up and makes another one.
+  /// Closes the connection of `part` and opens another.
   v1::StreamOpened Reopen(std::uint32_t part) { return Open(part, OpenPart(name_, part, count())); }
   v1::StreamOpened Open(std::uint32_t part, const v1::ReconstructRequest& request) {
     ranks_[part] = std::make_unique<StreamClient>(Connect(server_, Transport::kTcp));
@@ -82,7 +82,8 @@ class Ranks {
     for (std::uint32_t part = 0; part < count(); ++part) Send(part, sequence);
   }
 
-  /// What part 0 gets for this frame of the blob of seed 1, and the others for their parts of it.
+  /// Expects the answers to this frame of blob 1: the result for part 0, confirmations for the
+  /// other parts.
   void ExpectAnswered(std::uint64_t sequence, const Digests& expected) {
     const auto answer = ranks_[0]->Receive();
     ASSERT_TRUE(answer.has_frame()) << answer.ShortDebugString().substr(0, 200);

@@ -1,4 +1,4 @@
-// Processor time of another process, from outside.
+// Processor time of another process.
 #pragma once
 
 #include <sys/types.h>
@@ -7,10 +7,10 @@
 
 namespace partiemc::server {
 
-/// Of all its threads, those that have ended included; negative once it has gone.
+/// Of all its threads, including ended ones; negative after it has ended.
 double ProcessCpuMs(pid_t process);
 
-/// Of those of its threads that have this name now.
+/// Of its threads that currently have this name.
 double ThreadsCpuMs(pid_t process, const std::string& name);
 
 }  // namespace partiemc::server

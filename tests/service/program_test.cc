@@ -1,4 +1,4 @@
-// partiemc-server as a program: what scripts, containers and their health checks rely on.
+// partiemc-server as a program: the behaviour that scripts, containers and health checks rely on.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -1,4 +1,4 @@
-// What ends a stream or refuses it: the code, the reason and the words of each.
+// Ends and refusals of streams: code, reason and words of each.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 class Protocol : public ::testing::TestWithParam<Transport> {
  protected:
-  // Sends one request as the first of a stream and expects the stream to end so.
+  // Sends one request as the first of a stream and expects this end.
   void ExpectRefused(const v1::ReconstructRequest& first, grpc::StatusCode code,
                      const std::string& reason, const std::string& words) {
     StreamClient client(channel_);

@@ -1,8 +1,8 @@
-// One rank of a simulator: streams its part of a moving blob, particle k of it to rank k modulo
-// ranks. Rank 0 prints a line for each answer: "SEQUENCE RINGS_DIGEST MESH_DIGEST" or
-// "SEQUENCE REASON"; the others print what was refused.
+// One rank of a simulator: streams its part of a moving blob; particle k belongs to rank k modulo
+// ranks. Rank 0 prints a line for each answer: "SEQUENCE RINGS_DIGEST MESH_DIGEST" or "SEQUENCE
+// REASON". The others print refusals.
 //
-//   parts_rank ADDRESS FRAMES PAUSE_MS [RANK RANKS]     (Open MPI tells the last two otherwise)
+//   parts_rank ADDRESS FRAMES PAUSE_MS [RANK RANKS]     (default of the last two: Open MPI's)
 #include <chrono>
 #include <cinttypes>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// A simulator of many processes, started by hand and by Open MPI, whose ranks and server die.
+// A simulator of several processes, started by hand and by Open MPI; ranks and server are killed.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -44,7 +44,7 @@ std::unique_ptr<Program> StartRank(const std::string& address, std::uint64_t fra
                                               absl::StrCat(rank), absl::StrCat(ranks)});
 }
 
-// Of all ranks, the last one first: part 0 comes last.
+// Starts all ranks, the last one first, so that part 0 comes last.
 std::vector<std::unique_ptr<Program>> StartRanks(const std::string& address, std::uint64_t frames,
                                                  int pause_ms, std::uint32_t ranks) {
   std::vector<std::unique_ptr<Program>> programs(ranks);
@@ -119,7 +119,7 @@ TEST(Ranks, OthersEndWithinTheirTimeWhenPartZeroIsKilled) {
   WaitForLines(*programs[0], 3);
   programs[0]->Signal(SIGKILL);
   EXPECT_EQ(programs[1]->Wait(), 1);  // After ReconnectPolicy::give_up_after.
-  EXPECT_NE(programs[1]->Error().find("could not go on"), std::string::npos)
+  EXPECT_NE(programs[1]->Error().find("could not continue"), std::string::npos)
       << programs[1]->Error();
 }
 

@@ -1,4 +1,4 @@
-// Checkpoints, tokens and takeover as they look on the wire (proto/PROTOCOL.md, "Resume").
+// Checkpoints, tokens and take-over on the wire (proto/PROTOCOL.md, "Resume").
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ v1::ReconstructRequest Resume(const std::string& checkpoint, const std::string& 
 
 class ResumeProtocol : public ::testing::TestWithParam<Transport> {
  protected:
-  // What is expected of the end of a stream that `open` would open.
+  // Expects this end of a stream opened by `open`.
   void ExpectRefused(const v1::ReconstructRequest& open, grpc::StatusCode code,
                      const std::string& reason) {
     StreamClient client(channel_);
@@ -57,7 +57,7 @@ class ResumeProtocol : public ::testing::TestWithParam<Transport> {
     EXPECT_THAT(status.error_message(), HasSubstr(what));
   }
 
-  // A stream that is open, and its checkpoint after one frame.
+  // An open stream, and its checkpoint after one frame.
   struct Stream {
     std::unique_ptr<StreamClient> client;
     std::string token, checkpoint;
@@ -71,7 +71,7 @@ class ResumeProtocol : public ::testing::TestWithParam<Transport> {
     return stream;
   }
 
-  // Of the only stream.
+  // The name of the only stream.
   static std::string ListedName(const std::shared_ptr<grpc::Channel>& channel) {
     grpc::ClientContext context;
     SetDeadline(context);
@@ -109,7 +109,7 @@ TEST_P(ResumeProtocol, AResumedStreamGivesTheDigestsOfAnUndisturbedOne) {
   const std::vector<Digests> expected = LocalDigests(kSeed, kFrames);
   std::string token, checkpoint;
   for (std::uint64_t k = 0; k < kFrames; ++k) {
-    // Each frame in a call of its own, while the call before is still open.
+    // Each frame in its own call, while the previous call is still open.
     StreamClient client(channel_);
     const auto opened =
         client.SendAndReceive(k == 0 ? OpenWithCheckpoints(1) : Resume(checkpoint, token));
@@ -218,7 +218,7 @@ TEST_P(ResumeProtocol, ACheckpointIsGoodForItsOwnStreamAndForEverythingThatOpenS
   ExpectMismatch(open, "another stream_name");
 
   open = Resume(stream.checkpoint, stream.token);
-  open.mutable_open()->mutable_outputs()->set_rings(true);  // What an absent message means.
+  open.mutable_open()->mutable_outputs()->set_rings(true);  // The default of an absent message.
   open.mutable_open()->mutable_outputs()->set_mesh(true);
   StreamClient client(channel_);
   EXPECT_TRUE(client.SendAndReceive(open).has_opened());
@@ -251,9 +251,9 @@ TEST_P(ResumeProtocol, ServersWithOneKeyTakeEachOthersCheckpointsAndNoOthers) {
       << "the beginning of a stream has no signature";
 }
 
-TEST_P(ResumeProtocol, AKeyFileThatIsBrokenIsAnErrorAtTheStartAndKeepsTheOldKeysLater) {
+TEST_P(ResumeProtocol, ABrokenKeyFileFailsTheStartAndLaterKeepsTheOldKeys) {
   const support::TemporaryFolder folder;
-  const auto write = [&](const std::string& keys) {  // Whole or not at all.
+  const auto write = [&](const std::string& keys) {  // Atomically.
     std::filesystem::rename(folder.Write("next", keys), folder.Path("keys"));
     return folder.Path("keys");
   };
@@ -284,14 +284,14 @@ TEST_P(ResumeProtocol, AKeyFileThatIsBrokenIsAnErrorAtTheStartAndKeepsTheOldKeys
   EXPECT_EQ(log.Count("secret"), 0u) << log.Text();
 }
 
-TEST_P(ResumeProtocol, ACheckpointThatWouldBeTooLargeIsNotSentAndOneThatIsIsRefusedUnread) {
+TEST_P(ResumeProtocol, TooLargeACheckpointIsNeitherSentNorRead) {
   ServerOptions options = TestOptions();
   options.limits.max_frame_bytes = 10'000;
   server_ = StartServer(options);
   channel_ = Connect(*server_, GetParam());
   StreamClient client(channel_);
   const auto opened = client.SendAndReceive(OpenWithCheckpoints(1));
-  // Particles far apart, each with an outline of its own.
+  // Particles far apart, each with its own outline.
   auto spray = BlobRequest(1, kSeed, 0);
   std::vector<float> positions;
   for (int k = 0; k < 500; ++k) positions.insert(positions.end(), {static_cast<float>(k), 0.0f});

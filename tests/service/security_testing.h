@@ -1,5 +1,5 @@
-// A server whose certificate, authority and tokens are files that a test writes, and clients that
-// bring along what they like.
+// A server with certificate, authority and tokens in files that a test writes, and clients with any
+// credentials.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -17,10 +17,10 @@ namespace partiemc::server {
 inline constexpr char kToken[] = "alice-secret-0123456789";
 inline constexpr char kOtherToken[] = "bob-secret-0123456789ab";
 
-// What a client brings along.
+// Credentials of a client.
 struct Client {
   bool tls = true;
-  std::string authority;  // That it trusts.
+  std::string authority;  // The authority that it trusts.
   IssuedCertificate own = {};
   std::string token = {};
 };
@@ -28,28 +28,27 @@ struct Client {
 class Security : public ::testing::Test {
  protected:
   std::string Path(const std::string& name) const { return folder_.Path(name); }
-  // As a careful operator does it: whole or not at all.
+  // Replaces the file atomically.
   void Write(const std::string& name, const std::string& text) const;
   void WriteIdentity(const IssuedCertificate& identity) const;
 
   ServerOptions Options(bool tls, bool client_ca, bool tokens) const;
 
-  // A connection of its own.
+  // A channel with its own connection.
   std::shared_ptr<grpc::Channel> Channel(const Client& client) const;
 
   struct End {
     grpc::StatusCode code;
     std::string reason, message;
   };
-  // How a call of GetServerInfo ends.
+  // The end of a GetServerInfo call.
   End Ask(const Client& client) const { return Ask(Channel(client), client.token); }
   static End Ask(const std::shared_ptr<grpc::Channel>& channel, const std::string& token);
-  // How a call of any method ends that sends one empty message; streams are told after it that no
-  // more will come.
+  // The end of a call of any method with one empty message. Streams are then half-closed.
   static End Call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
                   const std::string& authorization);
 
-  const support::TemporaryFolder folder_;  // Goes after the server that looks into it.
+  const support::TemporaryFolder folder_;  // Destroyed after the server that reads it.
   CertificateAuthority authority_{"authority"}, stranger_{"stranger"};
   std::unique_ptr<Server> server_;
 };

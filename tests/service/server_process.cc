@@ -35,6 +35,8 @@ std::string FileText(const std::string& path) {
   return text.str();
 }
 
+std::string ServerProgram() { return PARTIEMC_SERVER; }
+
 ServerProcess::ServerProcess(std::vector<std::string> arguments, const Surroundings& surroundings)
     : folder_(std::make_unique<support::TemporaryFolder>()) {
   const std::string output = folder_->Path("output");
@@ -137,7 +139,7 @@ ServingProcess::ServingProcess(std::vector<std::string> arguments, const Surroun
     }
   }
   address_ = FileText(port_file);
-  address_.pop_back();  // The end of the line.
+  address_.pop_back();  // Removes the newline.
 }
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// partiemc-server as a process, and what the system tells about it.
+// Runs partiemc-server as a process and reads its figures from the system.
 #pragma once
 
 #include <sys/types.h>
@@ -17,15 +17,17 @@ namespace partiemc::server {
 
 std::string FileText(const std::string& path);
 
-/// What a server is started with beside its arguments.
+/// Path of the server built with the tests.
+std::string ServerProgram();
+
+/// Environment of a server process.
 struct Surroundings {
-  std::vector<std::string> environment = {};  ///< NAME=VALUE, beside this process's own.
-  int standard_error = -1;                    ///< A file descriptor; -1: in Output().
-  std::string program = {};                   ///< Empty: the one that was built with the tests.
+  std::vector<std::string> environment = {};  ///< NAME=VALUE, added to this process's environment.
+  int standard_error = -1;                    ///< A file descriptor; -1: captured in Output().
+  std::string program = {};                   ///< Empty: the one built with the tests.
 };
 
-/// partiemc-server with these arguments, its output in a file. Both are gone when this
-/// goes out of scope.
+/// partiemc-server with these arguments, with its output in a file. Both end with this object.
 class ServerProcess {
  public:
   explicit ServerProcess(std::vector<std::string> arguments, const Surroundings& surroundings = {});
@@ -34,18 +36,19 @@ class ServerProcess {
   ServerProcess& operator=(ServerProcess&&) = delete;
 
   void Signal(int signal);
-  /// The exit code, or -1 for a death by signal.
+  /// The exit code, or -1 if a signal ended it.
   int Wait();
-  /// As Wait; nothing if it is still there after `time`.
+  /// Same as Wait; empty if it still runs after `time`.
   std::optional<int> WaitFor(std::chrono::milliseconds time);
 
   std::string Output() const { return FileText(folder_->Path("output")); }
   pid_t process() const { return process_; }
 
-  // While it runs:
+  // Requires that it runs:
   double ResidentMib() const;
   std::size_t ThreadCount() const;
-  std::size_t ThreadCount(std::string_view name) const;  // As the kernel cuts it: 15 characters.
+  std::size_t ThreadCount(
+      std::string_view name) const;  // The kernel truncates names to 15 characters.
   std::size_t OpenFileCount() const;
 
  private:
@@ -56,10 +59,10 @@ class ServerProcess {
   pid_t process_ = 0;
 };
 
-/// The exit code of a run with these arguments.
+/// Runs the server with these arguments; returns the exit code.
 int RunServer(const std::vector<std::string>& arguments, std::string* output = nullptr);
 
-/// One that serves on a port of loopback that it chose itself.
+/// A server on a loopback port of its choice.
 class ServingProcess {
  public:
   explicit ServingProcess(std::vector<std::string> arguments = {},

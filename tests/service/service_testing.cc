@@ -15,7 +15,7 @@
 namespace partiemc::server {
 namespace {
 
-// Far beyond what any call takes, below CTest's own limit.
+// Longer than any call takes, shorter than CTest's limit.
 constexpr std::chrono::seconds kDeadline{120};
 
 Frame FrameOf(const std::vector<double>& positions) {
@@ -42,7 +42,7 @@ ServerOptions TestOptions() {
 
 std::unique_ptr<Server> StartServer(const ServerOptions& options) {
   auto server = Server::Start(options);
-  // Ends the test as failed, with these words.
+  // Fails the test with this message.
   if (!server.ok()) throw std::runtime_error("no server: " + server.status().ToString());
   return *std::move(server);
 }
@@ -60,7 +60,7 @@ std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport) {
   if (transport == Transport::kInProcess) return server.InProcessChannel();
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
-  // A connection of its own for every channel, as different clients have.
+  // One connection per channel, like different clients.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(server.address().ToString(), grpc::InsecureChannelCredentials(),
                                    arguments);

@@ -17,25 +17,25 @@ namespace partiemc::server {
 
 enum class Transport { kInProcess, kTcp };
 
-/// Named "InProcess" and "Tcp" in the names of tests.
+/// "InProcess" or "Tcp", for names of tests.
 std::string TransportName(Transport transport);
 
-/// Port 0 on loopback, two threads, and limits that are quick to reach.
+/// Port 0 on loopback, two threads, and low limits.
 ServerOptions TestOptions();
 
-/// Ends the test as failed where the server does not start.
+/// Fails the test if the server does not start.
 std::unique_ptr<Server> StartServer(const ServerOptions& options);
 
-/// Looks again and again, for what comes about some milliseconds later: a change of files, the end
-/// of a call as the server sees it. False after two minutes.
+/// Polls a condition that becomes true some milliseconds later: a reloaded file, or a call that the
+/// server sees end. False after two minutes.
 bool Eventually(const std::function<bool()>& holds);
 
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport);
 
-/// After this a call that hangs fails its test.
+/// Sets a deadline, so that a hanging call fails its test.
 void SetDeadline(grpc::ClientContext& context);
 
-/// The reason that the call ended with; empty if none.
+/// The reason of the call's end; empty if there is none.
 std::string ReasonOf(const grpc::ClientContext& context);
 
 /// A request with frame `index` of the moving blob of `seed`, numbered `sequence`.
@@ -44,24 +44,24 @@ v1::ReconstructRequest BlobRequest(std::uint64_t sequence, unsigned seed, std::u
 /// A request that opens a stream for moving blobs.
 v1::ReconstructRequest OpenRequest(const std::string& name = "");
 
-/// One Reconstruct call, driven step by step: a request, then the answers to it.
+/// One Reconstruct call, driven step by step: a request, then its responses.
 class StreamClient {
  public:
   explicit StreamClient(const std::shared_ptr<grpc::Channel>& channel);
-  /// Cancels a stream that was not finished.
+  /// Cancels an unfinished stream.
   ~StreamClient();
 
-  /// False once the stream has ended.
+  /// False after the end of the stream.
   bool Send(const v1::ReconstructRequest& request) { return stream_->Write(request); }
-  /// An answer without a case once the stream has ended.
+  /// An empty response after the end of the stream.
   v1::ReconstructResponse Receive();
   v1::ReconstructResponse SendAndReceive(const v1::ReconstructRequest& request);
-  /// Half-closes. Still to receive are the answers, then the end.
+  /// Half-closes. Responses and the end are still received.
   void HalfClose() { stream_->WritesDone(); }
   void Cancel() { context_.TryCancel(); }
-  /// Receives and drops what is left; gives the status.
+  /// Drops the remaining responses; returns the status.
   grpc::Status Finish();
-  /// Of the status.
+  /// Reason in the status.
   std::string reason() const { return ReasonOf(context_); }
 
  private:
@@ -76,20 +76,20 @@ class StreamClient {
 class WatchClient {
  public:
   explicit WatchClient(const std::shared_ptr<grpc::Channel>& channel);
-  /// Cancels a watch that was not finished.
+  /// Cancels an unfinished watch.
   ~WatchClient();
 
   bool Open(const std::string& stream_name, v1::WatchMode mode, std::uint32_t credits,
             std::optional<std::uint64_t> from_sequence = std::nullopt);
   bool Send(const v1::WatchStreamRequest& request) { return rpc_->Write(request); }
   bool Credit(std::uint32_t frames);
-  /// A message without a case once the watch has ended.
+  /// An empty message after the end of the watch.
   v1::WatchStreamResponse Receive();
   void HalfClose() { rpc_->WritesDone(); }
   void Cancel() { context_.TryCancel(); }
-  /// Receives and drops what is left; gives the status.
+  /// Drops the remaining messages; returns the status.
   grpc::Status Finish();
-  /// Of the status.
+  /// Reason in the status.
   std::string reason() const { return ReasonOf(context_); }
 
  private:
@@ -99,14 +99,14 @@ class WatchClient {
   bool finished_ = false;
 };
 
-/// How a Reconstruct call ended, and what came before that.
+/// The end of a Reconstruct call, and the responses before it.
 struct StreamEnd {
   grpc::Status status;
   std::string reason;
   std::vector<v1::ReconstructResponse> answers;
 };
 
-/// Sends bytes that no message may serialise to as the requests of a stream.
+/// Sends bytes that no message serialises to as the requests of a stream.
 StreamEnd SendBytes(const std::shared_ptr<grpc::Channel>& channel,
                     const std::vector<std::string>& requests);
 
@@ -116,11 +116,11 @@ struct Digests {
   friend bool operator==(const Digests&, const Digests&) = default;
 };
 
-/// Of the first `frames` frames of the moving blob of `seed`, computed in this process without any
-/// server, on one thread.
+/// Digests of the first `frames` frames of blob `seed`, computed in this process without a server,
+/// on one thread.
 std::vector<Digests> LocalDigests(unsigned seed, std::uint64_t frames);
 
-/// The same over a stream of its own, frame by frame; fails the test where an answer is no result.
+/// The same over a stream, one frame at a time; fails the test unless each answer is a result.
 std::vector<Digests> StreamedDigests(const std::shared_ptr<grpc::Channel>& channel, unsigned seed,
                                      std::uint64_t frames);
 

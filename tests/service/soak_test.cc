@@ -1,6 +1,6 @@
-// A server that runs for long beside simulations: streams that end and come again, watchers that
-// come and go, read and do not read. Its memory, files and threads must not grow. A minute by
-// default; `--minutes 30` also asks for the slope of the memory.
+// A long-running server beside simulations: streams end and restart, watchers join and leave, read
+// and do not read. Memory, files and threads must not grow. A minute by default; `--minutes 30`
+// also checks the slope of the memory.
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
@@ -30,19 +30,19 @@ using Seconds = std::chrono::duration<double>;
 struct Load {
   double minutes = 1;
   unsigned streams = 4, watchers = 4;
-  double frames_per_second = 8;  // Of each stream.
+  double frames_per_second = 8;  // Rate of each stream.
 };
 Load load;
 
 constexpr int kRows = 200, kColumns = 250;  // 50,000 particles.
-constexpr std::size_t kFrames = 8;          // Different ones, over and over.
+constexpr std::size_t kFrames = 8;          // Distinct frames, repeated.
 constexpr Seconds kWarmUp(15);
-// Below this the slope is noise; then memory may vary by this much.
+// Below this duration the slope is noise, and memory may vary by this amount instead.
 constexpr double kMinutesForSlope = 10;
-// gRPC's pools, by the names of their threads. They grow with how much goes on at once: two of
-// callbacks to two threads for each processor (src/core/lib/iomgr/executor.cc), that of timers to
-// one more than are busy together (timer_manager.cc), that of its events to what waits for it; but
-// for the last, which shrinks to one for each processor, they keep their threads.
+// gRPC's thread pools, by the names of their threads. They grow with concurrent work: the two
+// callback pools up to two threads per processor (src/core/lib/iomgr/executor.cc), timers to one
+// more than are busy at once (timer_manager.cc), events to the number of waiting ones. Only the
+// last shrinks, to one per processor.
 constexpr std::array<std::string_view, 4> kPools = {"default-executo", "resolver-execut",
                                                     "grpc_global_tim", "event_engine"};
 constexpr double kMaxSlopeMibPerHour = 1, kMaxGrowthMib = 8;
@@ -54,7 +54,7 @@ std::shared_ptr<grpc::Channel> NewChannel(const std::string& address) {
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 
-// A block of fluid whose surface waves.
+// A block of fluid with a wavy surface.
 std::vector<v1::ReconstructRequest> Frames() {
   std::vector<v1::ReconstructRequest> frames(kFrames);
   for (std::size_t k = 0; k < kFrames; ++k) {
@@ -76,7 +76,7 @@ std::vector<v1::ReconstructRequest> Frames() {
 
 std::string StreamName(unsigned stream) { return "soak-" + std::to_string(stream); }
 
-// One stream of random length, two frames in flight.
+// One stream of random length, with two frames in flight.
 std::uint64_t Produce(const std::string& address, unsigned stream, std::mt19937& random,
                       std::vector<v1::ReconstructRequest>& frames, const std::atomic<bool>& stop) {
   StreamClient client(NewChannel(address));
@@ -100,7 +100,7 @@ std::uint64_t Produce(const std::string& address, unsigned stream, std::mt19937&
   return received;
 }
 
-// One watch of a random stream: some frames are read, or some time is spent without reading.
+// One watch of a random stream: reads some frames, or spends some time without reading.
 std::uint64_t Watch(const std::string& address, std::mt19937& random) {
   const auto stub = v1::ReconstructionService::NewStub(NewChannel(address));
   grpc::ClientContext context;
@@ -131,7 +131,7 @@ std::uint64_t Watch(const std::string& address, std::mt19937& random) {
   return frames;
 }
 
-// The threads of all clients, from construction to destruction.
+// The threads of all clients, during the lifetime of this object.
 class Clients {
  public:
   explicit Clients(const std::string& address) {
@@ -200,7 +200,7 @@ class Soak : public ::testing::Test {
     std::array<std::size_t, kPools.size()> pool_threads = {};
   };
 
-  // When all clients have gone, which the server may notice a moment later than they do.
+  // Figures after all clients have disconnected, which the server may notice a moment later.
   Holds WhenQuiet(std::size_t expected_files) {
     const auto give_up = Clock::now() + std::chrono::seconds(20);
     while (server_.process().OpenFileCount() > expected_files && Clock::now() < give_up) {
@@ -218,7 +218,7 @@ class Soak : public ::testing::Test {
     std::this_thread::sleep_for(std::chrono::duration_cast<Clock::duration>(time));
   }
 
-  // Histories that are full once all is warm.
+  // Small histories, which are full when the server is warm.
   ServingProcess server_{{"--log-level", "off", "--threads", "2", "--history-bytes", "1MB"}};
 };
 

@@ -1,6 +1,6 @@
-// What streams leave behind in a server process: after very many of them, after very many that were
-// cancelled, and while very many are idle. A few by default; `--opened 100000 --cancelled 10000
-// --idle 1000` are the numbers of tests/PROMISES.md.
+// Resources that streams leave in a server process: after many streams, after many cancelled ones,
+// and with many idle ones. A few by default; `--opened 100000 --cancelled 10000 --idle 1000` are
+// the numbers of tests/PROMISES.md.
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
@@ -25,14 +25,14 @@ namespace {
 
 struct Counts {
   std::uint64_t opened = 4000, cancelled = 1000, idle = 100;
-  std::uint64_t particles = 100'000;  // Of a large frame.
+  std::uint64_t particles = 100'000;  // In a large frame.
 };
 Counts counts;
 
 constexpr int kClients = 4;
 constexpr double kMaxGrowthMib = 5;
 constexpr double kMaxIdleBytes = 100'000;
-// A little more than a worker keeps its buffers; then the server gives back what is free.
+// Slightly longer than a worker keeps its buffers; then the server frees memory.
 constexpr std::chrono::milliseconds kQuiet{11'500};
 
 std::shared_ptr<grpc::Channel> NewChannel(const std::string& address) {
@@ -70,7 +70,7 @@ v1::ReconstructRequest OpenUnitRequest(const std::string& name = "") {
   return request;
 }
 
-// What a stream remembers of it.
+// Size of the stream's state after it.
 double StateBytes(const std::vector<float>& positions) {
   ReconstructionParameters parameters;
   parameters.spacing = 1;
@@ -88,9 +88,9 @@ class StreamCosts : public ::testing::Test {
  protected:
   const std::string& address() const { return server_.address(); }
 
-  // Once workers are cold and nothing is open but what a test keeps open.
+  // Memory when workers are cold and only a test's own streams are open.
   double SettledMib() {
-    SmallStream();  // So that there is a worker that goes cold.
+    SmallStream();  // Leaves a worker that becomes cold.
     std::this_thread::sleep_for(kQuiet);
     return server_.process().ResidentMib();
   }
@@ -103,8 +103,8 @@ class StreamCosts : public ::testing::Test {
     EXPECT_TRUE(client.Finish().ok());
   }
 
-  // Runs `job` that many times, on several connections at once. It gets the channel and a source of
-  // random numbers.
+  // Runs `job` `count` times on several connections at once, with a channel and a source of random
+  // numbers.
   void Repeat(
       std::uint64_t times,
       const std::function<void(const std::shared_ptr<grpc::Channel>&, std::mt19937&)>& job) {
@@ -120,8 +120,8 @@ class StreamCosts : public ::testing::Test {
     for (std::thread& client : clients) client.join();
   }
 
-  // Whether the newest result of the stream "first" has been kept, as a watcher sees it that comes
-  // only now. The watch ends because the stream does, by its producer's half-close.
+  // True if the newest result of the stream "first" was kept, seen by a late watcher. The watch
+  // ends with the stream, by the producer's half-close.
   bool LateWatcherGetsOne(StreamClient& producer) {
     WatchClient watcher(channel_);
     watcher.Open("first", v1::WATCH_MODE_LATEST, 1);
@@ -141,7 +141,7 @@ class StreamCosts : public ::testing::Test {
         v1::ReconstructionService::NewStub(channel_)->GetServerInfo(&context, {}, &info).ok());
     return info;
   }
-  // A client may see the end of its stream before the server has let go of it.
+  // A client may see the end of its stream before the server has released it.
   void ExpectNoneIsOpen() {
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (Info().open_streams() > 0) ASSERT_LT(std::chrono::steady_clock::now(), give_up);
@@ -151,7 +151,7 @@ class StreamCosts : public ::testing::Test {
 
   ServingProcess server_{{"--log-level", "off", "--threads", "2", "--max-streams",
                           std::to_string(MaxStreams()), "--history-bytes",
-                          "0"}};  // What is held for watchers is bounded by itself.
+                          "0"}};  // Histories have their own limit.
   std::shared_ptr<grpc::Channel> channel_ = NewChannel(address());
 };
 
@@ -165,7 +165,7 @@ void OpenAndClose(const std::shared_ptr<grpc::Channel>& channel, std::mt19937& r
   EXPECT_TRUE(client.Finish().ok());
 }
 
-// Goes away after a random number of steps and some time into the next one.
+// Cancels after a random number of steps, at a random moment of the next step.
 void OpenAndCancel(const std::shared_ptr<grpc::Channel>& channel, std::mt19937& random) {
   StreamClient client(channel);
   const auto steps = static_cast<unsigned>(random() % 7);
@@ -217,7 +217,7 @@ TEST_F(StreamCosts, IdleStreamsCostLittleAlsoAfterALargeFrame) {
   const std::vector<float> positions = LargeFrame();
   const auto large = LargeRequest(positions);
   {
-    StreamClient client(channel_);  // So that all is warm that will be.
+    StreamClient client(channel_);  // Warms the server up.
     ASSERT_TRUE(client.SendAndReceive(OpenUnitRequest()).has_opened());
     ASSERT_TRUE(client.SendAndReceive(large).has_frame());
   }
@@ -227,7 +227,7 @@ TEST_F(StreamCosts, IdleStreamsCostLittleAlsoAfterALargeFrame) {
     return (mib - before) * 1024 * 1024 / static_cast<double>(counts.idle);
   };
 
-  // Each with a connection of its own, as different simulations have.
+  // One connection each, like different simulations.
   std::vector<std::unique_ptr<StreamClient>> clients;
   for (std::uint64_t i = 0; i < counts.idle; ++i) {
     clients.push_back(std::make_unique<StreamClient>(NewChannel(address())));
@@ -243,7 +243,7 @@ TEST_F(StreamCosts, IdleStreamsCostLittleAlsoAfterALargeFrame) {
   }
   EXPECT_EQ(Info().open_streams(), counts.idle);
   const double used = bytes_each(SettledMib()), state = StateBytes(positions);
-  // A result is kept for watchers to come only where it is no larger than a stream's share.
+  // A result is kept for later watchers only if it fits into a stream's share.
   const bool is_kept = result <= ServerLimits{.max_streams = MaxStreams()}.KeptResultBytes();
   const double kept = is_kept ? static_cast<double>(result) : 0;
   const std::size_t more_threads = server_.process().ThreadCount() - threads;
@@ -255,7 +255,7 @@ TEST_F(StreamCosts, IdleStreamsCostLittleAlsoAfterALargeFrame) {
       static_cast<unsigned long>(positions.size() / 2), state, kept, result, more_threads);
   EXPECT_LE(fresh, kMaxIdleBytes);
   EXPECT_LE(used - state - kept, kMaxIdleBytes);
-  EXPECT_LE(more_threads, 4u);  // Of gRPC's own, as many as it likes for any number of streams.
+  EXPECT_LE(more_threads, 4u);  // gRPC's own threads, for any number of streams.
 }
 
 }  // namespace

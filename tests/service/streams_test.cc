@@ -1,4 +1,4 @@
-// Streams over gRPC, in process and over a real port: results, frame errors, cancellation, many.
+// Streams over gRPC, in process and over a port: results, frame errors, cancellation, concurrency.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -119,7 +119,7 @@ TEST_P(Streams, AttributesComeAsTheCoreMakesThem) {
   }
 }
 
-TEST_P(Streams, RelativeCoordinatesThatWouldBeTooCoarseRefuseTheFrameAndLeaveTheStateAlone) {
+TEST_P(Streams, TooCoarseRelativeCoordinatesRefuseTheFrame) {
   StreamClient client(channel_);
   auto open = OpenRequest();
   open.mutable_open()->mutable_outputs()->set_rings(true);
@@ -129,7 +129,7 @@ TEST_P(Streams, RelativeCoordinatesThatWouldBeTooCoarseRefuseTheFrameAndLeaveThe
   const auto expected = LocalDigests(3, 2);
   EXPECT_EQ(client.SendAndReceive(BlobRequest(1, 3, 0)).frame().rings_digest(), expected[0].rings);
 
-  // Two clusters so far apart that float32 cannot resolve them from their middle.
+  // Two clusters so far apart that float32 relative to their middle cannot resolve them.
   std::vector<double> wide = MovingBlob(3, 7);
   for (std::size_t i = wide.size() / 2; i < wide.size(); ++i) wide[i] += 1e5 + 0.013;
   Frame frame;
@@ -165,7 +165,7 @@ TEST_P(Streams, DoubtsAreToldAndAGuessedSpacingLeavesNoTrace) {
   EXPECT_EQ(body.rings_digest(), expected.rings_digest());
   EXPECT_EQ(body.mesh_digest(), expected.mesh_digest());
 
-  // Now that it is fixed, particles three times as far are told of.
+  // The spacing is fixed now, so particles three times as far apart are reported.
   std::vector<double> wide = MovingBlob(3, 1);
   for (double& coordinate : wide) coordinate *= 3;
   auto contradicting = BlobRequest(3, 3, 1);
@@ -188,7 +188,7 @@ void ExpectError(StreamClient& client, const v1::ReconstructRequest& request,
   EXPECT_FALSE(answer.error().rule().empty());
 }
 
-TEST_P(Streams, EveryFifthFrameSpoiledIsAnsweredByItsErrorAndTheOthersAsIfItHadNeverCome) {
+TEST_P(Streams, SpoiledFramesDoNotChangeTheOtherResults) {
   StreamClient client(channel_);
   ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
   const auto expected = LocalDigests(4, 30);
@@ -249,7 +249,7 @@ TEST_P(Streams, AWindowOfFramesCanBeSentBeforeAnyAnswerIsReceived) {
   StreamClient client(channel_);
   ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
   const auto expected = LocalDigests(6, 12);
-  // A writer of its own, as a real client has: nothing is buffered in process.
+  // A separate writer, because nothing is buffered in process.
   std::thread writer([&] {
     for (std::uint64_t i = 0; i < 12; ++i) EXPECT_TRUE(client.Send(BlobRequest(i + 1, 6, i)));
     client.HalfClose();

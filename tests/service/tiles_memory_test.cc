@@ -1,4 +1,4 @@
-// Frames of few bytes that reach many tiles, against a server with a small budget.
+// Frames of few bytes that reach many tiles, on a server with a small budget.
 #include <grpcpp/create_channel.h>
 #include <gtest/gtest.h>
 
@@ -19,10 +19,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "positions are copied as they are");
 
 constexpr double kBudgetMib = 64;
-constexpr double kBesidesMib = 64;  // The program itself, and what is outside of the budget.
+constexpr double kBesidesMib = 64;  // The program and memory outside of the budget.
 
-// 32,400 particles at corners of tiles, each in four of its own: 518 kB, of which 129,600 tiles
-// would make a gigabyte.
+// 32,400 particles at corners of tiles, each in four tiles of its own: 518 kB, whose 129,600 tiles
+// would take a gigabyte.
 v1::ReconstructRequest CornersOfTiles(std::uint64_t sequence) {
   v1::ReconstructRequest request;
   v1::ParticleFrame& frame = *request.mutable_frame();

@@ -1,4 +1,4 @@
-// Who may speak to a server over TLS, and how it changes its certificate while it runs.
+// TLS: which clients are accepted, and rotation of certificates at run time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -59,7 +59,7 @@ TEST_F(Security, AClientNeedsACertificateOfTheAuthorityWhereOneIsAskedFor) {
             grpc::StatusCode::UNAVAILABLE);
 }
 
-TEST_F(Security, TheHealthCheckOfTheProgramPassesOverTlsAndShowsACertificateWhereAskedTo) {
+TEST_F(Security, TheHealthCheckWorksOverTlsWithAClientCertificate) {
   WriteIdentity(authority_.Issue("server"));
   Write("clients.pem", authority_.certificate());
   server_ = StartServer(Options(true, true, false));
@@ -81,12 +81,12 @@ int Rotations() {
 
 TEST_F(Security, CertificatesAreRotatedUnderLoadWithoutADroppedStream) {
   constexpr unsigned kStreams = 4;
-  constexpr std::uint64_t kFrames = 8;  // Of one round.
+  constexpr std::uint64_t kFrames = 8;  // Frames of one round.
   WriteIdentity(authority_.Issue("server"));
   server_ = StartServer(Options(true, false, false));
   ASSERT_NE(server_, nullptr);
 
-  // Streams that go on from before the first rotation until after the last.
+  // Streams that run from before the first rotation until after the last.
   std::atomic<bool> enough = false;
   std::atomic<std::uint64_t> opened = 0, answered = 0, wrong = 0;
   std::vector<std::thread> streams;
@@ -112,8 +112,8 @@ TEST_F(Security, CertificatesAreRotatedUnderLoadWithoutADroppedStream) {
   const CapturedLog log;
   std::string old_authority = authority_.certificate();
   for (int rotation = 1; rotation <= Rotations(); ++rotation) {
-    // A key that does not belong to the certificate, as in the midst of a careless rotation: the
-    // old identity stays.
+    // A key that does not belong to the certificate, as during a careless rotation: the old
+    // identity stays.
     const CertificateAuthority next("authority-" + std::to_string(rotation));
     const IssuedCertificate fresh = next.Issue("server");
     Write("server.key", fresh.key);
@@ -121,7 +121,7 @@ TEST_F(Security, CertificatesAreRotatedUnderLoadWithoutADroppedStream) {
       return log.Count("TLS certificate not reloaded") == static_cast<std::size_t>(rotation);
     }));
     EXPECT_EQ(Ask({.authority = old_authority}).code, grpc::StatusCode::OK) << rotation;
-    // The other half of it: the new one counts, and the old authority no more.
+    // Completes the rotation: the new identity applies, and the old authority no longer.
     Write("server.pem", fresh.certificate);
     EXPECT_TRUE(Eventually([&] {
       return Ask({.authority = next.certificate()}).code == grpc::StatusCode::OK;

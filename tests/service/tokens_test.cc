@@ -1,5 +1,5 @@
-// Who may speak to a server with a token, and what is told of tokens and keys, at the start and in
-// the log.
+// Tokens: which callers are accepted, and what is reported about tokens and keys at the start and
+// in the log.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -122,7 +122,7 @@ TEST_F(Security, WhatDoesNotHoldIsToldAtTheStart) {
   Write("tokens", "short-secret");
   EXPECT_THAT(told(Options(false, false, true)), HasSubstr("line 1"));
 
-  // In the clear beyond this machine.
+  // Without TLS beyond this machine.
   Write("tokens", kToken);
   ServerOptions options = Options(false, false, true);
   options.address.host = "0.0.0.0";
@@ -151,7 +151,7 @@ TEST_F(Security, NoSecretIsEverInTheLog) {
   Write("server.key", authority_.Issue("server").key);
   EXPECT_TRUE(Eventually([&] { return log.Count("not reloaded") == 2; }));
   server_.reset();
-  EXPECT_THAT(log.Text(), HasSubstr("\"message\":\"grpc\""));  // Errors of gRPC's are in it too.
+  EXPECT_THAT(log.Text(), HasSubstr("\"message\":\"grpc\""));  // Includes gRPC's errors.
   EXPECT_THAT(log.Text(), Not(HasSubstr("secret")));
   EXPECT_THAT(log.Text(), Not(HasSubstr("PRIVATE")));
   const std::size_t line = identity.key.find('\n') + 1;

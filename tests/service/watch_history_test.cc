@@ -1,4 +1,4 @@
-// Going back in a stream over gRPC: what late and paused watchers get, and what that may cost.
+// Going back in a stream over gRPC: frames for late and paused watchers, and its limits.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr std::uint32_t kMany = 1000;  // Credit for all.
+constexpr std::uint32_t kMany = 1000;  // Credit for all frames.
 
 // A result is about 20 kB.
 class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
@@ -35,7 +35,7 @@ class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
     producer_ = std::make_unique<StreamClient>(channel_);
     ASSERT_TRUE(producer_->SendAndReceive(OpenRequest("tank")).has_opened());
   }
-  // Frames up to `last`, each answered.
+  // Produces and answers frames up to `last`.
   void ProduceUntil(std::uint64_t last) { ProduceUntil(*producer_, produced_, last); }
   static void ProduceUntil(StreamClient& producer, std::uint64_t& produced, std::uint64_t last) {
     for (; produced < last; ++produced) {
@@ -50,7 +50,7 @@ class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
     opened_ = answer.opened();
     return watcher;
   }
-  // The next `count` frames, serialised; each has come without a drop.
+  // The next `count` frames, serialised; expects no drop.
   static std::vector<std::string> Frames(WatchClient& watcher, std::size_t count) {
     std::vector<std::string> frames;
     while (frames.size() < count) {
@@ -91,7 +91,7 @@ class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
   std::unique_ptr<StreamClient> producer_;
   std::uint64_t produced_ = 0;
   v1::WatchOpened opened_;
-  std::string error_;  // Of the program.
+  std::string error_;  // Output of the program.
 };
 
 TEST_P(WatchHistory, ALateOneGetsAllThatIsHeldAsTheFirstOneGotIt) {
@@ -108,7 +108,7 @@ TEST_P(WatchHistory, ALateOneGetsAllThatIsHeldAsTheFirstOneGotIt) {
   EXPECT_EQ(Frames(*late, 25), made);
   const auto later = Watch(kMany, 20);
   EXPECT_EQ(Frames(*later, 6), std::vector<std::string>(made.begin() + 19, made.end()));
-  for (std::uint64_t k = 26; k <= 28; ++k) {  // And then what is live.
+  for (std::uint64_t k = 26; k <= 28; ++k) {  // Then live frames.
     ProduceUntil(k);
     const auto live = Frames(first, 1);
     EXPECT_EQ(Frames(*late, 1), live);
@@ -151,7 +151,7 @@ TEST_P(WatchHistory, OneFromBeyondTheNewestGetsWhatIsLiveAlone) {
   EXPECT_EQ(Sequences(Frames(*far, 1)), From(7, 7));
 }
 
-TEST_P(WatchHistory, TheOldestAreDroppedAndWhoAsksForThemHearsOfItAndBeginsWithTheOldestLeft) {
+TEST_P(WatchHistory, DropsTheOldestAndReportsThemToAWatcherThatAsks) {
   Serve(100'000);
   ProduceUntil(100);
   const auto watcher = Watch(kMany, 3);
@@ -183,7 +183,7 @@ TEST_P(WatchHistory, AllStreamsTogetherHoldAnEighthOfTheBudgetInSharesAtMost) {
     ProduceUntil(*others.back(), produced, 60);
     EXPECT_LE(Info().load().history_bytes(), 1u << 20);
   }
-  // The first has made room although nothing was sent to it any more.
+  // The first has made room although nothing was sent to it.
   Watch(1, 0);
   const std::uint64_t held = opened_.newest_sequence() + 1 - opened_.oldest_sequence();
   EXPECT_LT(held, 40u);

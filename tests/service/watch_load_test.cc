@@ -1,10 +1,10 @@
-// What watching costs who is watched, with a process for everybody: a server, a producer, readers,
-// a watcher that is stopped by SIGSTOP, and one that never reads. Runs with and without watchers
-// take turns. With `--beside` there is a third run, of two servers with a producer each, one of
-// them watched: both have the machine as the watchers leave it, so that what their costs differ by
-// is what being watched costs, whatever twenty more processes on the machine cost. Processor times
-// are printed and not judged: they are the machine's too. A short form by default; the options of
-// the long ones are in tests/PROMISES.md.
+// The cost of watching for the producer, with separate processes: a server, a producer, readers, a
+// watcher stopped by SIGSTOP, and one that never reads. Runs with and without watchers take turns.
+// With `--beside` a third run measures two servers with a producer each at the same time; one of
+// them is watched. Both see the same load of the machine, so their difference is the cost of being
+// watched.
+// Processor times are printed, not judged, because they depend on the machine. A short form by
+// default; tests/PROMISES.md has the options of the long ones.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -35,23 +35,23 @@ using client::Program;
 struct Load {
   unsigned pairs = 1, readers = 18;
   bool beside = false;
-  double seconds = 1;                 // Of each run that are measured.
+  double seconds = 1;                 // Measured time of each run.
   double rate = 75, large_rate = 25;  // Frames per second; the dam break has 75.
-  std::uint64_t particles = 20'000;   // Of a large frame.
+  std::uint64_t particles = 20'000;   // In a large frame.
 };
 Load load;
 
-// Of one watcher: the server's --max-watcher-bytes, which it has by default.
+// Limit of one watcher: the server's default --max-watcher-bytes.
 constexpr std::uint64_t kMaxWatcherBytes = std::uint64_t{16} << 20;
-// What the server's memory may grow by for other reasons than what watchers hold: connections of
-// twenty processes, and what its own heap makes of it all.
+// Growth of the server's memory besides the watchers' memory: connections of twenty processes, and
+// fragmentation.
 constexpr double kMaxOtherMib = 32;
-// What the stream holds for watchers to go back to; by default, too.
+// The default size of a stream's history.
 constexpr double kHistoryMib = 64;
-// Processor time is looked at after about as many frames, and the median of these looks counts.
+// Processor time is read after this number of frames; the median counts.
 constexpr double kFramesPerLook = 5;
 constexpr std::chrono::seconds kPatience(60);
-// For watchers to come, while the producer goes on.
+// Time for watchers to join while the producer runs.
 constexpr double kLeadSeconds = 20;
 constexpr int kInterrupted = 130, kStreamEnded = 4;  // Exit codes of `partiemc`.
 
@@ -61,7 +61,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Processor time of a frame.
+// Processor time per frame.
 struct Costs {
   std::vector<double> producer, computing, server;
 };
@@ -78,7 +78,7 @@ struct Clocks {
   }
 };
 
-// What each line that `pattern` matches has as its first group.
+// The first group of each line that `pattern` matches.
 std::vector<std::uint64_t> NumbersIn(const std::string& text, const std::string& pattern) {
   std::vector<std::uint64_t> numbers;
   const std::regex regex(pattern);
@@ -93,16 +93,16 @@ std::vector<std::uint64_t> NumbersIn(const std::string& text, const std::string&
 struct Sequence {
   std::string path;
   double rate = 0;
-  std::vector<std::string> flags;  // Of the replay.
+  std::vector<std::string> flags;  // Flags of the replay.
 };
 
 // A server, and the producer of its only stream.
 class Served {
  public:
   void StartProducer(const Sequence& sequence, const std::string& name);
-  // The stream as ListStreams has it; without a name while it is not there.
+  // The stream in ListStreams; without a name if it is not listed.
   v1::StreamSummary Listed();
-  // Waits; a failure is one of the test.
+  // Waits for `ready`; fails the test on a timeout.
   template <typename Ready>
   void WaitUntil(Ready ready, const char* what);
   Clocks Look();
@@ -167,13 +167,14 @@ void Served::Interrupt() {
   EXPECT_EQ(producer_->Wait(), kInterrupted) << producer_->Error();
 }
 
-// Those who read, of which the first is stopped, and one that never reads.
+// The readers, the first of them stopped, and one watcher that never reads.
 class Audience {
  public:
   Audience(Served& served, const std::string& name);
-  // Once the stream is over.
+  // Requires that the stream has ended.
   void ExpectToldWhatWasCounted();
-  // Likewise: each has held something, and none more than it may. Gives the sum.
+  // Requires that the stream has ended. Expects that each has held something, and at most its
+  // limit. Returns the sum.
   std::uint64_t ExpectEachHeldWithinItsLimit() const;
 
  private:
@@ -206,7 +207,7 @@ void Audience::ExpectToldWhatWasCounted() {
   const std::string closed = "watch closed stream=[^ ]+ name=" + name_ + " ";
   std::vector<std::uint64_t> drops_counted;
   const auto give_up = std::chrono::steady_clock::now() + kPatience;
-  do {  // The last line of the log may come a moment after its watcher has heard the end.
+  do {  // The last line of the log may follow the end of its watch.
     drops_counted =
         NumbersIn(served_.process().Output(), closed + "frames=[0-9]+ dropped=([0-9]+)");
   } while (drops_counted.size() < watchers_.size() && std::chrono::steady_clock::now() < give_up);
@@ -237,10 +238,10 @@ std::uint64_t Audience::ExpectEachHeldWithinItsLimit() const {
 struct Run {
   Costs costs, beside;
   double before_mib = 0, most_mib = 0;
-  double held_mib = 0;  // By all watchers, each at its most.
+  double held_mib = 0;  // Sum of all watchers' maxima.
 };
 
-// Measures `served`, and `beside` in the same moments if there is one; that is never watched.
+// Measures `served`, and at the same time `beside` if given, which has no watchers.
 Run RunOnce(Served& served, Served* beside, const Sequence& sequence, const std::string& name,
             bool watched) {
   Run run{.before_mib = served.process().ResidentMib()};
@@ -316,7 +317,7 @@ void Compare(const Sequence& sequence) {
     std::printf("  memory of the server: %.1f MiB, alone %.1f, watched %.1f MiB\n",
                 alone.before_mib, alone.most_mib, watched.most_mib);
     EXPECT_LE(watched.most_mib - watched.before_mib, watched.held_mib + kHistoryMib + kMaxOtherMib);
-    if (other) {  // In turns, as no two processes have the same luck with their memory.
+    if (other) {  // In turns, because the memory layout of processes differs.
       Served* const two[] = {&served, &*other};
       const Run both =
           RunOnce(*two[pair % 2], two[1 - pair % 2], sequence, "beside-" + number, true);
@@ -345,7 +346,7 @@ TEST(WatchLoad, OfLargeResultsIsCountedAndBoundedAndDelaysNoFrame) {
   const support::TemporaryFolder folder;
   ASSERT_NO_FATAL_FAILURE(
       RecordSquare(folder.Path("square.pemc"), load.particles, Enough(load.large_rate)));
-  // The fill with the largest results: 40 bytes a particle.
+  // The fill with the largest results: 40 bytes per particle.
   Compare(
       {.path = folder.Path("square.pemc"), .rate = load.large_rate, .flags = {"--fill", "grid"}});
 }

@@ -1,5 +1,5 @@
-// Each row of the table of watches in proto/PROTOCOL.md: a test named as the row's reason, with the
-// exact code, reason and words (error_table_test.cc looks for rows without).
+// The rows of the table of watches in proto/PROTOCOL.md: one test per row, named by its reason,
+// with exact code, reason and words. error_table_test.cc finds rows without a test.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -41,11 +41,11 @@ class WatchRefused : public ErrorTable {
     watcher.Open(name, mode, credits);
     Expect(watcher, code, reason, message);
   }
-  // Of a watcher in mode `every` with one credit, while the producer goes on.
+  // Expects this end of a watcher in mode `every` with one credit, while the producer runs.
   void ExpectOfFrames(std::uint64_t max_watcher_bytes, const std::string& reason,
                       const std::string& message) {
     options_.limits.max_watcher_bytes = max_watcher_bytes;
-    options_.limits.history_bytes = 0;  // Where it would wait.
+    options_.limits.history_bytes = 0;  // It would wait in the history.
     OpenProducer();
     WatchClient watcher(channel_);
     watcher.Open("tank", v1::WATCH_MODE_EVERY, 1);

@@ -1,4 +1,4 @@
-// Watching over gRPC: what watchers get, what they are told, how watches end.
+// Watching over gRPC: frames, notices, and ends of watches.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ class Watch : public ::testing::TestWithParam<Transport> {
     (*open.mutable_open()->mutable_labels())["run"] = "7";
     ASSERT_TRUE(producer_->SendAndReceive(open).has_opened());
   }
-  // Frame `index` through the producer's stream; what came back to it.
+  // Sends frame `index` on the producer's stream; returns the response.
   v1::ReconstructedFrame Produce(std::uint64_t index) {
     return producer_->SendAndReceive(BlobRequest(index + 1, 1, index)).frame();
   }
@@ -69,7 +69,7 @@ std::string WithoutTimes(v1::ReconstructedFrame frame) {
   return frame.SerializeAsString();
 }
 
-TEST_P(Watch, EveryGetsEachResultBitForBitAsItsProducerDoesAndThenHearsTheEnd) {
+TEST_P(Watch, EveryReceivesTheProducersBytesThenTheEnd) {
   OpenProducer();
   WatchClient watcher(channel_);
   watcher.Open("tank", v1::WATCH_MODE_EVERY, 3);
@@ -98,7 +98,7 @@ TEST_P(Watch, WhoComesLateGetsTheNewestFrameAtOnceAlthoughNobodyWatchedIt) {
   OpenProducer();
   v1::ReconstructedFrame made;
   for (std::uint64_t i = 0; i < 5; ++i) made = Produce(i);
-  for (int k = 0; k < 3; ++k) {  // And again when the one before has left.
+  for (int k = 0; k < 3; ++k) {  // Repeated after the previous one has left.
     WatchClient watcher(channel_);
     watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
@@ -117,7 +117,7 @@ TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
   EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
   for (std::uint64_t i = 1; i < 6; ++i) Produce(i);
   watcher.Credit(1);
-  // The dispatcher may still be on its way with the last ones when the credit comes.
+  // The dispatcher may still process the last frames when the credit arrives.
   std::uint64_t dropped = 0;
   std::uint64_t sequence = 0;
   while (sequence < 6) {
@@ -132,18 +132,18 @@ TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
   for (std::uint64_t i = 6; i < 10; ++i) Produce(i);
   producer_->HalfClose();
   EXPECT_TRUE(producer_->Finish().ok());
-  watcher.HalfClose();  // No credit will come for what is there.
+  watcher.HalfClose();  // No credit follows for the pending frame.
   const auto ended = watcher.Receive();
   if (ended.ended().reason() == "FINISHED") {
     EXPECT_EQ(ended.ended().dropped(), 4u);
-  } else {  // Before the last of them was offered.
+  } else {  // Before the last frame was offered.
     EXPECT_EQ(ended.ended().reason(), "CREDIT_USED");
     EXPECT_LE(ended.ended().dropped(), 4u);
   }
   EXPECT_TRUE(watcher.Finish().ok());
 }
 
-TEST_P(Watch, TheLastFrameIsStillShownWhenItsCreditComesAfterTheEndOfTheStream) {
+TEST_P(Watch, ShowsTheLastFrameIfItsCreditComesAfterTheEnd) {
   OpenProducer();
   WatchClient watcher(channel_);
   watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
@@ -162,7 +162,7 @@ TEST_P(Watch, TheLastFrameIsStillShownWhenItsCreditComesAfterTheEndOfTheStream) 
   EXPECT_TRUE(watcher.Finish().ok());
 }
 
-TEST_P(Watch, ParticlesAreEchoedToWatchersAsTheyWereSentAndNotToTheProducer) {
+TEST_P(Watch, EchoesParticlesToWatchersButNotToTheProducer) {
   OpenProducer(/*echo_particles=*/true);
   WatchClient watcher(channel_);
   watcher.Open("tank", v1::WATCH_MODE_EVERY, 9);
@@ -288,7 +288,7 @@ TEST_P(Watch, ACallThatNeverOpensGivesUpItsPlace) {
   ExpectRefused(next, grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM", "tonk");
 }
 
-TEST_P(Watch, OneWatcherTooManyIsRefusedAtOnceAndThePlaceIsFreeWhenOneLeaves) {
+TEST_P(Watch, RefusesOneWatcherTooManyUntilASlotIsFree) {
   OpenProducer();
   std::vector<std::unique_ptr<WatchClient>> watchers;
   for (int k = 0; k < 4; ++k) {
@@ -302,7 +302,7 @@ TEST_P(Watch, OneWatcherTooManyIsRefusedAtOnceAndThePlaceIsFreeWhenOneLeaves) {
   ExpectRefused(fifth, grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS",
                 "watchers: 4 watch; must be at most 4");
   watchers.pop_back();
-  for (bool in = false; !in;) {  // The server hears of it a little later.
+  for (bool in = false; !in;) {  // The server sees it a little later.
     WatchClient again(channel_);
     again.Open("tank", v1::WATCH_MODE_LATEST, 1);
     in = again.Receive().has_opened();

@@ -1,5 +1,4 @@
-// A client of the gateway that speaks HTTP and WebSocket by itself, so that it can also say what
-// no library says.
+// A gateway client with its own HTTP and WebSocket code, so that it can also send malformed data.
 #pragma once
 
 #include <cstddef>
@@ -16,37 +15,36 @@
 
 namespace partiemc::server {
 
-/// What a client trusts and shows where the gateway speaks TLS.
+/// TLS settings of a client of the gateway.
 struct WebTls {
   std::string authority;       ///< PEM.
-  IssuedCertificate own = {};  ///< Or none.
+  IssuedCertificate own = {};  ///< Optional client certificate.
 };
 
-/// A connection, in the clear or with TLS. Blocks; nothing comes any more once it is broken.
+/// A blocking connection, with or without TLS. Receives nothing after an error.
 class WebPipe {
  public:
-  /// `from`: the IPv4 address that it comes from, one of this machine's; or null.
+  /// `from`: the local IPv4 address to connect from; or null.
   explicit WebPipe(const Address& address, const WebTls* tls = nullptr, const char* from = nullptr);
   ~WebPipe();
   WebPipe(const WebPipe&) = delete;
   WebPipe& operator=(const WebPipe&) = delete;
 
-  /// Whether it came about, TLS included.
+  /// True if connected, including TLS.
   bool is_open() const;
   bool Send(std::string_view bytes);
-  /// So many bytes, or fewer where no more come.
+  /// Receives `bytes` bytes, or fewer if the connection ends.
   std::string Receive(std::size_t bytes);
-  /// Up to and with `end`, at most 64 KiB.
+  /// Receives up to and including `end`, at most 64 KiB.
   std::string ReceiveUntil(std::string_view end);
-  /// Until the other side closes.
+  /// Receives until the other side closes.
   std::string ReceiveAll();
-  /// Whether the other side closes within `milliseconds`; what comes before that is dropped.
+  /// True if the other side closes within `milliseconds`; drops bytes before that.
   bool IsClosedWithin(int milliseconds);
-  /// Takes as little as the system lets it before the other side has to wait. Before anything
-  /// comes.
+  /// Minimises the receive buffer, so that the other side soon has to wait. Call before receiving.
   void TakeLittle();
   void Close();
-  /// Without a word to the other side, as when a program dies.
+  /// Closes without a closing handshake, like a killed program.
   void Reset();
 
  private:
@@ -54,19 +52,20 @@ class WebPipe {
   std::unique_ptr<Connection> connection_;
 };
 
-/// One header a line: "Origin: http://localhost\r\n".
+/// One header per line: "Origin: http://localhost\r
+/// ".
 using WebHeaders = std::string;
 
 struct HttpReply {
-  unsigned status = 0;                              ///< 0: none came.
-  std::map<std::string, std::string> headers = {};  ///< By their names in lower case.
+  unsigned status = 0;                              ///< 0: no response.
+  std::map<std::string, std::string> headers = {};  ///< By lower-case name.
   std::string body = {};
 };
 
-/// A request and its reply; the connection stays open where the server says so.
+/// Sends a request and receives its reply; the connection stays open if the server allows it.
 HttpReply Ask(WebPipe& pipe, std::string_view method, std::string_view target,
               const WebHeaders& headers = {}, std::string_view body = {});
-/// The same in a connection of its own.
+/// Same as above on a new connection.
 HttpReply Ask(const Address& address, std::string_view method, std::string_view target,
               const WebHeaders& headers = {}, std::string_view body = {},
               const WebTls* tls = nullptr);
@@ -74,16 +73,16 @@ HttpReply Ask(const Address& address, std::string_view method, std::string_view 
 HttpReply Post(const Address& address, std::string_view target, std::string_view body,
                const WebHeaders& headers = {}, const WebTls* tls = nullptr);
 
-/// How a call ended.
+/// The end of a call.
 struct WebEnd {
-  int code = -1;            ///< Of the status text; -1: none came.
-  std::string reason;       ///< Of its Violation.
-  std::string text;         ///< All of it.
+  int code = -1;            ///< Code in the status text; -1: none.
+  std::string reason;       ///< Reason of its Violation.
+  std::string text;         ///< The whole status text.
   unsigned close_code = 0;  ///< 0: the connection was cut.
 };
 WebEnd ParseStatus(std::string text);
 
-/// A frame as a client sends it: masked. `opcode`: 0 goes on, 1 text, 2 binary, 8 close, 9 ping.
+/// A masked client frame. `opcode`: 0 continuation, 1 text, 2 binary, 8 close, 9 ping.
 std::string ClientFrame(int opcode, std::string_view payload, bool last = true);
 
 /// One call over a WebSocket, driven step by step.
@@ -93,7 +92,7 @@ class WebSocketClient {
                   const std::string& protocols = "partiemc.v1", const WebTls* tls = nullptr,
                   const char* from = nullptr);
 
-  /// Of the handshake: 101 where it came about.
+  /// The response to the handshake: 101 if it succeeded.
   const HttpReply& handshake() const { return handshake_; }
   WebPipe& pipe() { return pipe_; }
 
@@ -103,16 +102,16 @@ class WebSocketClient {
     return Send(message.SerializeAsString());
   }
   void HalfClose() { pipe_.Send(ClientFrame(1, "end")); }
-  /// The next binary message; nothing once the status has come. Pings are answered.
+  /// The next binary message; empty after the status. Answers pings.
   std::optional<std::string> Receive();
-  /// Its parsed form; one without a case where nothing comes.
+  /// Its parsed form; an empty message at the end.
   template <typename Message>
   Message Receive() {
     Message message;
     if (const auto bytes = Receive()) message.ParseFromString(*bytes);
     return message;
   }
-  /// Drops what is left, answers the close frame, closes and gives what was said at the end.
+  /// Drops the rest, answers the close frame, closes and returns the end.
   WebEnd Finish();
 
   std::size_t pings() const { return pings_; }
@@ -120,7 +119,7 @@ class WebSocketClient {
 
  private:
   struct Frame {
-    int opcode = -1;  // -1: the connection is gone.
+    int opcode = -1;  // -1: the connection is closed.
     std::string payload;
   };
   Frame ReceiveFrame();

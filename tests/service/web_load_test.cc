@@ -1,5 +1,5 @@
-// What the gateway costs at worst, seen from outside: the memory of a server of its own while
-// strangers hold half-open sockets, announce what they never send, or stop reading.
+// Worst-case memory of the gateway, in a separate server process: clients hold half-open sockets,
+// announce bytes that they never send, or stop reading.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -67,7 +67,7 @@ TEST_F(WebLoad, TwoThousandHalfOpenSocketsTakeLittleAndDisturbNobody) {
   const double before = Mib();
   double most = before;
   std::vector<std::unique_ptr<WebPipe>> silent;
-  // Half a header, as large as one may be.
+  // Half a header of the maximum size.
   const std::string half = "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(16'000, 'x');
   for (std::uint64_t i = 0; i < 2000; ++i) {
     silent.push_back(std::make_unique<WebPipe>(web_));
@@ -81,7 +81,7 @@ TEST_F(WebLoad, TwoThousandHalfOpenSocketsTakeLittleAndDisturbNobody) {
   }
   most = std::max(most, Mib());
   RecordProperty("mib", std::to_string(most - before));
-  // 128 connections of one address, each of a header and what a connection is.
+  // 128 connections of one address, each with a header and its own memory.
   EXPECT_LT(most - before, 16);
   EXPECT_LT(server_->process().OpenFileCount(), 350u);
 }
@@ -98,7 +98,7 @@ TEST_F(WebLoad, WhatIsAnnouncedTakesNoMemory) {
     clients.back()->pipe().Send(head + "mask" + (i % 2 == 0 ? "some of it" : ""));
   }
   for (int i = 0; i < 30; i += 2) EXPECT_EQ(clients[i]->Finish().code, 8);
-  // 40 MB are allowed: what is said to come is not what has come.
+  // 40 MB are allowed; the announced length takes no memory.
   const std::string allowed =
       std::string("\x82\xff\0\0\0\0", 6) + "\x02\x62\x5a" + std::string(1, '\0');
   for (int i = 0; i < 30; ++i) {
@@ -111,7 +111,7 @@ TEST_F(WebLoad, WhatIsAnnouncedTakesNoMemory) {
 }
 
 TEST_F(WebLoad, AReaderThatStopsHoldsWhatItMayAndTheProducerGoesOn) {
-  Serve({"--history-bytes", "0"});  // Which holds results of its own, whoever reads.
+  Serve({"--history-bytes", "0"});  // Histories would hold results of their own.
   StreamClient producer(channel_);
   ASSERT_TRUE(producer.SendAndReceive(OpenRequest("tank")).has_opened());
   ASSERT_TRUE(producer.SendAndReceive(BlobRequest(1, 1, 0)).has_frame());
@@ -125,7 +125,7 @@ TEST_F(WebLoad, AReaderThatStopsHoldsWhatItMayAndTheProducerGoesOn) {
   WebSocketClient reader(web_, "/v1/watch");
   reader.SendMessage(OpenWatch(v1::WATCH_MODE_EVERY, 1'000'000));
   ASSERT_TRUE(reader.Receive<v1::WatchStreamResponse>().has_opened());
-  ASSERT_TRUE(reader.Receive<v1::WatchStreamResponse>().has_frame());  // The one that was kept.
+  ASSERT_TRUE(reader.Receive<v1::WatchStreamResponse>().has_frame());  // The kept result.
   const double before = Mib();
   double most = before;
   std::uint64_t bytes = 0;
@@ -139,9 +139,9 @@ TEST_F(WebLoad, AReaderThatStopsHoldsWhatItMayAndTheProducerGoesOn) {
   RecordProperty("mib", std::to_string(most - before));
   RecordProperty("mib_sent", std::to_string(static_cast<double>(bytes) / (1 << 20)));
   ASSERT_GT(bytes, 36u << 20) << "not more than everybody may hold";
-  // Each 16 MiB at most, of which most is shared, and something for what is on its way.
+  // Each holds at most 16 MiB, mostly shared, plus messages on the way.
   EXPECT_LT(most - before, 32);
-  // The one that wanted every frame was told that it has fallen behind, had it looked.
+  // The watcher in mode `every` has fallen behind.
   EXPECT_TRUE(Eventually([&] {
     v1::GetServerInfoResponse info;
     return info.ParseFromString(Post(web_, "/v1/info", "").body) &&

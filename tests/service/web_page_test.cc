@@ -1,4 +1,4 @@
-// The page's files through the gateway, and what a page of another host may not do.
+// The page's files through the gateway, and restrictions for pages of other hosts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -48,7 +48,7 @@ TEST_F(WebPage, FilesComeWithTheirTypeAndWhatKeepsAPageSafe) {
   WebPipe pipe(web());
   const HttpReply head = Ask(pipe, "HEAD", "/large.bin");
   EXPECT_EQ(head.headers.at("content-length"), std::to_string(large_.size()));
-  EXPECT_EQ(Ask(pipe, "GET", "/assets/app.js").body, "plain();");  // Of the same connection.
+  EXPECT_EQ(Ask(pipe, "GET", "/assets/app.js").body, "plain();");  // On the same connection.
   EXPECT_EQ(Ask(web(), "GET", "/nothing.js").status, 404u);
   EXPECT_EQ(Ask(web(), "POST", "/").status, 405u);
   EXPECT_EQ(Ask(web(), "GET", "/v1/nothing").status, 404u);
@@ -127,7 +127,7 @@ TEST_F(WebPage, APageOfAnotherHostMayNotCallUnlessItIsAllowed) {
     EXPECT_EQ(Post(web(), "/v1/info", "", header).status, 403u) << origin;
   }
   EXPECT_EQ(Refusals("origin"), 10);
-  // A name that somebody has pointed to this machine: it is the same in both headers.
+  // A foreign name that resolves to this machine: it is the same in both headers.
   const std::string pointed = "Host: evil.example:1\r\nOrigin: http://evil.example:1\r\n";
   EXPECT_EQ(WebSocketClient(web(), "/v1/watch", pointed).handshake().status, 421u);
   const std::string twice = OwnOrigin() + "Origin: http://evil.example\r\n";
@@ -142,7 +142,7 @@ TEST_F(WebPage, APageOfAnotherHostMayNotCallUnlessItIsAllowed) {
   const HttpReply asked = Ask(web(), "OPTIONS", "/v1/info", allowed);
   EXPECT_EQ(asked.status, 204u);
   EXPECT_EQ(asked.headers.at("access-control-allow-methods"), "POST");
-  // What a page of anybody can send without asking is not taken.
+  // Requests that any page can send without a preflight are refused.
   EXPECT_EQ(Ask(web(), "POST", "/v1/info", "Content-Type: text/plain\r\n").status, 415u);
 }
 

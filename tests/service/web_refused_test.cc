@@ -1,4 +1,4 @@
-// What no honest client does to the gateway: it is refused, counted, and disturbs nobody.
+// Malformed and hostile requests to the gateway: refused, counted, and harmless to others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// The head of a frame from a client that announces `bytes` and sends none of them.
+// The head of a client frame that announces `bytes` without sending them.
 std::string Announcement(std::uint64_t bytes) {
   std::string head = "\x82";
   head += static_cast<char>(0x80 | 127);
@@ -35,7 +35,7 @@ TEST_F(WebGatewayTest, GarbageInsteadOfAMessageEndsTheCallWithItsReason) {
     const WebEnd end = binary.Finish();
     EXPECT_EQ(end.reason, "PROTOCOL");
     EXPECT_EQ(end.close_code, 4003u);
-    // A stream is finished by then, or it is told what it should not have done.
+    // The stream is finished by then, or its client is informed of the error.
     after_end.SendMessage(OpenRequest());
     after_end.pipe().Send(ClientFrame(1, "end") + ClientFrame(2, "more"));
     EXPECT_THAT(after_end.Finish().text, HasSubstr("\"code\""));
@@ -77,7 +77,7 @@ TEST_F(WebGatewayTest, AMessageThatIsAnnouncedTooLargeIsRefusedBeforeItComes) {
       EXPECT_EQ(end.close_code, 4008u);
     }
   }
-  // In pieces, of which none is too large.
+  // In pieces; none exceeds the limit.
   WebSocketClient pieces(web(), "/v1/reconstruct");
   const std::string piece(100'000, 'x');
   pieces.pipe().Send(ClientFrame(2, piece, false));
@@ -155,7 +155,7 @@ TEST_F(WebGatewayTest, OfSocketsThatSayNothingTheOldestGiveWayAndCallsStay) {
       EXPECT_TRUE(watcher->Receive<v1::WatchStreamResponse>().has_frame());
     }
   }
-  // Where all have calls, one more gets no answer but to a health check.
+  // If all connections have calls, another one may only make a health check.
   silent.clear();
   while (watchers.size() < 8) {
     watchers.push_back(std::make_unique<WebSocketClient>(web(), "/v1/watch"));
@@ -172,7 +172,7 @@ int Cancels() {
   return text == nullptr ? 6000 : std::atoi(text);
 }
 
-// One client that does some of what a client does, and is gone in the middle of it.
+// A client that makes some steps and disconnects during one of them.
 void ComeAndGo(const Address& web, std::mt19937& random, const std::string& frame) {
   const auto below = [&](unsigned count) { return static_cast<unsigned>(random() % count); };
   const std::string open = OpenRequest().SerializeAsString();
@@ -231,7 +231,7 @@ TEST_F(WebGatewayTest, WhoeverGoesAtWhicheverPointLeavesNothingBehind) {
     return info.ParseFromString(Post(web(), "/v1/info", "").body) && info.open_streams() == 1 &&
            info.load().watchers() == 0 && info.load().memory_held() == 0;
   }));
-  // Each call but the producer's was counted at its end, once.
+  // Each call except the producer's was counted once, at its end.
   EXPECT_TRUE(Eventually(
       [&] { return Sum("grpc_server_started_total") == Sum("grpc_server_handled_total") + 1; }));
   EXPECT_GT(Sum("grpc_server_started_total"), Cancels() / 2);

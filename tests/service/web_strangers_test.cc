@@ -1,4 +1,4 @@
-// Clients without a token at the gateway: what they send keeps nobody else out, and is not read.
+// Gateway clients without a token: they block no other client, and their data is not read.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ constexpr char kOther[] = "127.0.0.2";
 
 class WebStrangers : public WebGatewayTest {
  protected:
-  // Over a connection of its own from the address `from`.
+  // Requests over a new connection from the address `from`.
   HttpReply AskFrom(const char* from, const std::string& target) {
     WebPipe pipe(web(), nullptr, from);
     return Ask(pipe, "GET", target);
@@ -31,7 +31,7 @@ class WebStrangers : public WebGatewayTest {
     EXPECT_TRUE(watcher->Receive<v1::WatchStreamResponse>().has_opened());
     return watcher;
   }
-  // All that the server sends until it closes.
+  // Receives until the server closes.
   std::string Exchange(const std::string& bytes) {
     WebPipe pipe(web());
     pipe.Send(bytes);
@@ -73,7 +73,7 @@ TEST_F(WebStrangers, OneAddressIsLimitedAndKeepsItsHealthChecks) {
   EXPECT_THAT(refused.body, HasSubstr("all connections"));
   EXPECT_EQ(AskFrom(kOther, "/").status, 200u);
   EXPECT_EQ(Refusals("full"), 1);
-  // Silent connections beyond the limit keep no health check out.
+  // Silent connections above the limit block no health check.
   std::vector<std::unique_ptr<WebPipe>> silent;
   for (int i = 0; i < 40; ++i) silent.push_back(std::make_unique<WebPipe>(web()));
   for (const char* from : {"127.0.0.1", kOther}) {
@@ -150,7 +150,7 @@ TEST_F(WebStrangers, WhatIsNoHostNameIsNoOption) {
               StartsWith("--web-frame-ancestors \""));
 }
 
-// The system takes a few megabytes by itself.
+// The system's buffers accept a few megabytes.
 TEST_F(WebStrangers, TheBodyOfACallWithoutATokenIsNotRead) {
   const support::TemporaryFolder folder;
   folder.Write("tokens", "0123456789abcdef0123456789abcdef lab\n");

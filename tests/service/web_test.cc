@@ -54,7 +54,7 @@ TEST_F(WebGatewayTest, AWatcherGetsTheSameBytesOverBothDoors) {
   EXPECT_TRUE(Eventually([&] { return Connections() == 0; }));
 }
 
-// Frame by frame; fails where an answer is no result.
+// One frame at a time; fails unless each answer is a result.
 std::vector<Digests> DigestsOverWeb(WebSocketClient& client, unsigned seed, std::uint64_t frames) {
   client.SendMessage(OpenRequest());
   EXPECT_TRUE(client.Receive<v1::ReconstructResponse>().has_opened());
@@ -90,7 +90,7 @@ TEST_F(WebGatewayTest, AMessageInPiecesIsTheSameMessage) {
     for (std::size_t at = 0; at < message.size(); at += piece) {
       const bool last = at + piece >= message.size();
       client.pipe().Send(ClientFrame(at == 0 ? 2 : 0, message.substr(at, piece), last));
-      // A ping between two pieces is answered by itself.
+      // A ping between two pieces is answered separately.
       if (at == piece) client.pipe().Send(ClientFrame(9, "between"));
     }
     const auto answer = client.Receive<v1::ReconstructResponse>();
@@ -233,7 +233,7 @@ TEST_F(WebGatewayTest, AProducerThatIsGoneLeavesItsStreamAndItsWatchersAreTold) 
   ASSERT_TRUE(watcher.Receive().has_opened());
   producer->pipe().Reset();
   EXPECT_EQ(watcher.Receive().ended().reason(), "PRODUCER_LOST");
-  // One that says goodbye without `end` has left as well.
+  // A client that closes without `end` has left, too.
   producer = std::make_unique<WebSocketClient>(web(), "/v1/reconstruct");
   producer->SendMessage(OpenRequest("tank"));
   ASSERT_TRUE(producer->Receive<v1::ReconstructResponse>().has_opened());
@@ -257,7 +257,7 @@ TEST_F(WebGatewayTest, ASilentClientIsAskedForASignOfLifeAndEndedWithoutOne) {
   std::thread silent([&] { EXPECT_TRUE(dead.pipe().IsClosedWithin(60'000)); });
   std::thread producer([&] {
     silent.join();
-    Produce(0);  // Only now does the other one hear anything but pings.
+    Produce(0);  // The other client receives only pings until now.
   });
   EXPECT_TRUE(alive.Receive<v1::WatchStreamResponse>().has_frame());
   EXPECT_GE(alive.pings(), 1u);

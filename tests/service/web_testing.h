@@ -1,4 +1,4 @@
-// A server with a gateway, as the tests of it need it.
+// A server with a gateway, for its tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,18 +24,18 @@ class WebGatewayTest : public ::testing::Test {
     channel_ = Connect(*server_, Transport::kTcp);
   }
   Address web() const { return *server_->web_address(); }
-  /// As a page that the server has sent says it.
+  /// The origin of a page that the server has sent.
   std::string OwnOrigin() const {
     return "Host: " + web().ToString() + "\r\nOrigin: http://" + web().ToString() + "\r\n";
   }
 
-  /// A line of the metrics; -1 where it is not there.
+  /// A sample of the metrics; -1 if it does not exist.
   double Metric(const std::string& name) const {
     const std::string text = "\n" + Ask(*server_->metrics_address(), "GET", "/metrics").body;
     const auto at = text.find("\n" + name + " ");
     return at == std::string::npos ? -1 : std::stod(text.substr(at + name.size() + 2));
   }
-  /// Of all lines with this name, whatever their labels.
+  /// Sum of all samples with this name, with any labels.
   double Sum(const std::string& name) const {
     std::istringstream lines(Ask(*server_->metrics_address(), "GET", "/metrics").body);
     double sum = 0;

@@ -52,7 +52,7 @@ void AddExtension(X509& certificate, int what, const char* value) {
   X509_EXTENSION_free(extension);
 }
 
-// Not signed yet.
+// Unsigned.
 Certificate MakeCertificate(const std::string& name, EVP_PKEY* key, long seconds_left) {
   static std::atomic<long> serial = 1;
   Certificate certificate(X509_new());

@@ -1,4 +1,4 @@
-// Certificates for tests: authorities and what they sign, made on the spot.
+// Certificates for tests: authorities, and certificates they sign at run time.
 #pragma once
 
 #include <chrono>
@@ -17,11 +17,11 @@ class CertificateAuthority {
   explicit CertificateAuthority(const std::string& name);
   ~CertificateAuthority();
 
-  /// Its own certificate, PEM.
+  /// The authority's own certificate, PEM.
   std::string certificate() const;
 
-  /// For localhost and 127.0.0.1, as server and as client; valid since an hour before now, or
-  /// before its end where that has passed already.
+  /// For localhost and 127.0.0.1, as server and client. Valid since an hour ago, or since before
+  /// its end if that is in the past.
   IssuedCertificate Issue(const std::string& name,
                           std::chrono::seconds valid_for = std::chrono::hours(1)) const;
 

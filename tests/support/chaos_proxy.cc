@@ -26,7 +26,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How much of a direction is held at most; then its source has to wait, as behind a full router.
+// Capacity of a direction. When it is full, the source must wait, as behind a full router.
 constexpr std::size_t kMostHeld = std::size_t{1} << 20;
 constexpr std::size_t kPiece = std::size_t{1} << 14;
 constexpr int kLongestPollMs = 1000;
@@ -56,7 +56,7 @@ class Socket {
   Socket& operator=(const Socket&) = delete;
 
   int fd() const { return fd_; }
-  // Closing then resets the connection.
+  // Makes closing reset the connection.
   void ResetOnClose() {
     const linger at_once{.l_onoff = 1, .l_linger = 0};
     setsockopt(fd_, SOL_SOCKET, SO_LINGER, &at_once, sizeof(at_once));
@@ -66,7 +66,7 @@ class Socket {
   int fd_;
 };
 
-// One direction of a connection: what has been read and is not written yet.
+// One direction of a connection: bytes that were read and not written yet.
 struct Direction {
   struct Piece {
     Clock::time_point due;
@@ -74,9 +74,9 @@ struct Direction {
   };
   std::deque<Piece> pieces;
   std::size_t held = 0;
-  Clock::time_point free_at{};  // When the limit lets the next piece begin.
-  bool ended = false;           // The source will send nothing more.
-  bool told = false;            // And the sink knows.
+  Clock::time_point free_at{};  // When the rate limit allows the next piece.
+  bool ended = false;           // The source has ended.
+  bool told = false;            // The sink has been notified of it.
 };
 
 struct Connection {
@@ -84,7 +84,7 @@ struct Connection {
 
   std::array<Socket, 2> ends;           // Client, server.
   std::array<Direction, 2> directions;  // From that end to the other.
-  bool forgotten = false;               // HalfOpen.
+  bool forgotten = false;               // After HalfOpen.
   bool broken = false;
 };
 
@@ -156,7 +156,7 @@ class ChaosProxy::Loop {
         polled.assign({{listener_.fd(), POLLIN, 0}, {wake_, POLLIN, 0}});
         for (const Connection& connection : connections_) {
           for (std::size_t end = 0; end < 2; ++end) {
-            // poll passes over a negative one; else it would tell of each end that has hung up.
+            // poll ignores a negative one; otherwise it would report every closed end.
             const short interest = Interest(connection, end);
             polled.push_back({interest == 0 ? -1 : connection.ends[end].fd(), interest, 0});
           }
@@ -169,7 +169,7 @@ class ChaosProxy::Loop {
     }
   }
 
-  // What there is to wait for at an end of a connection.
+  // Events to wait for at an end of a connection.
   static short Interest(const Connection& connection, std::size_t end) {
     if (connection.forgotten) return 0;
     const Direction& in = connection.directions[end];
@@ -197,7 +197,7 @@ class ChaosProxy::Loop {
     ++accepted;
   }
 
-  // Moves what can be moved; gives how long nothing else is due, in milliseconds.
+  // Moves all bytes that are due; returns the milliseconds until the next ones.
   int Advance() {
     auto next = Clock::now() + std::chrono::milliseconds(kLongestPollMs);
     for (Connection& connection : connections_) {
@@ -231,7 +231,7 @@ class ChaosProxy::Loop {
       bytes.resize(static_cast<std::size_t>(count));
       if (to_flip[end] > 0) {
         --to_flip[end];
-        // In the middle: a bit of whatever is there.
+        // A bit in the middle of the piece.
         bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x10);
         ++flipped;
       }
@@ -247,7 +247,7 @@ class ChaosProxy::Loop {
     }
   }
 
-  // Writes what is due from an end to the other.
+  // Writes due bytes from an end to the other.
   void Drain(Connection& connection, std::size_t end) {
     Direction& direction = connection.directions[end];
     const int sink = connection.ends[1 - end].fd();

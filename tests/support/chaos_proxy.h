@@ -1,5 +1,5 @@
-// A TCP proxy that does to connections what networks do: cuts, resets, delays, slows, forgets and
-// falsifies them.
+// A TCP proxy that disturbs connections: cuts, resets, delays, slows, silently drops and corrupts
+// them.
 #pragma once
 
 #include <chrono>
@@ -10,13 +10,13 @@
 
 namespace partiemc::support {
 
-/// Listens on a port of loopback and passes every connection on to `target` (HOST:PORT of
-/// loopback). Each function acts on the connections that are there, unless it says otherwise; new
-/// ones are undisturbed. Safe from any thread; one thread of its own does the work.
+/// Listens on a loopback port and forwards every connection to `target` (HOST:PORT of loopback).
+/// Each function acts on the current connections unless stated otherwise; new ones are undisturbed.
+/// Thread-safe; an internal thread does the work.
 class ChaosProxy {
  public:
   explicit ChaosProxy(const std::string& target);
-  /// Closes everything.
+  /// Closes all connections.
   ~ChaosProxy();
   ChaosProxy(const ChaosProxy&) = delete;
   ChaosProxy& operator=(const ChaosProxy&) = delete;
@@ -24,20 +24,20 @@ class ChaosProxy {
   /// HOST:PORT to connect to.
   std::string address() const;
 
-  /// Closes both ends in the orderly way, at whatever byte they are.
+  /// Closes both ends cleanly, at any byte.
   void Cut();
-  /// Closes both ends with a TCP reset; what was under way is lost.
+  /// Closes both ends with a TCP reset; bytes on the way are lost.
   void Reset();
-  /// Passes nothing more on and closes nothing: neither end is told that the other has gone.
+  /// Stops forwarding without closing: neither end detects that the other is lost.
   void HalfOpen();
-  /// Flips one bit in each of the next `count` pieces that come from the server, or the client, on
-  /// whatever connection.
+  /// Flips one bit in each of the next `count` pieces from the server or the client, on any
+  /// connection.
   void Flip(std::size_t count, bool from_server);
 
-  // For all connections, those to come too:
-  /// What comes is passed on so much later.
+  // For all connections, including new ones:
+  /// Delays forwarded bytes.
   void Delay(std::chrono::milliseconds delay);
-  /// In each direction of each connection; 0: no limit.
+  /// Per direction and connection; 0: no limit.
   void Limit(std::uint64_t bytes_per_second);
 
   std::size_t accepted() const;

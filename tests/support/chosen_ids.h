@@ -1,11 +1,11 @@
-// Ids that are made to meet in what the core makes of them.
+// Ids chosen for their hashes.
 #pragma once
 
 #include <cstdint>
 
 namespace partiemc::support {
 
-/// The id whose hash is this (core/src/base/id_hash.h): the steps of HashOf backwards.
+/// The id with this hash (core/src/base/id_hash.h): inverts HashOf.
 inline std::uint64_t IdWithHash(std::uint64_t hash) {
   hash ^= hash >> 31 ^ hash >> 62;
   hash *= 0x319642b2d24d8ec3u;

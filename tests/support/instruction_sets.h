@@ -1,4 +1,4 @@
-// The vectors that this processor has, forced in turn.
+// Runs tests with each instruction set of this processor.
 #pragma once
 
 #include <hwy/targets.h>
@@ -7,12 +7,12 @@
 
 namespace partiemc::support {
 
-/// Calls visit() once with each of the instruction sets that the core is compiled for and this
-/// processor has, then leaves the choice as it was. Returns how many there are.
+/// Calls visit() once for each instruction set that the core is compiled for and this processor
+/// has, then restores the selection. Returns their number.
 template <typename Visit>
 int ForEachInstructionSet(Visit visit) {
   const auto force = [](std::int64_t targets) {
-    hwy::SetSupportedTargetsForTest(targets);  // 0: all that the processor has.
+    hwy::SetSupportedTargetsForTest(targets);  // 0: all of the processor's.
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   };
   int count = 0;

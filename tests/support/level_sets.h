@@ -1,4 +1,4 @@
-// Level sets of random numbers, at nodes of a small lattice: what no particles would ever make.
+// Random level sets on a small lattice, including ones that no particles produce.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace partiemc::support {
 
-/// Values at the nodes [0, columns) x [0, rows); outside of them 1, hence outside.
+/// Values at the nodes [0, columns) x [0, rows); outside of them 1, which is outside the body.
 struct LevelSetPatch {
   int columns = 0, rows = 0;
   std::vector<float> values;  // Row by row.
@@ -19,11 +19,11 @@ struct LevelSetPatch {
   }
 };
 
-/// One of: noise, extreme ratios of neighbours, values next to 0, checkerboards (a saddle in every
-/// cell) with and without faults, smooth fields, walls, and fields of nothing but -1, 0 and 1.
+/// One of: noise, extreme ratios of neighbours, values near 0, checkerboards (a saddle in every
+/// cell) with and without defects, smooth fields, walls, and fields of -1, 0 and 1.
 LevelSetPatch RandomPatch(Random& random, int columns, int rows);
 
-/// -1, 0 and 1 only: every crossing at the middle of an edge or at a node, saddles that are ties.
+/// Only -1, 0 and 1: every crossing is in the middle of an edge or at a node; saddles are ties.
 LevelSetPatch TernaryPatch(Random& random, int columns, int rows);
 
 }  // namespace partiemc::support

@@ -1,4 +1,4 @@
-// Level sets by hand over two by two tiles, for tests of what becomes of them.
+// Level sets written by hand on two by two tiles.
 #pragma once
 
 #include <cmath>
@@ -26,7 +26,7 @@ inline ReconstructionParameters Plain(bool clean) {
   return {.placement = Placement::kMarchingSquares, .spacing = 1.0, .clean = clean};
 }
 
-/// The tiles that these level sets fill.
+/// The tiles of these level sets.
 inline constexpr TileCoordinate kLow{0, 0}, kHigh{1, 1};
 
 }  // namespace partiemc::support

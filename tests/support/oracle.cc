@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Decisions that hang on less than this many cells are left to rounding.
+// Decisions within this number of cells may differ by rounding.
 constexpr double kCloseCall = 1e-4;
 
 }  // namespace
@@ -68,8 +68,8 @@ double FieldOracle::Phi(Vector at) const {
 
 double FieldOracle::Guard(Vector at) const { return (guard_ - Density(at)) * radius_ / 1.164; }
 
-// The largest mean square of the particles' distances along a direction. As a function of the angle
-// it is a + b cos 2 angle + c sin 2 angle: three directions tell the three numbers.
+// The maximum over directions of the particles' mean square distance. As a function of the angle it
+// is a + b cos 2 angle + c sin 2 angle, so three directions determine it.
 double FieldOracle::Spread(Vector at) const {
   const double weight = KernelSum(at);
   if (weight == 0) return 0;
@@ -148,8 +148,8 @@ FarthestChoice FarthestParticle(const Particles& particles, Vector point, Vector
 }
 
 std::vector<std::pair<int, int>> CellSegments(const std::array<double, 4>& corners) {
-  // Round the cell, counter-clockwise: the isoline enters through an edge from inside to outside,
-  // for the inside is then on its left, and leaves through one from outside to inside.
+  // Around the cell, counter-clockwise: the isoline enters through an edge from inside to outside,
+  // which has the inside on its left, and leaves through an edge from outside to inside.
   std::vector<int> entries, exits;
   for (int edge = 0; edge < 4; ++edge) {
     const bool here = corners[edge] < 0;
@@ -159,13 +159,13 @@ std::vector<std::pair<int, int>> CellSegments(const std::array<double, 4>& corne
   }
   if (entries.empty()) return {};
   if (entries.size() == 1) return {{entries[0], exits[0]}};
-  // Where the bilinear interpolant is stationary: s = (F0 - F3) / (F0 + F2 - F1 - F3), and F there
-  // by going along the row at s.
+  // The stationary point of the bilinear interpolant: s = (F0 - F3) / (F0 + F2 - F1 - F3); F there
+  // by moving along the row at s.
   const double denominator = corners[0] + corners[2] - corners[1] - corners[3];
   const double s = (corners[0] - corners[3]) / denominator;
   const double saddle = corners[0] + s * (corners[1] - corners[0]);
-  // Joined corners: each segment cuts off the outside corner after its entry. Parted ones: each
-  // cuts off the inside corner before its entry.
+  // Joined corners: each segment cuts off the outside corner after its entry. Separated corners:
+  // each cuts off the inside corner before its entry.
   const int step = saddle < 0 ? 1 : 3;
   std::vector<std::pair<int, int>> segments;
   for (const int entry : entries) segments.emplace_back(entry, (entry + step) % 4);

@@ -1,5 +1,5 @@
-// The method as the paper writes it, by brute force and in double: what the stages are checked
-// against. Every function reads like its equation; none shares a line with the core.
+// The method of the paper by brute force in double precision: the reference for the stages. Every
+// function follows its equation; no code is shared with the core.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct Vector {
   double x = 0, y = 0;
 };
 
-/// The level set of a frame, in world units: sums over all particles, wherever they are.
+/// The level set of a frame in world units, as sums over all particles.
 class FieldOracle {
  public:
   /// Requires: resolved parameters; `particles` outlives the oracle.
@@ -26,16 +26,16 @@ class FieldOracle {
 
   double KernelSum(Vector at) const;            ///< sum k
   double Density(Vector at) const;              ///< f, Eq. 1
-  std::optional<Vector> Mean(Vector at) const;  ///< xbar, Eq. 3-4; nothing without support.
+  std::optional<Vector> Mean(Vector at) const;  ///< xbar, Eq. 3-4; empty without support.
   double Phi(Vector at) const;                  ///< Eq. 5; R - r without support.
   double Guard(Vector at) const;                ///< (g - f) R / 1.164
   double Spread(Vector at) const;               ///< s; 0 without support.
   double Gap(Vector at) const;                  ///< (s - s0) R / 0.45
   double Saturation(Vector at) const;           ///< (t - f) R / 1.164
   double Value(Vector at) const;                ///< F = min(max(phi, guard, gap), saturation)
-  double CreaseMargin(Vector at) const;         ///< What F lacks to another of its branches.
-  Vector PhiGradient(Vector at) const;          ///< By central differences.
-  Vector ValueGradient(Vector at) const;        ///< By central differences.
+  double CreaseMargin(Vector at) const;   ///< Difference between F and its nearest other branch.
+  Vector PhiGradient(Vector at) const;    ///< By central differences.
+  Vector ValueGradient(Vector at) const;  ///< By central differences.
   double kernel_radius() const { return radius_; }
 
  private:
@@ -49,7 +49,7 @@ class FieldOracle {
 };
 
 /// Section 3.5: the particle farthest along the unit normal, among those on or above the plane and
-/// within one cell of its point. Nothing if there is none, or if rounding could decide otherwise:
+/// within one cell of its point. Empty if there is none, or if rounding could change the choice:
 /// then `is_close_call` is set.
 struct FarthestChoice {
   std::optional<std::size_t> particle;
@@ -58,8 +58,8 @@ struct FarthestChoice {
 FarthestChoice FarthestParticle(const Particles& particles, Vector point, Vector normal,
                                 double cell_size);
 
-/// Segments of one cell as (entry edge, exit edge), the inside on the left, from the values at its
-/// corners, counter-clockwise from the lower left; edge k joins corners k and k + 1.
+/// Segments of one cell as (entry edge, exit edge), with the inside on the left, from the values at
+/// its corners, counter-clockwise from the lower left; edge k joins corners k and k + 1.
 std::vector<std::pair<int, int>> CellSegments(const std::array<double, 4>& corners);
 
 /// Median over particles of the distance to the nearest other position.

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Calls visit(x, y) for the integer points of a square of half the side `radius` round the origin.
+// Calls visit(x, y) for the integer points of a square of half side `radius` around the origin.
 template <typename Visit>
 void ForEachNode(double radius, Visit visit) {
   const int reach = static_cast<int>(std::ceil(radius));

@@ -1,4 +1,4 @@
-// Frames to test with: shapes, degenerate sets, and seeded random scenes.
+// Test frames: shapes, degenerate sets, and seeded random scenes.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace partiemc::support {
 struct Particles {
   std::vector<double> xy;
   std::vector<float> volumes;      ///< Empty, or one per particle.
-  std::vector<std::uint64_t> ids;  ///< Likewise.
+  std::vector<std::uint64_t> ids;  ///< Empty, or one per particle.
   std::vector<float> velocities;   ///< Empty, or x, y per particle.
   double time = 0;
 
@@ -25,18 +25,18 @@ struct Particles {
     xy.push_back(px);
     xy.push_back(py);
   }
-  /// Particles with the ids and velocities that they have.
+  /// Adds particles with their ids and velocities.
   void Add(const Particles& others);
-  /// A view; valid as long as this object is and does not change.
+  /// A view; valid while this object exists and does not change.
   Frame AsFrame() const;
 };
 
-// Shapes filled with particles at the nodes of a lattice of spacing 1, unless said otherwise.
+// Shapes filled with particles at the nodes of a lattice of spacing 1, unless stated otherwise.
 
 /// Particles at (x0 + i, y0 + j).
 Particles Lattice(int columns, int rows, double x0 = 0, double y0 = 0);
 Particles Disc(double radius, double cx = 0, double cy = 0);
-/// Between two circles round the origin.
+/// Between two circles around the origin.
 Particles Annulus(double inner, double outer);
 /// Particles with y <= 0 below a straight boundary: `columns` of them in `rows` layers.
 Particles HalfPlane(int columns, int rows);
@@ -50,22 +50,22 @@ Particles Noise(Random& random, std::size_t count, double extent);
 Particles Collinear(Random& random, std::size_t count);
 Particles Clusters(Random& random, std::size_t clusters, double extent);
 
-/// One of everything above, several at once, duplicates and spray now and then, volumes now and
-/// then, near the origin or up to a million spacings from it.
+/// A mixture of the shapes above, sometimes with duplicates, spray and volumes, near the origin or
+/// up to a million spacings from it.
 Particles RandomScene(std::uint64_t seed);
 
-/// Frame `frame` of a wavy body with a hole that turns, drifts, stretches and breaks up a little.
+/// Frame `frame` of a wavy body with a hole that turns, drifts, stretches and sheds fragments.
 Particles MovingBody(int frame);
 
-// Metamorphoses.
+// Metamorphic changes.
 
 Particles Shifted(Particles particles, double dx, double dy);
 /// Positions times `factor`, volumes times its square.
 Particles Scaled(Particles particles, double factor);
 Particles Permuted(const Particles& particles, Random& random);
-/// Some of the particles once more, at the same places.
+/// Repeats some of the particles at the same positions.
 Particles WithDuplicates(Particles particles, Random& random, std::size_t count);
-/// Positions rounded to what the bins keep: multiples of 2^-17 cells.
+/// Positions rounded to the precision of the bins: multiples of 2^-17 cells.
 Particles Snapped(Particles particles, double cell_size);
 
 }  // namespace partiemc::support

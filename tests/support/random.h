@@ -1,5 +1,5 @@
-// Random numbers that are the same on every machine: SplitMix64, and no distribution of the
-// standard library, whose results differ between implementations.
+// Random numbers that are the same on every machine: SplitMix64, without the standard library's
+// distributions, which differ between implementations.
 #pragma once
 
 #include <cstddef>

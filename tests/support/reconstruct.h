@@ -1,4 +1,4 @@
-// One call for what most tests of the whole method do.
+// Reconstructs one frame in one call.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ inline Result ReconstructOnce(const ReconstructionParameters& parameters,
   return ReconstructOnce(parameters, particles.AsFrame());
 }
 
-/// Angle between a direction and a normal that should be it, in degrees.
+/// Angle in degrees between a direction and its expected normal.
 inline double AngleBetween(double ax, double ay, double bx, double by) {
   return std::abs(std::atan2(ax * by - ay * bx, ax * bx + ay * by)) * 180 / std::numbers::pi;
 }

@@ -1,4 +1,4 @@
-// A stream of frames through the core, whose rings are asked for by where they are.
+// A stream of frames through the core, with its rings by position.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 namespace partiemc::support {
 
-/// At spacing 1 unless told otherwise.
+/// With spacing 1 by default.
 class RingStream {
  public:
   explicit RingStream(ReconstructionParameters parameters = {})

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Names the tests that did not run.
+"""Lists the skipped tests.
 
-    skips.py ctest CONSOLE_LOG LAST_TEST_LOG   what CTest wrote on the console and to LastTest.log
-    skips.py node LOG                          what node's test runner wrote
-    skips.py step NAME...                      steps of tests/run.sh that were left out
+    skips.py ctest CONSOLE_LOG LAST_TEST_LOG   CTest's console output and its LastTest.log
+    skips.py node LOG                          output of node's test runner
+    skips.py step NAME...                      skipped steps of tests/run.sh
 
-Prints a line "NAME<tab>REASON" for each; REASON is what tests/skips.txt says about NAME, or empty.
+Prints a line "NAME<tab>REASON" for each; REASON is the entry of NAME in tests/skips.txt, or empty.
 A test inside a Python program is CTEST_NAME/test_method.
 """
 

@@ -1,5 +1,5 @@
-// The stages one after the other, with everything in between at hand, and level sets made by hand.
-// For tests of the core only: it includes the core's private headers.
+// Runs the stages with access to intermediate results, also on level sets written by hand. For
+// tests of the core only: it includes private headers.
 #pragma once
 
 #include <functional>
@@ -24,7 +24,8 @@ namespace partiemc::support {
 /// A level set with values of `function` at nodes (column, row).
 LevelSet LevelSetOf(const std::function<double(int, int)>& function, const TileDirectory& tiles);
 
-/// What the stages make of one frame. Not movable once run: later results refer to earlier ones.
+/// Outputs of the stages for one frame. Not movable after a run: later results refer to earlier
+/// ones.
 struct Stages {
   ReconstructionParameters parameters;  ///< Resolved.
   VirtualPlaneVariant variant;          ///< Set before Run.
@@ -48,13 +49,13 @@ struct Stages {
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
 
-  /// All stages but identities of `particles`; parameters need a spacing.
+  /// Runs all stages except identities on `particles`; parameters need a spacing.
   void Run(const Particles& frame, const ReconstructionParameters& wanted,
            std::span<const CellNormal> previous = {});
 
-  /// The same from stage 3 on, of a level set made by hand, with values of `function` at nodes
-  /// (column, row), on the tiles [low, high]. Particles count for components and for the point
-  /// field, not for the level set. Nodes in the outermost row and column of tiles must be outside.
+  /// Same from stage 3 on, for a level set with values of `function` at nodes (column, row) on the
+  /// tiles [low, high]. Particles count for components and the point field only. Nodes in the
+  /// outermost row and column of tiles must be outside.
   void RunOn(const std::function<double(int, int)>& function, TileCoordinate low,
              TileCoordinate high, const Particles& frame, const ReconstructionParameters& wanted,
              std::span<const CellNormal> previous = {});
@@ -63,7 +64,7 @@ struct Stages {
   void TraceOn(const std::function<double(int, int)>& function, TileCoordinate low,
                TileCoordinate high, const Particles& frame, const ReconstructionParameters& wanted);
 
-  /// Corners and value at each corner of an active cell.
+  /// Value at each corner of an active cell.
   std::array<double, 4> CornerValues(const ActiveCell& cell) const;
 
  private:

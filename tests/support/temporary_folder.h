@@ -1,4 +1,4 @@
-// A folder of a test's own.
+// A temporary folder for one test.
 #pragma once
 
 #include <stdlib.h>
@@ -15,8 +15,8 @@
 
 namespace partiemc::support {
 
-/// A new folder that goes away with the object: tests that run at the same time, those of several
-/// checkouts even, do not meet in it.
+/// A new folder, removed by the destructor. Concurrent tests, also of several checkouts, do not
+/// share it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -45,7 +45,7 @@ class TemporaryFolder {
     return path;
   }
 
-  /// Names of all entries in order, hidden ones too.
+  /// Sorted names of all entries, including hidden ones.
   std::vector<std::string> Entries() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(path_)) {

@@ -1,13 +1,12 @@
-// What ThreadSanitizer is told about code that is not ours: oneTBB as Debian builds it is not
-// instrumented, so that its own calls of memcmp, delete and the like look unordered. What tasks do
-// is not hidden by this: they are called by oneTBB, and call it back, in code of ours
-// (fork_join.h). Nor does oneTBB wait for its own threads when a program ends: one that leaves just
-// then looks as if it had been forgotten.
+// Suppressions for code that is not ours. Debian's oneTBB is not instrumented, so its own calls of
+// memcmp, delete and others look unordered. This hides no task: oneTBB calls tasks through our
+// code, and they call it through our code (fork_join.h). oneTBB also does not join its threads at
+// the end of a program, which looks like a thread leak.
 extern "C" const char* __tsan_default_suppressions() {
   return "called_from_lib:libtbb.so\n"
          "thread:libtbb.so\n";
 }
 
-// Threads of a pool are still there when a program ends; it need not wait a second to see them
-// race.
+// A pool's threads still exist at the end of a program; there is no need to wait a second for their
+// races.
 extern "C" const char* __tsan_default_options() { return "atexit_sleep_ms=50"; }

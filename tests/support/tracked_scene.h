@@ -8,7 +8,7 @@
 
 namespace partiemc::support {
 
-/// What the particles of a test bring along.
+/// Quantities of a test's particles.
 struct Known {
   bool ids = false, velocities = false;
   friend std::ostream& operator<<(std::ostream& out, const Known& known) {
@@ -19,12 +19,12 @@ struct Known {
 inline constexpr Known kNothing{}, kIds{.ids = true}, kVelocities{.velocities = true},
     kBoth{.ids = true, .velocities = true};
 
-/// A frame that is put together of bodies.
+/// A frame composed of bodies.
 class Scene {
  public:
   explicit Scene(Known known, double time) : known_(known) { particles_.time = time; }
 
-  /// A body whose particles have ids from `first_id` on.
+  /// Adds a body with ids from `first_id`.
   Scene& Add(Particles body, std::uint64_t first_id, double vx = 0, double vy = 0) {
     for (std::size_t k = 0; k < body.size(); ++k) {
       if (known_.ids) body.ids.push_back(first_id + k);

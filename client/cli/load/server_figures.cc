@@ -5,9 +5,8 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-#include <cstdlib>
-
 #include "client/output/text.h"
+#include "common/text.h"
 
 namespace partiemc::client {
 namespace {
@@ -17,10 +16,8 @@ std::optional<double> ValueOf(std::string_view text, std::string_view name) {
   const std::string begin = Concat("\n", name, " ");
   const auto at = text.find(begin);
   if (at == std::string_view::npos) return std::nullopt;
-  const std::string rest(text.substr(at + begin.size(), 40));
-  char* end = nullptr;
-  const double value = std::strtod(rest.c_str(), &end);
-  return end != rest.c_str() ? std::optional(value) : std::nullopt;
+  text.remove_prefix(at + begin.size());
+  return ConsumeNumber<double>(text);
 }
 
 // Connects with a timeout of five seconds per step. Returns the descriptor, or -1.

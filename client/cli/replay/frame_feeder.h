@@ -26,7 +26,7 @@
 
 namespace partiemc::client {
 
-/// What to do with frames while the stream is busy.
+/// Policy for frames that arrive while the stream is busy.
 enum class SendPolicy {
   kBlock,   ///< Wait; no frame is lost.
   kLatest,  ///< Send the newest frame, skip and count the others.

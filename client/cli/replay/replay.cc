@@ -11,10 +11,10 @@
 #include "client/cli/replay/looped_input.h"
 #include "client/cli/replay/replay_outputs.h"
 #include "client/cli/replay_parameters.h"
-#include "client/input/base/text.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
 #include "common/printable.h"
+#include "common/text.h"
 #include "partiemc/client/local_stream.h"
 #include "partiemc/client/stream.h"
 #include "partiemc/validate.h"
@@ -45,7 +45,7 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
     return *std::move(stream);
   }
   const std::chrono::milliseconds patience = flags.policy == "latest" ? kShortPatience : kPatience;
-  const std::vector<std::string_view> servers = input::Split(flags.server.address, ',');
+  const std::vector<std::string_view> servers = Split(flags.server.address, ',');
   auto stream = Stream::Open(
       servers.front(),
       {.name = flags.name,

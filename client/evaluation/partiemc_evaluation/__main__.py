@@ -1,13 +1,11 @@
 """The command: python3 -m partiemc_evaluation paper|set ..."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os
 import pathlib
 import sys
-from typing import List, Optional, Sequence as Seq
+from typing import Sequence as Seq
 
 import partiemc
 
@@ -15,16 +13,11 @@ from .paper import default_film, judge_claims, run_paper
 from .recordings import read_recording
 from .report import Evaluation, as_html, as_json, as_text
 from .scenes import SETS, digest, make_scene, make_set
+from .shapes import TUNING_SHAPES, VALIDATION_SHAPES
 from .study import PLACEMENTS, Method, all_methods, run_study
 
-_ABOUT = """Measures the placements of PartiEMC on sequences whose true outline is known, and on recordings.
-
-  set NAME   every method on a set of synthetic sequences: ratios to marching squares in accuracy,
-             area and jitter, by group and by sampler, with 95 % intervals
-  paper      the same, then the paper's Tables 1 to 4 and Figures 5 to 14 from our own scenes, and a
-             verdict on each of its 27 claims
-
-Needs PYTHONPATH=BUILD/python:client/evaluation, where BUILD has the package partiemc."""
+_ABOUT = """Measures the placements of PartiEMC on sequences whose true outline is known, and on recordings. Needs
+PYTHONPATH=BUILD/python:client/evaluation, where BUILD has the package partiemc."""
 _EXAMPLES = """examples:
   python3 -m partiemc_evaluation set smoke                             # a few seconds: does it work?
   python3 -m partiemc_evaluation set tuning --steps --output-dir out   # what is each step worth?
@@ -41,6 +34,12 @@ def _range(text: str) -> slice:
     return slice(int(first or 0), int(last) if last else None)
 
 
+def _count(text: str) -> int:
+    if int(text) < 1:
+        raise ValueError(text)
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     shared = argparse.ArgumentParser(add_help=False)
     add = shared.add_argument
@@ -54,22 +53,24 @@ def _parser() -> argparse.ArgumentParser:
     add("--sensitivity", action="store_true", help="also the default with each of its constants times 0.7 and 1.4")
     add("--volumes", action="store_true", help="give methods the volume of each particle")
     add("--output-dir", metavar="DIR", type=pathlib.Path, help="write evaluation.html and evaluation.json here")
-    add("--jobs", metavar="N", type=int, default=os.cpu_count() or 1,
+    add("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1,
         help="sequences at a time; one for each processor by default")
     add("--quiet", action="store_true", help="no progress")
     parser = argparse.ArgumentParser("partiemc_evaluation", description=_ABOUT, epilog=_EXAMPLES,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="set|paper")
-    one = verbs.add_parser("set", parents=[shared], help="measure every method on a set of sequences")
+    one = verbs.add_parser("set", parents=[shared], help="measure every method on a set of synthetic sequences: ratios "
+                           "to marching squares in accuracy, area and jitter, by group and by sampler, with intervals")
     one.add_argument("set", choices=(*SETS, "none"), help="the set; 'none' for recordings alone")
     one.add_argument("--digests", action="store_true", help="print a digest of the particles of each sequence and of all "
                      "(committed: client/evaluation/digests.txt), and measure nothing")
-    paper = verbs.add_parser("paper", parents=[shared], help="also the paper's tables, figures and claims")
+    paper = verbs.add_parser("paper", parents=[shared], help="the same, then the paper's Tables 1 to 4 and Figures 5 to "
+                             "14 from our own scenes, and a verdict on each of its 27 claims")
     paper.add_argument("--set", choices=SETS, default="tuning", help="set of Tables 3 and 4; tuning by default")
     return parser
 
 
-def _methods(options: argparse.Namespace) -> List[Method]:
+def _methods(options: argparse.Namespace) -> list[Method]:
     methods = all_methods(options.steps, options.sensitivity)
     wanted = {*options.methods.split(","), *PLACEMENTS} - {"", "placements"}
     unknown = wanted - {method.name for method in methods}
@@ -81,7 +82,7 @@ def _methods(options: argparse.Namespace) -> List[Method]:
 def _print_digests(name: str) -> None:
     total = hashlib.sha256()
     for recipe in make_set(name):
-        line = f"{digest(make_scene(recipe))}  {recipe.name}"
+        line = f"{digest(make_scene(recipe))}  {name}/{recipe.name}"
         total.update(f"{line}\n".encode())
         print(line, flush=True)
     print(f"{total.hexdigest()[:16]}  all of {name}")
@@ -91,21 +92,25 @@ def _run(options: argparse.Namespace) -> None:
     def progress(text: str) -> None:
         if not options.quiet:
             print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-    notes: List[str] = []
-    paths = options.recording + (sorted(options.recordings.glob("*.pemc")) if options.recordings else [])
+    notes: list[str] = []
+    in_folder = sorted(options.recordings.glob("*.pemc")) if options.recordings else []
+    if options.recordings and not in_folder:
+        raise ValueError(f"--recordings: {options.recordings} has no .pemc file")
+    paths = options.recording + in_folder
     recordings = [read_recording(path, notes, options.frames) for path in paths]
     sources = [*([] if options.set == "none" else make_set(options.set)), *recordings]
     if not sources:
         raise ValueError("nothing to measure: 'none' needs --recording or --recordings with .pemc files")
     if options.output_dir:
         options.output_dir.mkdir(parents=True, exist_ok=True)
-    told = ["volumes" if options.volumes else "spacing", "nothing"]
-    study = run_study(sources, _methods(options), told, options.jobs,
+    given = ["volumes" if options.volumes else "spacing", "nothing"]
+    study = run_study(sources, _methods(options), given, options.jobs,
                       lambda done: progress(f"{done} of {len(sources)} sequences"))
     title = f"Evaluation: {', '.join([options.set, *(recording.name for recording in recordings)])}"
     evaluation = Evaluation(title, study, notes=notes)
     if options.verb == "paper":
-        evaluation.runs = run_paper(recordings[0] if recordings else default_film(), progress)
+        evaluation.runs = run_paper(recordings[0] if recordings else default_film(), progress,
+                                    VALIDATION_SHAPES if options.set == "validation" else TUNING_SHAPES)
         evaluation.claims = judge_claims(study, evaluation.runs)
     progress("")
     print(as_text(evaluation))
@@ -114,7 +119,7 @@ def _run(options: argparse.Namespace) -> None:
         (options.output_dir / "evaluation.json").write_text(as_json(evaluation))
 
 
-def main(arguments: Optional[Seq[str]] = None) -> int:
+def main(arguments: Seq[str] | None = None) -> int:
     """Exit code: 0; 1 if an input cannot be read or measured; 2 for a wrong flag."""
     options = _parser().parse_args(arguments)
     try:

@@ -9,8 +9,7 @@ flow (Sundaram, Brox, Keutzer, "Dense Point Trajectories by GPU-accelerated Larg
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,8 +17,8 @@ from scipy.spatial import cKDTree
 from .geometry import SAMPLE_STEP, Bools, Floats, Indices, Outline, Points, norm
 from .scenes import Frame
 
-# Reach in spacings and ridge as a share of the reach squared: they carry contours of the bundled dam
-# break with the least jitter, 14 % less than the mean displacement within two spacings.
+# Reach in spacings, and ridge as a share of the reach squared. They carry contours of the bundled dam break with the
+# least jitter: 14 % less than the mean displacement within two spacings.
 _REACH, _RIDGE = 3.0, 0.03
 _BLOCK = 256        # Points fitted at a time, so that the arrays stay in the cache.
 _LEAST_REST = 1e-9  # A particle with a larger leverage than one minus this says nothing of its error.
@@ -36,7 +35,7 @@ class DisplacementField:
         self._tree, self._known = cKDTree(positions), np.flatnonzero(~strangers)
         self._known_tree = cKDTree(positions[self._known])
 
-    def __call__(self, points: Points) -> Tuple[Points, Floats]:
+    def __call__(self, points: Points) -> tuple[Points, Floats]:
         """Displacements (P, d), far from all particles that of the nearest one, and their standard errors along one
         axis (P,), infinite where no particle is in reach or where a particle in reach comes or goes."""
         parts = [self._fit(points[k:k + _BLOCK]) for k in range(0, max(1, len(points)), _BLOCK)]
@@ -52,7 +51,7 @@ class DisplacementField:
                 return np.asarray(near[:, :most])
             k = min(2 * k, count)
 
-    def _fit(self, points: Points) -> Tuple[Points, Floats]:
+    def _fit(self, points: Points) -> tuple[Points, Floats]:
         near = self._neighbours(points)
         index = np.minimum(near, len(self._positions) - 1)
         # Components first: (d, P, K).
@@ -88,39 +87,39 @@ class DisplacementField:
 
 def _apply(matrices: Floats, vectors: Floats) -> Floats:
     """(d, P, K): the matrices (P, d, d) times the vectors (d, P, K)."""
-    return np.stack([sum(matrices[:, i, j, None] * vectors[j] for j in range(len(vectors)))
-                     for i in range(len(vectors))])
+    return np.stack([sum(m[:, None] * v for m, v in zip(row, vectors)) for row in matrices.transpose(1, 2, 0)])
 
 
-@dataclass(frozen=True)
-class Advection:
+class Advection(NamedTuple):
     """Displacements between two successive frames, forward and back. Depends on the particles alone."""
     there: DisplacementField
-    back: DisplacementField
+    back: DisplacementField | None
     spacing: float
 
     @staticmethod
-    def between(before: Frame, after: Frame, spacing: float) -> Optional[Advection]:
-        """By ids where both frames have them, else by the velocities of the frame that is left. None if there is
-        neither."""
-        there, back = _field(before, after, spacing), _field(after, before, spacing)
-        return Advection(there, back, spacing) if there and back else None
+    def between(before: Frame, after: Frame, spacing: float) -> Advection | None:
+        """By ids where both frames have them, else by the velocities of the frame that is left. None if `before` has
+        neither. If `after` has neither, no place is known."""
+        there = _field(before, after, spacing)
+        return Advection(there, _field(after, before, spacing), spacing) if there else None
 
     def carry(self, outline: Outline) -> Outline:
         """An outline of the frame before, sampled every tenth of a spacing, in the frame after."""
         dense = outline.densified(SAMPLE_STEP * self.spacing)
         return dense.moved(dense.points + self.there(dense.points)[0])
 
-    def follow(self, points: Points, forward: bool) -> Tuple[Points, Floats]:
+    def follow(self, points: Points, forward: bool) -> tuple[Points, Floats]:
         """Where points (P, d) of the frame before are in the frame after, or the reverse, and what is unknown of that
         place, a length (P,): the largest of both standard errors and the miss of the way back."""
         there, back = (self.there, self.back) if forward else (self.back, self.there)
+        if there is None or back is None:
+            return points, np.full(len(points), np.inf)
         move, leaving = there(points)
         way_back, returning = back(points + move)
         return points + move, np.max([leaving, returning, norm(move + way_back)], axis=0)
 
 
-def _field(source: Frame, target: Frame, spacing: float) -> Optional[DisplacementField]:
+def _field(source: Frame, target: Frame, spacing: float) -> DisplacementField | None:
     count = len(source.positions)
     strangers = np.zeros(count, np.bool_)
     if source.ids is not None and target.ids is not None:

@@ -1,9 +1,7 @@
 """Methods against a baseline: geometric means of the sequences' ratios, with bootstrap intervals."""
 
-from __future__ import annotations
-
 import math
-from typing import Callable, Dict, List, NamedTuple, Sequence as Seq
+from typing import Callable, NamedTuple, Sequence as Seq
 
 import numpy as np
 
@@ -36,9 +34,8 @@ class Comparison(NamedTuple):
 
 def ratios(pairs: Floats) -> Floats:
     """(N,) of pairs (N, 2), method and baseline, neither negative; 1 if both are 0, within RATIO_LIMIT."""
-    method, baseline = pairs[:, 0], pairs[:, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where((method == 0) & (baseline == 0), 1.0, method / baseline)
+        ratio = np.where((pairs == 0).all(axis=1), 1.0, pairs[:, 0] / pairs[:, 1])
     return np.clip(ratio, 1 / RATIO_LIMIT, RATIO_LIMIT)
 
 
@@ -84,13 +81,13 @@ class Part(NamedTuple):
     """Sequences of one group, sampler or name, with one ratio for each metric."""
     name: str
     sequences: int
-    ratios: Dict[str, Ratio]
+    ratios: dict[str, Ratio]
 
 
 def compare_parts(method: Seq[Row], baseline: Seq[Row], metrics: Seq[str], worst_by: str,
-                  key: Callable[[Row], str]) -> List[Part]:
+                  key: Callable[[Row], str]) -> list[Part]:
     """The judged rows in parts of equal `key`, worst first by the metric `worst_by`."""
-    groups: Dict[str, List[Row]] = {}
+    groups: dict[str, list[Row]] = {}
     for row in method:
         if row.judged:
             groups.setdefault(key(row), []).append(row)

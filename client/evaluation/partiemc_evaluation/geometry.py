@@ -1,16 +1,14 @@
 """Boundaries of regions: closed polylines, sampled curves, nearest points.
 
-Everything that samplers and metrics need of a boundary is in `Boundary`. `Curve` provides it for regions of the
-plane; a triangulated surface can provide the same for bodies in space.
-
-Arrays of points are (N, d) float64, d = 2 here, in the unit that the caller works in.
+`Boundary` is all that samplers and metrics need of a boundary. `Curve` provides it in the plane; a triangulated surface
+can provide it in space. Arrays of points are (N, d) float64, d = 2 here, in the unit of the caller.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from typing import Any, Iterable, List, Protocol, Sequence, Tuple
+from typing import Any, Iterable, NamedTuple, Protocol, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,11 +37,8 @@ def norm(a: Points) -> Floats:
 
 @dataclass(frozen=True)
 class Outline:
-    """Closed polylines with the region on their left: outer rings counter-clockwise, holes clockwise.
-
-    points: (P, 2). offsets: (R + 1,) integers; ring k is points[offsets[k]:offsets[k + 1]]. The first point of a ring
-    is not repeated at its end.
-    """
+    """Closed polylines with the region on their left: outer rings counter-clockwise, holes clockwise. points: (P, 2).
+    offsets: (R + 1,); ring k is points[offsets[k]:offsets[k + 1]], its first point not repeated at its end."""
     points: Points = field(default_factory=lambda: np.empty((0, 2)))
     offsets: Indices = field(default_factory=lambda: np.zeros(1, np.int64))
 
@@ -66,7 +61,7 @@ class Outline:
     def __bool__(self) -> bool:
         return len(self.points) > 0
 
-    def rings(self) -> List[Points]:
+    def rings(self) -> list[Points]:
         return [self.points[a:b] for a, b in zip(self.offsets[:-1], self.offsets[1:])]
 
     def moved(self, points: Points) -> Outline:
@@ -92,12 +87,7 @@ class Outline:
         return float(self.ring_areas.sum())
 
     @property
-    def extent(self) -> float:
-        """Diagonal of the box around all points."""
-        return float(norm(np.ptp(self.points, axis=0))) if self else 0.0
-
-    @property
-    def loop_counts(self) -> Tuple[int, int]:
+    def loop_counts(self) -> tuple[int, int]:
         """Numbers of outer rings and of holes."""
         outer = int((self.ring_areas > 0).sum())
         return outer, len(self.ring_areas) - outer
@@ -131,8 +121,7 @@ class Outline:
         return int((sides(i, j) & sides(j, i)).sum())
 
 
-@dataclass(frozen=True)
-class Samples:
+class Samples(NamedTuple):
     """Points of a boundary. middles: (N, d), each stands for the same measure and counts in means. corners: (M, d),
     where the boundary bends sharply; they count in maxima only."""
     middles: Points
@@ -151,7 +140,7 @@ class Boundary(Protocol):
 
     def __bool__(self) -> bool: ...
 
-    def nearest(self, points: Points) -> Tuple[Floats, Points, Points]:
+    def nearest(self, points: Points) -> tuple[Floats, Points, Points]:
         """Distance (N,), nearest point (N, d) and the outward unit normal there (N, d)."""
 
     def contains(self, points: Points) -> Bools:
@@ -186,10 +175,11 @@ class Curve:
 
     def __init__(self, outline: Outline, spacing: float) -> None:
         self.outline, self.spacing = outline, spacing
-        self.extent, self.measure, self.bounds = outline.extent, outline.area, np.zeros((2, 2))
+        corners = outline.points if outline else np.zeros((1, 2))
+        self.bounds = np.stack([corners.min(axis=0), corners.max(axis=0)])
+        self.extent, self.measure = float(norm(np.ptp(self.bounds, axis=0))), outline.area
         if not outline:
             return
-        self.bounds = np.stack([outline.points.min(axis=0), outline.points.max(axis=0)])
         pieces = outline.densified(_PIECE * spacing)
         self._from = pieces.points
         self._along = pieces.points[pieces.following] - pieces.points
@@ -211,7 +201,7 @@ class Curve:
     def contains(self, points: Points) -> Bools:
         return np.asarray(shapely_contains(self._region, points[:, 0], points[:, 1]), np.bool_)
 
-    def nearest(self, points: Points) -> Tuple[Floats, Points, Points]:
+    def nearest(self, points: Points) -> tuple[Floats, Points, Points]:
         """Exact: of the k pieces with the nearest middles the best is the nearest of all if no other middle is near
         enough. Where one may be, k grows. Requires: not empty."""
         count = len(points)

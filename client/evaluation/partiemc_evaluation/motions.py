@@ -6,7 +6,7 @@ A motion maps points (N, d) of frame t to where they are in frame t + 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Protocol, Sequence, Tuple
+from typing import Protocol, Sequence
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -43,7 +43,7 @@ class Similarity:
 @dataclass(frozen=True)
 class SimilarityMotion:
     """Rigid motions and dilations: steps[t] maps frame t to frame t + 1."""
-    steps: List[Similarity]
+    steps: list[Similarity]
 
     def carry(self, frame: int, points: Points) -> Points:
         return self.steps[frame](points)
@@ -62,7 +62,7 @@ class Shear:
 class FlowMotion:
     """Incompressible flow of the plane, the same in every step: two shears and a vortex, each of which keeps areas
     exactly. The vortex turns points within `radius` of `center`, by `angle` at its centre."""
-    shears: Tuple[Shear, Shear]
+    shears: tuple[Shear, Shear]
     center: Floats
     radius: float
     angle: float
@@ -104,7 +104,7 @@ class Body:
 @dataclass(frozen=True)
 class BodiesMotion:
     """Each point moves with the body whose boundary is nearest."""
-    bodies: List[Body]
+    bodies: list[Body]
 
     def carry(self, frame: int, points: Points) -> Points:
         nearest = np.stack([np.abs(body.distance(frame, points)) for body in self.bodies]).argmin(axis=0)
@@ -116,16 +116,14 @@ class BodiesMotion:
             Polygon(ellipse_ring(body.center(frame), body.a, body.b, body.angle, CURVE_STEP))
             for body in self.bodies]))
 
-    def particles(self, samples: Sequence[Points], frame: int) -> Tuple[Points, Indices]:
-        """The particles of the union, (N, 2), and their ids, (N,). samples[k]: those of body k, relative to its
-        centre. Where bodies overlap, only those of the first of them remain. An id is the number of the sample, the
-        bodies before it counted first."""
+    def particles(self, samples: Sequence[Points], frame: int) -> tuple[Points, Indices]:
+        """The particles of the union, (N, 2), and their ids, (N,). samples[k]: the particles of body k, relative to its
+        centre. Where bodies overlap, only the first of them keeps its particles. An id is the number of the sample."""
         moved = [body.center(frame) + points for body, points in zip(self.bodies, samples)]
         free = [np.all([before.distance(frame, points) >= 0 for before in self.bodies[:k]], axis=0)
                 & np.ones(len(points), np.bool_) for k, points in enumerate(moved)]
         kept = np.flatnonzero(np.concatenate(free))
         return np.concatenate(moved)[kept], kept
-
 
 
 @dataclass(frozen=True)

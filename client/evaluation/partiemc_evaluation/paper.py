@@ -4,11 +4,10 @@ The paper: "PartiEMC: Stable Isoline Reconstruction from Particle-Based Scalar F
 Its placement is measured as `farthest-particle`, section 3.5 to the letter.
 """
 
-from __future__ import annotations
-
 import time
+from collections import defaultdict, namedtuple
 from dataclasses import dataclass, field, replace
-from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence as Seq, Tuple
+from typing import Any, Callable, Iterator, NamedTuple, Sequence as Seq
 
 import numpy as np
 import partiemc
@@ -26,19 +25,9 @@ FILLS = ("grid", "greedy", "conforming", "polygon")
 _SEED, _REPETITIONS, _CELLS = 5_310, 3, (0.25, 4.0)  # Smallest and largest cell that the core accepts.
 
 
-class PaperRow(NamedTuple):
-    """A row of the paper's Tables 2 to 4, and the placement and fill that measure it here."""
-    name: str
-    placement: str
-    fill: str
-    milliseconds: float
-    triangles: float
-    hausdorff: float
-    mean_deviation: float
-    area_deviation: float
-    triangle_deviation: float
-
-
+# A row of the paper's Tables 2 to 4, and the placement and fill that measure it here.
+PaperRow = namedtuple("PaperRow", "name placement fill milliseconds triangles hausdorff mean_deviation area_deviation "
+                      "triangle_deviation")
 PAPER_ROWS = (PaperRow("Marching Squares (MS)", BASELINE, "grid", 11.8, 548, 0.043, 0.018, 0.071, 64.2),
               PaperRow("EMC-based reconstruction", "qef", "grid", 18.6, 612, 0.029, 0.012, 0.049, 51.8),
               PaperRow("PartiEMC (w/o greedy)", PAPER, "grid", 10.4, 231, 0.026, 0.010, 0.031, 22.4),
@@ -51,25 +40,24 @@ class Shot:
     """One frame as it is drawn. mesh: points (V, 2), triangles (T, 3), classes (T,)."""
     title: str
     outline: Outline
-    particles: Optional[Points] = None
+    particles: Points | None = None
     truth: Outline = field(default_factory=Outline)
-    mesh: Optional[Tuple[Floats, Any, Any]] = None
+    mesh: tuple[Floats, Any, Any] | None = None
 
 
-@dataclass
-class Film:
-    """One placement and fill over all frames. milliseconds: processor time of a frame, one thread."""
+class Film(NamedTuple):
+    """One placement and fill over all frames. milliseconds: processor time of a frame, one thread. Counts of triangles
+    and digests of rings: a frame each."""
     milliseconds: float
     triangles: Floats
-    digests: List[int]
+    digests: list[int]
 
 
-@dataclass
-class Grid:
+class Grid(NamedTuple):
     """One frame on one grid. triangles, t_junctions: by fill. same_rings: between the fills, bit for bit."""
     cell_size: float
-    triangles: Dict[str, float]
-    t_junctions: Dict[str, int]
+    triangles: dict[str, float]
+    t_junctions: dict[str, int]
     area: float
     same_rings: bool
     outline: Outline
@@ -81,17 +69,17 @@ class PaperRuns:
     and share, rows of Figures 6 and 10 with the factor that turns their lengths into spacings of the full set. grids:
     by placement and cells across the bounding square. fills: by shape and cells. shots: by figure."""
     film: Sequence
-    conditions: Tuple[int, int] = (0, 0)
-    films: Dict[Tuple[str, str], Film] = field(default_factory=dict)
-    features: List[Row] = field(default_factory=list)
-    thinned: Dict[Tuple[str, float], Tuple[Row, float]] = field(default_factory=dict)
-    grids: Dict[Tuple[str, int], Grid] = field(default_factory=dict)
-    resolution: Dict[str, Deviation] = field(default_factory=dict)
-    fills: Dict[Tuple[str, int], Grid] = field(default_factory=dict)
-    shots: Dict[str, List[Shot]] = field(default_factory=dict)
+    conditions: tuple[int, int] = (0, 0)
+    films: dict[tuple[str, str], Film] = field(default_factory=dict)
+    features: list[Row] = field(default_factory=list)
+    thinned: dict[tuple[str, float], tuple[Row, float]] = field(default_factory=dict)
+    grids: dict[tuple[str, int], Grid] = field(default_factory=dict)
+    resolution: dict[str, Deviation] = field(default_factory=dict)
+    fills: dict[tuple[str, int], Grid] = field(default_factory=dict)
+    shots: dict[str, list[Shot]] = field(default_factory=lambda: defaultdict(list))
 
 
-def _mesh(result: Any) -> Tuple[Floats, Any, Any]:
+def _mesh(result: Any) -> tuple[Floats, Any, Any]:
     return np.array(result.mesh.points), np.array(result.mesh.triangles), np.array(result.mesh.classes)
 
 
@@ -134,7 +122,7 @@ def _run_film(runs: PaperRuns) -> None:
                                     outline_of(results[t]), mesh=_mesh(results[t])) for t in shown]
 
 
-def _measure(scene: Sequence, placement: str) -> Tuple[Row, Outline]:
+def _measure(scene: Sequence, placement: str) -> tuple[Row, Outline]:
     """The row, and the outline of the first frame."""
     row = Evaluator(scene, centers=False).run(Method(placement, {"placement": placement}))
     return row, outline_of(next(reconstruct(scene, {"placement": placement})))
@@ -147,7 +135,7 @@ def _run_features(runs: PaperRuns) -> None:
         row, outline = _measure(scene, placement)
         first = row.frames[0]
         runs.features.append(row)
-        runs.shots.setdefault("Figure 5", []).append(Shot(
+        runs.shots["Figure 5"].append(Shot(
             f"{placement}\narea {100 * first['area_error']:+.2f} %, Hausdorff {first['hausdorff']:.2f} h", outline,
             scene.frames[0].positions, scene.frames[0].truth))
 
@@ -166,12 +154,11 @@ def _run_thinned(runs: PaperRuns) -> None:
             runs.thinned[placement, share] = row, ratio
             title = f"{placement}, {100 * share:.0f} %\nHausdorff {row.frames[0]['hausdorff'] * ratio:.2f} h"
             if placement != BASELINE:
-                runs.shots.setdefault("Figure 6", []).append(
-                    Shot(title, outline, frames[0].positions, frames[0].truth))
+                runs.shots["Figure 6"].append(Shot(title, outline, frames[0].positions, frames[0].truth))
 
 
 def _run_grid(sequence: Sequence, t: int, placement: str, side: float, cells: int,
-              fills: Seq[str]) -> Tuple[Grid, Dict[str, Any]]:
+              fills: Seq[str]) -> tuple[Grid, dict[str, Any]]:
     """One frame on a lattice of so many cells across `side`, within the range that the core accepts."""
     cell_size = float(np.clip(side / cells / sequence.spacing, *_CELLS))
     results = {fill: partiemc.reconstruct(sequence.frames[t].positions, spacing=sequence.spacing, threads=1,
@@ -195,11 +182,11 @@ def _run_grids(runs: PaperRuns) -> None:
         for cells in GRIDS:
             grid, results = _run_grid(film, t, placement, side, cells, FILLS[:2])
             runs.grids[placement, cells] = grid
-            runs.shots.setdefault("Figure 13", []).append(Shot(
+            runs.shots["Figure 13"].append(Shot(
                 f"frame {t}, {placement}, {cells} x {cells}\narea {grid.area:.5g}, {len(grid.outline.points)} vertices",
                 grid.outline, film.frames[t].positions))
             if placement == DEFAULT:
-                runs.shots.setdefault("Figure 11", []).extend(
+                runs.shots["Figure 11"].extend(
                     Shot(f"frame {t}, {cells} x {cells}, {fill}\n{grid.triangles[fill]:.0f} triangles, cell "
                          f"{grid.cell_size:.2f} h", grid.outline, mesh=_mesh(result))
                     for fill, result in results.items())
@@ -210,8 +197,8 @@ def _run_grids(runs: PaperRuns) -> None:
 FINDINGS = {"reproduces": "reproduces", "weaker": "the direction reproduces, the size does not",
             "fails": "does not reproduce"}
 _SHARE_OF_EFFECT, _NO_EFFECT = 0.9, 0.98  # An effect is 1 - ratio; a ratio above the second is no gain.
-_STABLE = 1.5                             # "Stable" has no number in the paper: half as much again.
-_CONSISTENT_CELLS, _CONSISTENT_AREA = 0.25, 0.02
+# "Stable" and "consistent" have no numbers in the paper.
+_STABLE, _CONSISTENT_CELLS, _CONSISTENT_AREA = 1.5, 0.25, 0.02
 
 
 class Claim(NamedTuple):
@@ -233,15 +220,15 @@ def worst(*findings: str) -> str:
     return max(findings, key=list(FINDINGS).index)
 
 
-def judge_claims(study: Study, runs: PaperRuns) -> List[Claim]:
+def judge_claims(study: Study, runs: PaperRuns) -> list[Claim]:
     """The 27 claims, in the paper's order. Of the study it uses synthetic rows that were given the first of
-    `study.told`."""
+    `study.given`."""
     found = [*_merging(runs), *_efficiency(runs), *_accuracy(study), *_stability(study, runs), *_features(runs),
              *_thinning(runs), *_merged_frames(runs), *_resolutions(runs), *_counts(runs)]
     return [Claim(*claim[:3], f"{claim[3]}: {FINDINGS[claim[2]]}.") for claim in found]
 
 
-_Claims = Iterator[Tuple[str, str, str, str]]
+_Claims = Iterator[tuple[str, str, str, str]]
 
 
 def _saved(ratios: Any) -> str:
@@ -271,15 +258,18 @@ def _efficiency(runs: PaperRuns) -> _Claims:
                    f"{ours / theirs:.2f}x ({ours:.3f} against {theirs:.3f} ms)")
 
 
-def _means(study: Study, placement: str, metric: str) -> Tuple[float, float, float]:
+def _paper_ratio(row: int, number: str) -> float:
+    return getattr(PAPER_ROWS[row], number) / getattr(PAPER_ROWS[0], number)
+
+
+def _means(study: Study, placement: str, metric: str) -> tuple[float, float, float]:
     """The ratio to the baseline, the mean of the placement and of the baseline."""
-    ours, theirs = (mean_over(study.of(name, study.told[0]), metric) for name in (placement, BASELINE))
+    ours, theirs = (mean_over(study.of(name, study.given[0]), metric) for name in (placement, BASELINE))
     return (ours / theirs if theirs else ABSENT), ours, theirs
 
 
 def _accuracy(study: Study) -> _Claims:
-    paper = [PAPER_ROWS[2].hausdorff / PAPER_ROWS[0].hausdorff,
-             PAPER_ROWS[2].mean_deviation / PAPER_ROWS[0].mean_deviation]
+    paper = [_paper_ratio(2, number) for number in ("hausdorff", "mean_deviation")]
     for placement in SUBJECTS:
         for name, metrics in (("true boundary", ("hausdorff", "mean_deviation")),
                               ("curve through the outermost centres", ("center_hausdorff", "center_mean"))):
@@ -290,12 +280,12 @@ def _accuracy(study: Study) -> _Claims:
 
 
 def _stability(study: Study, runs: PaperRuns) -> _Claims:
-    paper = PAPER_ROWS[2].area_deviation / PAPER_ROWS[0].area_deviation
+    paper = _paper_ratio(2, "area_deviation")
     for placement in SUBJECTS:
         ratio, ours, theirs = _means(study, placement, "area_deviation")
         yield ("Table 4", placement, judge(paper, ratio), "Mean area deviation (Eq. 30) against marching squares: "
                f"paper {paper:.2f}x, measured {ratio:.2f}x ({ours:.5f} against {theirs:.5f})")
-    paper = PAPER_ROWS[3].triangle_deviation / PAPER_ROWS[0].triangle_deviation
+    paper = _paper_ratio(3, "triangle_deviation")
     for placement in SUBJECTS:
         ours, theirs = (float(runs.films[key].triangles.std()) for key in ((placement, "greedy"), (BASELINE, "grid")))
         yield ("Table 4", placement, judge(paper, ours / theirs),
@@ -304,16 +294,16 @@ def _stability(study: Study, runs: PaperRuns) -> _Claims:
 
 
 def _features(runs: PaperRuns) -> _Claims:
-    squares = runs.features[0]
-    for row in runs.features[1:]:
-        better = ["reproduces" if row[m] / squares[m] < _NO_EFFECT else "fails" for m in ("hausdorff", "bias")]
-        yield ("Figure 5", row.method, worst(*better),
+    squares, *rows = runs.features
+    for row in rows:
+        better = all(row[metric] / squares[metric] < _NO_EFFECT for metric in ("hausdorff", "bias"))
+        yield ("Figure 5", row.method, "reproduces" if better else "fails",
                f"Sharp features and volume kept better than by marching squares, means of {len(row.frames)} frames: "
                f"Hausdorff {row['hausdorff']:.2f} against {squares['hausdorff']:.2f} h, area "
                f"{100 * row['area_error']:+.2f} % against {100 * squares['area_error']:+.2f} %")
 
 
-def thinned_values(runs: PaperRuns, placement: str, metric: str) -> List[float]:
+def thinned_values(runs: PaperRuns, placement: str, metric: str) -> list[float]:
     """By share, in spacings of the full set."""
     return [row[metric] * ratio for row, ratio in (runs.thinned[placement, share] for share in SHARES)]
 
@@ -355,7 +345,7 @@ def _resolutions(runs: PaperRuns) -> _Claims:
 
 
 def _counts(runs: PaperRuns) -> _Claims:
-    squares, paper = runs.films[BASELINE, "grid"].triangles, PAPER_ROWS[3].triangles / PAPER_ROWS[0].triangles
+    squares, paper = runs.films[BASELINE, "grid"].triangles, _paper_ratio(3, "triangles")
     for placement in SUBJECTS:
         ours = runs.films[placement, "greedy"].triangles
         fewer, ratio = int((ours < squares).sum()), float(ours.mean() / squares.mean())

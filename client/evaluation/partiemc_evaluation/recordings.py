@@ -1,9 +1,7 @@
 """Recordings (.pemc) as sequences, and what is known of them beside their particles."""
 
-from __future__ import annotations
-
 import pathlib
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Iterator
 
 import numpy as np
 import partiemc
@@ -16,7 +14,7 @@ from .scenes import Frame, Sequence
 from .shapes import CURVE_STEP
 
 
-def _varint(data: memoryview, at: int) -> Tuple[int, int]:
+def _varint(data: memoryview, at: int) -> tuple[int, int]:
     value, shift = 0, 0
     while True:
         byte = data[at]
@@ -25,9 +23,9 @@ def _varint(data: memoryview, at: int) -> Tuple[int, int]:
             return value, at
 
 
-def _fields(message: memoryview) -> Dict[int, Any]:
+def _fields(message: memoryview) -> dict[int, Any]:
     """The fields of a Protobuf message by number: varints, doubles and bytes; of several the last."""
-    fields: Dict[int, Any] = {}
+    fields: dict[int, Any] = {}
     at = 0
     while at < len(message):
         key, at = _varint(message, at)
@@ -43,7 +41,7 @@ def _fields(message: memoryview) -> Dict[int, Any]:
     return fields
 
 
-def _messages(path: pathlib.Path) -> Iterator[Dict[int, Any]]:
+def _messages(path: pathlib.Path) -> Iterator[dict[int, Any]]:
     """The header (partiemc.recording.v1) and the frames (partiemc.v1.ParticleFrame) of a file."""
     with open(path, "rb") as file:
         stream = zstandard.ZstdDecompressor().stream_reader(file, read_across_frames=True)
@@ -54,24 +52,20 @@ def _messages(path: pathlib.Path) -> Iterator[Dict[int, Any]]:
         at += size
 
 
-def _frame(fields: Dict[int, Any]) -> Frame:
-    kinds = {1: ("<f4", 2), 2: ("<f8", 2)}
-    kind = fields.get(3, 0)
-    if kind not in kinds:
-        raise ValueError("is not a recording of the plane")
+def _frame(fields: dict[int, Any]) -> Frame:
+    kinds = {1: "<f4", 2: "<f8"}  # Positions of the plane.
+    if fields.get(3) not in kinds or not fields.get(4):
+        raise ValueError("is not a recording of the plane, or has a frame without particles")
 
-    def array(number: int, dtype: str) -> Optional[Any]:
+    def array(number: int, dtype: str) -> Any:
         return np.frombuffer(fields[number], dtype) if fields.get(number) else None
-    positions, ids, volumes, velocities = (array(4, kinds[kind][0]), array(5, "<u8"), array(6, "<f4"),
-                                           array(7, "<f4"))
-    if positions is None:
-        raise ValueError("has a frame without particles")
-    return Frame(fields.get(2, 0.0), positions.astype(float).reshape(-1, 2), volumes, ids,
+    ids, volumes, velocities = array(5, "<u8"), array(6, "<f4"), array(7, "<f4")
+    return Frame(fields.get(2, 0.0), array(4, kinds[fields[3]]).astype(float).reshape(-1, 2), volumes, ids,
                  None if velocities is None else velocities.astype(float).reshape(-1, 2),
                  area=0.0 if volumes is None else float(volumes.sum(dtype=float)))
 
 
-def read_recording(path: pathlib.Path, notes: List[str], frames: slice = slice(None)) -> Sequence:
+def read_recording(path: pathlib.Path, notes: list[str], frames: slice = slice(None)) -> Sequence:
     """Reads a .pemc file, and NAME.truth beside NAME.pemc if there is one.
 
     A spacing that the file lacks is estimated from the first frame, and `notes` says so. Raises ValueError with the
@@ -112,7 +106,10 @@ def add_truth(text: str, sequence: Sequence) -> None:
         elif words == ["spray"]:
             sequence.whole = False
         elif words[:1] == ["wall"] and len(words) == 5:
-            wall = np.array([float(word) for word in words[1:]]).reshape(2, 2)
+            try:
+                wall = np.array(words[1:], float).reshape(2, 2)
+            except ValueError:
+                wall = np.full((2, 2), np.nan)
             if not np.isfinite(wall).all() or (wall[0] == wall[1]).all():
                 raise ValueError(f"'{line}': must be two different points")
             walls.append(wall)
@@ -151,7 +148,7 @@ def wall_roughness(outline: Outline, positions: Points, walls: Floats, spacing: 
         along = (end - start) / norm(end - start)
         wet = np.zeros(int(length / _PIECE), np.bool_)
 
-        def place(points: Points) -> Tuple[Floats, Floats]:
+        def place(points: Points) -> tuple[Floats, Floats]:
             arm = points - start
             return dot(arm, along[None]) / spacing, cross(along[None], arm) / spacing
         at, height = place(positions)

@@ -1,14 +1,12 @@
 """The evaluation as text, as JSON and as one HTML page with pictures."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io
 import json
 import math
 from dataclasses import dataclass, field
-from typing import Any, List, Optional, Sequence as Seq, Tuple
+from typing import Any, Sequence as Seq
 
 import matplotlib
 import numpy as np
@@ -20,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from .comparisons import compare_rows
+from .comparisons import compare_rows, match
 from .geometry import Outline
 from .paper import FINDINGS, SHARES, SUBJECTS, Claim, PaperRuns, Shot, thinned_values
 from .study import BASELINE, DEFAULT, PAPER, Study
@@ -35,9 +33,9 @@ class Evaluation:
     """A study, and the paper's runs and claims if there are any. notes: sentences for the reader."""
     title: str
     study: Study
-    runs: Optional[PaperRuns] = None
-    claims: List[Claim] = field(default_factory=list)
-    notes: List[str] = field(default_factory=list)
+    runs: PaperRuns | None = None
+    claims: list[Claim] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 def as_text(evaluation: Evaluation) -> str:
@@ -105,26 +103,29 @@ def shots_figure(shots: Seq[Shot], columns: int) -> Figure:
     return figure
 
 
-def ratio_figure(study: Study, told: str, recordings: bool) -> Figure:
-    """Geometric means of ratios to marching squares with their intervals, a group for each metric."""
-    metrics, baseline = judged_metrics(recordings), study.of(BASELINE, told, recordings)
-    methods = [m.name for m in study.methods[1:] if not m.is_step and study.of(m.name, told, recordings)]
+def ratio_figure(study: Study, given: str, recordings: bool) -> Figure:
+    """Geometric means of ratios to marching squares with their intervals, a group for each metric that is there."""
+    baseline = study.of(BASELINE, given, recordings)
+    metrics = [metric for metric in judged_metrics(recordings) if len(match(baseline, baseline, metric))]
+    methods = [m.name for m in study.methods[1:] if not m.is_step and study.of(m.name, given, recordings)]
     figure, axis = plt.subplots(figsize=(9, 0.9 + 0.55 * len(metrics)))
     for k, method in enumerate(methods):
-        rows = study.of(method, told, recordings)
-        values = np.array([compare_rows(rows, baseline, metric).ratio for metric in metrics], float)
+        rows = study.of(method, given, recordings)
+        values = np.array([compare_rows(rows, baseline, metric).ratio for metric in metrics], float).reshape(-1, 3)
         axis.errorbar(values[:, 0], np.arange(len(metrics)) + 0.7 * (k + 0.5) / len(methods) - 0.35,
                       xerr=np.abs(values[:, 1:] - values[:, :1]).T, fmt="o", markersize=4, linewidth=1.2,
                       color=_COLORS.get(method), label=method)
     axis.axvline(1, color="#8a8f98", linewidth=0.8)
     axis.set(yticks=range(len(metrics)), yticklabels=[m.replace("_", " ") for m in metrics], xscale="log",
-             xlabel="ratio to marching squares, 95 % interval; below 1 is better")
-    axis.invert_yaxis()
-    axis.legend(fontsize=7)
+             ylim=(len(metrics) - 0.5, -0.5), xlabel="ratio to marching squares, 95 % interval; below 1 is better",
+             title=f"{'Recordings' if recordings else 'Synthetic sequences'}, {given} given")
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(lambda x, _: f"{x:.1g}" if f"{x:.1g}"[-1] in "25" else "")
+    axis.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
     return figure
 
 
-def lines_figure(charts: Seq[Tuple[str, Seq[Any], Seq[Any]]]) -> Figure:
+def lines_figure(charts: Seq[tuple[str, Seq[Any], Seq[Any]]]) -> Figure:
     """Charts beside each other: title, labels, and names with their values. A name begins with its placement."""
     figure, axes = plt.subplots(1, len(charts), figsize=(10, 3), squeeze=False)
     for axis, (title, labels, series) in zip(axes.flat, charts):
@@ -136,7 +137,7 @@ def lines_figure(charts: Seq[Tuple[str, Seq[Any], Seq[Any]]]) -> Figure:
     return figure
 
 
-def _paper_sections(evaluation: Evaluation, runs: PaperRuns) -> List[str]:
+def _paper_sections(evaluation: Evaluation, runs: PaperRuns) -> list[str]:
     tables, film = [table.as_html() for table in paper_tables(evaluation.study, runs)], runs.film.name
     thinned = lines_figure([(f"{metric.replace('_', ' ')} by share of particles, h at 100 %",
                              [f"{100 * share:.0f} %" for share in SHARES],
@@ -196,10 +197,10 @@ def as_html(evaluation: Evaluation) -> str:
     """One page that needs nothing else, no script either."""
     study, sections = evaluation.study, []
     if evaluation.claims:
-        count = ", ".join(f"{sum(c.finding == f for c in evaluation.claims)} {f}" for f in FINDINGS)
-        sections.append(_section("What of the paper reproduces", f"{count}.", _claim_list(evaluation.claims)))
-    pictures = "".join(_picture(ratio_figure(study, told, recordings), f"Ratios to marching squares, {told} given")
-                       for recordings in (False, True) for told in study.told if study.of(BASELINE, told, recordings))
+        count = ", ".join(f"{f}: {sum(c.finding == f for c in evaluation.claims)}" for f in FINDINGS)
+        sections.append(_section("The paper's claims", f"{count}.", _claim_list(evaluation.claims)))
+    pictures = "".join(_picture(ratio_figure(study, given, recordings), f"Ratios to marching squares, {given} given")
+                       for recordings in (False, True) for given in study.given if study.of(BASELINE, given, recordings))
     shown = [method.name for method in study.methods[1:] if not method.is_step]
     sections.append(_section("Methods", "Every sequence counts alike; every method has its own calibration.",
                              pictures + "".join(table.as_html() for table in study_tables(study, shown))))

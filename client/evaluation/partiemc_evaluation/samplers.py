@@ -4,10 +4,8 @@ A sampler is a function of the region's boundary, whether a lattice fits it, and
 returns the centres, (N, d). All but `hexagonal` and `ragged` work in any dimension.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from typing import Callable, Dict, Optional
+from typing import Callable
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,15 +14,12 @@ from shapely.geometry import box
 from .geometry import Boundary, Curve, Floats, Indices, Outline, Points, dot
 
 INSET = 0.5  # A layer of particles has its centres this far inside the boundary.
-
-_DART_DISTANCE = 0.75  # 0.83 would be the most that fits on average.
-_DART_ATTEMPTS = 200   # Rejected darts for each accepted one, before the distance shrinks.
-_DART_SHRINK = 0.97
-_RAGGED_MARGIN = 2.0
+# Distance of darts: 0.83 would be the most that fits on average. It shrinks after 200 rejected darts for each accepted one.
+_DART_DISTANCE, _DART_SHRINK, _DART_ATTEMPTS = 0.75, 0.97, 200
 _RASTER_STEP, _RASTERS = 0.2, 4  # 25 points for each particle of the plane.
-_SETTLING_NOISE = 0.05
-# Clumps: nearest neighbours have mean 0.61 and standard deviation 0.24, as after the wave of a dam break broke (frame
-# 50 of the bundled recording: 0.59 and 0.24).
+_SETTLING_NOISE, _RAGGED_MARGIN = 0.05, 2.0
+# Clumps have nearest neighbours of mean 0.61 and standard deviation 0.24, as a dam break has after its wave broke
+# (frame 50 of the bundled recording: 0.59 and 0.24).
 _CLUMP_NOISE, _CLUMP_ROUNDS = 0.37, 4
 _SHIFT_RADIUS, _SHIFT_STEP, _SHIFT_INSET = 2.0, 0.5, 0.1
 
@@ -41,7 +36,7 @@ def raster(region: Boundary, step: float, offset: Floats) -> Points:
 
 
 def throw_darts(region: Boundary, count: int, rng: Rng, inset: float = INSET,
-                others: Optional[Points] = None) -> Points:
+                others: Points | None = None) -> Points:
     """`count` darts at random places, `inset` inside the region or more, at least 0.75 (less where they do not fit)
     from each other and from `others`, which are not part of the result."""
     low, high = region.bounds
@@ -68,8 +63,7 @@ def _first_apart(points: Points, distance: float) -> Indices:
     keep = np.ones(len(points), np.bool_)
     pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
     for first, second in pairs[np.lexsort(pairs.T)].tolist():
-        if keep[first]:
-            keep[second] = False
+        keep[second] &= not keep[first]
     return np.flatnonzero(keep)
 
 
@@ -81,7 +75,7 @@ def push_inside(region: Boundary, centers: Points, inset: float = INSET) -> Poin
         distance, foot, outward = region.nearest(centers[moving])
         inside = region.contains(centers[moving])
         near = ~inside | (distance < inset)
-        # Beside a reentrant corner the way in leads away from the corner, not along a normal.
+        # Away from a reentrant corner; elsewhere this is along the normal.
         by_arm = (inside & (distance > 1e-6))[near, None]
         moving, distance, foot = moving[near], distance[near], foot[near]
         arm = (centers[moving] - foot) / np.maximum(distance, 1e-6)[:, None]
@@ -93,8 +87,7 @@ def relax(region: Boundary, centers: Points, rounds: int) -> Points:
     """Lloyd's iteration: each centre moves to the centroid of its Voronoi cell within the region, then to the inset
     if it is nearer to the boundary. Cells are sets of raster points; rounds alternate between shifted rasters,
     because on one alone the iteration stops within thirty rounds."""
-    dimension = centers.shape[1]
-    rasters = [raster(region, _RASTER_STEP, np.full(dimension, k * _RASTER_STEP / _RASTERS))
+    rasters = [raster(region, _RASTER_STEP, np.full(centers.shape[1], k * _RASTER_STEP / _RASTERS))
                for k in range(_RASTERS)]
     for k in range(rounds):
         points = rasters[k % _RASTERS]
@@ -177,7 +170,7 @@ def _ragged(region: Boundary, fits: bool, rng: Rng) -> Points:
     return darts[region.contains(darts)]
 
 
-SAMPLERS: Dict[str, Sampler] = {
+SAMPLERS: dict[str, Sampler] = {
     "relaxed": _relaxed, "relaxed-100": partial(_relaxed, rounds=100), "settled": _settled,
     "hexagonal": _hexagonal, "blue-noise": partial(_relaxed, rounds=0), "clumped": _clumped, "lattice": _lattice,
     "ragged": _ragged}

@@ -1,10 +1,8 @@
 """Synthetic sequences with exact truth, and the sets of them. A `Recipe` determines everything in a scene."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, Iterator, List, Optional, Sequence as Seq, Tuple
+from typing import Any, Iterator, Sequence as Seq
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +20,9 @@ class Frame:
     area: of the true region; of recordings the sum of volumes, or 0."""
     time: float
     positions: Points
-    volumes: Optional[Floats] = None
-    ids: Optional[NDArray[np.uint64]] = None
-    velocities: Optional[Points] = None
+    volumes: Floats | None = None
+    ids: NDArray[np.uint64] | None = None
+    velocities: Points | None = None
     truth: Outline = field(default_factory=Outline)
     area: float = 0.0
 
@@ -43,11 +41,11 @@ class Sequence:
     shape: str
     sampler: str
     spacing: float
-    frames: List[Frame]
+    frames: list[Frame]
     judged: bool = True
     whole: bool = True
     walls: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
-    motion: Optional[Motion] = None
+    motion: Motion | None = None
     truth_follows_motion: bool = True
 
 
@@ -82,9 +80,9 @@ _STRAIN, _WAVE, _VORTEX_ANGLE = (0.04, 0.10), (0.8, 1.6), (0.075, 0.15)  # Of a 
 _AREA_GROWTH = 1.05    # A frame.
 _BODY_GAP, _BODY_DEPTH = 3.1, 7.3  # Bodies come from this gap and end this deep in each other, in spacings.
 
-# Size of the second body over the first's; half axis of the first towards the second over its radius; sideways
-# offset over the reach of both; whether a third body comes from the other side.
-_BODIES: Dict[str, Tuple[float, float, float, bool]] = {
+# Size of the second body over the size of the first. Half axis of the first towards the second over its radius. Sideways
+# offset over the reach of both. Whether a third body comes from the other side.
+_BODIES: dict[str, tuple[float, float, float, bool]] = {
     "discs": (0.8, 1, 0, False), "uneven-discs": (0.45, 1, 0.1, False),
     "glancing-discs": (0.9, 1, 0.5, False), "disc-chain": (0.7, 1, 0.15, True),
     "ellipses": (0.85, 1.3, 0, False), "uneven-ellipses": (0.5, 0.8, 0.1, False),
@@ -94,7 +92,7 @@ _BODIES: Dict[str, Tuple[float, float, float, bool]] = {
 _TUNING_BODIES, _VALIDATION_BODIES = tuple(_BODIES)[:8], tuple(_BODIES)[8:]
 
 # The frames of a scene in spacings: outline, particles and, where they are not 0, 1, ..., their ids.
-_Draft = Tuple[List[Tuple[Outline, Points, Optional[Indices]]], Motion]
+_Draft = tuple[list[tuple[Outline, Points, Indices | None]], Motion]
 
 
 def _signed(rng: Rng, low: float, high: float) -> float:
@@ -224,7 +222,7 @@ def digest(sequence: Sequence) -> str:
 _SAMPLERS = tuple(name for name in SAMPLERS if name != "ragged")  # Those of every kind of motion.
 _COUNTS = (900, 600, 1400, 700, 2000, 1100, 3000, 500)
 _NOISES, _SHARES = (0.05, 0.10, 0.20), (1.0, 0.8, 0.5, 0.3)
-_Plan = Seq[Tuple[str, Seq[str]]]
+_Plan = Seq[tuple[str, Seq[str]]]
 
 
 def _recipes(shapes: Seq[str], bodies: Seq[str], seed: int, plan: _Plan) -> Iterator[Recipe]:
@@ -239,7 +237,7 @@ def _recipes(shapes: Seq[str], bodies: Seq[str], seed: int, plan: _Plan) -> Iter
                 shape, next_shape = shapes[next_shape % len(shapes)], next_shape + 1
             count, noise, share = _COUNTS[(serial + k // 8) % 8], _NOISES[k % 3], _SHARES[k % 4]
             backwards = k // len(bodies) % 2 == 1
-            changes: Dict[str, Tuple[str, Dict[str, Any]]] = {
+            changes: dict[str, tuple[str, dict[str, Any]]] = {
                 "noise": (f"-{100 * noise:.0f}", {"noise": noise, "pace": "steady"}),
                 "thinned": (f"-{100 * share:.0f}", {"kept_share": share, "particles": count + 600}),
                 "topology": ("-split" if backwards else "-merge",
@@ -262,7 +260,7 @@ _SMOKE = (("rigid", ["relaxed"]), ("noise", ["relaxed"]), ("thinned", ["relaxed"
 SETS = ("smoke", "tuning", "validation", "discs")
 
 
-def make_set(name: str) -> List[Recipe]:
+def make_set(name: str) -> list[Recipe]:
     """The recipes of a set of SETS. smoke: one small sequence a group. tuning: every sampler on rigid, deformed,
     topology and growth, two seeds each, and noise, thinned, ragged; methods are chosen by these. validation: the same
     of other shapes, bodies and seeds, three seeds each; never used for choosing. discs: discs and ellipses, relaxed

@@ -1,13 +1,11 @@
 """Outlines of the synthetic scenes, by name, in units of the particle spacing.
 
-A shape is a function of h, the spacing in the shape's own unit, that returns its region as a Shapely polygon. It is
-called twice: once to measure its area, then with the h at which the area is the requested one. Gaps between bodies
-are multiples of h; all else scales.
+A shape is a function of h, the spacing in the shape's own unit, that returns its region as a Shapely polygon. The first
+call measures its area, the second has the h at which the area is the requested one. Gaps between bodies are multiples
+of h; all else scales.
 """
 
-from __future__ import annotations
-
-from typing import Any, Callable, Dict, Tuple
+from typing import Any, Callable
 
 import numpy as np
 from shapely import affinity
@@ -31,11 +29,11 @@ def _disc(x: float, y: float, radius: float, h: float) -> Any:
     return _ellipse(x, y, radius, radius, h)
 
 
-def _polygon(*corners: Tuple[float, float]) -> Shape:
+def _polygon(*corners: tuple[float, float]) -> Shape:
     return lambda h: Polygon(corners)
 
 
-def _teeth(count: int, corners: Tuple[Tuple[float, float], ...]) -> Shape:
+def _teeth(count: int, corners: tuple[tuple[float, float], ...]) -> Shape:
     """`count` times the corners (share of a tooth's angle, radius)."""
     turn = 2 * np.pi / count
     return _polygon(*((r * np.cos(turn * (k + at)), r * np.sin(turn * (k + at)))
@@ -74,7 +72,7 @@ def _path(x: float, y: float, steps: str) -> Any:
 
 # Sides of these lie along the axes at whole numbers of spacings, so that a lattice fits: a unit becomes the
 # whole number of spacings that brings the area nearest.
-_LATTICE: Dict[str, Any] = {
+_LATTICE: dict[str, Any] = {
     "ell": _path(0, 0, "R2 U1 L1 U1 L1"),
     "cross": _path(1, 0, "R1 U1 R1 U1 L1 U1 L1 D1 L1 D1 R1"),
     "frame": box(0, 0, 5, 5).difference(box(2, 1, 4, 3)),
@@ -87,7 +85,7 @@ _LATTICE: Dict[str, Any] = {
     "spiral": _path(0, 0, "R6 U6 L6 D4 R3 U1 L2 U2 R4 D4 L5")}
 _ASPECTS = {"square": 1.0, "rectangle": 2.0, "bar": 0.0}  # Width over height; the bar is 6 high.
 
-_SHAPES: Dict[str, Shape] = {
+_SHAPES: dict[str, Shape] = {
     "disc": lambda h: _disc(0, 0, 1, h),
     "annulus": lambda h: _disc(0, 0, 1, h).difference(_disc(0, 0, 0.45, h)),
     "gear": _teeth(9, ((0, 0.8), (0.3, 0.8), (0.45, 1), (0.85, 1))),
@@ -122,9 +120,9 @@ _SHAPES: Dict[str, Shape] = {
     "disc-and-bar": lambda h: MultiPolygon([_disc(0, 0, 0.8, h),
                                             box(-1.2, -1.3 - _BAR_GAP * h, 1.2, -0.8 - _BAR_GAP * h)])}
 
-VALIDATION_SHAPES: Tuple[str, ...] = ("pillow", "aitch", "keyhole", "arrow", "zed", "ring-sector", "parabola",
+VALIDATION_SHAPES: tuple[str, ...] = ("pillow", "aitch", "keyhole", "arrow", "zed", "ring-sector", "parabola",
                                       "eccentric-ring", "spiral", "disc-and-bar")
-TUNING_SHAPES: Tuple[str, ...] = (
+TUNING_SHAPES: tuple[str, ...] = (
     "disc", "square", "ell", "annulus", "gear", "horseshoe", "star", "bar", "two-discs", "ellipse", "rectangle",
     "cross", "triangle", "blob-with-holes", "clover", "frame", "lens", "comb", "two-ellipses", "egg", "tee",
     "crescent", "stairs", "drop", "bean", "half-disc", "trapezoid", "window", "three-discs")

@@ -1,12 +1,10 @@
 """Methods over sequences, in this process: rows of metrics. Methods are not given ids: no outline depends on them."""
 
-from __future__ import annotations
-
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence as Seq, Union
+from typing import Any, Callable, Iterator, NamedTuple, Sequence as Seq
 
 import numpy as np
 import partiemc
@@ -14,39 +12,26 @@ from partiemc import _native
 
 from .advection import Advection
 from .geometry import Curve, Outline
-from .metrics import ABSENT, Deviation, carried, compare, find_defects, jitter, known_jitter
+from .metrics import ABSENT, Deviation, carried, compare, find_defects, jitter, known_jitter, nearest_neighbours
 from .recordings import wall_roughness
 from .scenes import Frame, Recipe, Sequence, make_scene
 
 BASELINE, PAPER, DEFAULT = "marching-squares", "farthest-particle", "virtual-plane"
 PLACEMENTS = (BASELINE, "qef", PAPER, DEFAULT)
 
-# Numbers of a row, each the mean over frames unless said otherwise; absent ones are NaN.
-METRICS = {
-    "hausdorff": "to the true boundary, spacings",
-    "mean_deviation": "to the true boundary, spacings",
-    "bias": "size of the mean of area_error",
-    "area_deviation": "Eq. 29-30 on area / true area, mean over the frames after the first",
-    "hausdorff_jitter": "from the outline before, carried along; mean over pairs of frames, spacings",
-    "mean_jitter": "the same",
-    "known_hausdorff_jitter": "where particles determine the motion; recordings, weighted by known_share",
-    "known_mean_jitter": "the same",
-    "known_share": "of the samples that these two use",
-    "area_error_size": "size of area_error",
-    "wall_roughness": "standard deviation of the distance from straight walls, spacings",
-    "area_error": "area / true area - 1",
-    "center_hausdorff": "to the curve through the outermost centres, where it is defined, spacings",
-    "center_mean": "the same",
-    "triangles": "of the mesh",
-    "triangle_deviation": "standard deviation of triangles over the frames",
-    "self_intersections": "pairs of segments that cross",
-    "folds": "triangles that are clockwise or degenerate",
-    "spurious_components": "outer rings without a particle",
-    "component_error": "difference of the number of outer rings from the truth's",
-    "hole_error": "the same of holes",
-    "wrong_normals": "share of vertices whose normal is more than a right angle off",
-    "vertices": "of the rings",
-    "milliseconds": "all stages, wall clock, one thread"}
+# Numbers of a row, each the mean over frames unless said otherwise; lengths in spacings, areas relative, absent ones NaN.
+METRICS = (
+    "hausdorff", "mean_deviation",      # To the true boundary.
+    "bias", "area_deviation",           # |mean of area_error|; Eq. 29-30 on area / true area, frames after the first.
+    "hausdorff_jitter", "mean_jitter",  # From the outline before, carried along.
+    "known_hausdorff_jitter", "known_mean_jitter",    # Where particles determine the motion; recordings.
+    "known_share", "area_error_size",                 # Share of the samples of these two, their weight; |area_error|.
+    "wall_roughness", "area_error",     # Standard deviation of the distance from straight walls; area / true area - 1.
+    "center_hausdorff", "center_mean",  # To the curve through the outermost centres, where it is defined.
+    "triangles", "triangle_deviation",  # Of the mesh; their standard deviation over the frames.
+    "self_intersections", "folds", "spurious_components", "component_error", "hole_error", "wrong_normals",
+    "vertices", "neighbour_mean", "neighbour_deviation",  # Of the rings; distances of nearest particles.
+    "milliseconds")                     # All stages, wall clock, one thread.
 
 
 @dataclass(frozen=True)
@@ -55,16 +40,16 @@ class Method:
     changed, for a table of its own. needs_spacing: left out where no spacing is given, because it is the same as
     another method there."""
     name: str
-    parameters: Dict[str, Any]
+    parameters: dict[str, Any]
     remark: str = ""
     is_step: bool = False
     needs_spacing: bool = False
 
 
-def all_methods(steps: bool = False, sensitivity: bool = False) -> List[Method]:
+def all_methods(steps: bool = False, sensitivity: bool = False) -> list[Method]:
     """The baseline first, then the other placements and two variants; on request the default without each of its
     steps, and with each of its constants times 0.7 and 1.4."""
-    def changed(name: str, remark: str, kind: str, value: Dict[str, Any], is_step: bool = True) -> Method:
+    def changed(name: str, remark: str, kind: str, value: dict[str, Any], is_step: bool = True) -> Method:
         return Method(f"{DEFAULT}-{name}", {"placement": DEFAULT, "_research": {kind: value}}, remark, is_step,
                       value == {"area": False})
     methods = [
@@ -86,7 +71,7 @@ def all_methods(steps: bool = False, sensitivity: bool = False) -> List[Method]:
 
 @dataclass
 class Row:
-    """One method on one sequence. told: what it was given, "spacing", "volumes" or "nothing". values: by metric. frames:
+    """One method on one sequence. given: what it was given, "spacing", "volumes" or "nothing". values: by metric. frames:
     the same by frame."""
     sequence: str
     group: str
@@ -94,23 +79,23 @@ class Row:
     sampler: str
     judged: bool
     method: str
-    told: str
-    values: Dict[str, float]
-    frames: List[Dict[str, float]] = field(repr=False)
+    given: str
+    values: dict[str, float]
+    frames: list[dict[str, float]] = field(repr=False)
 
     def __getitem__(self, metric: str) -> float:
         return self.values[metric]
 
 
-def reconstruct(sequence: Sequence, parameters: Dict[str, Any], told: str = "spacing") -> Iterator[Any]:
+def reconstruct(sequence: Sequence, parameters: dict[str, Any], given: str = "spacing") -> Iterator[Any]:
     """The result of each frame, a partiemc.Result, one thread. Raises partiemc.Error that names the sequence and the
     frame."""
-    spacing = None if told == "nothing" else sequence.spacing
+    spacing = None if given == "nothing" else sequence.spacing
     stream = partiemc.Reconstructor(spacing=spacing, threads=1, **parameters)
     for t, frame in enumerate(sequence.frames):
         try:
             yield stream.reconstruct(frame.positions, frame.time,
-                                     volumes=frame.volumes if told == "volumes" else None)
+                                     volumes=frame.volumes if given == "volumes" else None)
         except partiemc.Error as error:
             error.args = (f"{sequence.name}, frame {t}: {error}",)
             raise
@@ -121,13 +106,12 @@ def outline_of(result: Any) -> Outline:
     return Outline(np.array(result.rings.points), result.rings.offsets.astype(np.int64))
 
 
-@dataclass
-class _Reference:
-    """The truth of one frame, ready for comparisons: the boundary, the curve through the outermost centres, and,
-    where the truth does not follow the motion, the truth of the frame before, carried along."""
-    truth: Optional[Curve] = None
-    centers: Optional[Curve] = None
-    before: Optional[Curve] = None
+class _Reference(NamedTuple):
+    """The truth of one frame: the boundary, the curve through the outermost centres, and, where the truth does not
+    follow the motion, the truth of the frame before, carried along."""
+    truth: Curve | None = None
+    centers: Curve | None = None
+    before: Curve | None = None
 
 
 class Evaluator:
@@ -137,6 +121,7 @@ class Evaluator:
     def __init__(self, sequence: Sequence, centers: bool = True) -> None:
         self.sequence = sequence
         self._references = [self._reference(t, frame, centers) for t, frame in enumerate(sequence.frames)]
+        self._neighbours = [nearest_neighbours(frame.positions, sequence.spacing) for frame in sequence.frames]
         self._advections = [] if sequence.motion else [
             Advection.between(before, after, sequence.spacing)
             for before, after in zip(sequence.frames, sequence.frames[1:])]
@@ -151,17 +136,17 @@ class Evaluator:
             before = Curve(last.moved(sequence.motion.carry(t - 1, last.points)), h)
         return _Reference(Curve(frame.truth, h), Curve(inner, h) if inner else None, before)
 
-    def run(self, method: Method, told: str = "spacing") -> Row:
+    def run(self, method: Method, given: str = "spacing") -> Row:
         sequence, before = self.sequence, Outline()
-        frames: List[Dict[str, float]] = []
-        for t, result in enumerate(reconstruct(sequence, method.parameters, told)):
+        frames: list[dict[str, float]] = []
+        for t, result in enumerate(reconstruct(sequence, method.parameters, given)):
             curve = Curve(outline_of(result), sequence.spacing)
             frames.append({**self._measure(t, result, curve), **(self._jitter(t, before, curve) if t else {})})
             before = curve.outline
         return Row(sequence.name, sequence.group, sequence.shape, sequence.sampler, sequence.judged, method.name,
-                   told, _summary(frames), frames)
+                   given, _summary(frames), frames)
 
-    def _measure(self, t: int, result: Any, curve: Curve) -> Dict[str, float]:
+    def _measure(self, t: int, result: Any, curve: Curve) -> dict[str, float]:
         sequence, frame, h, reference = (self.sequence, self.sequence.frames[t], self.sequence.spacing,
                                          self._references[t])
         area = frame.area or len(frame.positions) * h * h
@@ -172,11 +157,12 @@ class Evaluator:
                 "area_error": result.area / area - 1 if sequence.whole else ABSENT,
                 "wall_roughness": wall_roughness(curve.outline, frame.positions, sequence.walls, h),
                 "triangles": len(result.mesh), "vertices": len(result.rings.points),
-                "milliseconds": result.times["total"], **find_defects(result, reference.truth)}
+                "milliseconds": result.times["total"], "neighbour_mean": self._neighbours[t][0],
+                "neighbour_deviation": self._neighbours[t][1], **find_defects(result, reference.truth)}
 
-    def _jitter(self, t: int, before: Outline, curve: Curve) -> Dict[str, float]:
+    def _jitter(self, t: int, before: Outline, curve: Curve) -> dict[str, float]:
         motion, h, reference = self.sequence.motion, self.sequence.spacing, self._references[t]
-        numbers: Dict[str, float] = {}
+        numbers: dict[str, float] = {}
         if motion:
             deviation = jitter(carried(before, motion, t - 1, h), curve, h, reference.before, reference.truth)
         else:
@@ -198,7 +184,7 @@ def mean_of(values: Any, weights: Any = 1.0) -> float:
     return float((weights[there] * values[there]).sum() / total) if total > 0 else ABSENT
 
 
-def _summary(frames: List[Dict[str, float]]) -> Dict[str, float]:
+def _summary(frames: list[dict[str, float]]) -> dict[str, float]:
     columns = {metric: np.array([frame.get(metric, ABSENT) for frame in frames]) for metric in METRICS}
     values = {metric: mean_of(column) for metric, column in columns.items()}
     share = 1 + columns["area_error"]
@@ -215,27 +201,27 @@ def _summary(frames: List[Dict[str, float]]) -> Dict[str, float]:
 
 @dataclass
 class Study:
-    """All rows, by sequence, then method, then what was told; recordings last."""
-    methods: List[Method]
-    told: List[str]
-    rows: List[Row]
+    """All rows, by sequence, then method, then what was given; recordings last."""
+    methods: list[Method]
+    given: list[str]
+    rows: list[Row]
 
-    def of(self, method: str, told: str, recordings: bool = False) -> List[Row]:
-        return [row for row in self.rows if row.method == method and row.told == told
+    def of(self, method: str, given: str, recordings: bool = False) -> list[Row]:
+        return [row for row in self.rows if row.method == method and row.given == given
                 and (row.group == "recording") == recordings]
 
 
-def _run_all(methods: List[Method], told: List[str], source: Union[Recipe, Sequence]) -> List[Row]:
+def _run_all(methods: list[Method], given: list[str], source: Recipe | Sequence) -> list[Row]:
     evaluator = Evaluator(make_scene(source) if isinstance(source, Recipe) else source)
-    return [evaluator.run(method, given) for method in methods for given in told
-            if given != "nothing" or not method.needs_spacing]
+    return [evaluator.run(method, each) for method in methods for each in given
+            if each != "nothing" or not method.needs_spacing]
 
 
-def run_study(sources: Seq[Union[Recipe, Sequence]], methods: List[Method], told: List[str], jobs: int = 1,
+def run_study(sources: Seq[Recipe | Sequence], methods: list[Method], given: list[str], jobs: int = 1,
               progress: Callable[[int], None] = lambda done: None) -> Study:
     """Every method on every sequence. The rows are the same for any number of jobs, except times. jobs: processes
     that each take one sequence at a time. progress: called with the number of sequences done."""
-    run, rows = partial(_run_all, methods, told), []
+    run, rows = partial(_run_all, methods, given), []
     # Spawned: the native module has threads, which a fork would lose.
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) if jobs > 1 else None
     try:
@@ -245,4 +231,4 @@ def run_study(sources: Seq[Union[Recipe, Sequence]], methods: List[Method], told
     finally:
         if pool:
             pool.shutdown(cancel_futures=True)
-    return Study(methods, told, rows)
+    return Study(methods, given, rows)

@@ -1,11 +1,9 @@
 """What a study and the paper's runs found, as tables for a terminal and for the page."""
 
-from __future__ import annotations
-
 import html
 import math
 from dataclasses import dataclass
-from typing import List, Sequence as Seq, Tuple
+from typing import Sequence as Seq
 
 import numpy as np
 
@@ -24,8 +22,8 @@ class Table:
     """rows: a name and a text for each head. A text that ends with "!" asks for attention."""
     title: str
     note: str
-    heads: List[str]
-    rows: List[Tuple[str, List[str]]]
+    heads: list[str]
+    rows: list[tuple[str, list[str]]]
 
     def as_text(self) -> str:
         lines = [["", *self.heads]] + [[name, *cells] for name, cells in self.rows]
@@ -57,22 +55,22 @@ def _interval(ratio: Ratio) -> str:
     return "-" if math.isnan(ratio.value) else f"{ratio.low:.3f}..{ratio.high:.3f}"
 
 
-def judged_metrics(recordings: bool) -> Tuple[str, ...]:
+def judged_metrics(recordings: bool) -> tuple[str, ...]:
     return RECORDING_METRICS if recordings else SCENE_METRICS
 
 
-def _table(what: str, note: str, told: str, recordings: bool, heads: Seq[str]) -> Table:
+def _table(what: str, note: str, given: str, recordings: bool, heads: Seq[str]) -> Table:
     kind = "Recordings" if recordings else "Synthetic sequences"
-    return Table(f"{kind}: {what}, {told} given", note, [head.replace("_", " ") for head in heads], [])
+    return Table(f"{kind}: {what}, {given} given", note, [head.replace("_", " ") for head in heads], [])
 
 
-def ratio_table(study: Study, told: str, recordings: bool) -> Table:
-    metrics, baseline = judged_metrics(recordings), study.of(BASELINE, told, recordings)
+def ratio_table(study: Study, given: str, recordings: bool) -> Table:
+    metrics, baseline = judged_metrics(recordings), study.of(BASELINE, given, recordings)
     table = _table("geometric means of ratios to marching squares", "Every sequence counts alike; below 1 is better. "
-                   "95 % bootstrap interval; ratio of the means; sequences won / tied (1 %) / lost.", told, recordings,
+                   "95 % bootstrap interval; ratio of the means; sequences won / tied (1 %) / lost.", given, recordings,
                    metrics)
     for method in study.methods:
-        rows = study.of(method.name, told, recordings)
+        rows = study.of(method.name, given, recordings)
         if method.is_step or method.name == BASELINE or not rows:
             continue
         found = [compare_rows(rows, baseline, metric) for metric in metrics]
@@ -83,15 +81,15 @@ def ratio_table(study: Study, told: str, recordings: bool) -> Table:
     return table
 
 
-def step_table(study: Study, told: str, recordings: bool) -> Table:
+def step_table(study: Study, given: str, recordings: bool) -> Table:
     """What each step of the default is worth; without rows if the study has no such methods."""
-    metrics, baseline = judged_metrics(recordings), study.of(BASELINE, told, recordings)
+    metrics, baseline = judged_metrics(recordings), study.of(BASELINE, given, recordings)
     table = _table(f"{DEFAULT} with a step or a constant changed", "Geometric means of ratios to marching squares; "
-                   "marked where the change is better by 1 %.", told, recordings, metrics)
-    steps = [m.name for m in study.methods if m.is_step and study.of(m.name, told, recordings)]
-    whole: List[float] = []
+                   "marked where the change is better by 1 %.", given, recordings, metrics)
+    steps = [m.name for m in study.methods if m.is_step and study.of(m.name, given, recordings)]
+    whole: list[float] = []
     for name in [DEFAULT, *steps] if steps else []:
-        rows = study.of(name, told, recordings)
+        rows = study.of(name, given, recordings)
         means = [geometric_mean(match(rows, baseline, metric)) for metric in metrics]
         whole = whole or means
         table.rows.append((name, [fixed(value) + ("!" if value < (1 - TIE_SHARE) * own else "")
@@ -99,52 +97,53 @@ def step_table(study: Study, told: str, recordings: bool) -> Table:
     return table
 
 
-def part_table(study: Study, told: str, recordings: bool, method: str, what: str, losses: bool = False) -> Table:
+def part_table(study: Study, given: str, recordings: bool, method: str, what: str, losses: bool = False) -> Table:
     """Ratios of one method by "group", "sampler" or "sequence", worst first, all together last. losses: only parts
     with a ratio above LOSS_RATIO in any metric but the area bias."""
     metrics, worst = judged_metrics(recordings), "known_mean_jitter" if recordings else "mean_deviation"
     table = _table(f"ratios by {what}{f' above {LOSS_RATIO}' if losses else ''}, {method}", "Geometric means to marching "
-                   f"squares; worst first by {worst.replace('_', ' ')}. Above 1 is marked.", told, recordings,
+                   f"squares; worst first by {worst.replace('_', ' ')}. Above 1 is marked.", given, recordings,
                    [*metrics, "sequences"])
-    rows, baseline = study.of(method, told, recordings), study.of(BASELINE, told, recordings)
+    rows, baseline = study.of(method, given, recordings), study.of(BASELINE, given, recordings)
     parts = compare_parts(rows, baseline, metrics, worst, lambda row: str(getattr(row, what)))
     if losses:
         parts = [part for part in parts
                  if any(ratio.value > LOSS_RATIO for m, ratio in part.ratios.items() if m != "bias")]
-    for part in parts + compare_parts(rows, baseline, metrics, worst, lambda row: "all"):
+    for part in parts and parts + compare_parts(rows, baseline, metrics, worst, lambda row: "all"):
         table.rows.append((part.name, [*map(_ratio, part.ratios.values()), str(part.sequences)]))
         if part.sequences > 1:
             table.rows.append(("  95 % interval", [*map(_interval, part.ratios.values()), ""]))
     return table
 
 
-def mean_table(study: Study, told: str, recordings: bool) -> Table:
+def mean_table(study: Study, given: str, recordings: bool) -> Table:
     """Means of all metrics over the judged sequences, a row for each metric."""
-    names = [m.name for m in study.methods if not m.is_step and study.of(m.name, told, recordings)]
-    table = _table("means", "Over the judged sequences. Lengths in spacings, areas relative.", told, recordings, names)
+    names = [m.name for m in study.methods if not m.is_step and study.of(m.name, given, recordings)]
+    table = _table("means", "Over the judged sequences. Lengths in spacings, areas relative.", given, recordings, names)
     for metric in METRICS:
-        means = [mean_over(study.of(name, told, recordings), metric) for name in names]
+        means = [mean_over(study.of(name, given, recordings), metric) for name in names]
         if not np.isnan(means).all():
             defect = metric in ("self_intersections", "folds", "spurious_components")
             table.rows.append((metric, [fixed(mean, 5) + ("!" if defect and mean > 0 else "") for mean in means]))
     return table
 
 
-def study_tables(study: Study, methods: Seq[str]) -> List[Table]:
+def study_tables(study: Study, methods: Seq[str]) -> list[Table]:
     """What counts first; details of `methods` only."""
     tables = []
-    for recordings, told in ((r, t) for r in (False, True) for t in study.told if study.of(BASELINE, t, r)):
-        tables += [ratio_table(study, told, recordings), step_table(study, told, recordings)]
+    for recordings, given in ((r, t) for r in (False, True) for t in study.given if study.of(BASELINE, t, r)):
+        tables += [ratio_table(study, given, recordings), step_table(study, given, recordings)]
+        one_group = len({row.group for row in study.of(BASELINE, given, recordings)}) == 1
         for method in methods:
-            if study.of(method, told, recordings):
-                tables += [part_table(study, told, recordings, method, what)
-                           for what in (("sequence",) if recordings else ("group", "sampler"))]
-                tables += [part_table(study, told, recordings, method, "sequence", losses=True)]
-        tables.append(mean_table(study, told, recordings))
+            if study.of(method, given, recordings):
+                tables += [part_table(study, given, recordings, method, what) for what in
+                           (["sequence"] if one_group else ["group"]) + ([] if recordings else ["sampler"])]
+                tables += [part_table(study, given, recordings, method, "sequence", losses=True)]
+        tables.append(mean_table(study, given, recordings))
     return [table for table in tables if table.rows]
 
 
-def paper_tables(study: Study, runs: PaperRuns) -> List[Table]:
+def paper_tables(study: Study, runs: PaperRuns) -> list[Table]:
     """The paper's Table 1, then its Tables 2 to 4 in one, because they have the same rows."""
     merging = Table("Table 1: triangles before and after greedy merging",
                     f"Measured: two frames of {runs.film.name}, {DEFAULT}.",
@@ -163,10 +162,10 @@ def paper_tables(study: Study, runs: PaperRuns) -> List[Table]:
         table.rows.append((name, [f"{value:.3g} ({value / of:.2f})" if value == value else "-"
                                   for value, of in zip(values, base)]))
 
-    def measured(placement: str, fill: str) -> List[float]:
+    def measured(placement: str, fill: str) -> list[float]:
         film = runs.films[placement, fill]
         return [film.milliseconds, float(film.triangles.mean()), float(film.triangles.std()),
-                *(mean_over(study.of(placement, study.told[0]), metric) for metric in metrics)]
+                *(mean_over(study.of(placement, study.given[0]), metric) for metric in metrics)]
     for row in PAPER_ROWS:
         paper = [[r.milliseconds, r.triangles, r.triangle_deviation, r.hausdorff, r.mean_deviation, math.nan, math.nan,
                   r.area_deviation] for r in (row, PAPER_ROWS[0])]

@@ -1,9 +1,12 @@
 #include "client/input/base/number_text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <system_error>
+
+#include "common/text.h"
 
 namespace partiemc::client::input {
 namespace {
@@ -36,11 +39,7 @@ std::optional<double> ParseNumber(std::string_view text) {
 }
 
 std::optional<std::uint64_t> ParseCount(std::string_view text) {
-  std::uint64_t count = 0;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, count);
-  if (stop != end || error != std::errc() || text.empty()) return std::nullopt;
-  return count;
+  return partiemc::ParseNumber<std::uint64_t>(text);
 }
 
 std::optional<std::uint64_t> ParseId(std::string_view text) {

@@ -13,7 +13,7 @@ namespace {
 using Answer = AsyncStream::Answer;
 using Answered = AsyncStream::Answered;
 
-/// What fulfils a promise; std::function wants to be copied, which a promise cannot be.
+/// Fulfils `promise`. It is shared because std::function must be copyable.
 Answered FulfilmentOf(const std::shared_ptr<std::promise<Answer>>& promise) {
   return [promise](Answer answer) { promise->set_value(std::move(answer)); };
 }
@@ -33,8 +33,9 @@ class AsyncStream::Receiving {
 
   FrameStream& stream() { return stream_; }
 
-  /// `send` sends the frame. Answers come in the order of the frames, so the first that waits is
-  /// the next to be answered; it waits from before its frame is sent, as its answer may come first.
+  /// `send` sends the frame. Frames are answered in order, so the front of the queue is answered
+  /// next. The callback is queued before its frame is sent, because the answer may arrive before
+  /// `send` returns.
   template <typename Sending>
   void Send(Answered answered, const Sending& send) {
     {
@@ -95,7 +96,7 @@ class AsyncStream::Receiving {
     return oldest;
   }
 
-  /// Null where the end of the stream has answered it already.
+  /// Null if the end of the stream has already answered it.
   Answered TakeNewest() {
     const std::scoped_lock lock(mutex_);
     if (waiting_.empty()) return nullptr;
@@ -107,8 +108,8 @@ class AsyncStream::Receiving {
   FrameStream& stream_;
   const Told told_;
   std::mutex mutex_;
-  std::deque<Answered> waiting_;  // Guarded by the mutex; of the frames sent, in their order.
-  absl::Status ended_;            // Of the thread, until it has been joined.
+  std::deque<Answered> waiting_;  // Guarded by the mutex; callbacks of sent frames, in order.
+  absl::Status ended_;            // Written by the thread; read after it has been joined.
   std::thread thread_;
 };
 

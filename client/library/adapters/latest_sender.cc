@@ -19,13 +19,13 @@ class LatestSender::Sending {
     if (!thread_.joinable()) return;
     {
       const std::scoped_lock lock(mutex_);
-      Stop(absl::CancelledError("the sender went away"));
+      Stop(absl::CancelledError("the sender was destroyed"));
     }
     stream_.Cancel();
     thread_.join();
   }
 
-  template <typename Particles>  // A frame or its rows.
+  template <typename Particles>  // Frame or wire::FrameRows.
   absl::Status Offer(const Particles& frame, double time) {
     const std::scoped_lock lock(mutex_);
     if (finishing_) return absl::FailedPreconditionError("frame: offered after Finish");
@@ -65,7 +65,7 @@ class LatestSender::Sending {
       std::swap(in_hand, waiting_);
       is_waiting_ = false;
       ++counts_.sent;
-      // Before it is sent: its answer may be there before Send returns.
+      // Called before the frame is sent: its answer may arrive before Send returns.
       hooks_.sending(in_hand.number());
       lock.unlock();
       const absl::Status sent = stream_.Send(in_hand.frame(), in_hand.time()).status();
@@ -95,7 +95,7 @@ class LatestSender::Sending {
   bool is_waiting_ = false, finishing_ = false;
   std::uint64_t offers_ = 0;
   OfferCounts counts_;
-  absl::Status status_;  // Of the stream; what ended it.
+  absl::Status status_;  // Status that ended the stream.
   std::thread thread_;
 };
 

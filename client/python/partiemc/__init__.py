@@ -1,18 +1,18 @@
-"""PartiEMC: temporally stable outlines and light meshes of particles, frame by frame.
+"""PartiEMC: temporally stable outlines and meshes of particle frames.
 
     import partiemc
     result = partiemc.reconstruct(positions, spacing=0.01)     # in this process
     result.rings.points, result.rings.offsets, result.mesh.triangles
 
-    with partiemc.connect("127.0.0.1:50051", spacing=0.01) as stream:   # live, by a server
+    with partiemc.connect("127.0.0.1:50051", spacing=0.01) as stream:   # on a server
         for result in stream.map(frames):
             ...
-    for result in partiemc.watch("127.0.0.1:50051", "dam-break"):       # somebody else's
+    for result in partiemc.watch("127.0.0.1:50051", "dam-break"):  # another producer's stream
         ...
 
-Positions are (N, 2) or (N, 3) arrays of float32 or float64, or tuples of two or three arrays of N;
-whatever their strides, each number is copied once, into the message. Results are read-only views
-without a copy, which keep their result.
+Positions are (N, 2) or (N, 3) arrays of float32 or float64, or tuples of two or three arrays of N.
+Any strides are allowed; each number is copied once, into the message. Results are read-only views
+that keep the memory of their result alive.
 """
 
 from . import _convert
@@ -26,33 +26,35 @@ __all__ = ["Error", "Mesh", "Reconstructor", "Result", "Rings", "Stream", "Watch
 
 def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attributes=None,
                 **parameters):
-    """Reconstructs one frame in this process. Result.
+    """Reconstructs one frame in this process and returns a Result.
 
     positions: (N, 2) float32 or float64, world units; (N, 3) for particles in a plane parallel to
         `plane`; or a tuple of two or three arrays of N. Finite.
-    volumes: (N,) areas that particles stand for, world units squared; spacing squared if None.
-    ids: (N,) integers of 32 or 64 bits, the same for a particle in every frame.
-    velocities: as positions, world units per unit of time.
-    attributes: what else is wanted at the vertices (Result.attributes), a dict of names and (N,),
-        (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}.
-    spacing: distance of particles, world units; estimated if None, then the outline is less true.
-    threads: that compute; one per processor if None.
+    volumes: (N,) areas of particles, world units squared; spacing squared if None.
+    ids: (N,) integers of 32 or 64 bits; a particle has the same id in every frame.
+    velocities: same shape as positions, world units per unit of time.
+    attributes: particle attributes to interpolate to the vertices (Result.attributes): a dict from
+        names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}.
+    spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
+    threads: number of compute threads; one per processor if None.
     placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
     fill: "greedy", "conforming", "polygon", "grid" or "none".
     kernel_radius, cell_size, reference_radius: lengths in spacings.
-    plane: "xy", "xz" or "yz", of (N, 3) positions.
-    slice: (N, 3) positions fill space, and the outline is that of a section: ("z", 0.5), or
-        ((x, y, z), (nx, ny, nz)), a point of the plane and its normal. Wants spacing; volumes are
-        volumes. Of ("z", c) points are (x, y), of ("y", c) (x, z), of ("x", c) (y, z).
-    isovalue: in [0.01, 10]: the outline is the isoline of the density, which is about 1 inside of
-        bodies and 0.5 on flat boundaries, instead of the body's outline.
-    sections: a list of at most 16 dicts of slice, isovalue or both: more outlines of the particles
-        (Result.sections), with all other parameters: [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
+    plane: "xy", "xz" or "yz", for (N, 3) positions.
+    slice: section plane for (N, 3) positions that fill space: ("z", 0.5), or a point of the plane
+        and its normal, ((x, y, z), (nx, ny, nz)). Requires spacing; `volumes` are then volumes.
+        The outline has the coordinates (x, y) for ("z", c), (x, z) for ("y", c), (y, z) for
+        ("x", c).
+    isovalue: in [0.01, 10]: draws this isoline of the density instead of the body's outline. The
+        density is about 1 inside of bodies and 0.5 on flat boundaries.
+    sections: additional outlines of the particles (Result.sections): a list of at most 16 dicts of
+        slice, isovalue or both. Other parameters are the same for all outlines:
+        [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 
-    Other arrays and lists are converted, which copies them. For a simulation's frames, one after
-    the other, a Reconstructor keeps outlines steady, tracks rings and is faster. Raises Error.
+    Lists and arrays of other types are converted, which copies them. Use a Reconstructor for the
+    frames of a simulation: it keeps outlines steady, tracks rings and is faster. Raises Error.
     """
     return Reconstructor(**parameters).reconstruct(positions, volumes=volumes, ids=ids,
                                                    velocities=velocities, attributes=attributes)
@@ -61,63 +63,66 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
 def connect(address=None, *, latest=False, **options):
     """Opens a Stream to the server at HOST:PORT, [IPV6]:PORT or unix:PATH, for `with`.
 
-    address: that of PARTIEMC_SERVER if None, or else 127.0.0.1:50051.
+    address: if None, the value of PARTIEMC_SERVER, or 127.0.0.1:50051.
 
-    latest: send never waits; of frames that come while the stream is busy only the newest is sent.
-    name: by which others watch the stream. labels: a dict of strings, shown where it is listed.
-    attributes: names of what results have at their vertices, of the attributes given to send;
-        "velocity" are the velocities.
-    normals, echo_particles: whether results have normals, and watchers get the particles.
-    tls, ca_file, cert_file, key_file, token, token_file: as the command line has them; those of the
-        environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...) unless given.
-    fallback_addresses: servers to go on with. checkpoint_interval, max_held_bytes,
-        connect_timeout, deadline, send_timeout (seconds): as in client/include/
-        partiemc/client/stream.h.
-    give_up_after: seconds after which a lost connection ends the stream; 300, with latest 30. 0:
-        at once.
-    part, parts: of a simulator of many processes, each of which connects with the same `name`: its
-        number from 0 on, and how many there are. Every one sends its particles of each frame, also
-        none; part 0 gets the results, the others None for each frame. The frame is that of all
-        particles, in the order of ids where they have ids, else part by part.
-    parts_token: a secret of theirs, the same for all; "" lets in who may produce the stream.
-    part_timeout: seconds after which a frame that lacks a part is an Error (PARTS_MISSING); 10.
-    And the parameters of reconstruct. Raises Error.
+    latest: send never waits; while the stream is busy, only the newest frame is kept.
+    name: name for watchers. labels: a dict of strings, shown in lists of streams.
+    attributes: attributes given to send that results have at their vertices: names; "velocity" are
+        the velocities.
+    normals: compute normals. echo_particles: send the particles to watchers.
+    tls, ca_file, cert_file, key_file, token, token_file: as on the command line. The defaults come
+        from the environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...).
+    fallback_addresses: servers to fail over to. checkpoint_interval, max_held_bytes,
+        connect_timeout, deadline, send_timeout (seconds): see
+        client/include/partiemc/client/stream.h.
+    give_up_after: seconds to reconnect before the stream ends; 300, with latest 30. 0: do not
+        reconnect.
+    part, parts: index of this process, from 0, and number of processes of a simulator. Each process
+        connects with the same `name` and sends its particles of every frame, even if it has none.
+        Part 0 receives the results, the other parts None for each frame. Particles are ordered by
+        id if they have ids, otherwise by part.
+    parts_token: secret shared by all parts. If it is empty, any caller that may produce the stream
+        may send its parts.
+    part_timeout: seconds before a frame with a missing part raises Error (PARTS_MISSING); 10.
+    Other options are the parameters of reconstruct. Raises Error.
 
-    At the end of `with` frames on their way arrive; answers that nobody has received are dropped.
+    Leaving `with` waits until sent frames have arrived, and drops results that were not received.
     """
     return Stream(address, latest, options)
 
 
 def watch(address, name, **options):
-    """An iterator over the results of the stream `name`, made by somebody else. Watch.
+    """Returns a Watch, an iterator over the results of another producer's stream `name`.
 
-    mode: "latest", the newest frame whenever there is room for one, or "every", every frame from now
-        on; who falls behind for long is disconnected.
-    credits: frames on their way or waiting to be received.
-    from_sequence: go back in the stream: begin with the frame of this number, 0 with the oldest that
-        the server still holds, and follow from there; none is left out before the newest is reached.
+    mode: "latest" receives the newest frame when a credit is free; "every" receives every frame from
+        now on, and a slow watcher is disconnected.
+    credits: number of frames on the way or waiting to be received.
+    from_sequence: begin with the frame of this number, or with the oldest held frame if 0. The
+        server sends its history without gaps, then live frames.
     tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
-        deadline: as of connect. give_up_after: seconds for which a lost stream is looked for; 30.
+        deadline: see connect. give_up_after: seconds to look for a lost stream; 30.
         Raises Error.
 
-    Iteration ends with the stream. Each Result tells in `dropped` how many did not come.
+    Iteration ends with the stream. `dropped` of each Result counts the frames that were left out.
     """
     return Watch(address, name, options)
 
 
 def read_pysph(path, *, array="fluid"):
-    """Frames of a PySPH run, in the order of their steps: an iterator of dicts.
+    """Returns an iterator over the frames of a PySPH run, in the order of steps, as dicts.
 
     path: the folder of a run, with NAME_0.hdf5, NAME_100.hdf5, ... or the same as .npz; or one file.
-    array: the particle array that is wanted.
+    array: name of the particle array.
 
-    A frame is a dict for Reconstructor.reconstruct(**frame) or Stream.send(**frame): `positions`
-    and `velocities`, (x, y), (N,) float64 each, with z as a third where it is not the same for all;
-    `time`; `volumes`, mass by density, where both are in the file; `ids` where PySPH's global ids
-    are all different. Ghosts and particles of other processes are left out.
+    A frame is a dict for Reconstructor.reconstruct(**frame) or Stream.send(**frame):
+    - `positions` and `velocities`: (x, y), each (N,) float64; also z unless all z are equal;
+    - `time`;
+    - `volumes`: mass over density, if the file has both;
+    - `ids`: PySPH's global ids, if they are unique.
+    Ghosts and particles of other processes are left out.
 
-    A file is read when its frame is asked for; HDF5 takes h5py. NPZ files hold a pickle, of which
-    nothing but arrays and what is built into Python is accepted. Raises Error.
+    Each file is read when the iterator reaches it. HDF5 requires h5py. NPZ files contain a pickle;
+    only arrays and built-in types are accepted. Raises Error.
     """
     from . import _pysph
 
@@ -125,10 +130,10 @@ def read_pysph(path, *, array="fluid"):
 
 
 def _map(self, frames, times=None):
-    """The results of `frames`, an iterable of positions, in their order: an iterator.
+    """Yields the results of `frames`, an iterable of positions, in order.
 
-    Sends ahead as far as the window allows, in one thread. times: an iterable; 0, 1, ... if None.
-    A frame that is refused raises Error.
+    Sends up to a window of frames ahead, in one thread. times: an iterable; 0, 1, ... if None.
+    A refused frame raises Error.
     """
     times = None if times is None else iter(times)
     for positions in frames:

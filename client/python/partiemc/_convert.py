@@ -1,4 +1,4 @@
-"""Results for other libraries. Each is imported when it is asked for."""
+"""Conversions to other libraries, which are imported on first use."""
 
 
 def to_shapely(rings):
@@ -15,11 +15,11 @@ def to_shapely(rings):
 
 
 def to_path(rings):
-    """A matplotlib Path of all rings, for PathPatch: holes are left out of what is filled."""
+    """A matplotlib Path of all rings, for PathPatch, which does not fill the holes."""
     import numpy
     from matplotlib.path import Path
 
-    # numpy.insert adds to these indices in place, which it cannot do to unsigned ones.
+    # numpy.insert adds to these indices in place and requires signed ones.
     offsets = rings.offsets.astype(numpy.intp)
     starts, ends = offsets[:-1], offsets[1:]
     vertices = numpy.insert(rings.points, ends, rings.points[starts], axis=0)
@@ -30,18 +30,18 @@ def to_path(rings):
 
 
 def to_triangulation(mesh):
-    """A matplotlib Triangulation, for triplot and its kin."""
+    """A matplotlib Triangulation, for triplot, tripcolor and tricontour."""
     from matplotlib.tri import Triangulation
 
     return Triangulation(mesh.points[:, 0], mesh.points[:, 1], mesh.triangles)
 
 
 def to_meshio(mesh):
-    """A meshio Mesh with z = 0, which writes VTK, VTU, STL, Gmsh and many others."""
+    """A meshio Mesh with z = 0. meshio writes VTK, VTU, STL, Gmsh and other formats."""
     import meshio
     import numpy
 
-    # Some of its writers require three coordinates, Gmsh's signed indices.
+    # Some of its writers require three coordinates; Gmsh requires signed indices.
     points = numpy.pad(mesh.points, ((0, 0), (0, 1)))
     return meshio.Mesh(points, [("triangle", mesh.triangles.astype(numpy.int64))])
 

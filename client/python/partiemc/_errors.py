@@ -1,11 +1,11 @@
 class Error(Exception):
-    """What PartiEMC refuses or cannot do.
+    """An error of PartiEMC: a refused argument or frame, or a failed stream.
 
-    code: "INVALID_ARGUMENT", "UNAVAILABLE", ...: as gRPC names them.
-    reason: for programs: "NOT_FINITE", "COUNT", ...; "" where no rule was broken. proto/PROTOCOL.md
-        lists them. With a reason, a stream refuses one frame and goes on; without, it has ended.
-    field, value, rule: what broke which rule, as "positions[17].x", "nan", "must be finite".
-    sequence: the number of the frame that a server has refused; else 0.
+    code: gRPC status code: "INVALID_ARGUMENT", "UNAVAILABLE", ...
+    reason: for programs: "NOT_FINITE", "COUNT", ...; "" if no rule was broken. proto/PROTOCOL.md
+        lists them. With a reason, a stream refuses one frame and continues; without, it has ended.
+    field, value, rule: for example "positions[17].x", "nan", "must be finite".
+    sequence: number of the frame that a server has refused; otherwise 0.
     """
 
     def __init__(self, message, code="INTERNAL", reason="", field="", value="", rule="", sequence=0):

@@ -1,4 +1,4 @@
-"""PySPH's own output files, HDF5 and NPZ. Imported when the first is read."""
+"""Reads PySPH's output files, HDF5 and NPZ. Imported on first use."""
 
 import io
 import pathlib
@@ -8,13 +8,13 @@ import zipfile
 
 from ._errors import Error
 
-# What deflate can make of a byte; what HDF5 has not stored at all is refused, too.
+# Deflate's maximum ratio. Data that the file does not store at all is refused, too.
 _MOST_INFLATED = 1032
 _WANTED = ("x", "y", "z", "u", "v", "w", "m", "rho", "gid", "tag")
 
 
 def read(path, array):
-    """What partiemc.read_pysph promises."""
+    """Implements partiemc.read_pysph."""
     return _frames(_files(pathlib.Path(path)), array)
 
 
@@ -52,7 +52,7 @@ def _frame(file, array):
         return _as_frame(*(_read_npz if file.suffix == ".npz" else _read_hdf5)(file, array))
     except (Error, ImportError):
         raise
-    except Exception as error:  # A damaged file makes h5py, NumPy and pickle raise anything.
+    except Exception as error:  # h5py, NumPy and pickle raise many types for damaged files.
         raise Error(f"{file}: is no output of PySPH, or damaged: {error!r}", code="DATA_LOSS",
                     field=str(file)) from error
 
@@ -71,7 +71,7 @@ def _as_frame(time, data):
     if all(name in data for name in "uvw"[:axes]):
         frame["velocities"] = tuple(data[name] for name in "uvw"[:axes])
     if "m" in data and "rho" in data:
-        with numpy.errstate(divide="ignore", invalid="ignore"):  # The frame is refused for it.
+        with numpy.errstate(divide="ignore", invalid="ignore"):  # Frames with NaN volumes are refused later.
             frame["volumes"] = data["m"] / data["rho"]
     if "gid" in data and len(numpy.unique(data["gid"])) == len(data["gid"]):
         frame["ids"] = data["gid"]
@@ -111,7 +111,7 @@ def _read_npz(file, array):
 
 
 class _PlainUnpickler(pickle.Unpickler):
-    """Arrays, numbers, text and what contains them: whatever else a pickle names is refused."""
+    """Accepts arrays, numbers, text and containers; refuses all other types."""
 
     _ALLOWED = {("numpy", "ndarray"), ("numpy", "dtype"),
                 ("numpy.core.multiarray", "_reconstruct"), ("numpy.core.multiarray", "scalar"),
@@ -124,7 +124,7 @@ class _PlainUnpickler(pickle.Unpickler):
 
 
 def _unpickled(archive, name):
-    """The dict that numpy.savez has pickled as an array without a shape."""
+    """Reads a dict that numpy.savez has pickled as an array of dimension 0."""
     from numpy.lib import format as npy
 
     stream = io.BytesIO(archive.read(f"{name}.npy"))

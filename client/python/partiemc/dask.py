@@ -1,4 +1,4 @@
-"""Many recordings on many machines, by Dask (Debian: python3-distributed).
+"""Maps recordings over a Dask cluster (Debian: python3-distributed).
 
     import dask.distributed
     import partiemc.dask
@@ -6,7 +6,7 @@
     client = dask.distributed.Client("scheduler:8786")
     figures = partiemc.dask.bag(paths, partiemc.read_pysph, spacing=0.01).compute()
 
-client/couplings/README.md tells when that pays.
+client/couplings/README.md describes when this is faster.
 """
 
 from . import Reconstructor
@@ -15,13 +15,13 @@ __all__ = ["bag", "figures", "reconstruct"]
 
 
 def bag(recordings, read, *, collect=None, **parameters):
-    """A dask.bag of what `reconstruct` gives for each recording, in their order.
+    """Returns a dask.bag with the return value of `reconstruct` for each recording, in order.
 
-    recordings: an iterable of what `read` takes, such as paths that every worker can open.
-    read, collect, parameters: as of `reconstruct`; functions travel to the workers.
+    recordings: an iterable of arguments for `read`, such as paths that every worker can open.
+    read, collect, parameters: see `reconstruct`. Functions are sent to the workers.
 
-    Nothing is computed before .compute(), or another method of the bag, asks for it. Each recording
-    is a task of its own. An Error of one is raised by compute.
+    Lazy: .compute() and similar methods start the computation. Each recording is one task. compute
+    raises an Error of any recording.
     """
     import dask.bag
 
@@ -33,14 +33,14 @@ def bag(recordings, read, *, collect=None, **parameters):
 
 
 def reconstruct(recording, read, *, collect=None, threads=1, **parameters):
-    """What `collect` makes of each frame of one recording, in this process: a list.
+    """Reconstructs one recording in this process; returns a list of the values of `collect`.
 
-    read: called with `recording`, yields frames: dicts for Reconstructor.reconstruct(**frame).
-        partiemc.read_pysph is one.
-    collect: called with each Result; what it returns travels back, so it must be picklable, and
-        copy what it takes of a result's arrays. `figures` if None.
-    threads: one, as it is recordings that are computed at the same time.
-    parameters: those of partiemc.reconstruct.
+    read: function that yields frames of `recording`: dicts for Reconstructor.reconstruct(**frame).
+        partiemc.read_pysph is an example.
+    collect: called with each Result. Its return value is sent back: it must be picklable and own
+        copies of the arrays it uses. `figures` if None.
+    threads: 1 by default, because recordings are computed in parallel.
+    parameters: see partiemc.reconstruct.
     """
     collect = figures if collect is None else collect
     sequence = Reconstructor(threads=threads, **parameters)

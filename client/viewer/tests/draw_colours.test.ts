@@ -1,4 +1,5 @@
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import {
   hex, identityColour, packed, rgb, type Rgb, theme, unpacked,
@@ -78,6 +79,16 @@ test('legend stops cover the range', () => {
   assert.equal(stops[stops.length - 1], hex(rampColour(1, true)));
   const texels = rampTexels(256, true);
   assert.equal(hex([texels[0] / 255, texels[1] / 255, texels[2] / 255]), stops[0]);
+});
+
+test('SVG pictures of the command line have the same colours', () => {
+  const read = (name: string) => readFileSync(new URL(`../../../output/${name}`, import.meta.url), 'utf8');
+  const bytes = [...read('color_map.cc').matchAll(/\{?0x(\w\w), 0x(\w\w), 0x(\w\w)\}/g)];
+  assert.deepEqual(bytes.map(([, ...parts]) => `#${parts.join('')}`), rampStops(false));
+  const { interior, edge, particle, outline, isoline } = theme(false);
+  for (const colour of [interior, edge, particle, outline, isoline]) {
+    assert.ok(read('svg.cc').includes(hex(colour)), hex(colour));
+  }
 });
 
 test('a range ignores NaN and infinity', () => {

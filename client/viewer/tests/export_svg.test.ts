@@ -5,7 +5,7 @@ import { DEFAULT_LOOK, type Look } from '../src/draw/look';
 import { rampStops } from '../src/draw/ramp';
 import { svg } from '../src/export/svg';
 import type { Frame } from '../src/protocol/frame';
-import { makeFrame } from './draw_frames';
+import { makeFrame, meshOf } from './draw_frames';
 
 const SIZE = { width: 850, height: 550 };
 const VIEW = { x: 8.5, y: 5.5, scale: 50 };
@@ -100,6 +100,24 @@ test('an attribute colours the outline; NaN is grey', () => {
   const unknown = { ...FRAME.rings, attributes: new Map([['x', values.map(() => NaN)]]) };
   assert.ok(draw({ outline: true, colour: 'x' }, { ...FRAME, rings: unknown })
     .includes(`stroke="${hex(theme(false).missing)}"`));
+});
+
+test('an attribute colours the mesh in bands', () => {
+  const { points, triangles, classes } = makeFrame().mesh!;
+  const values = Float32Array.from({ length: points.length / 2 }, (_, k) => points[2 * k]);
+  const mesh = meshOf(points, triangles, classes, new Map([['x', values]]));
+  const text = draw({ fill: true, colour: 'x' }, { ...FRAME, mesh });
+  assert.ok(count(text, /<path fill="#/g) > 50);
+  const [first] = /d="([^"]*)"/.exec(text)!.slice(1);
+  const xs = [...first.matchAll(/[ML]([\d.]+) /g)].map(([, x]) => Number(x));
+  assert.ok(Math.max(...xs) - Math.min(...xs) <= (850 / 64) + 0.02, 'a band is narrow');
+});
+
+test('isolines and selected rings are lines', () => {
+  const isolines = FRAME.rings;
+  assert.ok(draw({ isolines: true }, { ...FRAME, isolines }).includes(hex(theme(false).isoline)));
+  const text = svg(FRAME, NOTHING, VIEW, SIZE, null, [0]);
+  assert.ok(text.includes(hex(theme(false).accent)));
 });
 
 test('a missing attribute leaves the outline plain', () => {

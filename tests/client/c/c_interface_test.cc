@@ -1,4 +1,4 @@
-// The C interface as programs in C and Fortran use it, in process and with a real server.
+// The C interface as used by programs in C and Fortran, in process and with a real server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ Ran RunFile(const std::string& name, const std::vector<std::string>& arguments) 
   return {exit_code, program.Out(), program.Error()};
 }
 
-// The last two words of each line, of which the first has the digest of rings.
+// The last two words of each line with the digest of rings.
 std::vector<std::string> DigestsOf(const std::string& text) {
   std::vector<std::string> digests;
   std::istringstream lines(text);
@@ -38,7 +38,7 @@ std::vector<std::string> DigestsOf(const std::string& text) {
   return digests;
 }
 
-// What `partiemc replay` makes of the particles of the examples.
+// Digests of `partiemc replay` for the particles of the examples.
 std::vector<std::string> DigestsOfReplay() {
   const support::TemporaryFolder folder;
   for (int step = 0; step < 5; ++step) {
@@ -120,7 +120,7 @@ TEST(CInterface, TheLibraryShowsItsFunctionsAndNothingElse) {
   std::vector<std::string> symbols;
   std::istringstream lines(ran.out);
   for (std::string line; std::getline(lines, line);) {
-    if (line != "PARTIEMC_1") symbols.push_back(line);  // The version itself.
+    if (line != "PARTIEMC_1") symbols.push_back(line);  // The version node.
   }
   EXPECT_THAT(symbols, SizeIs(18));
   EXPECT_THAT(symbols, Each(StartsWith("partiemc_")));

@@ -1,4 +1,4 @@
-// `partiemc convert`, as a person runs it.
+// `partiemc convert` as a program.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ TEST(Convert, KeepsTheFramesAndTheParticlesThatWereAskedFor) {
   EXPECT_THAT(frame.ids, ElementsAre(1, 2));
 }
 
-// A ball of five spacings' radius.
+// A ball with a radius of five spacings.
 void WriteBall(const std::string& path) {
   std::ofstream file(path);
   file << "x,y,z,vx,vy,vz\n";
@@ -84,7 +84,7 @@ TEST(Convert, KeepsParticlesInSpaceForSlices) {
     EXPECT_EQ(ran.exit_code, 0) << ran.error;
     return Content(directory.Path(file));
   };
-  // Without the columns of milliseconds.
+  // Ignores the columns of milliseconds.
   const auto digests = [](const std::string& csv) {
     std::vector<std::string> rows;
     std::istringstream lines(csv);

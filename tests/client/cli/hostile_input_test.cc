@@ -1,4 +1,4 @@
-// Input that is not what it seems, and outputs that cannot be written.
+// Malformed inputs, and outputs that cannot be written.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zstd.h>
@@ -16,7 +16,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// Three frames of 900 particles with their times, of which a notice tells.
+// Three frames of 900 particles with times, which a notice reports.
 void WriteFrames(const support::TemporaryFolder& directory) {
   for (int k = 0; k < 3; ++k) {
     std::ofstream file(directory.Path("frame_" + std::to_string(k) + ".csv"));
@@ -45,7 +45,7 @@ TEST(FullDisk, EndsWithTheErrorInTheLastLine) {
   }
 }
 
-// What zstd makes of many equal lines is a ten-thousandth of them.
+// zstd compresses equal lines ten-thousandfold.
 TEST(PackedInput, IsRefusedWhenItExpandsTooMuch) {
   const support::TemporaryFolder directory;
   std::string table = "x,y\n";

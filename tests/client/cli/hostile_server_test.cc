@@ -1,4 +1,4 @@
-// A server whose words a terminal would obey: they come out as words.
+// A server whose messages contain terminal commands: they are printed escaped.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Clears the screen, by C0 and by C1, turns the direction of text round, and breaks the line.
+// Clears the screen (C0 and C1), reverses the direction of text, and breaks the line.
 const std::string kHostile =
     "a\x1b[2J\xc2\x9b"
     "2J\xe2\x80\xae"

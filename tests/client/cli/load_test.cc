@@ -1,4 +1,4 @@
-// `partiemc load`: its figures by hand, and a short run against a real server.
+// `partiemc load`: figures checked by hand, and a short run against a real server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ TEST(Load, WindowsSettleWhereMedianAndTailAreAlike) {
   const Percentiles usual{.count = 50, .p50 = 10, .p90 = 15, .p99 = 40, .max = 90};
   EXPECT_TRUE(HaveSettled(usual, usual));
   Percentiles other = usual;
-  other.max = 1000;  // One frame tells nothing.
+  other.max = 1000;  // A single frame is not representative.
   other.p99 = 41.9;
   EXPECT_TRUE(HaveSettled(usual, other));
   other.p99 = 43;
@@ -77,7 +77,7 @@ TEST(Load, CountsWhatItMeasures) {
   EXPECT_EQ(load["refused"], 0);
   const int frames = load["frames"];
   EXPECT_GT(frames, 0);
-  // Answers are counted one by one while figures are taken.
+  // Answers are counted while figures are taken.
   EXPECT_NEAR(load["answers"]["count"], frames, 20);
   EXPECT_GT(load["watches"]["count"], 0);
   for (const char* what : {"answers", "watches"}) {

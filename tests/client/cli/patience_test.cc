@@ -1,4 +1,5 @@
-// `partiemc replay` while its server is stopped: it waits, and says so, or gives up when told to.
+// `partiemc replay` while its server is stopped: it waits and reports it, or gives up after
+// --give-up-after.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -48,7 +49,7 @@ class StoppedServer : public testing::Test {
 TEST_F(StoppedServer, IsWaitedForWithALineOfProgress) {
   const auto replay = ReplayAndStop("100");
   WaitWhile(*replay, [&] { return replay->Error().find("trying again") == std::string::npos; });
-  std::this_thread::sleep_for(std::chrono::seconds(3));  // Some attempts are cut short.
+  std::this_thread::sleep_for(std::chrono::seconds(3));  // Long enough for some attempts.
   EXPECT_TRUE(replay->Running());
   server_.Signal(SIGCONT);
   EXPECT_EQ(replay->Wait(), 0) << replay->Error();
@@ -63,7 +64,7 @@ TEST_F(StoppedServer, IsWaitedForWithALineOfProgress) {
 TEST_F(StoppedServer, IsGivenUpWithAnErrorInTheLastLine) {
   const auto replay = ReplayAndStop("1");
   EXPECT_EQ(replay->Wait(), 4);
-  EXPECT_THAT(LastLine(replay->Error()), StartsWith("partiemc: the stream could not go on"));
+  EXPECT_THAT(LastLine(replay->Error()), StartsWith("partiemc: the stream could not continue"));
   EXPECT_THAT(LastLine(replay->Error()), HasSubstr("1 s"));
 }
 

@@ -76,7 +76,7 @@ Ran RunPartiemc(const std::vector<std::string>& arguments) {
 }
 
 Ran RunPartiemcOnFullDisk(int kilobytes, std::vector<std::string> arguments) {
-  // Without the signal, write fails with EFBIG. dash counts blocks of 512 bytes.
+  // With the signal ignored, write fails with EFBIG. dash counts blocks of 512 bytes.
   const std::string limited =
       "trap '' XFSZ; ulimit -f " + std::to_string(2 * kilobytes) + "; exec \"$0\" \"$@\"";
   arguments.insert(arguments.begin(), {"-c", limited, PARTIEMC_PROGRAM});

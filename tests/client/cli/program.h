@@ -1,4 +1,4 @@
-// The programs as a shell would run them.
+// Runs the project's programs as a shell would.
 #pragma once
 
 #include <sys/types.h>
@@ -11,7 +11,7 @@
 
 namespace partiemc::client {
 
-/// A program under way. Its output goes to files, so that it never waits for a reader.
+/// A running program. Its output goes to files, so it never waits for a reader.
 class Program {
  public:
   Program(const std::string& program, const std::vector<std::string>& arguments);
@@ -20,7 +20,7 @@ class Program {
 
   void Signal(int signal) const;
   bool Running();
-  /// Waits for its end, at most a minute. 128 + N for a signal N, -1 if it did not end in time.
+  /// Waits for the end, at most a minute. Returns 128 + N for a signal N, -1 on a timeout.
   int Wait();
 
   pid_t id() const { return id_; }
@@ -39,15 +39,15 @@ struct Ran {
   std::string out, error;
 };
 
-/// `partiemc` with these arguments, until it ends.
+/// Runs `partiemc` with these arguments.
 Ran RunPartiemc(const std::vector<std::string>& arguments);
-/// The same where no file may be longer than `kilobytes`: as on a full disk, writing fails.
+/// Same with files limited to `kilobytes`, which simulates a full disk.
 Ran RunPartiemcOnFullDisk(int kilobytes, std::vector<std::string> arguments);
 
-/// The last of these lines, without its end.
+/// The last line without its newline.
 std::string LastLine(const std::string& lines);
 
-/// The real server on a port that the system chose.
+/// A real server on a port chosen by the system.
 class ServerProgram {
  public:
   ServerProgram();
@@ -61,7 +61,7 @@ class ServerProgram {
   std::string address_;
 };
 
-/// The names of all files below a directory, hidden ones too, in their order.
+/// Sorted names of all files below a directory, including hidden ones.
 std::vector<std::string> FilesIn(const std::filesystem::path& directory);
 
 std::string Content(const std::string& path);

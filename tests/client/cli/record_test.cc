@@ -1,4 +1,4 @@
-// `partiemc watch --record`: a live stream as a recording that replays to the same bits.
+// `partiemc watch --record`: records a live stream that replays to the same bits.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using ::testing::SizeIs;
 
 constexpr int kFrames = 40;
 
-// A block that turns, of particles with everything that a recording holds.
+// A turning block of particles with all quantities of a recording.
 RecordedFrame BlockFrame(int index) {
   RecordedFrame frame;
   frame.time = 0.1 * index;
@@ -46,7 +46,7 @@ void WriteRecording(const std::string& path) {
   ASSERT_TRUE((*writer)->Finish().ok());
 }
 
-// "rings digest, mesh digest, time" of every frame; they are the last columns.
+// "rings digest, mesh digest, time" of every frame: the last columns.
 std::vector<std::string> Digests(const std::string& statistics) {
   static const std::regex kLine(R"(.*,([0-9a-f]{16},[0-9a-f]{16}),.*)");
   std::istringstream lines(statistics);
@@ -58,7 +58,7 @@ std::vector<std::string> Digests(const std::string& statistics) {
   return digests;
 }
 
-// The words of `partiemc replay ...` in the last line of what a watch has said, and `more`.
+// The words of the command `partiemc replay ...` in the last line of a watch's output, and `more`.
 std::vector<std::string> ToldCommand(const std::string& out, const std::vector<std::string>& more) {
   std::istringstream line(out.substr(out.rfind("partiemc ") + 9));
   std::vector<std::string> words;
@@ -73,7 +73,7 @@ class Record : public ::testing::Test {
 
   std::string Path(const std::string& name) const { return folder_.Path(name); }
 
-  // The stream "block", while it goes on.
+  // The running stream "block".
   std::vector<std::string> Producer(std::vector<std::string> flags) const {
     std::vector<std::string> command = {"replay", Path("made.pemc"), "--server", server_.address(),
                                         "--name", "block",           "--stats",  Path("made.csv")};
@@ -81,7 +81,7 @@ class Record : public ::testing::Test {
     return command;
   }
 
-  // As soon as there is the stream.
+  // Watches as soon as the stream exists.
   Ran Watch(std::vector<std::string> flags) const {
     flags.insert(flags.begin(), {"watch", "block", "--server", server_.address()});
     Ran ran{.exit_code = 4};

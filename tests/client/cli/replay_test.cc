@@ -1,4 +1,4 @@
-// `partiemc replay` and `partiemc info`, as a person runs them.
+// `partiemc replay` and `partiemc info` as programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Three small frames; the second one holds what no frame may hold.
+// Three small frames; the second is invalid.
 void WriteFrames(const support::TemporaryFolder& directory) {
   for (int k = 0; k < 3; ++k) {
     std::ofstream file(directory.Path("frame_" + std::to_string(k) + ".csv"));
@@ -82,7 +82,7 @@ TEST(Replay, ByTheLatestPolicyEveryFrameIsReplayedOrSkippedAndCounted) {
   }
 }
 
-// A block that stays and one that leaps over it, with the columns that `header` names.
+// A body and a block that leaps over it, with the columns of `header`.
 void WriteLeap(const support::TemporaryFolder& directory, const std::string& header,
                bool with_times) {
   for (int frame = 0; frame < 4; ++frame) {
@@ -98,7 +98,7 @@ void WriteLeap(const support::TemporaryFolder& directory, const std::string& hea
   times << "frame,t\n0,0\n1,0.5\n2,1\n3,1.5\n";
 }
 
-// The frames of a replay at spacing 1 as GeoJSON, which tells identities.
+// The frames of a replay at spacing 1 as GeoJSON, which contains identities.
 std::vector<std::string> Outlines(const std::string& input, std::vector<std::string> where) {
   const support::TemporaryFolder output;
   where.insert(where.begin(), {"replay", input, "--quiet", "--spacing", "1", "--output-dir",
@@ -127,7 +127,7 @@ TEST(Replay, RingsThatLeapKeepTheirIdentityByIdsOrByVelocitiesWithTimes) {
     const std::vector<std::string> local = Outlines(directory.path().string(), {"--local"});
     EXPECT_THAT(local.at(3), HasSubstr(is_kept ? "\"identity\":2" : "\"identity\":5"));
     EXPECT_EQ(Outlines(directory.path().string(), {"--server", server.address()}), local);
-    // A recording made of it has the same outlines, and times where there were none.
+    // A recording of it has the same outlines, and times.
     const support::TemporaryFolder recordings;
     ASSERT_EQ(
         RunPartiemc({"convert", directory.path().string(), recordings.Path("a.pemc")}).exit_code,
@@ -223,8 +223,8 @@ TEST(Replay, ARecordingThatWasCutOffIsReplayedAsFarAsItGoes) {
   EXPECT_THAT(ran.error, HasSubstr("truncated after"));
 }
 
-// What came through before the end that `why` tells: a row of statistics and a frame of the report
-// for each file that was written.
+// Expects the frames before the end, whose reason is `why`: a row of statistics and a frame of the
+// report for each written file.
 void ExpectKept(const support::TemporaryFolder& directory, const std::string& why) {
   const std::string report = Content(directory.Path("report.html"));
   EXPECT_THAT(report, AllOf(HasSubstr("ended early: " + why), HasSubstr("</html>")));
@@ -239,7 +239,7 @@ void ExpectKept(const support::TemporaryFolder& directory, const std::string& wh
   EXPECT_EQ(frames_in_report, frames.size());
   for (std::size_t k = 0; k < frames.size(); ++k) EXPECT_EQ(frames[k], std::to_string(k));
   for (const std::string& file : FilesIn(directory.path())) {
-    EXPECT_EQ(file.find(".part"), file.npos) << file;  // Nothing half written.
+    EXPECT_EQ(file.find(".part"), file.npos) << file;  // No partial file.
   }
 }
 
@@ -271,7 +271,7 @@ TEST(Replay, APlaceThatCannotBeWrittenIsKnownBeforeTheWork) {
   EXPECT_THAT(ran.error, HasSubstr("/nonexistent/directory/report.html"));
 }
 
-// A replay into `directory` that is under way: two frames are there.
+// A running replay into `directory` with two finished frames.
 std::unique_ptr<Program> BeginReplay(const support::TemporaryFolder& directory,
                                      std::vector<std::string> where) {
   where.insert(where.begin(),
@@ -308,7 +308,7 @@ TEST(Replay, ALoopBeginsAnewUntilCtrlC) {
   const ServerProgram server;
   Program replay(PARTIEMC_PROGRAM, {"replay", kDamBreak, "--frames", "0:3", "--loop", "--name",
                                     "loop", "--server", server.address()});
-  // Of three frames the tenth is there.
+  // Waits for the tenth frame.
   const std::regex ten(R"("frames": *\d\d)");
   while (replay.Running() &&
          !std::regex_search(RunPartiemc({"streams", "--json", "--server", server.address()}).out,
@@ -318,10 +318,10 @@ TEST(Replay, ALoopBeginsAnewUntilCtrlC) {
   replay.Signal(SIGINT);
   EXPECT_EQ(replay.Wait(), 130);
   EXPECT_THAT(replay.Error(), HasSubstr("interrupted after"));
-  EXPECT_THAT(replay.Out(), IsEmpty());  // There is no table of what has no end.
+  EXPECT_THAT(replay.Out(), IsEmpty());  // An endless replay prints no table.
 }
 
-// Its checkpoints are of no use without another server, to which it looks in vain.
+// Checkpoints do not help without another server, which it looks for in vain.
 TEST(Replay, AServerThatDiesIsExitCodeFourInOneLineAndKeepsWhatCameBefore) {
   for (const char* interval : {"0", "1"}) {
     const ServerProgram server;
@@ -365,7 +365,7 @@ TEST(Info, TellsVersionAndLimitsForPeopleAndPrograms) {
   EXPECT_EQ(std::ranges::count(json.out, '\n'), 1);
 }
 
-// A block whose particles carry a linear field and a linear velocity.
+// A block of particles with a linear attribute and a linear velocity.
 void WriteLinearFields(const support::TemporaryFolder& directory) {
   std::ofstream file(directory.Path("frame_0.csv"));
   file << "x,y,vx,vy,p\n";

@@ -1,4 +1,4 @@
-// A wrong word on the command line: one line, exit code 2, nothing done.
+// Invalid command lines: one line, exit code 2, no effect.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ void ExpectOneLine(const Ran& ran) {
 TEST(Usage, HelpTeachesEveryVerbByExamples) {
   const Ran help = RunPartiemc({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"replay", "watch", "streams", "info", "load", "evaluate", "convert"}) {
+  for (const char* verb : {"replay", "watch", "streams", "info", "load", "convert"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     const Ran verb_help = RunPartiemc({verb, "--help"});
     EXPECT_EQ(verb_help.exit_code, 0);
@@ -119,7 +119,7 @@ TEST(Usage, NoServerThereIsExitCodeFour) {
     ExpectOneLine(ran);
     EXPECT_THAT(ran.error, HasSubstr("no server at unix:/nonexistent/socket"));
     EXPECT_THAT(ran.error, HasSubstr("start one with `partiemc-server --address"));
-    // The only one that can do without.
+    // The only verb that works without.
     EXPECT_EQ(ran.error.find("--local") != std::string::npos, arguments.front() == "replay");
   }
 }

@@ -59,7 +59,7 @@ TEST(Columns, NamedPositionsOfUnknownAxesTakeNoVelocities) {
 }
 
 TEST(Columns, NumberDensitiesAreNoVolumes) {
-  // PySPH's V is one over the volume.
+  // PySPH's V is the reciprocal of the volume.
   EXPECT_FALSE(Plan({"x", "y", "V"}).volume.has_value());
   EXPECT_EQ(Plan({"x", "y", "Volume"}).volume, 2u);
   EXPECT_EQ(Plan({"x", "y", "area [m2]"}).volume, 2u);

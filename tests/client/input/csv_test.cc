@@ -124,7 +124,7 @@ TEST(Csv, DegenerateFilesAreRefusedInOneLine) {
 TEST(Csv, AttributesAreColumnsOfTheirNamesOrArrays) {
   const RecordedFrame frame = Read("x,y,p,T:0,T:1,Vel_x,Vel_y\n1,2,.5,3,4,7,8\n3,4,1.5,5,6,9,10\n",
                                    {.attributes = {"T", "p", "velocity"}});
-  ASSERT_EQ(frame.attributes.size(), 2);  // Velocities have a place of their own.
+  ASSERT_EQ(frame.attributes.size(), 2);  // Velocities are not attributes.
   EXPECT_EQ(frame.attributes[0], (ParticleAttribute{"T", 2, {3, 4, 5, 6}}));
   EXPECT_EQ(frame.attributes[1], (ParticleAttribute{"p", 1, {.5, 1.5}}));
   EXPECT_THAT(frame.velocities, ElementsAre(7, 8, 9, 10));

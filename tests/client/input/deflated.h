@@ -1,4 +1,4 @@
-// Data packed by zlib.
+// Compresses data with zlib.
 #pragma once
 
 #include <zlib.h>
@@ -7,7 +7,7 @@
 
 namespace partiemc::client {
 
-/// What a file holds around deflated data, by zlib's number of bits.
+/// Container of the deflated data, by zlib's number of bits.
 enum class Wrapping { kNone = -MAX_WBITS, kGzip = 16 + MAX_WBITS };
 
 inline std::string Deflated(const std::string& content, Wrapping wrapping) {

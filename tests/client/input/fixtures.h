@@ -1,4 +1,4 @@
-// Sequences read whole, from files made on the spot.
+// Reads whole sequences from files that a test writes.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +40,7 @@ inline ReadSequence ReadAll(const std::string& input, const SequenceOptions& opt
     if (!found.ok() || !*found) break;
     read.frames.push_back(frame);
   }
-  // An error stays: a caller that asks again must not take the rest for whole.
+  // Errors are permanent: a caller that continues must not mistake the rest for the whole.
   if (!read.status.ok()) {
     EXPECT_EQ((*sequence)->Next(frame).status(), read.status);
   }
@@ -48,7 +48,7 @@ inline ReadSequence ReadAll(const std::string& input, const SequenceOptions& opt
   return read;
 }
 
-/// The only frame of an input; an empty one, and a failed test, if there is another number.
+/// The only frame of an input. Fails the test and returns an empty frame if the number differs.
 inline RecordedFrame ReadOne(const std::string& input, const SequenceOptions& options = {}) {
   const ReadSequence read = ReadAll(input, options);
   EXPECT_TRUE(read.status.ok()) << read.status;
@@ -56,7 +56,7 @@ inline RecordedFrame ReadOne(const std::string& input, const SequenceOptions& op
   return read.frames.empty() ? RecordedFrame() : read.frames.front();
 }
 
-/// A status of `code` in one line that has each of `words`.
+/// Expects a one-line status with `code` that contains each of `words`.
 inline void ExpectRefused(const absl::Status& status, absl::StatusCode code,
                           const std::vector<std::string>& words) {
   EXPECT_EQ(status.code(), code) << status;

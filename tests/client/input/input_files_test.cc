@@ -45,7 +45,7 @@ TEST(InputFiles, SeveralSeriesAreRefusedByNameWithAPatternToUse) {
   EXPECT_EQ(ReadAll(directory.Path("Soil_*.csv")).frames.size(), 2u);
 }
 
-TEST(InputFiles, RunsThatDifferInAnotherNumberAreSeveralSeriesUnlessAPatternSaysOtherwise) {
+TEST(InputFiles, RunsThatDifferInAnotherNumberAreSeveralSeries) {
   support::TemporaryFolder directory;
   WriteFrames(directory, "run1_", 2);
   WriteFrames(directory, "run2_", 2);

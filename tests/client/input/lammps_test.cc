@@ -53,7 +53,7 @@ TEST(LammpsDump, ScaledPositionsAreFractionsOfTheBox) {
 }
 
 TEST(LammpsDump, ATiltedBoxShearsScaledPositions) {
-  // A box of 10 x 20 that leans 4 to the right: its bounding box is 14 wide.
+  // A box of 10 x 20 with a tilt of 4: its bounding box is 14 wide.
   const std::string tilted = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n0 14 4\n0 20 0\n-0.5 0.5 0\n";
   const ReadSequence read = Read(Frame("0", "2", "xs ys\n0 1\n0.5 0.5\n", tilted));
   ASSERT_EQ(read.frames.size(), 1u) << read.status;
@@ -61,7 +61,7 @@ TEST(LammpsDump, ATiltedBoxShearsScaledPositions) {
 }
 
 TEST(LammpsDump, TheBoundsOfATriclinicBoxHoldAllOfItsCorners) {
-  // Boxes of 10 x 20 x 1 that lean twice along x: the corner of both tilts is the farthest.
+  // Boxes of 10 x 20 x 1 with two tilts along x: the corner of both tilts is the farthest.
   const std::string head = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n";
   for (const std::string bounds :
        {"0 17 4\n-2 20 3\n-0.5 0.5 -2\n", "-7 10 -4\n0 22 -3\n-0.5 0.5 2\n"}) {
@@ -105,7 +105,7 @@ TEST(LammpsDump, DeclaredCountsAreNotBelieved) {
     ExpectRefused(Read(Frame("0", count, "x y\n1 2\n")).status, absl::StatusCode::kDataLoss,
                   {"number of atoms", count});
   }
-  // Within the limit but not there: no memory is taken for what does not come.
+  // An allowed but false count: takes no memory for missing data.
   ExpectRefused(Read(Frame("0", "60000000", "x y\n1 2\n")).status, absl::StatusCode::kDataLoss,
                 {"after 1 of 60000000 atoms"});
 }

@@ -43,7 +43,7 @@ struct Entry {
   std::string name;
   std::string content;
   bool deflate = false;
-  std::string surplus = {};  // Behind the packed content, of whose size the directory knows.
+  std::string surplus = {};  // After the compressed content, whose size is in the directory.
 };
 
 std::string Zip(const std::vector<Entry>& entries) {

@@ -33,7 +33,7 @@ TEST(NumberText, BeyondTheRangeOfDoubleLieInfinityAndZero) {
 }
 
 TEST(NumberText, ALocaleWithCommasChangesNothing) {
-  // Where no such locale is installed, the C locale stays and the expectation is still right.
+  // Without this locale the C locale stays, and the expectation still holds.
   std::setlocale(LC_ALL, "de_DE.UTF-8");
   EXPECT_EQ(ParseNumber("1.5"), 1.5);
   EXPECT_FALSE(ParseNumber("1,5").has_value());

@@ -50,7 +50,7 @@ TEST_P(Packed, PartsThatFollowEachOtherAreOneFile) {
 
 TEST_P(Packed, WhatIsCutOffIsSaidAfterTheFramesBefore) {
   const support::TemporaryFolder directory;
-  // Larger than the blocks of the packings, so that a part can be unpacked.
+  // Larger than a block of each format, so that a part can be unpacked.
   const std::string whole = GetParam()(Dump(200));
   const ReadSequence read = ReadAll(directory.Write("packed", whole.substr(0, whole.size() - 40)));
   EXPECT_GT(read.frames.size(), 10u);
@@ -68,7 +68,7 @@ TEST_P(Packed, DamageIsAnError) {
 
 INSTANTIATE_TEST_SUITE_P(Packings, Packed, testing::Values(&Gzip, &Zstd));
 
-// Comments, which cost little to read.
+// Comments, which are cheap to read.
 std::string MostlyComments(std::size_t bytes) {
   const std::string comment = "#" + std::string(4094, '-') + "\n";
   std::string table = "x,y\n";

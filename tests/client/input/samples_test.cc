@@ -1,4 +1,4 @@
-// The same 587 particles as several programs write them.
+// The same 587 particles in the formats of several programs.
 #include "client/input/fixtures.h"
 
 namespace partiemc::client {

@@ -3,7 +3,7 @@
 namespace partiemc::client {
 namespace {
 
-// As old SPHinXsys writes it: "Format" with a capital letter, no header_type.
+// In the format of old SPHinXsys: "Format" with a capital letter, no header_type.
 std::string Vtp(const std::string& count, const std::string& positions,
                 const std::string& arrays = "") {
   return "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
@@ -80,7 +80,7 @@ TEST(Vtk, CellsArePassedOver) {
   const std::string before = std::string(kLegacy) + "UNSTRUCTURED_GRID\n" + kTwoPoints;
   for (const std::string& cells : {
            std::string("CELLS 2 4\n1 0\n1 1\nCELL_TYPES 2\n1\n1\n"),
-           // Indices of points that are not there, and counts beyond the cells' end.
+           // Indices of missing points, and counts beyond the end of the cells.
            std::string("CELLS 2 4\n9 900000000\n-7 1\nCELL_TYPES 2\n1\n99\n"),
            std::string("CELLS 1 2\n5 0\nCELL_TYPES 1\n1\n"),
        }) {

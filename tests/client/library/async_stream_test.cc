@@ -1,4 +1,4 @@
-// Answers by callbacks and futures.
+// AsyncStream: answers by callbacks and futures.
 #include "partiemc/client/async_stream.h"
 
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ TEST(AsyncStream, ARefusedFrameIsToldWhyAndTheNextIsAnswered) {
   positions[5] = std::numeric_limits<double>::quiet_NaN();
   auto refused = async.Send(FrameOf(positions), 0);
   auto taken = async.Send(FrameOf(good), 1);
-  // One that is refused before it is sent: there is no y.
+  // Refused before it is sent: y is missing.
   const std::vector<double> x(4);
   auto incomplete = async.SendArrays({.count = 4, .x = x.data()}, 2);
   const auto answer = refused.get();

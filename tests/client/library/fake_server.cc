@@ -39,7 +39,7 @@ grpc::Status FakeServer::GetServerInfo(grpc::ServerContext*, const v1::GetServer
   response->set_version("1.2.3");
   response->mutable_limits()->set_max_particles_per_frame(1000);
   response->add_placements(v1::PLACEMENT_QEF);
-  response->add_placements(static_cast<v1::Placement>(99));  // Of a later version.
+  response->add_placements(static_cast<v1::Placement>(99));  // From a later version.
   response->add_fills(v1::FILL_GRID);
   response->add_capabilities("resume");
   return grpc::Status::OK;

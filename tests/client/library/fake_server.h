@@ -1,4 +1,4 @@
-// A server whose stream does what a test tells it to do, right or wrong.
+// A server whose stream follows a test's script, valid or not.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -17,7 +17,7 @@ class FakeServer final : private v1::ReconstructionService::Service {
   using Rpc = grpc::ServerReaderWriter<v1::ReconstructResponse, v1::ReconstructRequest>;
   using Script = std::function<grpc::Status(grpc::ServerContext&, Rpc&)>;
 
-  /// Listens on a free port of the loopback device; `script` is the whole of each stream.
+  /// Listens on a free loopback port; `script` handles each stream.
   explicit FakeServer(Script script);
   ~FakeServer() override;
 
@@ -40,13 +40,13 @@ v1::OpenStream Accept(FakeServer::Rpc& rpc, std::uint32_t frames_in_flight,
 /// The next frame; false when the client has finished.
 bool ReadFrame(FakeServer::Rpc& rpc, v1::ParticleFrame& frame);
 
-/// An answer to `frame` that holds one triangle beginning at its first particle.
+/// An answer to `frame` with one triangle at its first particle.
 v1::ReconstructResponse TriangleAt(const v1::ParticleFrame& frame);
 
-/// Accepts, then answers every frame in its turn.
+/// Accepts the stream and answers every frame.
 grpc::Status AnswerAll(grpc::ServerContext& context, FakeServer::Rpc& rpc);
 
-/// Returns when the client has gone away.
+/// Returns when the client has cancelled.
 grpc::Status WaitForCancel(grpc::ServerContext& context);
 
 }  // namespace partiemc::client

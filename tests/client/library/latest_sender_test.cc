@@ -1,4 +1,4 @@
-// The sender that keeps the newest frame only, over a stream that takes frames when it is told to.
+// LatestSender over a stream that accepts frames on request.
 #include "partiemc/client/latest_sender.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-// Send waits until the test lets it go on.
+// Send waits until the test releases it.
 class GatedStream final : public FrameStream {
  public:
   const StreamInfo& info() const override { return info_; }
@@ -63,14 +63,14 @@ class GatedStream final : public FrameStream {
     allowed_ += frames;
     changed_.notify_all();
   }
-  // Until that many frames have come to Send, waiting there or through.
+  // Waits until `frames` frames have reached Send.
   void WaitForArrivals(int frames) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return arrived_ >= frames; });
   }
 
   std::vector<std::pair<double, float>> taken;  // Time, first coordinate.
-  std::vector<float> volumes;                   // Of the last one.
+  std::vector<float> volumes;                   // Volumes of the last frame.
   bool finished = false;
 
  private:
@@ -81,14 +81,14 @@ class GatedStream final : public FrameStream {
   bool cancelled_ = false;
 };
 
-// Offers frame number `k`, whose arrays are gone when this returns.
+// Offers frame `k`, whose arrays are freed when this returns.
 absl::Status OfferFrame(LatestSender& sender, int k) {
   const std::vector<float> positions = {static_cast<float>(k), 0};
   const std::vector<float> volumes = {0.5f * static_cast<float>(k)};
   return sender.Offer({.positions = std::span<const float>(positions), .volumes = volumes}, k);
 }
 
-TEST(LatestSender, SendsTheNewestOfThoseThatCameMeanwhileAndTellsOfTheOthersInOrder) {
+TEST(LatestSender, SendsTheNewestFrameAndReportsSkippedOnesInOrder) {
   GatedStream stream;
   std::string told;
   const auto tell = [&](char what) {
@@ -97,7 +97,7 @@ TEST(LatestSender, SendsTheNewestOfThoseThatCameMeanwhileAndTellsOfTheOthersInOr
   LatestSender sender(stream, {.sending = tell('+'), .skipped = tell('-')});
   ASSERT_TRUE(OfferFrame(sender, 1).ok());
   stream.WaitForArrivals(1);
-  // The stream has no room, and the simulator goes on all the same.
+  // The stream is busy, and the simulator continues.
   for (int k = 2; k <= 6; ++k) ASSERT_TRUE(OfferFrame(sender, k).ok());
   EXPECT_EQ(sender.counts().sent, 1u);
   EXPECT_EQ(sender.counts().skipped, 4u);
@@ -170,8 +170,8 @@ TEST(LatestSender, GoesAwayAlsoWhileTheStreamTakesNothing) {
   EXPECT_FALSE(stream.finished);
 }
 
-// Over a real stream: every answer belongs to a frame that was sent, numbers have no gap, and what
-// was offered is sent, skipped or refused.
+// Over a real stream: every answer belongs to a sent frame, numbers have no gap, and each offer is
+// sent, skipped or refused.
 TEST(LatestSender, NumbersWhatItSendsWithoutAGap) {
   const auto stream = LocalStream::Open({.parameters = {.spacing = 1.0}, .threads = 1});
   ASSERT_TRUE(stream.ok());

@@ -1,4 +1,4 @@
-// The core in this process behind the interface of a stream.
+// LocalStream: the core in this process behind the interface of a stream.
 #include "partiemc/client/local_stream.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A clock that a test sets, and numbers that it chooses.
+// A clock and a random source that a test controls.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@ class ManualClock final : public Clock {
   std::atomic<TimePoint::rep> now_ = 0;
 };
 
-/// The same number for ever.
+/// Always returns the same number.
 class FixedRandom final : public RandomSource {
  public:
   explicit FixedRandom(std::uint64_t number) : number_(number) {}

@@ -1,5 +1,5 @@
-// Particles as simulators hold them: the same bytes and answers as from interleaved arrays, written
-// straight to where they are sent from.
+// Arrays in a simulator's layout: the same bytes and results as interleaved arrays, written
+// directly into the message.
 #include "partiemc/client/particle_arrays.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@
 
 namespace {
 
-// Of operator new, in all of this program, while somebody wants to know.
+// Bytes allocated by operator new in this program, while counting is on.
 std::atomic<std::size_t> allocated_bytes{0};
 
 }  // namespace
@@ -41,7 +41,7 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 namespace partiemc::client {
 namespace {
 
-// What a simulator may have of each particle. Packed: nothing in it is aligned.
+// Quantities of a particle in a simulator. Packed: nothing is aligned.
 template <typename T>
 struct [[gnu::packed]] Body {
   char kind;
@@ -51,7 +51,7 @@ struct [[gnu::packed]] Body {
   float vx, vy, vz;
 };
 
-// A block with a hole that drifts, and all that may come with particles.
+// A drifting block with a hole, with all quantities of particles.
 template <typename T>
 struct Scene {
   std::vector<Body<T>> bodies;
@@ -127,7 +127,7 @@ class ParticleArraysTest : public testing::Test {};
 using Coordinates = testing::Types<float, double>;
 TYPED_TEST_SUITE(ParticleArraysTest, Coordinates);
 
-// Of a few particles, and of so many that rows lie across the pieces that a message is made of.
+// For few particles, and for so many that rows cross the pieces of a message.
 TYPED_TEST(ParticleArraysTest, AreTheSameBytesAsInterleavedWhereverTheyLie) {
   for (const int side : {0, 1, 7, 600}) {
     const Scene<TypeParam> scene(side, 0.25);
@@ -154,7 +154,7 @@ TYPED_TEST(ParticleArraysTest, AreTheSameBytesAsInterleavedWhereverTheyLie) {
     EXPECT_TRUE(Bytes(ParticleArrays{.count = count, .x = x.data(), .y = y.data()}) == Bytes(plain))
         << side;
     const Frame spatial{.positions = std::span<const TypeParam>(scene.xyz), .components = 3};
-    if (count == 0) continue;  // No array, no third coordinate.
+    if (count == 0) continue;  // No arrays, so no third coordinate.
     EXPECT_TRUE(Bytes(ParticleArrays{.count = count,
                                      .x = {scene.xyz.data(), kThree},
                                      .y = {scene.xyz.data() + 1, kThree},
@@ -212,7 +212,7 @@ TEST(ParticleArrays, AttributesAreWrittenIntoTheMessageWithoutAnotherCopy) {
   EXPECT_LT(taken, request->Length() + request->Length() / 100);
 }
 
-// Of all that operator new gives meanwhile, the message takes everything.
+// The message accounts for all allocated bytes.
 TEST(ParticleArrays, AreWrittenIntoTheMessageWithoutAnotherCopy) {
   const Scene<double> scene(1000, 0);
   const auto rows = RowsOf(scene.AsBodies(), 0);
@@ -224,13 +224,13 @@ TEST(ParticleArrays, AreWrittenIntoTheMessageWithoutAnotherCopy) {
   ASSERT_TRUE(request.ok());
   const std::size_t message = request->Length();
   EXPECT_GT(message, 30u * scene.bodies.size());
-  EXPECT_GE(taken, message);  // Else the count would see nothing.
+  EXPECT_GE(taken, message);  // Otherwise the count would miss them.
   EXPECT_LT(taken, message + message / 100);
 }
 
 using Answer = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>;
 
-// What frames become, sent by `send`.
+// Results of the frames that `send` sends.
 template <typename Send>
 std::vector<Answer> Answers(FrameStream& stream, Send send) {
   std::vector<Answer> answers;

@@ -1,4 +1,4 @@
-// The library against the real server, over a real port.
+// The library against the real server over a port.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -66,7 +66,7 @@ TEST(RealServer, GivesTheSameBitsAsTheCoreInThisProcess) {
   EXPECT_EQ(remote_digests, Replay(**local));
 }
 
-// A body that stays and a drop that leaps over it, with what particles may bring along.
+// A body and a drop that leaps over it, with ids and velocities.
 struct Leap {
   std::vector<float> positions, velocities;
   std::vector<std::uint64_t> ids;
@@ -82,7 +82,7 @@ struct Leap {
   }
 };
 
-// The rings of all frames, and of one that is refused, number 3.
+// The rings of all frames. Frame 3 is refused.
 std::vector<Rings> LeapThrough(FrameStream& stream, bool with_ids, bool with_velocities) {
   std::vector<Rings> rings;
   Event event;
@@ -122,7 +122,7 @@ TEST(RealServer, TellsIdentitiesByIdsAndVelocitiesAsTheCoreInThisProcessDoes) {
     ASSERT_TRUE(local.ok()) << local.status();
     const std::vector<Rings> rings = LeapThrough(**local, with_ids, with_velocities);
     EXPECT_EQ(LeapThrough(**remote, with_ids, with_velocities), rings);
-    // The body and the drop are the same all the way, or the drop is new in every frame.
+    // Body and drop keep their identities, or the drop has a new one in every frame.
     const bool is_told = with_ids || with_velocities;
     const Rings& last = rings.back();
     ASSERT_EQ(last.measures.size(), 2u);

@@ -1,4 +1,4 @@
-// What the client does about a loss, step by step, against servers that do as they are told.
+// How the client handles a loss, step by step, against scripted servers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,8 +24,7 @@ const std::string kToken(32, '7');
 const std::vector<double> kPositions = {1, 2};
 const Frame kFrame{.positions = std::span<const double>(kPositions)};
 
-// Accepts a stream that can be resumed, `change` being what this server does otherwise; gives the
-// request.
+// Accepts a resumable stream with the changes of `change`; returns the request.
 v1::OpenStream AcceptResumable(
     FakeServer::Rpc& rpc, std::uint64_t next_sequence,
     const std::function<void(v1::StreamOpened&)>& change = [](v1::StreamOpened&) {}) {
@@ -43,7 +42,7 @@ v1::OpenStream AcceptResumable(
   return request.open();
 }
 
-// Answers the next `count` frames, with a checkpoint "after N" every `interval`-th.
+// Answers the next `count` frames, with a checkpoint "after N" in every `interval`-th answer.
 void AnswerSome(FakeServer::Rpc& rpc, int count, std::uint64_t interval) {
   v1::ParticleFrame frame;
   for (int k = 0; k < count && ReadFrame(rpc, frame); ++k) {
@@ -62,7 +61,7 @@ StreamOptions Options(const FakeServer* other = nullptr) {
   return options;
 }
 
-// Sends frame after frame, each answered before the next; gives the numbers of the answers.
+// Sends frames, each after the previous answer; returns the numbers of the answers.
 std::vector<std::uint64_t> Exchange(FrameStream& stream, int count) {
   std::vector<std::uint64_t> answered;
   Event event;
@@ -197,7 +196,7 @@ TEST(Resume, ADrainingServerIsLeftWithoutAWordToTheCaller) {
   EXPECT_THAT(Exchange(**stream, 4), ElementsAre(1, 2, 3, 4));
 }
 
-TEST(Resume, AStreamGoesWhereTheDrainingServerSaysButNotWithATokenInTheClear) {
+TEST(Resume, GoesWhereTheDrainingServerSaysWithoutATokenInClearText) {
   FakeServer second([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
     EXPECT_EQ(context.client_metadata().count("authorization"), 1u);
     AcceptResumable(rpc, 1);
@@ -229,8 +228,8 @@ TEST(Resume, AStreamGoesWhereTheDrainingServerSaysButNotWithATokenInTheClear) {
   Event event;
   ASSERT_TRUE((*stream)->Receive(event).ok());
   ASSERT_EQ(event.kind, Event::Kind::kReconnected);
-  // Nowhere else in between.
-  EXPECT_THAT(event.message, HasSubstr("went on at " + second.address()));
+  // At no other address in between.
+  EXPECT_THAT(event.message, HasSubstr("continued at " + second.address()));
   ASSERT_TRUE((*stream)->Receive(event).ok());
   EXPECT_EQ(event.sequence, 2u);
 }
@@ -251,12 +250,12 @@ TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
   Event event;
   ASSERT_EQ(*(*stream)->Receive(event), Received::kEvent);
   EXPECT_EQ(event.kind, Event::Kind::kReconnected);
-  EXPECT_THAT(event.message, HasSubstr("went on at " + server.address()));
+  EXPECT_THAT(event.message, HasSubstr("continued at " + server.address()));
   ASSERT_EQ(*(*stream)->Receive(event), Received::kEvent);
   EXPECT_EQ(event.sequence, 1u);
 }
 
-// What is true of a replica that cannot go on with a stream as the first server began it.
+// Expects that a replica with these differences is skipped.
 void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise) {
   FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     AcceptResumable(rpc, 1);
@@ -304,7 +303,8 @@ TEST(Resume, GivesUpInTimeWithTheLastError) {
   Event event;
   const auto received = (*stream)->Receive(event);
   EXPECT_EQ(received.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_THAT(std::string(received.status().message()), HasSubstr("could not go on within 0.2 s"));
+  EXPECT_THAT(std::string(received.status().message()),
+              HasSubstr("could not continue within 0.2 s"));
   EXPECT_EQ((*stream)->Send(kFrame, 1).status().code(), absl::StatusCode::kUnavailable);
 }
 
@@ -331,7 +331,7 @@ TEST(Resume, ACallThatIsOnlyAcceptedAgainAndAgainIsNoProgress) {
   FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     ++calls;
     AcceptResumable(rpc, 1);
-    return Lost(grpc::StatusCode::UNAVAILABLE);  // As a server that a frame brings down.
+    return Lost(grpc::StatusCode::UNAVAILABLE);  // Like a server that crashes on a frame.
   });
   StreamOptions options = Options();
   options.reconnect = {.give_up_after = milliseconds(1500), .first_pause = milliseconds(20)};
@@ -366,7 +366,7 @@ TEST(Resume, SendWaitsNoLongerThanItsTimeoutAlsoWhileAServerIsLookedFor) {
   EXPECT_EQ(refused.code(), absl::StatusCode::kDeadlineExceeded) << refused;
   ASSERT_TRUE(FindViolation(refused)) << refused;
   EXPECT_EQ(FindViolation(refused)->reason, "SEND_TIMEOUT");
-  EXPECT_EQ((*stream)->InFlight(), static_cast<std::size_t>(taken));  // The stream lives.
+  EXPECT_EQ((*stream)->InFlight(), static_cast<std::size_t>(taken));  // The stream continues.
   (*stream)->Cancel();
   receiver.join();
 }
@@ -443,7 +443,7 @@ TEST(Resume, AnotherAddressServesWhereTheFirstHasNobody) {
   EXPECT_TRUE(stream.ok()) << stream.status();
 }
 
-TEST(Backoff, TriesEachAddressAtOnceThenPausesLongerAndLongerButNeverTooLong) {
+TEST(Backoff, TriesEachAddressAtOnceThenDoublesThePauseToALimit) {
   const ReconnectPolicy policy{.first_pause = milliseconds(100),
                                .longest_pause = milliseconds(1000)};
   Backoff backoff(policy, 3, 42);

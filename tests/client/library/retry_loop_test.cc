@@ -1,4 +1,4 @@
-// The order and the times of attempts after a loss.
+// Order and times of attempts after a loss.
 #include "client/library/retry_loop.h"
 
 #include <gmock/gmock.h>
@@ -117,7 +117,7 @@ TEST_F(RetryLoopTest, TriesWhatItLearnedAfterWhatItWasGiven) {
   loop.TryNext(absl::UnavailableError("gone"));
   ASSERT_TRUE(loop.Run(attempts, {}).ok());
   EXPECT_THAT(attempts.started, ElementsAre("b", "c"));
-  // The one in use stays, what was learned before does not.
+  // The address in use stays; other learned ones are replaced.
   loop.Learn({"e"});
   EXPECT_EQ(loop.address(), "c");
   EXPECT_THAT(loop.addresses(), ElementsAre("a", "b", "c", "e"));
@@ -140,7 +140,7 @@ TEST_F(RetryLoopTest, TellsItsStoryAlsoOnceItHasRecovered) {
   ASSERT_TRUE(loop.Run(attempts, {}).ok());
   loop.Recovered();
   EXPECT_FALSE(loop.lost());
-  EXPECT_THAT(loop.Story(), HasSubstr("lost a (cut), went on at b after 0"));
+  EXPECT_THAT(loop.LossDescription(), HasSubstr("lost a (cut), continued at b after 0"));
 }
 
 TEST_F(RetryLoopTest, TriesTheSameAddressWhereItIsToldTo) {
@@ -164,7 +164,7 @@ TEST_F(RetryLoopTest, EndsWithWhatNoOtherAttemptMayChange) {
 
 TEST_F(RetryLoopTest, GivesUpInTimeAndKeepsWhatTheLastAttemptSaid) {
   RetryLoop loop = Loop(milliseconds(30));
-  Scripted attempts(clock_, {kBusy, kBusy, {.opened = false}});  // The last one never says a word.
+  Scripted attempts(clock_, {kBusy, kBusy, {.opened = false}});  // The last one never responds.
   loop.Lose("lost a");
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
   EXPECT_EQ(loop.refusal(), absl::UnavailableError("busy"));
@@ -217,7 +217,7 @@ TEST_F(RetryLoopTest, PausesGrowToTheLongest) {
   loop.Lose("lost a");
   Scripted attempts(clock_, {kBusy});
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
-  // Pauses of up to 1 s, halved at most: between 300 and 600 attempts, and a few short ones.
+  // Pauses of up to 1 s, at least half of it: 300 to 600 attempts, and a few short ones.
   EXPECT_THAT(attempts.started.size(), testing::AllOf(testing::Ge(300u), testing::Le(610u)));
 }
 

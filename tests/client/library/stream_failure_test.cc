@@ -1,5 +1,4 @@
-// A stream to a server that is not there, does not answer, or breaks the protocol: one line, in
-// time, never a hang.
+// Streams to a server that is missing, silent or violates the protocol: a one-line error, in time.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +25,7 @@ constexpr std::chrono::milliseconds kShort(200);
 const std::vector<double> kPositions = {1, 2};
 const Frame kFrame{.positions = std::span<const double>(kPositions)};
 
-// A port of the loopback device where nobody listens: bound, so that nobody else gets it.
+// A loopback port without a listener; bound, so that no other process gets it.
 class DeafPort {
  public:
   DeafPort() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
@@ -67,7 +66,7 @@ TEST(StreamFailure, NoServerThereIsOneLineThatSaysWhatToDo) {
         GetServerInfo(port.address(), kShort).status()}) {
     EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
     ExpectOneLine(status);
-    // On a busy machine an attempt may be over before it is refused.
+    // On a busy machine an attempt may time out before it is refused.
     EXPECT_THAT(std::string(status.message()),
                 MatchesRegex("no server at " + port.address() +
                              " .(Connection refused|tcp handshaker shutdown).: start one with "

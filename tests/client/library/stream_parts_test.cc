@@ -1,4 +1,4 @@
-// A stream whose frames come in parts, against a server that does as it is told.
+// A stream in parts against a scripted server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ v1::OpenStream AcceptPart(FakeServer::Rpc& rpc, std::uint64_t next_sequence) {
   return request.open();
 }
 
-// Reads so many parts and gives their numbers.
+// Reads `count` parts and returns their numbers.
 std::vector<std::uint64_t> ReadParts(FakeServer::Rpc& rpc, int count) {
   std::vector<std::uint64_t> sequences;
   v1::ParticleFrame frame;
@@ -59,8 +59,9 @@ grpc::Status LeaderGone(grpc::ServerContext& context) {
   return grpc::Status(grpc::StatusCode::UNAVAILABLE, "part 0 has left");
 }
 
-// Part 1 sends three frames; a first call answers the first and ends, a second one wants parts from
-// `next_sequence` on and answers all that come. Gives what came again; all are told as taken.
+// Part 1 sends three frames. The first call answers the first and ends; the second requests parts
+// from `next_sequence` and answers all. Returns the resent parts; expects that all are reported as
+// accepted.
 std::vector<std::uint64_t> SentAgain(std::uint64_t resume_sequence, std::uint64_t next_sequence) {
   int calls = 0;
   std::vector<std::uint64_t> again;

@@ -60,7 +60,7 @@ TEST(Stream, AnswersComeInOrderWithTheirTimesAndGeometry) {
 }
 
 TEST(Stream, NeverHasMoreFramesUnansweredThanTheServerAllows) {
-  // Reads as fast as it can, answers one frame of each three that it could have read.
+  // Reads as fast as possible, answers one of three frames.
   std::atomic<int> most_unanswered = 0;
   FakeServer server([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     Accept(rpc, 3);
@@ -142,7 +142,7 @@ TEST(Stream, ARefusedFrameIsAnEventAndTheStreamGoesOn) {
               ElementsAre(Event::Kind::kResult, Event::Kind::kRefusal, Event::Kind::kResult));
 }
 
-TEST(Stream, AFrameOverTheServersLimitIsRefusedBeforeItIsSentAndUsesUpNoNumber) {
+TEST(Stream, RefusesAFrameAboveTheServersLimitBeforeSending) {
   FakeServer server([](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     Accept(rpc, 2, /*max_frame_bytes=*/100);
     v1::ParticleFrame frame;

@@ -29,7 +29,7 @@ def digests(result):
 
 
 def digests_of_replay(frames, spacing=1.0, flags=()):
-    """What `partiemc replay` makes of the same frames."""
+    """Digests of `partiemc replay` for the same frames."""
     with tempfile.TemporaryDirectory() as folder:
         for k, frame in enumerate(frames):
             numpy.save(f"{folder}/frame_{k:03}.npy", frame)
@@ -41,7 +41,7 @@ def digests_of_replay(frames, spacing=1.0, flags=()):
 
 
 class Server:
-    """partiemc-server on a socket of its own, for `with`."""
+    """partiemc-server on a new socket, for `with`."""
 
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()

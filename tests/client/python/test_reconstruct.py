@@ -102,7 +102,7 @@ class Layouts(unittest.TestCase):
         self.assertEqual(digests(sequence.reconstruct(frames[0])), digests(results[0]))
 
     def test_what_goes_along_counts(self):
-        # A drop that leaps over a body: ids and velocities tell that it is the same.
+        # A drop that leaps over a body: ids and velocities identify it.
         def leap(frame):
             drop = numpy.array([[60.0 * frame + k % 4, 40 + k // 4] for k in range(16)])
             return numpy.concatenate([block(side=20), drop])
@@ -193,7 +193,7 @@ class Results(unittest.TestCase):
     def test_arrays_are_views_that_keep_their_result(self):
         rings = self.result.rings
         address = rings.points.__array_interface__["data"][0]
-        self.assertEqual(rings.points.__array_interface__["data"][0], address)  # Not made anew.
+        self.assertEqual(rings.points.__array_interface__["data"][0], address)  # Not a new array.
         self.assertIs(rings.points.base, self.result)
         self.assertIs(self.result.mesh.triangles.base, self.result)
         second = rings[1].__array_interface__["data"][0]
@@ -212,7 +212,7 @@ class Results(unittest.TestCase):
         self.result = None
         gc.collect()
         for k in range(20):
-            partiemc.reconstruct(block(k), spacing=1)  # Whatever was freed is written over.
+            partiemc.reconstruct(block(k), spacing=1)  # Overwrites freed memory.
         self.assertTrue((points == expected).all())
         self.assertEqual(points.__array_interface__["data"][0], address)
 
@@ -227,7 +227,7 @@ class Results(unittest.TestCase):
             seen = [result.rings.points, result.mesh.points, result.mesh.triangles]
             _, peak = tracemalloc.get_traced_memory()
             self.assertLess(peak, 100_000)
-            copy = wide[:, 0].copy()  # What the count sees of a copy.
+            copy = wide[:, 0].copy()  # The counter must see a copy.
             self.assertGreater(tracemalloc.get_traced_memory()[1], copy.nbytes)
         finally:
             tracemalloc.stop()
@@ -354,7 +354,7 @@ class Threads(unittest.TestCase):
             turns += 1
             done.wait(0.001)
         worker.join()
-        self.assertGreater(turns, 2)  # One, where the GIL is held; a busy machine gives few.
+        self.assertGreater(turns, 2)  # One if the GIL is held; a busy machine gives few.
 
     def test_many_threads_get_the_same_bits(self):
         expected = digests(partiemc.reconstruct(block(side=60), spacing=1))

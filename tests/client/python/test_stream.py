@@ -145,11 +145,11 @@ class Streams(unittest.TestCase):
 
     def test_a_refused_frame_leaves_the_stream_as_it_was(self):
         with partiemc.connect(self.address, spacing=1) as stream:
-            with self.assertRaises(partiemc.Error) as caught:  # By the client.
+            with self.assertRaises(partiemc.Error) as caught:  # Refused by the client.
                 stream.send(numpy.zeros((5, 4)))
             self.assertEqual((caught.exception.reason, caught.exception.sequence), ("COUNT", 0))
             stream.send(numpy.full((3, 2), numpy.nan))
-            with self.assertRaises(partiemc.Error) as caught:  # By the server.
+            with self.assertRaises(partiemc.Error) as caught:  # Refused by the server.
                 stream.receive()
             self.assertEqual(caught.exception.reason, "NOT_FINITE")
             self.assertEqual(caught.exception.field, "positions[0].x")
@@ -167,7 +167,7 @@ class Streams(unittest.TestCase):
             for k, frame in enumerate(frames):
                 passing = frame.copy()
                 self.assertIsNone(stream.send(passing, k))
-                passing[:] = numpy.nan  # It was copied.
+                passing[:] = numpy.nan  # The frame was copied.
             results = []
             while not results or results[-1].time < 59:
                 results.append(stream.receive(wait=30))
@@ -258,7 +258,7 @@ class Streams(unittest.TestCase):
         _, error = waiting.communicate(timeout=60)
         self.assertIn("KeyboardInterrupt", error)
 
-    def test_the_script_of_the_readme_draws_and_gives_the_digests_of_replay(self):
+    def test_readme_script_draws_and_gives_the_digests_of_replay(self):
         script = readme()
         self.assertLessEqual(len(script.split("\n\n")[1].splitlines()), 10)
         frames = [block(0.3 * k) for k in range(6)]
@@ -274,7 +274,7 @@ class Streams(unittest.TestCase):
                 text = picture.read()
         self.assertEqual(text.count("<path"), 3)
         self.assertTrue(text.endswith("</svg>\n"))
-        if "PARTIEMC_PICTURES" in os.environ:  # For whoever wants to look at it.
+        if "PARTIEMC_PICTURES" in os.environ:  # For inspection.
             with open(os.path.join(os.environ["PARTIEMC_PICTURES"], "readme.svg"), "w") as copy:
                 copy.write(text)
 

@@ -1,4 +1,4 @@
-"""The wheel: made without a network, whole, and good for an import elsewhere."""
+"""The wheel: made without a network, complete, and importable elsewhere."""
 
 import ast
 import os

@@ -33,7 +33,7 @@ class Recording : public ::testing::Test {
   support::TemporaryFolder directory_;
 };
 
-// Frames of different sizes, an empty one among them; every second one has no volumes.
+// Frames of different sizes, one of them empty; every second one has no volumes.
 std::vector<RecordedFrame> RandomFrames(std::size_t count) {
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
@@ -258,15 +258,14 @@ TEST_F(Recording, ADamagedByteIsNeverDeliveredAsAFrame) {
     const WhatWasRead read = Read(Path("damaged.pemc"));
     ExpectPrefix(read.frames, frames);
     if (!read.status.ok()) ++errors;
-    // A length that has grown looks like a file that was cut off; a bit that means nothing may
-    // leave everything as it was.
+    // A larger length looks like a truncated file; an unused bit may change nothing.
     EXPECT_TRUE(!read.status.ok() || !read.notices.empty() || read.frames.size() == frames.size());
   }
   EXPECT_GT(errors, whole.size() / 2);
 }
 
-// Messages behind their lengths, as they are in a block: field 1 of a frame is its number, field 3
-// its format; field 1 left out is number 0.
+// Length-delimited messages as in a block: field 1 of a frame is its number, field 3 its format; an
+// absent field 1 is 0.
 TEST_F(Recording, AFrameInAnotherFramesPlaceIsDamage) {
   using namespace std::string_literals;
   const std::string header = "\0"s, frame_0 = "\x02\x18\x01"s, frame_1 = "\x04\x08\x01\x18\x01"s;
@@ -342,7 +341,7 @@ TEST(BundledRecording, IsTheDamBreakBelowTwoMegabytes) {
     EXPECT_THAT(frame.ids, SizeIs(2278));
     EXPECT_THAT(frame.velocities, SizeIs(2 * 2278));
   }
-  // 34 x 67 particles from (0.03, 0.03) on.
+  // 34 x 67 particles starting at (0.03, 0.03).
   EXPECT_EQ(read.frames[0].positions[0], 0.03f);
   EXPECT_EQ(read.frames[0].positions[3], 0.060303f);
   EXPECT_EQ(*read.frames[1].time, 0.023347);

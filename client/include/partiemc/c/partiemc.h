@@ -1,17 +1,18 @@
-/* PartiEMC from C99, and from whatever calls C: particles in, outlines and meshes out, by a server
- * or in this process. client/c/example.c is a whole program, client/c/example.f90 one in Fortran.
+/* PartiEMC's C99 interface, also for languages that call C: converts particles to outlines and
+ * meshes, on a server or in this process. Example programs: client/c/example.c and, in Fortran,
+ * client/c/example.f90.
  *
- * A stream numbers its frames from 1 as they are sent, and answers them one by one in that order.
- * One thread sends and another one receives; partiemc_cancel may come from any thread. A program
- * with one thread receives before it sends whenever partiemc_in_flight has reached
- * partiemc_window, or it uses partiemc_reconstruct. Streams do not know of each other.
+ * A stream numbers its frames from 1 in the order of sending and answers each once, in that order.
+ * One thread sends, another receives; any thread may call partiemc_cancel. A program with one
+ * thread must receive before it sends when partiemc_in_flight has reached partiemc_window, or use
+ * partiemc_reconstruct. Streams are independent of each other.
  *
- * Every function that may fail returns a partiemc_code; partiemc_last_error then says why. A struct
- * that begins with `size` may become longer in later versions: its partiemc_..._init fills as much
- * of it as the caller knows, and the library reads and writes no more than that.
+ * Every function that can fail returns a partiemc_code; partiemc_last_error describes the error. A
+ * struct that begins with `size` may become longer in later versions. The library reads and writes
+ * only its first `size` bytes; partiemc_..._init sets `size`.
  *
- * A process may hold this library once, and not beside a copy of the C++ client or of the Python
- * package: each would register the same messages with Protobuf, which ends the process. */
+ * Load this library once per process, and not together with the C++ client or the Python package:
+ * each registers the same Protobuf messages, and a second registration aborts the process. */
 #ifndef PARTIEMC_C_PARTIEMC_H_
 #define PARTIEMC_C_PARTIEMC_H_
 
@@ -22,28 +23,29 @@
 extern "C" {
 #endif
 
-/* The codes of gRPC. Those that are not named here may come from a server, too. */
+/* gRPC status codes. A server may return other gRPC codes, too. */
 typedef int32_t partiemc_code;
 enum {
   PARTIEMC_OK = 0,
-  PARTIEMC_CANCELLED = 1,           /* By partiemc_cancel. */
-  PARTIEMC_INVALID_ARGUMENT = 3,    /* An option, an address, an array, a frame. */
+  PARTIEMC_CANCELLED = 1,           /* After partiemc_cancel. */
+  PARTIEMC_INVALID_ARGUMENT = 3,    /* Option, address, array or frame. */
   PARTIEMC_DEADLINE_EXCEEDED = 4,   /* The server did not answer in time. */
   PARTIEMC_RESOURCE_EXHAUSTED = 8,  /* A limit, or memory. */
-  PARTIEMC_FAILED_PRECONDITION = 9, /* A call that does not go after the ones before it. */
-  PARTIEMC_INTERNAL = 13,           /* A mistake of the library. */
-  PARTIEMC_UNAVAILABLE = 14,        /* No server there, or it went away for good. */
-  PARTIEMC_DATA_LOSS = 15,          /* An answer that makes no sense. */
-  PARTIEMC_UNAUTHENTICATED = 16     /* The token. */
+  PARTIEMC_FAILED_PRECONDITION = 9, /* Not allowed after the previous calls. */
+  PARTIEMC_INTERNAL = 13,           /* A bug in the library. */
+  PARTIEMC_UNAVAILABLE = 14,        /* No server, or the connection was lost. */
+  PARTIEMC_DATA_LOSS = 15,          /* A malformed response. */
+  PARTIEMC_UNAUTHENTICATED = 16     /* Missing or invalid token. */
 };
 
-/* Why the last call of this thread failed; strings are never NULL and valid until the thread's next
- * call. With a `reason`, a rule was broken: of partiemc_send, it refuses that frame alone and the
- * stream goes on. Without, the stream has ended. proto/PROTOCOL.md has the reasons. */
+/* The error of this thread's last failed call. Strings are never NULL and stay valid until the
+ * thread's next call. An error of partiemc_send with a `reason` refuses only that frame, and the
+ * stream continues; an error without a reason has ended the stream. proto/PROTOCOL.md lists the
+ * reasons. */
 typedef struct partiemc_error {
   partiemc_code code;
-  const char* message; /* One line for a person. */
-  const char* reason;  /* For programs: "COUNT", "NOT_FINITE", ...; "" where no rule was broken. */
+  const char* message; /* One line for people. */
+  const char* reason;  /* For programs: "COUNT", "NOT_FINITE", ...; "" if no rule was broken. */
   const char* field;   /* "positions[17].x" */
   const char* value;   /* "nan" */
   const char* rule;    /* "must be finite" */
@@ -57,126 +59,125 @@ const char* partiemc_version(void);
 
 typedef struct partiemc_stream partiemc_stream;
 
-/* One more outline of the particles, with the options of the stream but for these. This struct will
- * not grow. */
+/* An additional outline of the particles; it differs from the stream's options in these members.
+ * This struct will not grow. */
 typedef struct partiemc_section {
-  const double* slice; /* Six numbers as in partiemc_options; NULL: that of the stream. */
-  double isovalue;     /* Likewise; 0: the outline of the body. */
+  const double* slice; /* Six numbers as in partiemc_options; NULL: the stream's. */
+  double isovalue;     /* As in partiemc_options; 0: the outline of the body. */
 } partiemc_section;
 
 typedef struct partiemc_options {
   size_t size;
-  double spacing;         /* Distance of particles, world units; 0: estimated. */
-  const char* placement;  /* "virtual-plane", "marching-squares", ...; NULL: the default. */
-  const char* fill;       /* "greedy", "conforming", "polygon", "grid", "none"; NULL likewise. */
-  const char* plane;      /* Of particles with z: "xy", "xz", "yz"; NULL: xy. */
-  double kernel_radius;   /* In spacings; 0: the default, 3. */
-  double cell_size;       /* In spacings; 0: the default, 1. */
-  int32_t normals;        /* 1: outward normals at the points of rings. */
-  int32_t latest;         /* 1: partiemc_send never waits; of frames that come while the stream
-                             is busy only the newest is sent. */
-  int32_t threads;        /* In process only: threads that compute; 0: one per processor. */
-  const char* name;       /* By which others watch the stream; NULL: the server makes one up. */
-  int32_t echo_particles; /* 1: watchers get the particles, too. */
-  int32_t tls;            /* 1: speak TLS. The four files below are PEM and may be NULL. */
-  const char* ca_file;    /* Authorities; NULL: those of the system. */
-  const char* cert_file;  /* The client's own certificate, and its key. */
+  double spacing;        /* Particle spacing, world units; 0: estimated. */
+  const char* placement; /* "virtual-plane", "marching-squares", ...; NULL: the default. */
+  const char* fill;      /* "greedy", "conforming", "polygon", "grid", "none"; NULL: the default. */
+  const char* plane;     /* For particles with z: "xy", "xz", "yz"; NULL: xy. */
+  double kernel_radius;  /* In spacings; 0: the default, 3. */
+  double cell_size;      /* In spacings; 0: the default, 1. */
+  int32_t normals;       /* 1: outward normals at ring vertices. */
+  int32_t latest;        /* 1: partiemc_send never waits; while the stream is busy, only the
+                            newest frame is kept. */
+  int32_t threads;       /* In process only: compute threads; 0: one per processor. */
+  const char* name;      /* For watchers; NULL: the server chooses a name. */
+  int32_t echo_particles; /* 1: send the particles to watchers too. */
+  int32_t tls;            /* 1: use TLS. The next three files are PEM and may be NULL. */
+  const char* ca_file;    /* Trusted authorities; NULL: the system's. */
+  const char* cert_file;  /* The client's certificate, and its key. */
   const char* key_file;
-  const char* token_file; /* Whose first word is the bearer token. */
-  const char* token;      /* Or the token itself. */
+  const char* token_file; /* File whose first word is the bearer token. */
+  const char* token;      /* The token itself, instead of a file. */
   double connect_timeout; /* Seconds to reach the server; 0: 2. */
-  double deadline;        /* Seconds for each answer; 0: 30. */
-  double give_up_after;   /* Seconds after which a lost connection ends the stream; 0: 300, with
-                             `latest` 30. Negative: at once. */
-  double send_timeout; /* Seconds for partiemc_send to get a place in the window, whatever becomes
-                          of the connection: DEADLINE_EXCEEDED then, and the stream goes on; 0:
-                          as long as the stream lives. */
-  /* Of a simulator of many processes, each of which opens the stream of the same `name`, and sends
-   * its particles of each frame, also none. Part 0 gets the results, the others PARTIEMC_PART_TAKEN
-   * for each frame. The frame is that of all particles, in the order of ids where they have ids,
-   * else part by part. Not with `latest`. */
-  uint32_t parts;          /* How many there are; 0: frames come whole. */
-  uint32_t part;           /* Which one this is, from 0 on. */
-  const char* parts_token; /* A secret of theirs, the same for all; NULL: who may produce the stream
-                              may send its parts. */
-  double part_timeout;     /* Seconds after which a frame that lacks a part is refused
-                              (PARTS_MISSING); 0: 10. */
-  const char* attributes;  /* Names, separated by commas, of what particles carry that is wanted at
-                              the vertices, too; "velocity" are the velocities. NULL: nothing. */
-  const double* slice;     /* Six numbers: a point of a plane and its normal. Particles then have x,
-                              y and z and fill space, and the outline is that of the section, in
-                              coordinates along the plane from that point on: x and y of a normal
-                              along z, x and z of one along -y, y and z of one along x. Wants
-                              `spacing`; volumes are volumes. NULL: no slice. */
-  double isovalue; /* In [.01, 10]: the outline is the isoline of the density, which is about
-                      1 inside of bodies and .5 on flat boundaries; 0: that of the body. */
-  const partiemc_section* sections; /* More outlines of each frame, at most 16, each of which costs
-                                       as much as a frame (partiemc_event_section). */
+  double deadline;        /* Seconds for each response; 0: 30. */
+  double give_up_after;   /* Seconds to reconnect before the stream ends; 0: 300, with `latest`
+                             30. Negative: do not reconnect. */
+  double send_timeout; /* Seconds for partiemc_send to get a slot in the window, in any state of the
+                          connection. Then it returns DEADLINE_EXCEEDED, and the stream continues.
+                          0: no limit while the stream lives. */
+  /* For a simulator with several processes. Each opens a stream with the same `name` and sends its
+   * particles of every frame, even if it has none. Part 0 receives the results, the other parts
+   * PARTIEMC_PART_TAKEN. Particles are ordered by id if they have ids, otherwise by part. Not with
+   * `latest`. */
+  uint32_t parts;          /* Number of parts; 0: frames are sent whole. */
+  uint32_t part;           /* Index of this part, from 0. */
+  const char* parts_token; /* Secret shared by all parts; NULL: any caller that may produce the
+                              stream may send its parts. */
+  double part_timeout; /* Seconds before a frame with a missing part is refused (PARTS_MISSING); 0:
+                          10. */
+  const char* attributes; /* Particle attributes to interpolate to the vertices: names separated by
+                             commas; "velocity" are the velocities. NULL: none. */
+  const double* slice;    /* Six numbers: a point of a plane and its normal. Particles then have x,
+                             y and z and fill space; the outline is the section with the plane.
+                             Its coordinates are in the plane, relative to the point: x and y for a
+                             normal along z, x and z for -y, y and z for x. Requires `spacing`;
+                             `volumes` are then volumes. NULL: no slice. */
+  double isovalue; /* In [.01, 10]: the outline is this isoline of the density, which is about 1
+                      inside of bodies and .5 on flat boundaries. 0: the body's outline. */
+  const partiemc_section* sections; /* Additional outlines of each frame, at most 16
+                                       (partiemc_event_section). Each costs like a frame. */
   size_t section_count;
 } partiemc_options;
-/* Every option at its default. `size` is sizeof(partiemc_options). */
+/* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
 
-/* Opens a stream to the server at HOST:PORT, [IPV6]:PORT or unix:PATH; `address` "": at
- * PARTIEMC_SERVER, or else at 127.0.0.1:50051; NULL: to the method in this process, with the same
- * answers, bit for bit. Credentials that are NULL are those of the environment, PARTIEMC_TOKEN_FILE
- * and so on. `options` may be NULL. On success
- * `*stream` is to be closed by partiemc_close, else it is NULL. Errors: INVALID_ARGUMENT,
- * UNAVAILABLE, UNAUTHENTICATED, RESOURCE_EXHAUSTED, DEADLINE_EXCEEDED. */
+/* Opens a stream to the server at `address`: HOST:PORT, [IPV6]:PORT or unix:PATH. "": the value of
+ * PARTIEMC_SERVER, or 127.0.0.1:50051. NULL: computes in this process, with the same bits.
+ * Credentials that are NULL come from the environment (PARTIEMC_TOKEN_FILE and others). `options`
+ * may be NULL. On success the caller closes `*stream` by partiemc_close; on failure it is NULL.
+ * Errors: INVALID_ARGUMENT, UNAVAILABLE, UNAUTHENTICATED, RESOURCE_EXHAUSTED, DEADLINE_EXCEEDED. */
 partiemc_code partiemc_open(const char* address, const partiemc_options* options,
                             partiemc_stream** stream);
 
-/* Frees the stream and all that its events point to. Cancels it unless its end has been received.
- * No other call may be under way. NULL is allowed. */
+/* Frees the stream and the memory of its events. Cancels it unless its end has been received.
+ * Requires: no other call on the stream is in progress. NULL is allowed. */
 void partiemc_close(partiemc_stream* stream);
 
 /* ---- Particles ---- */
 
 enum {
-  PARTIEMC_NONE = 0, /* The array is not there. */
+  PARTIEMC_NONE = 0, /* No array. */
   PARTIEMC_FLOAT32 = 1,
   PARTIEMC_FLOAT64 = 2,
-  PARTIEMC_INT32 = 3, /* Of ids only, and so are those that follow. */
+  PARTIEMC_INT32 = 3, /* This and the following types: ids only. */
   PARTIEMC_INT64 = 4,
   PARTIEMC_UINT32 = 5,
   PARTIEMC_UINT64 = 6
 };
 
-/* A number for each particle: that of particle k lies k * stride bytes after `first`. */
+/* One number per particle: particle k's is k * stride bytes after `first`. */
 typedef struct partiemc_array {
   const void* first;
-  ptrdiff_t stride; /* May be negative, or 0 for a number that all share. */
+  ptrdiff_t stride; /* May be negative, or 0 if all particles share one number. */
   int32_t type;
 } partiemc_array;
 
-/* What particles carry besides: a number each in x, or a vector in x and y, or x, y and z; of
+/* An attribute of particles: a number in x, or a vector in x and y, or in x, y and z. Its type is
  * PARTIEMC_FLOAT32 or PARTIEMC_FLOAT64, rounded to float. This struct will not grow. */
 typedef struct partiemc_attribute {
   const char* name; /* 1 to 64 bytes of printable ASCII. */
   partiemc_array x, y, z;
 } partiemc_attribute;
 
-/* The particles of one frame. Arrays must stay until the call that gets them returns; it copies
- * each number once, to where it is sent from. */
+/* The particles of one frame. Arrays must stay valid during the call they are passed to; it copies
+ * each number once, directly into the message. */
 typedef struct partiemc_particles {
   size_t size;
   size_t count;
-  partiemc_array x, y;    /* World units, finite. */
-  partiemc_array z;       /* Optional: all particles then lie in a plane that `plane` names, or fill
-                             space for a `slice`. */
-  partiemc_array volumes; /* Optional: area of each, world units squared; for a slice cubed. */
-  partiemc_array ids;     /* Optional: the same for a particle in every frame. */
-  /* Optional: world units per unit of time, as many as there are coordinates. */
+  partiemc_array x, y; /* World units, finite. */
+  partiemc_array z;    /* Optional: all particles then lie in a plane parallel to `plane`, or fill
+                          space for a `slice`. */
+  partiemc_array volumes; /* Optional: area in world units squared; for a slice, cubed. */
+  partiemc_array ids;     /* Optional: the same number for a particle in every frame. */
+  /* Optional: world units per unit of time, in the components of the coordinates. */
   partiemc_array velocity_x, velocity_y, velocity_z;
-  /* Optional: what the options name is looked at. */
+  /* Optional: only those named in the options are used. */
   const partiemc_attribute* attributes;
   size_t attribute_count;
 } partiemc_particles;
-/* No particles and no arrays. `size` is sizeof(partiemc_particles). */
+/* Sets no particles and no arrays. `size` is sizeof(partiemc_particles). */
 void partiemc_particles_init(partiemc_particles* particles, size_t size);
 
-/* Sets x and y, and z where `components` is 3, to `count` particles whose coordinates lie one after
- * the other: x0, y0, (z0,) x1, ... */
+/* Sets x and y, and z if `components` is 3, to `count` particles with interleaved coordinates: x0,
+ * y0, (z0,) x1, ... */
 void partiemc_set_float32(partiemc_particles* particles, const float* coordinates, size_t count,
                           int components);
 void partiemc_set_float64(partiemc_particles* particles, const double* coordinates, size_t count,
@@ -185,24 +186,24 @@ void partiemc_set_float64(partiemc_particles* particles, const double* coordinat
 /* ---- Sending ---- */
 
 /* Sends a frame. Waits while partiemc_window frames are sent and not yet received; with `latest` it
- * never waits. `sequence` gets the frame's number (0 with `latest`) and may be NULL.
- * Errors: see partiemc_error. DEADLINE_EXCEEDED when nobody receives. */
+ * never waits. Stores the frame's number (0 with `latest`) in `sequence`, which may be NULL.
+ * Errors: see partiemc_error. DEADLINE_EXCEEDED if no thread receives. */
 partiemc_code partiemc_send(partiemc_stream* stream, const partiemc_particles* particles,
                             double time, uint64_t* sequence);
 
-/* No more frames will come; answers are still to be received. With `latest` waits until the newest
- * frame has been sent, so that somebody must receive meanwhile. */
+/* Declares that no frame follows. Results of sent frames are still received. With `latest` it waits
+ * until the newest frame has been sent, so another thread must receive. */
 partiemc_code partiemc_finish(partiemc_stream* stream);
 
-/* Ends the stream at once: calls under way and later ones return CANCELLED. */
+/* Ends the stream at once: current and later calls return CANCELLED. */
 void partiemc_cancel(partiemc_stream* stream);
 
-/* Frames sent and not yet received, and how many there may be. */
+/* Number of frames sent and not yet received, and its limit. */
 size_t partiemc_in_flight(const partiemc_stream* stream);
 size_t partiemc_window(const partiemc_stream* stream);
 
-/* What became of frames, with `latest`: sent, skipped for a newer one, refused before they were
- * sent. Each pointer may be NULL; without `latest` all are 0. */
+/* Counts of frames with `latest`: sent, replaced by a newer one, refused before they were sent.
+ * Each pointer may be NULL; without `latest` all counts are 0. */
 void partiemc_latest_counts(const partiemc_stream* stream, uint64_t* sent, uint64_t* skipped,
                             uint64_t* refused);
 
@@ -212,80 +213,80 @@ typedef struct partiemc_ring {
   double area;      /* World units squared; positive for outer rings, negative for holes. */
   double perimeter; /* World units. */
   double centroid_x, centroid_y;
-  uint64_t particle_count; /* Of the ring's component; 0 for holes. */
-  uint64_t identity;       /* The same in every frame where the ring goes on; 0: not tracked. */
+  uint64_t particle_count; /* Particles of the ring's component; 0 for holes. */
+  uint64_t identity;       /* Constant from frame to frame; 0: not tracked. */
 } partiemc_ring;
 
 enum {
   PARTIEMC_RESULT = 0,      /* Outline and mesh of frame `sequence`. */
   PARTIEMC_REFUSAL = 1,     /* Frame `sequence` broke a rule and left no trace. */
-  PARTIEMC_NOTICE = 2,      /* A word of the server in `message`. */
-  PARTIEMC_NOTHING_YET = 3, /* The time to wait is over. */
+  PARTIEMC_NOTICE = 2,      /* A notice from the server in `message`. */
+  PARTIEMC_NOTHING_YET = 3, /* No event within the time to wait. */
   PARTIEMC_END = 4,         /* partiemc_finish was called and every frame has been answered. */
-  PARTIEMC_PART_TAKEN = 5 /* Part 0 has the answer to frame `sequence`, of which this was a part. */
+  PARTIEMC_PART_TAKEN = 5   /* A part of frame `sequence` was accepted; part 0 gets the result. */
 };
 
 #define PARTIEMC_NO_RING 0xffffffffu
 
-/* What particles carry, at the vertices. This struct will not grow. */
+/* Values of an attribute at the vertices. This struct will not grow. */
 typedef struct partiemc_values {
   const char* name;
   int32_t components;  /* 1 to 3. */
-  const float* values; /* Of each point of the mesh, whose first are those of the rings; without a
-                          mesh of each point of the rings. */
+  const float* values; /* At the mesh vertices, which begin with the ring vertices; without a mesh
+                          at the ring vertices. */
 } partiemc_values;
 
-/* One answer. Pointers are valid until the next call on this stream that fills an event; arrays
- * without elements may be NULL. Strings are never NULL. */
+/* One event. Pointers are valid until the next call on this stream that fills an event. Empty
+ * arrays may be NULL. Strings are never NULL. */
 typedef struct partiemc_event {
   size_t size;
   int32_t kind;
   uint64_t sequence;
-  double time; /* Of a result: as the frame was sent with. */
+  double time; /* Results: time of the frame. */
 
-  /* Of a refusal, as in partiemc_error. */
+  /* Refusals: as in partiemc_error. */
   const char *message, *reason, *field, *value, *rule;
 
-  /* Closed rings, the inside on their left: outer ones counter-clockwise, holes clockwise. */
+  /* Closed rings with the inside on the left: outer rings counter-clockwise, holes clockwise. */
   size_t ring_count, point_count;
   const double* points;       /* x0, y0, x1, y1, ...: point_count pairs, world units. */
   const uint32_t* offsets;    /* ring_count + 1: ring k has points offsets[k] to offsets[k + 1]. */
-  const uint32_t* outer_of;   /* ring_count: of a hole its outer ring, else PARTIEMC_NO_RING. */
+  const uint32_t* outer_of;   /* ring_count: a hole's outer ring, otherwise PARTIEMC_NO_RING. */
   const partiemc_ring* rings; /* ring_count. */
-  const float* normals;       /* point_count pairs where they were asked for, else NULL. */
+  const float* normals;       /* point_count pairs; NULL unless requested. */
 
   /* Triangles that cover the inside. */
   size_t mesh_point_count, triangle_count;
-  const double* mesh_points;       /* Pairs; the first are those of the rings. */
+  const double* mesh_points;       /* Pairs; they begin with `points`. */
   const uint32_t* triangles;       /* Three point indices each, counter-clockwise. */
   const uint8_t* triangle_classes; /* 0: in the band along the outline, 1: inside. */
 
   uint64_t particle_count;
   double area, perimeter;             /* Sums over rings. */
   double spacing, cell_size;          /* As used in this frame, world units. */
-  double milliseconds;                /* That the frame was computed for. */
+  double milliseconds;                /* Computation time. */
   uint64_t rings_digest, mesh_digest; /* Equal digests mean equal bits. */
 
-  size_t attribute_count; /* As the options name them, in their order. */
+  size_t attribute_count; /* Attributes of the options, in that order. */
   const partiemc_values* attributes;
 
-  size_t section_count; /* Of a result: those of the options. */
+  size_t section_count; /* Results: sections of the options. */
 } partiemc_event;
-/* Nothing. `size` is sizeof(partiemc_event). */
+/* Sets an empty event. `size` is sizeof(partiemc_event). */
 void partiemc_event_init(partiemc_event* event, size_t size);
 
-/* Waits for the next answer, at most `wait` seconds; negative: as long as it takes.
- * Errors: whatever ended the stream. */
+/* Waits for the next event, at most `wait` seconds; negative: without a limit.
+ * Errors: the status that ended the stream. */
 partiemc_code partiemc_receive(partiemc_stream* stream, double wait, partiemc_event* event);
 
-/* Fills `event` with a section of the result that the last event of the stream was, `index` below
- * its section_count: as if it were the only outline, but for `milliseconds`, which are the frame's.
- * Its pointers are valid for as long as those of that event. Errors: INVALID_ARGUMENT. */
+/* Fills `event` with section `index` of the stream's last event, which must be a result. `event` is
+ * filled like a result with one outline; `milliseconds` is the frame's. Its pointers are valid as
+ * long as the last event's. Errors: INVALID_ARGUMENT unless `index` is below section_count. */
 partiemc_code partiemc_event_section(partiemc_stream* stream, size_t index, partiemc_event* event);
 
-/* Sends a frame and waits for its answer, which is a result or a refusal. For programs with one
- * thread that want nothing else meanwhile. Errors: those of partiemc_send and partiemc_receive;
- * FAILED_PRECONDITION with `latest`, or while earlier frames are in flight. */
+/* Sends a frame and waits for its result or refusal. For programs with one thread. Errors: see
+ * partiemc_send and partiemc_receive; FAILED_PRECONDITION with `latest`, or while earlier frames
+ * are in flight. */
 partiemc_code partiemc_reconstruct(partiemc_stream* stream, const partiemc_particles* particles,
                                    double time, partiemc_event* event);
 

@@ -1,4 +1,5 @@
-// Answers without a loop of one's own: each by a callback, or as a future.
+// Sends frames and delivers each result through a callback or a future, without a receive loop in
+// the caller.
 //
 //   partiemc::client::AsyncStream async(**stream);
 //   auto answer = async.Send({.positions = std::span<const float>(xy)}, time);
@@ -17,38 +18,39 @@
 
 namespace partiemc::client {
 
-/// Sends on a stream and receives from it on a thread of its own. Each result is handed over with
-/// its buffers, which Receive would use again. One thread sends.
+/// Adapter that receives from a stream on its own thread. Each result is moved out with its
+/// buffers, so they are not reused. One thread sends.
 class AsyncStream {
  public:
-  /// What a frame became; of parts other than 0 (StreamOptions) nothing. Errors: one with a
-  /// Violation (FindViolation) where it was refused, and the stream goes on; else what ended the
-  /// stream.
+  /// The result of one frame; empty for parts other than 0 (StreamOptions). Errors: a status with a
+  /// Violation (FindViolation) refuses this frame only, and the stream continues. Any other status
+  /// ended the stream.
   using Answer = absl::StatusOr<FrameResult>;
   using Answered = std::function<void(Answer)>;
-  /// Told of what is no answer: Event::Kind::kNotice and kReconnected.
+  /// Receives the events that answer no frame: Event::Kind::kNotice and kReconnected.
   using Told = std::function<void(const Event&)>;
 
-  /// `stream` outlives this, and nobody else sends on it or receives from it. `told` is called on
-  /// the receiving thread.
+  /// `stream` must outlive this object; no other code sends or receives on it. `told` runs on the
+  /// receiving thread.
   explicit AsyncStream(FrameStream& stream, Told told = {});
-  /// Cancels the stream unless Finish has returned; what is unanswered is answered by that.
+  /// Cancels the stream unless Finish has returned. Frames without an answer get status CANCELLED.
   ~AsyncStream();
   AsyncStream(const AsyncStream&) = delete;
   AsyncStream& operator=(const AsyncStream&) = delete;
 
-  /// As FrameStream::Send and SendArrays, so they wait for the window; the future never waits
-  /// longer than the stream's deadline for a frame that is due.
+  /// Sends like FrameStream::Send and SendArrays: waits for the window. The future is ready at the
+  /// latest when the stream's deadline for the frame expires.
   std::future<Answer> Send(const Frame& frame, double time);
   std::future<Answer> SendArrays(const ParticleArrays& particles, double time);
 
-  /// The same, and `answered` is called once: on the receiving thread, in the order of the frames,
-  /// or before Send returns where the stream does not take the frame. It holds up the answers
-  /// behind it, and may not call this.
+  /// Same as above, with a callback. `answered` is called once: on the receiving thread in the
+  /// order of the frames, or before Send returns if the stream does not accept the frame. Later
+  /// answers wait until it returns. It must not call this object.
   void Send(const Frame& frame, double time, Answered answered);
   void SendArrays(const ParticleArrays& particles, double time, Answered answered);
 
-  /// No more frames will come. Waits until each has been answered. Errors: what ended the stream.
+  /// Ends the sending side and waits until every frame is answered. Errors: the status that ended
+  /// the stream.
   absl::Status Finish();
 
  private:

@@ -1,35 +1,36 @@
-// How a client makes sure of its server, and the server of its client.
+// TLS and token settings with which client and server authenticate each other.
 #pragma once
 
 #include <string>
 
 namespace partiemc::client {
 
-/// Files are PEM and are read when a connection is made, a token file at every call: a token that
-/// was replaced counts from the next call on.
+/// All files are PEM except the token file. PEM files are read when a connection is opened. The
+/// token file is read at every call, so a new token applies from the next call.
 struct Credentials {
-  /// Speak TLS: the server's certificate must be valid, signed by a known authority, and for the
-  /// host of the address.
+  /// Uses TLS. The server's certificate must be valid, signed by a known authority, and issued for
+  /// the host of the address.
   bool tls = false;
-  std::string ca_file = {};  ///< The authorities that are known; empty: those of the system.
-  /// The client's own certificate and key, for a server that asks for one. Both or neither.
+  std::string ca_file = {};  ///< Trusted authorities; empty: the system's.
+  /// The client's certificate and private key, if the server requires a certificate. Set both or
+  /// neither.
   std::string cert_file = {};
   std::string key_file = {};
 
-  /// The bearer token that is sent with every call; empty: none. A token is a secret: it is sent
-  /// over TLS or within this machine, and refused to go anywhere else.
+  /// Bearer token sent with every call; empty: none. It is sent only over TLS or within this
+  /// machine; MakeChannel refuses any other address.
   std::string token = {};
-  /// Or the file that holds it: the first word that is no comment, so that the file of a server
-  /// does as well. Counts only without `token`.
+  /// File with the token; ignored if `token` is set. The first word outside comments is used, so a
+  /// server's token file works too.
   std::string token_file = {};
 };
 
-/// What the command line reads, too: PARTIEMC_TLS (0, false, no, off or empty: not),
-/// PARTIEMC_TLS_CA, PARTIEMC_TLS_CERT, PARTIEMC_TLS_KEY, PARTIEMC_TOKEN, PARTIEMC_TOKEN_FILE.
-/// Whoever names a certificate wants TLS.
+/// Reads PARTIEMC_TLS (0, false, no, off or empty: disabled), PARTIEMC_TLS_CA, PARTIEMC_TLS_CERT,
+/// PARTIEMC_TLS_KEY, PARTIEMC_TOKEN and PARTIEMC_TOKEN_FILE, like the command line. Setting a
+/// certificate enables TLS.
 Credentials CredentialsFromEnvironment();
 
-/// PARTIEMC_SERVER, or else 127.0.0.1:50051.
+/// The value of PARTIEMC_SERVER; 127.0.0.1:50051 if it is not set.
 std::string ServerFromEnvironment();
 
 }  // namespace partiemc::client

@@ -1,5 +1,5 @@
-// The core in this process behind the interface of a stream: same frames, same answers, same bits
-// as from a server, without one.
+// Runs the core in this process behind the interface of a stream. Results have the same bits as a
+// server's.
 #pragma once
 
 #include <chrono>
@@ -16,12 +16,12 @@ struct LocalStreamOptions {
   ReconstructionParameters parameters = {};
   std::vector<std::string> attributes = {};  ///< As Outputs::attributes (stream.h).
   FrameLimits limits = {};
-  /// Threads that reconstruct, at least 1. 0: one for each processor.
+  /// Compute threads, at least 1; 0: one per processor.
   int threads = 0;
-  /// Frames that wait or are in work, at least 1. 2 lets the caller read the next one meanwhile.
+  /// Frames that wait or are being computed, at least 1. A caller with 2 can read the next frame
+  /// while one is computed.
   std::size_t frames_in_flight = 2;
-  /// As StreamOptions::send_timeout (stream.h). Absent: no limit, as the work is done by this
-  /// process itself.
+  /// Same as StreamOptions::send_timeout (stream.h); absent: no limit.
   std::optional<std::chrono::milliseconds> send_timeout = {};
 };
 
@@ -30,7 +30,7 @@ class LocalStream : public FrameStream {
   /// Errors: INVALID_ARGUMENT, see Validate(ReconstructionParameters).
   static absl::StatusOr<std::unique_ptr<LocalStream>> Open(const LocalStreamOptions& options);
 
-  /// Waits for the frame in work, drops the others. No call may be under way.
+  /// Waits for the frame that is being computed and drops the others. No call may be in progress.
   ~LocalStream() override = default;
 };
 

@@ -1,4 +1,4 @@
-// Parameters that are names, as bindings to other languages and files of settings have them.
+// Sets parameters by name, for language bindings and configuration files.
 #pragma once
 
 #include <array>
@@ -13,8 +13,9 @@
 
 namespace partiemc::client {
 
-/// Sets `parameter`, which is called `field`, to that of `values` whose Name is `name`.
-/// Errors: INVALID_ARGUMENT with a Violation (reason UNSUPPORTED) that tells all names.
+/// Sets `parameter` to the element of `values` whose Name is `name`. `field` is the parameter's
+/// name in errors. Errors: INVALID_ARGUMENT with a Violation (reason UNSUPPORTED) that lists all
+/// names.
 template <typename Value>
 absl::Status SetByName(std::string_view field, std::string_view name, std::span<const Value> values,
                        Value& parameter) {

@@ -18,15 +18,16 @@
 
 namespace partiemc::client {
 
-/// One number for each particle, of one of the `Numbers`. Owns nothing.
+/// A view of one number per particle, with a byte stride; its type is one of `Numbers`. Owns
+/// nothing.
 template <typename... Numbers>
 class StridedView {
  public:
-  /// None.
+  /// An absent array.
   StridedView() = default;
 
-  /// Particle k's lies `k * stride` bytes after `first`; the stride may be 0 or negative, and no
-  /// number needs to be aligned.
+  /// The number of particle k is `k * stride` bytes after `first`. The stride may be 0 or negative;
+  /// numbers need not be aligned.
   template <typename T>
   requires(std::same_as<T, Numbers> || ...)
       StridedView(const T* first, std::ptrdiff_t stride = sizeof(T))
@@ -36,7 +37,7 @@ class StridedView {
     return std::visit([](const auto* first) { return first == nullptr; }, first_);
   }
   std::ptrdiff_t stride() const { return stride_; }
-  /// Calls `use` with the pointer to particle 0's number.
+  /// Calls `use` with the typed pointer to particle 0's number.
   template <typename Use>
   decltype(auto) Visit(Use&& use) const {
     return std::visit(std::forward<Use>(use), first_);
@@ -50,26 +51,26 @@ class StridedView {
 using Reals = StridedView<float, double>;
 using Ids = StridedView<std::uint64_t, std::int64_t, std::uint32_t, std::int32_t>;
 
-/// One of Frame::attributes: a number, or a vector of two or three.
+/// Same as Attribute, with one view per component: a number, or a vector of two or three.
 struct AttributeArrays {
-  std::string_view name;  ///< As of Attribute.
+  std::string_view name;  ///< As in Attribute.
   Reals x, y = {}, z = {};
 };
 
-/// What Frame is for interleaved arrays. Views must outlive the call that they are given to only;
-/// it copies each number once, to where it is sent from.
+/// Same as Frame, with one view per quantity. Views must stay valid during the call they are passed
+/// to; it copies each number once, directly into the message.
 struct ParticleArrays {
-  std::size_t count = 0;  ///< Particles; each view that is given has so many numbers.
+  std::size_t count = 0;  ///< Number of particles; the length of each view that is given.
 
-  /// World units, finite. With `z`, all particles must lie in one plane parallel to the one that
-  /// ReconstructionParameters::plane names. They travel as float where all are float, else as
-  /// double.
+  /// World units, finite. With `z`, all particles must lie in one plane parallel to
+  /// ReconstructionParameters::plane. Coordinates are sent as float if all of them are float,
+  /// otherwise as double.
   Reals x, y, z;
 
-  // Each as in Frame, and may be left out. Doubles are rounded to float.
+  // Optional, as in Frame. Doubles are rounded to float.
   Reals volumes;
-  Ids ids;  ///< Negative ones count as those above 2^63.
-  /// As many of them as of coordinates, or none.
+  Ids ids;  ///< The same components as the coordinates, or none.
+  /// As many components as coordinates, or none.
   Reals velocity_x, velocity_y, velocity_z;
   /// Rounded to float.
   std::span<const AttributeArrays> attributes = {};

@@ -28,108 +28,107 @@
 
 namespace partiemc::client {
 
-/// What the server sends back for each frame; rings and statistics always come.
+/// Outputs of each frame. Rings and statistics are always included.
 struct Outputs {
   bool mesh = true;
-  bool normals = false;  ///< Outward unit normals at the points of the rings.
-  /// Coordinates as float32 relative to an origin: half the bytes. A frame so wide that a point
-  /// would move by more than 1e-4 spacings is refused.
+  bool normals = false;  ///< Outward unit normals at ring vertices.
+  /// Sends coordinates as float32 relative to an origin: half the bytes. A frame is refused if it
+  /// is so wide that a vertex would move by more than 1e-4 spacings.
   bool relative_float32 = false;
-  bool echo_particles = false;  ///< Watchers of the stream get the particles too.
-  /// Of Frame::attributes those that are wanted at the vertices (Result::attributes), at most 16;
-  /// "velocity" are Frame::velocities. A frame that lacks one is refused.
+  bool echo_particles = false;  ///< Sends the particles to the stream's watchers too.
+  /// Attributes to interpolate to the vertices (Result::attributes), by the names of
+  /// Frame::attributes; at most 16. "velocity" names Frame::velocities. A frame that lacks one is
+  /// refused.
   std::vector<std::string> attributes = {};
 };
 
-/// Patience of a producer that waits for its server, and of one that skips frames meanwhile or
-/// watches.
+/// Default time before a client gives up reconnecting. kShortPatience is for watchers and for
+/// producers that skip frames.
 inline constexpr std::chrono::minutes kPatience{5};
 inline constexpr std::chrono::seconds kShortPatience{30};
 
-/// How a stream goes on after its connection or its server was lost.
+/// How a stream reconnects after it lost its connection or its server.
 struct ReconnectPolicy {
-  /// Time from the loss to the next new answer, after which the stream ends with an error. A lost
-  /// connection is noticed within 10 s. 0: the stream ends with its connection.
+  /// Time from the loss to the next new result; after it the stream ends with an error. A lost
+  /// connection is detected within 10 s. 0: do not reconnect.
   std::chrono::milliseconds give_up_after{kPatience};
-  /// Each address is tried once at once. Then pauses follow, each twice as long as the one before,
-  /// of which a random part is left out, so that many clients do not come back as one.
+  /// Each address is first tried once without a pause. Then pauses follow; each is twice as long as
+  /// the previous one, minus a random part, so that many clients do not reconnect at the same
+  /// moment.
   std::chrono::milliseconds first_pause{50};
   std::chrono::milliseconds longest_pause{1000};
-  /// Whether Receive tells of each reconnection (Event::Kind::kReconnected).
+  /// Receive reports each reconnection (Event::Kind::kReconnected).
   bool announce = false;
 };
 
-/// Frames that come in parts, each from a process of its own: every rank of a simulator opens the
-/// stream of the same name, sends its particles of each step, all ranks as many frames and in the
-/// same order, also where it has none, and receives. Rank 0 gets the results, the others
-/// Event::Kind::kPartTaken for what they have sent. A frame is that of all its particles, in the
-/// order of their ids where they have ids, else part by part. Not for a LatestSender: ranks would
-/// leave out different frames.
+/// Settings for frames that several processes (ranks) of a simulator send in parts. Every rank
+/// opens a stream with the same name and sends its particles of every step, even if it has none;
+/// all ranks send the same number of frames in the same order. Rank 0 receives the results, the
+/// others Event::Kind::kPartTaken for each part. Particles are ordered by id if they have ids,
+/// otherwise by part. Not for a LatestSender: ranks would skip different frames.
 struct FrameParts {
-  std::uint32_t parts = 0;  ///< 0: frames come whole.
-  std::uint32_t part = 0;   ///< Below `parts`. Part 0 opens the stream; others wait for that.
-  /// The same for all parts and for nobody else, at most 128 bytes of printable ASCII. Empty:
-  /// whoever may produce a stream of this name may send its parts.
+  std::uint32_t parts = 0;  ///< Number of parts; 0: frames are sent whole.
+  std::uint32_t part = 0;  ///< Below `parts`. Part 0 opens the stream; the other parts wait for it.
+  /// Secret shared by all parts, at most 128 bytes of printable ASCII. Empty: any caller that may
+  /// produce a stream of this name may send its parts.
   std::string token = {};
-  /// A frame that lacks a part for so long after part 0 has come is refused (PARTS_MISSING). Below
-  /// `deadline`, at most ten minutes; part 0 decides.
+  /// A frame is refused (PARTS_MISSING) if a part is missing this long after its first part
+  /// arrived. Below `deadline`, at most ten minutes; the value of part 0 applies.
   std::chrono::milliseconds timeout{10000};
 };
 
 struct StreamOptions {
-  /// 1 to 128 characters of [A-Za-z0-9._-], unique on the server. Empty: the server makes one up.
+  /// 1 to 128 characters of [A-Za-z0-9._-], unique on the server. Empty: the server chooses a name.
   std::string name = {};
   ReconstructionParameters parameters = {};
   Outputs outputs = {};
-  /// Shown where streams are listed. At most 16; 128 bytes at most, no control characters each.
+  /// Shown in lists of streams. At most 16; each at most 128 bytes without control characters.
   std::map<std::string, std::string> labels = {};
-  /// TLS, certificates and token. Loopback and Unix sockets need none, unless the server wants
+  /// TLS, certificates and token. Loopback and Unix sockets need none unless the server requires
   /// them.
   Credentials credentials = {};
-  /// For reaching the server; a server that starts meanwhile is found.
+  /// Time to reach the server, including the time until it has started.
   std::chrono::milliseconds connect_timeout{2000};
-  /// For the server to accept the stream, and then for each answer, counted from the frame, the
-  /// answer or the reconnection before it, whichever came last.
+  /// Time for the server to accept the stream, and for each response. It starts at the latest of
+  /// three events: the frame was sent, the previous response, a reconnection.
   std::chrono::milliseconds deadline{30000};
-  /// For Send to get a place in the window, whatever becomes of connection and server. A frame that
-  /// gets none is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream goes on. Absent: as
-  /// long as the stream lives, that is for `deadline`, after a loss for `reconnect.give_up_after`
-  /// more.
+  /// Time for Send to get a slot in the window, in any state of connection and server. A frame
+  /// without a slot is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream continues. Absent:
+  /// `deadline`; after a loss `reconnect.give_up_after` longer.
   std::optional<std::chrono::milliseconds> send_timeout = {};
-  /// Servers to go on with, beside the one that Open is given: of the same version and with no
-  /// smaller limits. Behind a proxy one address is enough.
+  /// Servers to fail over to, in addition to the address of Open. They need the same version and
+  /// limits that are not smaller. Behind a proxy one address is enough.
   std::vector<std::string> fallback_addresses = {};
-  /// The server sends what is needed to go on elsewhere with every such frame. Less repeats fewer
-  /// frames after a loss and holds fewer; it costs the bytes of the outline. 0: the stream ends
-  /// with its connection.
+  /// Number of frames between checkpoints. Fewer frames mean less to hold and to repeat after a
+  /// loss, and more bytes: each checkpoint has the size of the outline. 0: do not reconnect.
   std::uint32_t checkpoint_interval = 4;
   ReconnectPolicy reconnect = {};
-  /// Wants a name. What else is set here counts for part 0 alone, but for credentials, addresses
-  /// and times.
+  /// Requires a name. All other options apply to part 0 only, except credentials, addresses and
+  /// times.
   FrameParts parts = {};
-  /// What frames may take that are held for being sent again: `checkpoint_interval` and a window of
-  /// them. A frame that does not fit is refused.
+  /// Upper bound on the frames held for resending: `checkpoint_interval` frames plus the window. A
+  /// frame that does not fit is refused.
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
 
-/// Frames are never dropped: Send waits while the server's window is full. A frame larger than the
-/// server's limits is refused before anything is sent. Reading runs in the background, so that a
-/// sender and a receiver never wait for each other beyond the window.
+/// Never drops frames: Send waits while the server's window is full. A frame above the server's
+/// limits is refused before anything is sent. Reading runs in the background, so sender and
+/// receiver only wait for each other through the window.
 ///
-/// A stream survives its connection and its server: Receive connects again, to the next address
-/// first, and goes on from the last checkpoint. Every frame is still answered once, in order, with
-/// the bits that it would have had. Send does not fail meanwhile; it waits for the window, for
-/// `send_timeout` at most.
+/// Survives the loss of its connection and its server: Receive reconnects, to the next address
+/// first, and resumes from the last checkpoint. Every frame is still answered once, in order, with
+/// the same bits. Send does not fail during that time; it waits for the window, at most
+/// `send_timeout`.
 class Stream : public FrameStream {
  public:
-  /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
-  /// Errors: INVALID_ARGUMENT (address, credentials, parameters, name or labels), UNAVAILABLE (no
-  /// server at any address, or one of the two does not trust the other), UNAUTHENTICATED (token),
-  /// RESOURCE_EXHAUSTED (no room for another stream), DEADLINE_EXCEEDED, each in one line.
+  /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH. Errors: INVALID_ARGUMENT (address,
+  /// credentials, parameters, name or labels), UNAVAILABLE (no server at any address, or TLS
+  /// verification failed), UNAUTHENTICATED (token), RESOURCE_EXHAUSTED (no slot for another
+  /// stream), DEADLINE_EXCEEDED. Each message is one line.
   static absl::StatusOr<std::unique_ptr<Stream>> Open(std::string_view address,
                                                       const StreamOptions& options);
 
-  /// Cancels the stream unless its end has been received. No call may be under way.
+  /// Cancels the stream unless its end has been received. No call may be in progress.
   ~Stream() override = default;
 };
 

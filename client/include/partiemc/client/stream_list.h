@@ -1,4 +1,4 @@
-// The streams that are open on a server now.
+// Lists the open streams of a server.
 #pragma once
 
 #include <chrono>
@@ -18,17 +18,17 @@ struct StreamSummary {
   std::string stream_id;
   std::string name;
   std::map<std::string, std::string> labels;
-  ReconstructionParameters parameters;  ///< As resolved.
-  std::uint64_t last_sequence = 0;      ///< The last number that the stream has used up.
-  std::uint64_t frames = 0;             ///< Answered by a result.
+  ReconstructionParameters parameters;  ///< Resolved.
+  std::uint64_t last_sequence = 0;      ///< Number of the stream's newest frame.
+  std::uint64_t frames = 0;             ///< Frames answered by a result.
   std::uint64_t frame_errors = 0;
   std::uint32_t watchers = 0;
   double open_seconds = 0;
   double idle_seconds = 0;
 };
 
-/// Asks the server at `address` (HOST:PORT, [IPV6]:PORT or unix:PATH), in the order of opening.
-/// Errors: those of GetServerInfo.
+/// Requests the list from the server at `address` (HOST:PORT, [IPV6]:PORT or unix:PATH), in the
+/// order of opening. Errors: see GetServerInfo.
 absl::StatusOr<std::vector<StreamSummary>> ListStreams(
     std::string_view address, std::chrono::milliseconds deadline = std::chrono::seconds(5),
     const Credentials& credentials = {});

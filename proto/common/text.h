@@ -1,0 +1,43 @@
+// Splits text and reads numbers, in terms of std::string_view (which Debian's abseil does not
+// accept), independent of the locale.
+#pragma once
+
+#include <charconv>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+namespace partiemc {
+
+inline constexpr std::string_view kAsciiBlanks = " \t\r\n\v\f";
+
+/// `text` without the characters of `blanks` at both ends.
+std::string_view Strip(std::string_view text, std::string_view blanks = kAsciiBlanks);
+
+/// The parts between separators, stripped of `blanks`; one empty part for an empty text.
+std::vector<std::string_view> Split(std::string_view text, char separator,
+                                    std::string_view blanks = kAsciiBlanks);
+
+/// Removes `prefix` from the front of `text`, if it is there.
+bool ConsumePrefix(std::string_view& text, std::string_view prefix);
+
+/// Removes a decimal number from the front of `text`: digits for unsigned integers, "-1.5e3", "nan"
+/// or "inf" for floating point. Nothing if there is no number, or it is out of range.
+template <typename Number>
+std::optional<Number> ConsumeNumber(std::string_view& text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc()) return std::nullopt;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return number;
+}
+
+/// As ConsumeNumber, for a text that is nothing but the number.
+template <typename Number>
+std::optional<Number> ParseNumber(std::string_view text) {
+  const auto number = ConsumeNumber<Number>(text);
+  return text.empty() ? number : std::nullopt;
+}
+
+}  // namespace partiemc

@@ -1,0 +1,15 @@
+// Bytes that this process's connections have received.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+namespace partiemc::server {
+
+/// Bytes received by each TCP connection of this process. The key is the peer in gRPC's format:
+/// "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234". Empty if the system does not report
+/// them. Cost: two system calls per open descriptor.
+std::map<std::string, std::uint64_t> ReceivedBytesOfConnections();
+
+}  // namespace partiemc::server

@@ -1,0 +1,313 @@
+#include "server/compute/read_permits.h"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "server/compute/memory_budget.h"
+
+namespace partiemc::server {
+namespace {
+
+// A connection that brings less than this in the time that follows is idle: 16 kB/s, less than a
+// slow line has. The time is longer than a busy client needs to begin. Where the system does not
+// report what a connection has received, a read has more time.
+constexpr std::uint64_t kMovingBytes = 16 << 10;
+constexpr std::chrono::milliseconds kQuiet(1000), kQuietUnknown(2000);
+
+// What a connection brings beside the message: frames of HTTP/2, pings, other calls.
+constexpr std::uint64_t kBeside = 1 << 20;
+
+absl::Status OutOfMemoryForReads() {
+  return absl::UnavailableError(
+      "the server has no memory for the frames that are on their way: connect again; the next "
+      "frame "
+      "is read when there is room");
+}
+
+}  // namespace
+
+ReadPermits::ReadPermits(MemoryBudget& budget, const ReadTerms& terms)
+    : budget_(budget),
+      terms_{.streams_beyond = std::max(terms.streams_beyond, 1u),
+             .message_bytes = std::max<std::uint64_t>(terms.message_bytes, 1)} {}
+
+std::uint64_t ReadPermits::Expected(const Read& read) const {
+  if (read.expected_bytes == 0) return terms_.message_bytes;
+  return std::min(read.expected_bytes, terms_.message_bytes);
+}
+
+ReadPermits::Permit& ReadPermits::Renew(const std::shared_ptr<Reader>& reader, Read read) {
+  auto& item = *permits_.try_emplace(reader.get()).first;
+  Finish(item);
+  item.second = {.reader = reader, .read = std::move(read), .number = ++numbers_};
+  ++waiting_;  // Before the budget is asked: whoever gives back afterwards serves this one.
+  return item.second;
+}
+
+bool ReadPermits::Begin(const std::shared_ptr<Reader>& reader, Read read) {
+  bool begins = false;
+  {
+    const std::lock_guard lock(mutex_);
+    Renew(reader, std::move(read));
+    begins = TryPermit(*permits_.find(reader.get()), /*may_open_slot=*/waiting_ == 1);
+  }
+  if (!begins || NeedsLook()) TellWaiting();
+  return begins;
+}
+
+void ReadPermits::BeginNow(const std::shared_ptr<Reader>& reader, Read read) {
+  const std::lock_guard lock(mutex_);
+  Permit& permit = Renew(reader, std::move(read));
+  permit.state = State::kReading;
+  permit.planned = Expected(permit.read);
+  budget_.Plan(permit.planned, permit.read.caller);
+  --waiting_;
+  ++reading_;
+}
+
+absl::Status ReadPermits::Came(const Reader& reader, std::uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  const auto found = permits_.find(&reader);
+  if (found == permits_.end() || found->second.state != State::kReading) return absl::OkStatus();
+  Permit& permit = found->second;
+  permit.state = State::kHolding;
+  --reading_;
+  Unplan(permit);
+  if (std::exchange(permit.has_lapsed, false)) {
+    --lapsed_;
+    return budget_.CheckHeld(bytes, permit.read.caller);
+  }
+  if (!permit.has_slot) return absl::OkStatus();
+  Slot& slot = slots_.at(permit.read.stream);
+  slot.reading = false;
+  slot.bytes += bytes;
+  SetBeyond(permit, std::min(bytes, terms_.message_bytes));
+  return absl::OkStatus();
+}
+
+void ReadPermits::End(const Reader& reader) {
+  const std::lock_guard lock(mutex_);
+  const auto found = permits_.find(&reader);
+  if (found == permits_.end()) return;
+  Finish(*found);
+  permits_.erase(found);
+}
+
+void ReadPermits::Unplan(Permit& permit) {
+  budget_.Unplan(std::exchange(permit.planned, 0), permit.read.caller);
+  changed_ = true;
+}
+
+void ReadPermits::SetBeyond(Permit& permit, std::uint64_t bytes) {
+  budget_.ChangeBeyond(std::exchange(permit.beyond, bytes), bytes);
+}
+
+// What the permit was for is over.
+void ReadPermits::Finish(Permits::value_type& item) {
+  Permit& permit = item.second;
+  if (permit.number == 0) return;  // It is new.
+  changed_ = true;
+  if (permit.state == State::kWaiting) --waiting_;
+  if (permit.state == State::kReading) --reading_;
+  if (permit.planned > 0) Unplan(permit);
+  if (std::exchange(permit.has_lapsed, false)) --lapsed_;
+  LeaveSlot(item.first, permit);
+}
+
+bool ReadPermits::TryPermit(Permits::value_type& item, bool may_open_slot) {
+  Permit& permit = item.second;
+  const std::uint64_t expected = Expected(permit.read);
+  if (!budget_.TryPlan(expected, permit.read.caller)) {
+    Slot* const slot = FindSlot(item, may_open_slot);
+    if (slot == nullptr) return false;
+    slot->reading = permit.has_slot = true;
+    slot->used.insert(item.first);
+    slot->open.insert(item.first);
+    SetBeyond(permit, expected);
+    budget_.Plan(expected, permit.read.caller);
+  }
+  permit.planned = expected;
+  permit.state = State::kReading;
+  --waiting_;
+  ++reading_;
+  return true;
+}
+
+// The slot in which this connection may be read from beyond the budget.
+ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool may_open_slot) {
+  const auto found = slots_.find(item.second.read.stream);
+  if (found != slots_.end()) {
+    Slot& slot = found->second;
+    const bool may_read =
+        !slot.reading && slot.bytes < terms_.message_bytes && !slot.used.contains(item.first);
+    return may_read ? &slot : nullptr;
+  }
+  if (!may_open_slot || slots_.size() >= terms_.streams_beyond) return nullptr;
+  return &slots_[item.second.read.stream];
+}
+
+// Frames that fit into the budget and the share of their caller by now are not beyond them.
+void ReadPermits::FreeSlots() {
+  for (auto& [reader, permit] : permits_) {
+    if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
+      LeaveSlot(reader, permit);
+    }
+  }
+}
+
+void ReadPermits::LeaveSlot(const Reader* reader, Permit& permit) {
+  if (!std::exchange(permit.has_slot, false)) return;
+  SetBeyond(permit, 0);
+  const auto slot = slots_.find(permit.read.stream);
+  if (permit.state == State::kReading) slot->second.reading = false;
+  slot->second.open.erase(reader);
+  if (slot->second.open.empty()) slots_.erase(slot);
+}
+
+// Gives the next permit, if there is room for one.
+std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
+  std::map<const CallerAccount*, std::size_t> slots_of;
+  for (const auto& [reader, permit] : permits_) {
+    if (permit.has_slot) ++slots_of[permit.read.caller];
+  }
+  std::vector<Permits::value_type*> waiting;
+  for (auto& item : permits_) {
+    if (item.second.state == State::kWaiting) waiting.push_back(&item);
+  }
+  // What completes a frame that is beyond the budget comes first.
+  const auto rank = [&](const Permits::value_type* item) {
+    const Permit& permit = item->second;
+    const CallerAccount* const caller = permit.read.caller;
+    return std::tuple(!slots_.contains(permit.read.stream), slots_of[caller],
+                      budget_.PlannedBy(caller), permit.number);
+  };
+  std::ranges::sort(waiting, {}, rank);
+  for (Permits::value_type* const item : waiting) {
+    auto reader = item->second.reader.lock();
+    if (reader != nullptr && TryPermit(*item, true)) return reader;
+  }
+  return nullptr;
+}
+
+void ReadPermits::Serve() {
+  if (!changed_.exchange(false)) return;
+  budget_.Grant();
+  ServeWaiting();
+}
+
+void ReadPermits::ServeWaiting() {
+  if (waiting_ == 0) return;
+  std::vector<std::shared_ptr<Reader>> permitted;
+  {
+    const std::lock_guard lock(mutex_);
+    FreeSlots();
+    while (waiting_ > 0) {
+      auto reader = PermitNext();
+      if (reader == nullptr) break;
+      permitted.push_back(std::move(reader));
+    }
+  }
+  for (const auto& reader : permitted) reader->ReadPermitted();
+}
+
+bool ReadPermits::NeedsLook() const {
+  if (NeedsBytes()) return true;
+  // All that reads can bring at once.
+  const std::uint64_t most = budget_.bytes() + terms_.streams_beyond * terms_.message_bytes;
+  const std::uint64_t planned = budget_.planned();
+  return planned > most || (most - planned) / terms_.message_bytes < reading_;
+}
+
+void ReadPermits::OnWaiting(std::function<void()> tell) {
+  const std::lock_guard lock(tell_mutex_);
+  tell_waiting_ = std::move(tell);
+}
+
+void ReadPermits::TellWaiting() const {
+  const std::lock_guard lock(tell_mutex_);
+  if (tell_waiting_) tell_waiting_();
+}
+
+void ReadPermits::Measure(Permit& permit, Clock::time_point now, const ReceivedBytes& received) {
+  const auto bytes = received(permit.read.peer);
+  permit.grown = 0;
+  if (bytes && permit.received) {
+    permit.grown = *bytes - std::min(*bytes, *permit.received);
+    permit.came += permit.grown;
+  }
+  if (!permit.moved || permit.grown >= kMovingBytes) permit.moved = now;
+  if (bytes && (!permit.received || permit.grown >= kMovingBytes)) {
+    permit.received = bytes;
+  } else {
+    permit.came -= permit.grown;  // Too little yet: it is counted with what follows.
+  }
+}
+
+void ReadPermits::LapseOrCover(Permits::value_type& item, Clock::time_point now) {
+  Permit& permit = item.second;
+  const auto quiet = permit.received ? kQuiet : kQuietUnknown;
+  if (now - *permit.moved >= quiet) {
+    if (waiting_ == 0 || permit.has_lapsed) return;
+    Unplan(permit);
+    permit.has_lapsed = true;
+    ++lapsed_;
+    LeaveSlot(item.first, permit);
+    return;
+  }
+  if (permit.came <= permit.planned + kBeside || permit.planned >= terms_.message_bytes) return;
+  const std::uint64_t most = permit.has_lapsed ? Expected(permit.read) : terms_.message_bytes;
+  const std::uint64_t more = most - std::min(most, permit.planned);
+  if (more == 0 || !budget_.TryPlan(more, permit.read.caller)) return;
+  permit.planned += more;
+  if (std::exchange(permit.has_lapsed, false)) --lapsed_;
+}
+
+void ReadPermits::Look(Clock::time_point now, const ReceivedBytes& received) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto& item : permits_) {
+      if (item.second.state != State::kReading) continue;
+      Measure(item.second, now, received);
+      LapseOrCover(item, now);
+    }
+  }
+  Serve();
+}
+
+bool ReadPermits::IsAtRisk(const Permit& permit) const {
+  if (permit.state != State::kReading || permit.planned >= terms_.message_bytes) return false;
+  return permit.received ? permit.grown >= kMovingBytes || permit.came > permit.planned + kBeside
+                         : permit.has_lapsed;
+}
+
+std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
+  std::vector<std::shared_ptr<Reader>> revoked;
+  {
+    const std::lock_guard lock(mutex_);
+    // Of each caller, those that are nearest to their end come first; of all callers, the first
+    // ones, then the second ones.
+    std::map<const CallerAccount*, std::vector<const Permit*>> of_caller;
+    for (const auto& [reader, permit] : permits_) {
+      if (IsAtRisk(permit)) of_caller[permit.read.caller].push_back(&permit);
+    }
+    std::vector<std::pair<std::size_t, const Permit*>> in_turn;
+    for (auto& [caller, reads] : of_caller) {
+      std::ranges::sort(reads, std::ranges::greater(), &Permit::came);
+      for (std::size_t k = 0; k < reads.size(); ++k) in_turn.emplace_back(k, reads[k]);
+    }
+    std::ranges::stable_sort(in_turn, {}, &std::pair<std::size_t, const Permit*>::first);
+    for (std::size_t k = free_bytes / terms_.message_bytes; k < in_turn.size(); ++k) {
+      if (auto reader = in_turn[k].second->reader.lock()) revoked.push_back(std::move(reader));
+    }
+  }
+  for (const auto& reader : revoked) reader->ReadRevoked(OutOfMemoryForReads());
+  return revoked.size();
+}
+
+std::size_t ReadPermits::streams_beyond() const {
+  const std::lock_guard lock(mutex_);
+  return slots_.size();
+}
+
+}  // namespace partiemc::server

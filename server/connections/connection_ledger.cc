@@ -1,0 +1,161 @@
+#include "server/connections/connection_ledger.h"
+
+#include <algorithm>
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+// A message takes up to this part more on the wire: frames of HTTP/2 and records of TLS. Proxies
+// make frames of a kilobyte.
+constexpr std::uint64_t kOverheadPart = 8;
+// Of a message, whatever its size.
+constexpr std::uint64_t kMessageOverhead = 256;
+// Of a call: its headers, as they usually are, its end, and its window updates.
+constexpr std::uint64_t kCallOverhead = 1'024;
+// A client acknowledges what it receives by WINDOW_UPDATE: usually a thousandth of it.
+constexpr std::uint64_t kReplyPart = 16;
+// A message that is too large is received in full, so that its sender is told by how much: up to
+// twice what one may have, and at least this many bytes. Beyond that the connection is cut.
+constexpr std::uint64_t kLeastReadAllowance = std::uint64_t{64} << 20;
+// PINGs and SETTINGS, which are nobody's.
+constexpr double kBytesPerSecond = 16 * 1'024;
+// Bytes that a call may have under way unread: its window and that of the connection.
+constexpr std::uint64_t kWindowBytes = 320 << 10;
+// For so long an ended call's bytes may still arrive.
+constexpr double kLingerSeconds = 5;
+// Windows of ended calls that linger at once, beside one message.
+constexpr std::uint64_t kLingeringWindows = 64;
+
+// Headers that belong together arrive in one go. Where gRPC has read much more since a stream began
+// than its headers may have, and the stream is still no call after this time, they have no end.
+constexpr milliseconds kHeaderTime(100);
+// Where it has read little. gRPC itself has no such limit.
+constexpr std::chrono::seconds kSlowHeaderTime(10);
+
+std::uint64_t OnTheWire(std::uint64_t bytes) {
+  return bytes + bytes / kOverheadPart + kMessageOverhead;
+}
+
+}  // namespace
+
+std::string_view FloodName(Flood flood) {
+  switch (flood) {
+    case Flood::kUnaccountedBytes:
+      return "unaccounted bytes";
+    case Flood::kStreams:
+      return "too many streams";
+    case Flood::kHeaders:
+      return "headers without an end";
+  }
+  return "";
+}
+
+ConnectionLedger::ConnectionLedger(const ConnectionRules& rules, Clock::time_point now)
+    : rules_(rules), examined_(now), pending_since_(now) {}
+
+void ConnectionLedger::OnCallBegun() {
+  credit_.fetch_add(kCallOverhead, std::memory_order_relaxed);
+  calls_open_.fetch_add(1, std::memory_order_relaxed);
+  calls_begun_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void ConnectionLedger::OnReadDone(std::uint64_t bytes) {
+  credit_.fetch_add(OnTheWire(bytes), std::memory_order_relaxed);
+  reads_open_.fetch_sub(1, std::memory_order_relaxed);
+}
+
+void ConnectionLedger::OnCallEnded(bool reading) {
+  ended_.fetch_add(kWindowBytes + (reading ? ReadAllowance() : 0), std::memory_order_relaxed);
+  if (reading) reads_open_.fetch_sub(1, std::memory_order_relaxed);
+  calls_open_.fetch_sub(1, std::memory_order_relaxed);
+}
+
+ConnectionLedger::Counts ConnectionLedger::Take() const {
+  return {.calls_begun = calls_begun_.load(std::memory_order_relaxed),
+          .calls_open = calls_open_.load(std::memory_order_relaxed),
+          .reads_open = reads_open_.load(std::memory_order_relaxed),
+          .credit = credit_.load(std::memory_order_relaxed),
+          .ended = ended_.load(std::memory_order_relaxed)};
+}
+
+std::uint64_t ConnectionLedger::ReadAllowance() const {
+  if (rules_.max_message_bytes == 0) return OnTheWire(0);
+  return OnTheWire(std::max(2 * rules_.max_message_bytes, kLeastReadAllowance));
+}
+
+std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,
+                                               const ConnectionReading& reading,
+                                               Clock::time_point now) {
+  const double seconds = std::chrono::duration<double>(now - examined_).count();
+  PayDebt(counts, reading, seconds);
+  CountStreams(counts, reading, seconds);
+  const double allowed =
+      static_cast<double>(counts.calls_open * kWindowBytes + counts.reads_open * ReadAllowance()) +
+      lingering_;
+  excess_ = static_cast<std::uint64_t>(std::max(0.0, debt_ - allowed));
+  examined_ = now;
+  last_counts_ = counts;
+  last_ = reading;
+  if (rules_.max_streams > 0 && streams_ > rules_.max_streams) return Flood::kStreams;
+  if (rules_.unaccounted_bytes == 0) return std::nullopt;
+  if (excess_ > rules_.unaccounted_bytes) return Flood::kUnaccountedBytes;
+  return ExamineHeaders(counts, reading, now);
+}
+
+// Credits of before the debt would be lost, as the debt does not go below zero: bytes of a message
+// are received before the message is reported, so both come in this order.
+void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& reading,
+                               double seconds) {
+  debt_ += static_cast<double>(reading.bytes_received - last_.bytes_received);
+  const double most = static_cast<double>(ReadAllowance() + kLingeringWindows * kWindowBytes);
+  lingering_ = std::min(most, lingering_ + static_cast<double>(counts.ended - last_counts_.ended));
+  // What an ended call allowed is forgiven step by step, so that it allows less and less.
+  const double forgiven = lingering_ * std::min(1.0, seconds / kLingerSeconds);
+  lingering_ -= forgiven;
+  debt_ -= static_cast<double>(counts.credit - last_counts_.credit) + forgiven +
+           static_cast<double>((reading.bytes_sent - last_.bytes_sent) / kReplyPart) +
+           kBytesPerSecond * seconds;
+  debt_ = std::max(0.0, debt_);
+}
+
+// A stream that was reset is no longer open, but gRPC still makes a call of it and has its memory
+// until then. Some streams never become calls, so the number is forgiven step by step.
+void ConnectionLedger::CountStreams(const Counts& counts, const ConnectionReading& reading,
+                                    double seconds) {
+  const double forgiven = static_cast<double>(rules_.max_streams) * seconds / kLingerSeconds;
+  waiting_streams_ = std::max(0.0, waiting_streams_ - forgiven);
+  if (!reading.has_streams) return;
+  waiting_streams_ += static_cast<double>(reading.streams_started - counted_started_) -
+                      static_cast<double>(counts.calls_begun - counted_begun_);
+  waiting_streams_ = std::max(0.0, waiting_streams_);
+  counted_started_ = reading.streams_started;
+  counted_begun_ = counts.calls_begun;
+  streams_ = std::max(reading.streams_open, static_cast<std::uint64_t>(waiting_streams_));
+}
+
+std::optional<Flood> ConnectionLedger::ExamineHeaders(const Counts& counts,
+                                                      const ConnectionReading& reading,
+                                                      Clock::time_point now) {
+  if (!reading.has_streams) return std::nullopt;
+  headers_pending_ = reading.streams_open > counts.calls_open;
+  // Between the headers of a block no other stream begins, and no message ends.
+  if (!headers_pending_ || reading.streams_started != pending_stream_ ||
+      reading.messages != pending_messages_) {
+    pending_since_ = now;
+    pending_stream_ = reading.streams_started;
+    pending_messages_ = reading.messages;
+    pending_bytes_ = reading.bytes_read;
+    return std::nullopt;
+  }
+  const std::uint64_t bytes = reading.bytes_read - pending_bytes_;
+  const auto time = now - pending_since_;
+  if ((time >= kHeaderTime && bytes > rules_.unaccounted_bytes) ||
+      (time >= kSlowHeaderTime && bytes > 0)) {
+    return Flood::kHeaders;
+  }
+  return std::nullopt;
+}
+
+}  // namespace partiemc::server

@@ -1,0 +1,331 @@
+#include "server/connections/connection_watch.h"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "server/telemetry/logging.h"
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+// How often connections are examined, and how often while a few of them are new or have an excess:
+// gRPC begins 50 calls in a millisecond.
+constexpr milliseconds kPeriod(20), kAlertPeriod(5);
+constexpr std::size_t kMostInAlert = 64;
+constexpr seconds kNew(1);
+// Connections neither new nor with an excess that are examined in one period.
+constexpr std::size_t kQuietInPeriod = 128;
+// gRPC renders the counts of streams as text, in 20 us. A stream takes 22 bytes at least, so that
+// there are at most 750 more of them than were counted last.
+constexpr std::uint64_t kBytesBetweenCounts = 16 << 10;
+constexpr std::size_t kCountsInPeriod = 64;
+constexpr milliseconds kPendingBetweenCounts(500);
+
+// Connections for health checks alone: of one address, of all, and how long one is kept.
+constexpr std::size_t kHealthOnlyOfAddress = 8;
+constexpr std::size_t kHealthOnly = 64;
+constexpr seconds kHealthOnlyTime(5);
+// What one may send beside its messages, and its streams.
+constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
+constexpr std::uint64_t kHealthOnlyStreams = 16;
+// gRPC receives such a connection after this time, unless the peer sends more than a health check
+// has before its first reply. So a peer that was cut and connects again costs next to nothing.
+constexpr milliseconds kHealthOnlyDelay(20);
+constexpr std::uint64_t kFirstBytes = 4 << 10;
+
+// gRPC frees what a flood took soon after its connection has ended; to give it back to the system
+// takes some milliseconds, in which nothing is allocated.
+constexpr milliseconds kBetweenGivingBack(500);
+
+constexpr seconds kBetweenForgetting(1);
+constexpr std::uint32_t kLinesPerSecond = 10;
+
+constexpr std::uint64_t kWakeKey = 0;  // Of epoll; keys of connections are larger.
+
+ConnectionRules RulesOf(Admission admission, ConnectionRules rules) {
+  if (admission == Admission::kKept) return rules;
+  return {.unaccounted_bytes = kHealthOnlyBytes,
+          .max_message_bytes = 0,
+          .max_streams = kHealthOnlyStreams};
+}
+
+}  // namespace
+
+ConnectionWatch::ConnectionWatch(const ConnectionLimits& limits, const ConnectionRules& rules,
+                                 ConnectionTable& table)
+    : rules_(rules),
+      table_(table),
+      events_(epoll_create1(EPOLL_CLOEXEC)),
+      wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      counts_(limits),
+      log_limit_(kLinesPerSecond) {
+  epoll_event event{.events = EPOLLIN, .data = {.u64 = kWakeKey}};
+  epoll_ctl(events_.get(), EPOLL_CTL_ADD, wake_.get(), &event);
+}
+
+ConnectionWatch::~ConnectionWatch() {
+  stop_ = true;
+  eventfd_write(wake_.get(), 1);
+  if (thread_.joinable()) thread_.join();
+  const std::lock_guard lock(mutex_);
+  while (!connections_.empty()) {
+    Abort(connections_.front().socket.get());
+    Remove(connections_.begin());
+  }
+}
+
+void ConnectionWatch::Start(StreamCounter* streams, std::function<void()> give_back_memory) {
+  streams_ = streams;
+  give_back_memory_ = std::move(give_back_memory);
+  thread_ = std::thread([this] { Run(); });
+}
+
+void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
+  auto peer = PeerOf(socket.get());
+  Connection connection;
+  connection.socket = Descriptor(fcntl(socket.get(), F_DUPFD_CLOEXEC, 0));
+  if (!peer || connection.socket.get() < 0) return;
+  connection.peer = *std::move(peer);
+  const std::string& address = connection.peer.address;
+  const auto now = Clock::now();
+  const std::lock_guard lock(mutex_);
+  if (counts_.IsFull()) EvictIdleLocked();
+  const Admission admission = counts_.Add(address, now);
+  if (admission == Admission::kRefused) return Abort(socket.get());
+  connection.tracked =
+      std::make_shared<TrackedConnection>(RulesOf(admission, rules_), admission, now);
+  if (!connection.peer.name.empty() && !table_.Add(connection.peer.name, connection.tracked)) {
+    counts_.Remove(address, admission);
+    return;
+  }
+  ++counters_.accepted;
+  if (admission == Admission::kHealthOnly) {
+    ++counters_.health_only;
+    EvictHealthOnly(address);
+    connection.waiting = std::move(socket);
+    connection.hand_over = hand_over;
+  }
+  connection.key = ++next_key_;
+  connection.came = connection.counted = now;
+  connection.counts_bytes = ReadByteCounts(connection.socket.get(), connection.reading);
+  epoll_event event{.events = EPOLLRDHUP | EPOLLET, .data = {.u64 = connection.key}};
+  epoll_ctl(events_.get(), EPOLL_CTL_ADD, connection.socket.get(), &event);
+  if (connections_.empty()) eventfd_write(wake_.get(), 1);
+  connections_.push_back(std::move(connection));
+  by_key_.emplace(connections_.back().key, std::prev(connections_.end()));
+  count_ = connections_.size();
+  if (admission == Admission::kKept) hand_over(std::move(socket));
+}
+
+void ConnectionWatch::EndAllAt(Clock::time_point deadline) {
+  const std::lock_guard lock(mutex_);
+  end_all_at_ = deadline;
+  eventfd_write(wake_.get(), 1);
+}
+
+void ConnectionWatch::Run() {
+  pthread_setname_np(pthread_self(), "connections");
+  while (!stop_) {
+    HandleEvents(TimeToWait(Clock::now()));
+    const auto now = Clock::now();
+    if (now >= give_back_at_) {
+      give_back_at_ = Clock::time_point::max();
+      give_back_memory_();
+    }
+    const std::lock_guard lock(mutex_);
+    if (now >= end_all_at_) {
+      for (const Connection& connection : connections_) Abort(connection.socket.get());
+    }
+    if (now >= examine_at_) ExamineAll(now);
+    if (now >= forget_at_) {
+      counts_.Forget(now);
+      forget_at_ = now + kBetweenForgetting;
+    }
+  }
+}
+
+// In milliseconds; -1 where there is nothing to do before an event.
+int ConnectionWatch::TimeToWait(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (connections_.empty() && counts_.addresses() == 0) return -1;
+  const auto next = connections_.empty() ? forget_at_ : examine_at_;
+  const auto wait = std::chrono::ceil<milliseconds>(std::min(next, end_all_at_) - now);
+  return static_cast<int>(
+      std::clamp(wait, milliseconds(1), milliseconds(kBetweenForgetting)).count());
+}
+
+void ConnectionWatch::HandleEvents(int timeout_ms) {
+  std::array<epoll_event, 64> events;
+  const int count =
+      epoll_wait(events_.get(), events.data(), static_cast<int>(events.size()), timeout_ms);
+  const std::lock_guard lock(mutex_);
+  for (int k = 0; k < count; ++k) {
+    const auto& event = events[static_cast<std::size_t>(k)];
+    if (event.data.u64 == kWakeKey) {
+      eventfd_t ignored = 0;
+      eventfd_read(wake_.get(), &ignored);
+    } else if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
+      // gRPC or the peer has ended it; until this descriptor is closed too, it takes memory.
+      const auto found = by_key_.find(event.data.u64);
+      if (found != by_key_.end()) Remove(found->second);
+    }
+  }
+}
+
+std::vector<ExaminedConnection> ConnectionWatch::Examined() const {
+  std::vector<ExaminedConnection> examined;
+  examined.reserve(connections_.size());
+  for (const Connection& connection : connections_) {
+    examined.push_back({connection.tracked.get(), &connection.peer.address});
+  }
+  return examined;
+}
+
+bool ConnectionWatch::EvictIdle() {
+  const std::lock_guard lock(mutex_);
+  return EvictIdleLocked();
+}
+
+bool ConnectionWatch::EvictIdleLocked() {
+  const auto idle = IdleOfLargestAddress(Examined(), counts_);
+  if (!idle) return false;
+  const auto connection = std::next(connections_.begin(), static_cast<std::ptrdiff_t>(*idle));
+  ++counters_.evicted;
+  shutdown(connection->socket.get(), SHUT_RDWR);
+  Remove(connection);
+  return true;
+}
+
+// Frees a slot for one more.
+void ConnectionWatch::EvictHealthOnly(const std::string& address) {
+  const auto is_health_only = [](const Connection& connection) {
+    return connection.tracked->admission == Admission::kHealthOnly;
+  };
+  std::size_t of_address = 0, all = 0;
+  for (const Connection& connection : connections_) {
+    if (!is_health_only(connection)) continue;
+    ++all;
+    of_address += connection.peer.address == address ? 1 : 0;
+  }
+  const bool own = of_address >= kHealthOnlyOfAddress;
+  if (!own && all < kHealthOnly) return;
+  const auto oldest = std::find_if(connections_.begin(), connections_.end(), [&](const auto& one) {
+    return is_health_only(one) && (!own || one.peer.address == address);
+  });
+  Abort(oldest->socket.get());
+  Remove(oldest);
+}
+
+// All connections where they are few; else those with an excess, and the others in turn.
+void ConnectionWatch::ExamineAll(Clock::time_point now) {
+  counts_left_ = kCountsInPeriod;
+  const bool is_period = now >= all_at_;
+  std::size_t index = 0, alerting = 0;
+  for (auto next = connections_.begin(); next != connections_.end(); ++index) {
+    const auto connection = next++;
+    const ConnectionLedger& ledger = connection->tracked->ledger;
+    const bool alerts =
+        ledger.excess() > 0 || ledger.headers_pending() || now - connection->came < kNew;
+    alerting += alerts ? 1 : 0;
+    if (alerts || (is_period && IsTurn(index))) Examine(connection, now);
+  }
+  ExamineTogether(now);
+  if (is_period) {
+    turn_ = connections_.empty() ? 0 : (turn_ + kQuietInPeriod) % connections_.size();
+    all_at_ = now + kPeriod;
+  }
+  examine_at_ = alerting > 0 && alerting <= kMostInAlert ? now + kAlertPeriod : all_at_;
+}
+
+bool ConnectionWatch::IsTurn(std::size_t index) const {
+  const std::size_t count = connections_.size();
+  return count <= kQuietInPeriod || (index + count - turn_) % count < kQuietInPeriod;
+}
+
+void ConnectionWatch::Examine(Connections::iterator connection, Clock::time_point now) {
+  TrackedConnection& tracked = *connection->tracked;
+  const auto counts = tracked.ledger.Take();
+  ConnectionReading& reading = connection->reading;
+  if (connection->counts_bytes) ReadByteCounts(connection->socket.get(), reading);
+  if (tracked.admission == Admission::kHealthOnly && !ExamineHealthOnly(*connection, now)) {
+    Abort(connection->socket.get());
+    Remove(connection);
+    return;
+  }
+  reading.has_streams = CountStreams(*connection, now);
+  if (const auto flood = tracked.ledger.Examine(counts, reading, now)) {
+    Cut(connection, *flood, now);
+  }
+}
+
+// False if it is to end.
+bool ConnectionWatch::ExamineHealthOnly(Connection& connection, Clock::time_point now) {
+  const auto time = now - connection.came;
+  if (connection.tracked->misused || time > kHealthOnlyTime) return false;
+  if (connection.waiting.get() < 0) return true;
+  if (connection.reading.bytes_received > kFirstBytes) return false;
+  if (time >= kHealthOnlyDelay)
+    std::exchange(connection.hand_over, {})(std::move(connection.waiting));
+  return true;
+}
+
+bool ConnectionWatch::CountStreams(Connection& connection, Clock::time_point now) {
+  if (streams_ == nullptr || counts_left_ == 0 || connection.peer.name.empty()) return false;
+  const std::uint64_t bytes = connection.reading.bytes_read - connection.bytes_at_count;
+  const auto time = now - connection.counted;
+  const bool pending = connection.tracked->ledger.headers_pending();
+  if (bytes < kBytesBetweenCounts && !(pending && time > kPendingBetweenCounts) &&
+      !(bytes > 0 && time > seconds(1))) {
+    return false;
+  }
+  --counts_left_;
+  connection.bytes_at_count = connection.reading.bytes_read;
+  connection.counted = now;
+  return streams_->Read(connection.peer.name, connection.grpc_socket, connection.reading);
+}
+
+void ConnectionWatch::ExamineTogether(Clock::time_point now) {
+  while (const auto excess = LargestExcess(Examined(), rules_)) {
+    Cut(std::next(connections_.begin(), static_cast<std::ptrdiff_t>(excess->index)), excess->flood,
+        now);
+  }
+}
+
+void ConnectionWatch::Cut(Connections::iterator connection, Flood flood, Clock::time_point now) {
+  const Connection& cut = *connection;
+  Abort(cut.socket.get());
+  ++counters_.floods[static_cast<std::size_t>(flood)];
+  counts_.OnFlood(cut.peer.address, cut.tracked->admission, now);
+  if (give_back_memory_) give_back_at_ = std::min(give_back_at_, now + kBetweenGivingBack);
+  if (log_limit_.Allow(now)) {
+    LogEvent(spdlog::level::warn, "connection cut",
+             {{"peer", cut.peer.name.empty() ? cut.peer.address : cut.peer.name},
+              {"reason", std::string(FloodName(flood))},
+              {"received", cut.reading.bytes_read},
+              {"unaccounted", cut.tracked->ledger.excess()},
+              {"streams", cut.tracked->ledger.streams()},
+              {"calls", cut.tracked->ledger.calls_begun()}});
+  }
+  Remove(connection);
+}
+
+void ConnectionWatch::Remove(Connections::iterator connection) {
+  epoll_ctl(events_.get(), EPOLL_CTL_DEL, connection->socket.get(), nullptr);
+  if (!connection->peer.name.empty()) table_.Remove(connection->peer.name);
+  counts_.Remove(connection->peer.address, connection->tracked->admission);
+  by_key_.erase(connection->key);
+  connections_.erase(connection);
+  count_ = connections_.size();
+}
+
+}  // namespace partiemc::server

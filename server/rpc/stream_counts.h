@@ -1,0 +1,28 @@
+// Reads gRPC's own counts of a connection: its streams and messages.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "server/connections/connection_watch.h"
+
+namespace partiemc::server {
+
+/// By channelz, which gRPC keeps for every connection. For one thread.
+class ChannelzStreams final : public StreamCounter {
+ public:
+  /// Of the server that was built last in this process.
+  ChannelzStreams();
+
+  bool Read(const std::string& peer, std::int64_t& socket, ConnectionReading& reading) override;
+
+ private:
+  std::int64_t Find(const std::string& peer);
+
+  std::int64_t server_ = 0;
+  std::int64_t next_socket_ = 0;                // The first that was not listed yet.
+  std::map<std::string, std::int64_t> listed_;  // By peers; some may be gone.
+};
+
+}  // namespace partiemc::server
