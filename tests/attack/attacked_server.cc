@@ -1,6 +1,7 @@
 #include "attack/attacked_server.h"
 
 #include <arpa/inet.h>
+#include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <signal.h>
 #include <spawn.h>
@@ -20,21 +21,6 @@
 
 namespace partiemc::attack {
 namespace {
-
-// A free loopback port.
-std::uint16_t FreePort() {
-  const int file = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  if (::bind(file, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
-      ::getsockname(file, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    throw std::runtime_error("no free port on loopback");
-  }
-  ::close(file);
-  return ntohs(address.sin_port);
-}
 
 double StatusMib(pid_t process, const std::string& field) {
   std::ifstream status("/proc/" + std::to_string(process) + "/status");
@@ -69,6 +55,28 @@ std::string HttpGet(const std::string& address, const std::string& path) {
 
 }  // namespace
 
+std::string FreeAddress() {
+  const int file = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  if (::bind(file, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
+      ::getsockname(file, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+    throw std::runtime_error("no free port on loopback");
+  }
+  ::close(file);
+  return "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+}
+
+double PlannedMib(std::vector<std::string> arguments) {
+  arguments.push_back("--print-memory-plan");
+  std::string plan;
+  EXPECT_EQ(server::RunServer(arguments, &plan), 0) << plan;
+  const auto line = plan.rfind('\n', plan.size() - 2) + 1;
+  return std::stod(plan.substr(line));
+}
+
 AttackedServer::AttackedServer(std::vector<std::string> arguments,
                                const server::Surroundings& surroundings) {
   if (std::find(arguments.begin(), arguments.end(), "--threads") == arguments.end()) {
@@ -87,7 +95,7 @@ AttackedServer::AttackedServer(std::vector<std::string> arguments,
   }
   // Another process may take the port before the server does.
   for (int attempt = 0; serving_ == nullptr; ++attempt) {
-    metrics_address_ = "127.0.0.1:" + std::to_string(FreePort());
+    metrics_address_ = FreeAddress();
     auto all = arguments;
     all.insert(all.end(), {"--metrics", metrics_address_});
     try {
@@ -158,7 +166,7 @@ int AttackedServer::Terminate(std::chrono::milliseconds time) {
 }
 
 Proxy::Proxy(const std::string& server, const std::string& certificate) {
-  address_ = "127.0.0.1:" + std::to_string(FreePort());
+  address_ = FreeAddress();
   std::vector<std::string> arguments = {"/usr/sbin/haproxy", "-db", "-q", "-f",
                                         PARTIEMC_SOURCE_DIR "/docker/haproxy.cfg"};
   std::vector<std::string> environment = {"PARTIEMC_PROXY=" + address_,

@@ -46,6 +46,12 @@ class AttackedServer {
   int code_ = 0;
 };
 
+/// A free address of loopback.
+std::string FreeAddress();
+
+/// The sum of --print-memory-plan of a server with these arguments, in MiB.
+double PlannedMib(std::vector<std::string> arguments);
+
 /// haproxy with docker/haproxy.cfg in front of a server, during the lifetime of this object.
 class Proxy {
  public:

@@ -151,8 +151,8 @@ std::vector<Case> CasesOverTls() {
 
 INSTANTIATE_TEST_SUITE_P(All, FloodOverTls, testing::ValuesIn(CasesOverTls()), NameOf);
 
-// haproxy with docker/haproxy.cfg in front of a server without limits per address. The attacker has a
-// token, so its calls reach the server. Its sixteen connections run on idle processors only.
+// haproxy with docker/haproxy.cfg in front of a server without limits per address. The attacker has
+// a token, so its calls reach the server. Its sixteen connections run on idle processors only.
 class FloodBehindProxy : public testing::TestWithParam<Case> {
  protected:
   const Files files_;

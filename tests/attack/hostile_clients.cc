@@ -1,5 +1,10 @@
 #include "attack/hostile_clients.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <array>
 #include <chrono>
 #include <deque>
@@ -10,8 +15,10 @@
 #include <thread>
 #include <vector>
 
+#include "attack/floods.h"
 #include "attack/http2_client.h"
 #include "attack/requests.h"
+#include "attack/sender.h"
 
 namespace partiemc::attack {
 namespace {
@@ -210,6 +217,98 @@ void CallsThatStay(Hostility& hostility) {
   });
 }
 
+// Runs `work` for each number below `count`, all at the same time.
+void AllAtOnce(std::size_t count, const std::function<void(std::size_t)>& work) {
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < count; ++k) {
+    threads.emplace_back([&work, k] {
+      YieldProcessors();
+      try {
+        work(k);
+      } catch (const std::runtime_error&) {
+        // As in Rounds.
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+// Frames of the maximum size, in more streams than there is memory for.
+void LargeFrames(Hostility& hostility) {
+  const std::string frame = SquareFrame(1, 400, kLarge);
+  while (!hostility.stop) {
+    AllAtOnce(31, [&](std::size_t) {
+      Sender sender(hostility.address, hostility.token);
+      if (sender.Open() && sender.Send(frame, true, kPatience)) sender.IsAnswered(kPatience);
+    });
+    ++hostility.rounds;
+  }
+}
+
+// Parts of frames of the maximum size, in streams whose part 0 sends nothing.
+void PartsWithoutPart0(Hostility& hostility) {
+  constexpr std::size_t kStreams = 6, kParts = 5;
+  const std::string frame = SquareFrame(1, 400, kLarge);
+  while (!hostility.stop) {
+    const std::string round = std::to_string(hostility.rounds) + "-";
+    std::vector<std::unique_ptr<Sender>> leaders;
+    AllAtOnce(1, [&](std::size_t) {
+      for (std::size_t stream = 0; stream < kStreams; ++stream) {
+        leaders.push_back(std::make_unique<Sender>(hostility.address, hostility.token));
+        leaders.back()->Open({"parts-" + round + std::to_string(stream), 0, kParts, 2'000});
+      }
+    });
+    AllAtOnce(kStreams * (kParts - 1), [&](std::size_t k) {
+      Sender sender(hostility.address, hostility.token);
+      const auto part = static_cast<std::uint32_t>(1 + k % (kParts - 1));
+      if (!sender.Open({"parts-" + round + std::to_string(k / (kParts - 1)), part, kParts})) return;
+      if (sender.Send(frame, false, kPatience)) sender.IsAnswered(kPatience);
+    });
+    ++hostility.rounds;
+  }
+}
+
+// Every flood below the level of calls, one second each, each from another address.
+void EveryFlood(Hostility& hostility) {
+  for (std::uint64_t k = 0; !hostility.stop; ++k) {
+    const Flood& flood = Floods()[k % Floods().size()];
+    RunFlood(flood, {.address = hostility.address,
+                     .source = "127.0.0." + std::to_string(2 + k % 200),
+                     .time = milliseconds(1'000),
+                     .yield_processors = true});
+    ++hostility.rounds;
+  }
+}
+
+// Handshakes of WebSocket calls that send no request.
+void MuteHandshakes(Hostility& hostility) {
+  const auto colon = hostility.web.rfind(':');
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(hostility.web.substr(colon + 1))));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const std::string request =
+      "GET /v1/watch HTTP/1.1\r\nHost: " + hostility.web + "\r\nOrigin: http://" + hostility.web +
+      "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nAuthorization: Bearer " +
+      hostility.token + "\r\n\r\n";
+  std::deque<int> open;
+  while (!hostility.stop) {
+    for (int k = 0; k < 256; ++k) {
+      const int file = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+      if (::connect(file, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0) {
+        [[maybe_unused]] const auto sent =
+            ::send(file, request.data(), request.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+      }
+      open.push_back(file);
+    }
+    ++hostility.rounds;
+    std::this_thread::sleep_for(kPause);
+    for (; open.size() > 300; open.pop_front()) ::close(open.front());
+  }
+  for (const int file : open) ::close(file);
+}
+
 constexpr std::array kAttacks = {
     Attack{"unknown-fields", "60 frames with 5 MiB of an unknown field each", UnknownFields},
     Attack{"repeated-fields", "8 frames with 10 MB of empty scalars each", RepeatedFields},
@@ -220,6 +319,10 @@ constexpr std::array kAttacks = {
     Attack{"bad-frames", "every fifth frame breaks a rule", BadFrames},
     Attack{"killed-clients", "connections cut with frames in flight", KilledClients},
     Attack{"calls-that-stay", "hundreds of calls that say nothing", CallsThatStay},
+    Attack{"large-frames", "31 streams with a frame of 32.9 MB each", LargeFrames},
+    Attack{"parts-without-part-0", "24 parts of 32.9 MB, and part 0 is silent", PartsWithoutPart0},
+    Attack{"every-flood", "each flood of tests/attack/floods.h for a second", EveryFlood},
+    Attack{"mute-handshakes", "256 WebSocket calls without a request", MuteHandshakes},
 };
 
 }  // namespace

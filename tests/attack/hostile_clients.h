@@ -12,6 +12,7 @@ namespace partiemc::attack {
 
 struct Hostility {
   std::string address;
+  std::string web;    ///< Address of the gateway.
   std::string token;  ///< A valid token for attackers that have one.
   support::Random random;
   const std::atomic<bool>& stop;

@@ -1,6 +1,6 @@
-// Everything hostile at once beside two honest streams, and a flood without tokens. A minute and
-// ten seconds by default; on demand
-//   attack_test --gtest_filter='Hostile*' --minutes 60 --flood-seconds 60 --slowdown 2 --beside 64
+// All attacks at once beside two honest streams, in a cgroup of the size that the server prints,
+// and a flood without tokens. A minute and ten seconds by default; on demand
+//   attack_test --gtest_filter='Hostile*' --minutes 60 --flood-seconds 60 --slowdown 3
 // and one attack alone: --attack unknown-fields.
 #include <gtest/gtest.h>
 
@@ -15,15 +15,17 @@
 #include <vector>
 
 #include "attack/attacked_server.h"
+#include "attack/floods.h"
 #include "attack/honest_stream.h"
 #include "attack/hostile_clients.h"
+#include "attack/memory_group.h"
 #include "attack/options.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::attack {
 namespace {
 
-constexpr double kBudgetMib = 256, kMostFloodMib = 32;
+constexpr double kMostFloodMib = 32;
 constexpr char kHonestToken[] = "honest-0123456789abcdef", kToken[] = "hostile-0123456789abcdef";
 constexpr std::chrono::seconds kPatience(90);
 
@@ -33,15 +35,18 @@ double Percentile99(std::vector<double> values) {
   return values[values.size() * 99 / 100];
 }
 
-// Attackers with one thread each, during the lifetime of this object.
+// Attackers during the lifetime of this object. They run on idle processors only, because real ones
+// have processors of their own.
 class Attackers {
  public:
-  Attackers(const std::string& address, const std::string& only) {
+  Attackers(const std::string& address, const std::string& web, const std::string& only) {
     for (const Attack& attack : Attacks()) {
       if (!only.empty() && only != attack.name) continue;
       rounds_.emplace_back(attack.name, 0);
-      threads_.emplace_back([this, &attack, &rounds = rounds_.back().second, address] {
-        Hostility hostility{address, kToken, support::Random(GetOptions().seed), stop_, rounds};
+      threads_.emplace_back([this, &attack, &rounds = rounds_.back().second, address, web] {
+        YieldProcessors();
+        Hostility hostility{address, web,   kToken, support::Random(GetOptions().seed),
+                            stop_,   rounds};
         attack.run(hostility);
       });
     }
@@ -74,14 +79,23 @@ class Hostile : public ::testing::Test {
     return Percentile99(all);
   }
 
-  std::vector<std::string> Arguments() const {
+  std::vector<std::string> Arguments(const std::string& web) const {
     return {
-        "--memory-budget", "256MB", "--token-file",
+        "--memory-budget",
+        "256MB",
+        "--web",
+        web,
+        "--threads",
+        "2",
+        "--token-file",
         folder_.Write("tokens", std::string(kHonestToken) + " honest\n" + kToken + " hostile\n")};
   }
 
   const support::TemporaryFolder folder_;
-  AttackedServer server_{Arguments()};
+  const std::string web_ = FreeAddress();
+  const double planned_mib_ = PlannedMib(Arguments(web_));
+  const MemoryGroup group_{static_cast<std::uint64_t>(planned_mib_) << 20};
+  AttackedServer server_{Arguments(web_), group_.Around()};
 };
 
 TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
@@ -95,20 +109,22 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
   double disturbed = 0;
   {
     std::unique_ptr<AttackedServer> other;
-    if (options.elsewhere) other = std::make_unique<AttackedServer>(Arguments());
-    const Attackers attackers((other ? *other : server_).address(), options.attack);
+    const std::string web = options.elsewhere ? FreeAddress() : web_;
+    if (options.elsewhere) other = std::make_unique<AttackedServer>(Arguments(web));
+    const Attackers attackers((other ? *other : server_).address(), web, options.attack);
     disturbed = QuietP99(one, two, all - quiet);
   }
   const double peak = memory.PeakMib();
   one.Stop();
   two.Stop();
   std::printf(
-      "%s: at most %.1f MiB at a budget of %.0f; p99 %.2f -> %.2f ms (%.2f times); %lu "
-      "honest frames\n",
-      options.attack.empty() ? "all" : options.attack.c_str(), peak, kBudgetMib, undisturbed,
-      disturbed, disturbed / undisturbed, static_cast<unsigned long>(one.frames() + two.frames()));
+      "%s: at most %.1f MiB of %.0f planned, in a group: %s (%.0f MiB); p99 %.2f -> %.2f ms (%.2f "
+      "times); %lu honest frames\n",
+      options.attack.empty() ? "all" : options.attack.c_str(), peak, planned_mib_,
+      group_.available() ? "yes" : "no", group_.PeakMib(), undisturbed, disturbed,
+      disturbed / undisturbed, static_cast<unsigned long>(one.frames() + two.frames()));
   ASSERT_TRUE(server_.Lives()) << server_.Output();
-  EXPECT_LE(peak, kBudgetMib + options.beside_mib);
+  EXPECT_LE(peak, planned_mib_);
   EXPECT_LE(disturbed, options.slowdown * undisturbed);
   EXPECT_EQ(server_.GaugesNotAtZero(kPatience), "");
   EXPECT_EQ(server_.Terminate(), 0) << server_.Output();
@@ -127,7 +143,8 @@ TEST_F(Hostile, AFloodWithoutATokenTakesLittle) {
   std::vector<std::thread> threads;
   for (std::uint64_t k = 0; k < 4; ++k) {
     threads.emplace_back([&, k] {
-      Hostility hostility{server_.address(), "", support::Random(options.seed + k), stop, calls};
+      Hostility hostility{
+          server_.address(), web_, "", support::Random(options.seed + k), stop, calls};
       FloodWithoutToken(hostility, 10'000, 25);
     });
   }

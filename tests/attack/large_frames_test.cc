@@ -14,9 +14,8 @@
 #include <vector>
 
 #include "attack/attacked_server.h"
-#include "attack/http2_client.h"
 #include "attack/memory_group.h"
-#include "attack/requests.h"
+#include "attack/sender.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::attack {
@@ -29,99 +28,6 @@ constexpr seconds kPatience(120);
 // Codes that clients treat as a lost connection.
 constexpr int kCancelled = 1, kUnavailable = 14;
 constexpr char kToken[] = "large-frames-0123456789", kOther[] = "another-0123456789abcde";
-
-// A square of particles with attributes that make the frame `bytes` large.
-std::string SquareFrame(std::uint64_t sequence, std::size_t side, std::size_t bytes) {
-  v1::ReconstructRequest request;
-  v1::ParticleFrame& frame = *request.mutable_frame();
-  frame.set_sequence(sequence);
-  frame.set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
-  std::vector<float> positions;
-  for (std::size_t k = 0; k < side * side; ++k) {
-    positions.push_back(static_cast<float>(k % side) * 0.05f);
-    positions.push_back(static_cast<float>(k / side) * 0.05f);
-  }
-  frame.set_positions(positions.data(), positions.size() * sizeof(float));
-  for (int k = 0; request.ByteSizeLong() + 12 * side * side < bytes; ++k) {
-    v1::NamedScalar& scalar = *frame.add_scalars();
-    scalar.set_name("load " + std::to_string(k));
-    scalar.set_components(3);
-    scalar.mutable_values()->assign(12 * side * side, 0);
-  }
-  return request.SerializeAsString();
-}
-
-struct PartOf {
-  std::string stream;
-  std::uint32_t part = 0, parts = 0, timeout_ms = 0;
-};
-
-// One Reconstruct call over a new connection.
-class Sender {
- public:
-  explicit Sender(const std::string& address, const std::string& token = "") : client_(address) {
-    client_.OnFrame([this](const ReceivedFrame& frame) {
-      if (frame.type == FrameType::kData) bytes_ += frame.payload.size();
-      if (frame.type == FrameType::kHeaders) status_ = GrpcStatusOf(frame.payload);
-      if (frame.EndsStream()) ended_ = true;
-    });
-    Headers more;
-    if (!token.empty()) more.emplace_back("authorization", "Bearer " + token);
-    call_ = client_.Call(CallHeaders(kReconstruct, more));
-  }
-
-  bool Open(const PartOf& part = {}) {
-    auto request = attack::Open(part.stream);
-    request.mutable_open()->set_part(part.part);
-    request.mutable_open()->set_parts(part.parts);
-    request.mutable_open()->set_part_timeout_ms(part.timeout_ms);
-    if (!client_.SendData(call_, Prefixed(request.SerializeAsString()), false, kPatience)) {
-      return false;
-    }
-    return client_.Read(kPatience, [this] { return bytes_ > 0 || ended_; }) && !ended_;
-  }
-  /// Sends a message as fast as the server reads it. False if the call has ended.
-  bool Send(const std::string& message, bool last, milliseconds time = kPatience) {
-    before_ = bytes_;
-    const std::string whole = Prefixed(message);
-    const auto give_up = std::chrono::steady_clock::now() + time;
-    for (std::string_view rest = whole; !rest.empty();) {
-      const auto left = std::chrono::ceil<milliseconds>(give_up - std::chrono::steady_clock::now());
-      client_.Read(left, [this] { return ended_ || client_.WindowOf(call_) > 0; });
-      if (ended_ || client_.WindowOf(call_) <= 0) return false;
-      const auto window = static_cast<std::size_t>(client_.WindowOf(call_));
-      const std::string_view part = rest.substr(0, std::min<std::size_t>(window, 256 << 10));
-      rest.remove_prefix(part.size());
-      if (!client_.SendData(call_, part, last && rest.empty(), left)) return false;
-    }
-    return true;
-  }
-  /// True if an answer to the last message has begun to arrive.
-  bool IsAnswered(milliseconds time = kPatience) {
-    return client_.Read(time, [this] { return bytes_ > before_ || ended_; }) && bytes_ > before_;
-  }
-  /// The status of the call; -1 if it has not ended in time.
-  int End() {
-    client_.Read(kPatience, [this] { return ended_; });
-    return ended_ ? status_ : -1;
-  }
-
- private:
-  Http2Client client_;
-  std::uint32_t call_ = 0;
-  std::size_t bytes_ = 0, before_ = 0;
-  int status_ = -1;
-  bool ended_ = false;
-};
-
-// The sum printed by partiemc-server, in MiB.
-double PlannedMib(std::vector<std::string> arguments) {
-  arguments.push_back("--print-memory-plan");
-  std::string plan;
-  EXPECT_EQ(server::RunServer(arguments, &plan), 0) << plan;
-  const auto line = plan.rfind('\n', plan.size() - 2) + 1;
-  return std::stod(plan.substr(line));
-}
 
 // A server with 256 MB for frames, in a cgroup of the printed size, if cgroups can be created.
 class LargeFrames : public ::testing::Test {
@@ -192,8 +98,6 @@ class LargeFrames : public ::testing::Test {
   std::unique_ptr<MemoryGroup> group_;
   std::unique_ptr<AttackedServer> server_;
 };
-
-constexpr std::size_t kLarge = 32'900'000;
 
 TEST_F(LargeFrames, OneOfEachStreamIsAnsweredWithinThePlan) {
   Serve();

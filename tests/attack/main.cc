@@ -30,8 +30,6 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Of what is random")->capture_default_str();
   app.add_option("--slowdown", options.slowdown, "The most of an honest stream's p99")
       ->capture_default_str();
-  app.add_option("--beside", options.beside_mib, "The most memory beyond the budget, in MiB")
-      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -77,7 +77,7 @@ class Rank final : private StreamTransport, private StreamHandler {
     const std::size_t slot = TakeReadSlot();
     slots_[slot] = {.sequence = next_++, .came = world_.now, .refusal = absl::OkStatus()};
     const std::uint64_t sequence = slots_[slot].sequence;
-    ++brought_;
+    if (machine_->state().phase == Phase::kServing) ++taken_;
     if (part_ == 0) {
       assembler_->LeaderSent(sequence);
     } else {
@@ -120,7 +120,7 @@ class Rank final : private StreamTransport, private StreamHandler {
 
   void Finish(const absl::Status& status) override {
     finished_ = true;
-    world_.Require(!status.ok() || brought_ == answered_,
+    world_.Require(!status.ok() || taken_ == answered_,
                    "each frame and part is answered once before a good end");
     if (part_ == 0) {
       assembler_->End(status);
@@ -177,7 +177,8 @@ class Rank final : private StreamTransport, private StreamHandler {
   std::vector<Slot> slots_;
   std::optional<std::size_t> read_slot_;
   std::optional<Outgoing> writing_;
-  std::uint64_t brought_ = 0, answered_ = 0;
+  // A part that comes when the call is already ending is not taken: the end is its answer.
+  std::uint64_t taken_ = 0, answered_ = 0;
   bool finished_ = false, cut_ = false;
   std::shared_ptr<StreamStateMachine> machine_;
 };
