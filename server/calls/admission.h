@@ -34,6 +34,6 @@ absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const C
 /// As Admit, for a health check, which needs no token. It is counted apart from other calls, so
 /// that these keep no probe out. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
 absl::StatusOr<AdmittedCall> AdmitProbe(const Authentication& authentication,
-                                          const CallOrigin& origin);
+                                        const CallOrigin& origin);
 
 }  // namespace partiemc::server

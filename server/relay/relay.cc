@@ -291,9 +291,8 @@ void Relay::Lost(const std::string& replica) {
   joiner_.Forget(replica);
   for (Import& import : imports_) {
     if (import.stream->stream().replica != replica) continue;
-    import.stream->Lost(
-        {std::string(kReasonProducerLost), "the server of the stream was lost", {}},
-        Clock::now());
+    import.stream->Lost({std::string(kReasonProducerLost), "the server of the stream was lost", {}},
+                        Clock::now());
   }
 }
 

@@ -41,8 +41,8 @@ HealthService::HealthService(const Authentication& authentication, OpeningCalls&
         *context, connections, CallKind::kHealthCheck,
         [&, this](CallChannel& channel, const CallOrigin& origin) {
           return std::make_unique<UnaryCall>(
-              channel, /*meters=*/nullptr, AdmitProbe(authentication, origin),
-              UnaryKind::kProbe, opening, calls, budget, /*pool=*/nullptr,
+              channel, /*meters=*/nullptr, AdmitProbe(authentication, origin), UnaryKind::kProbe,
+              opening, calls, budget, /*pool=*/nullptr,
               [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
         });
   });

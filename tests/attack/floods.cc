@@ -206,7 +206,7 @@ void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
 
 void YieldProcessors() {
   const sched_param parameters{};
-  sched_setscheduler(0, SCHED_IDLE, &parameters);  // Of the calling thread alone.
+  sched_setscheduler(0, SCHED_IDLE, &parameters);  // 0: the calling thread.
 }
 
 std::span<const Flood> Floods() { return kFloods; }

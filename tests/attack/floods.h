@@ -35,7 +35,7 @@ struct FloodSettings {
   double bytes_per_second = 0;  ///< 0: no limit.
   std::uint64_t most_bytes = std::uint64_t{2} << 30;
   std::size_t connections = 1;  ///< Threads with one connection each.
-  /// The attackers run only on idle processors, because real ones have processors of their own.
+  /// The attackers run only on idle processors, because real ones share none with the server.
   bool yield_processors = false;
 };
 

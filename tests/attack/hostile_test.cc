@@ -35,8 +35,8 @@ double Percentile99(std::vector<double> values) {
   return values[values.size() * 99 / 100];
 }
 
-// Attackers during the lifetime of this object. They run on idle processors only, because real ones
-// have processors of their own.
+// Attackers during the lifetime of this object. They run only on idle processors, because real ones
+// share none with the server.
 class Attackers {
  public:
   Attackers(const std::string& address, const std::string& web, const std::string& only) {
