@@ -171,19 +171,20 @@ std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
   for (const auto& [reader, permit] : permits_) {
     if (permit.has_slot) ++slots_of[permit.read.caller];
   }
-  std::vector<Permits::value_type*> waiting;
+  // The budget of a caller changes during the sort, so each rank is computed once, before it.
+  using Rank = std::tuple<bool, std::size_t, std::uint64_t, std::uint64_t>;
+  std::vector<std::pair<Rank, Permits::value_type*>> waiting;
   for (auto& item : permits_) {
-    if (item.second.state == State::kWaiting) waiting.push_back(&item);
-  }
-  // What completes a frame that is beyond the budget comes first.
-  const auto rank = [&](const Permits::value_type* item) {
-    const Permit& permit = item->second;
+    const Permit& permit = item.second;
+    if (permit.state != State::kWaiting) continue;
     const CallerAccount* const caller = permit.read.caller;
-    return std::tuple(!slots_.contains(permit.read.stream), slots_of[caller],
-                      budget_.PlannedBy(caller), permit.number);
-  };
-  std::ranges::sort(waiting, {}, rank);
-  for (Permits::value_type* const item : waiting) {
+    // Connections that complete a frame beyond the budget come first.
+    waiting.push_back({{!slots_.contains(permit.read.stream), slots_of[caller],
+                        budget_.PlannedBy(caller), permit.number},
+                       &item});
+  }
+  std::ranges::sort(waiting);
+  for (auto& [rank, item] : waiting) {
     auto reader = item->second.reader.lock();
     if (reader != nullptr && TryPermit(*item, true)) return reader;
   }

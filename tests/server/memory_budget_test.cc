@@ -123,6 +123,43 @@ TEST(MemoryBudget, ATokensBytesAreItsMost) {
   EXPECT_THAT(waiter->granted, ElementsAre(1));
 }
 
+class Reader final : public ReadPermits::Reader {
+ public:
+  void ReadPermitted() override {}
+  void ReadRevoked(const absl::Status&) override {}
+};
+
+// The memory of callers changes while the next read is selected.
+TEST(ReadPermits, SelectTheNextReadWhileCallersTakeAndGiveBack) {
+  constexpr std::size_t kCallers = 300, kReaders = 300;
+  constexpr int kRounds = 400;
+  const std::vector<CallerAccount> callers(kCallers);
+  MemoryBudget budget(1'000, {.reads = {.streams_beyond = 1, .message_bytes = 1'000}});
+  for (const CallerAccount& caller : callers) budget.Take(100'000, &caller);
+  std::vector<std::shared_ptr<Reader>> readers;
+  for (std::size_t k = 0; k < kReaders; ++k) {
+    readers.push_back(std::make_shared<Reader>());
+    budget.reads().Begin(readers.back(),
+                         {.stream = readers.back().get(), .caller = &callers[k % kCallers]});
+  }
+  std::vector<std::thread> threads;
+  for (unsigned seed = 1; seed <= 16; ++seed) {
+    threads.emplace_back([&, seed] {
+      std::minstd_rand random(seed);
+      for (int k = 0; k < kRounds; ++k) {
+        const CallerAccount* const caller = &callers[random() % kCallers];
+        const std::uint64_t bytes = 1 + random() % 1'000;
+        budget.GiveBack(bytes, caller);  // Selects the next read, too.
+        budget.Take(bytes, caller);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(budget.reads().waiting(), kReaders - 1);
+  for (const auto& reader : readers) budget.reads().End(*reader);
+  EXPECT_EQ(budget.reads().waiting(), 0u);
+}
+
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
 constexpr std::size_t kWindow = 4;
 
