@@ -41,11 +41,17 @@ void Tell(const char* what, const Storm& storm, std::uint64_t seed,
       static_cast<unsigned long>(counts.client), took.count(), static_cast<unsigned long>(seed));
 }
 
+// A server without limits per address, because all callers have the same one.
+std::vector<std::string> Arguments(std::vector<std::string> more) {
+  more.insert(more.end(), {"--connections-per-address", "0", "--new-connections-per-address", "0"});
+  return more;
+}
+
 // Runs the calls on a server with these arguments and one honest stream.
 void ExpectBorne(const char* what, std::vector<std::string> arguments, double share) {
   const Options& options = GetOptions();
   const auto calls = static_cast<std::int64_t>(share * static_cast<double>(options.calls));
-  AttackedServer server(std::move(arguments));
+  AttackedServer server(Arguments(std::move(arguments)));
   {
     HonestStream honest(server.address(), "", 1);  // Runs all the time.
     const auto began = std::chrono::steady_clock::now();
@@ -75,10 +81,10 @@ TEST(RandomCalls, AFullServerBearsThemOverTlsWithAToken) {
   const CertificateAuthority authority("authority");
   const IssuedCertificate identity = authority.Issue("server");
   const std::string token = "alice-secret-0123456789";
-  AttackedServer server({"--max-streams", "2", "--max-watchers", "1", "--tls-cert",
-                         folder.Write("server.pem", identity.certificate), "--tls-key",
-                         folder.Write("server.key", identity.key), "--token-file",
-                         folder.Write("tokens", token + " alice\n")});
+  AttackedServer server(Arguments({"--max-streams", "2", "--max-watchers", "1", "--tls-cert",
+                                   folder.Write("server.pem", identity.certificate), "--tls-key",
+                                   folder.Write("server.key", identity.key), "--token-file",
+                                   folder.Write("tokens", token + " alice\n")}));
   const CallMessages messages;
   CallCounts counts;
   counts.left = static_cast<std::int64_t>(options.calls / 10);
@@ -102,7 +108,8 @@ TEST(RandomCalls, DrainingServersLeaveInOrder) {
   support::Random random(options.seed);
   std::uint64_t begun = 0;
   for (std::uint64_t k = 0; k < servers; ++k) {
-    AttackedServer server({"--max-streams", "4", "--max-watchers", "4", "--grace-seconds", "1"});
+    AttackedServer server(
+        Arguments({"--max-streams", "4", "--max-watchers", "4", "--grace-seconds", "1"}));
     Storm storm(server.address(), 1'000'000'000, options.seed * 1'000 + k);
     const auto now = [&] {
       return static_cast<std::int64_t>(storm.counts().raw + storm.counts().client);
