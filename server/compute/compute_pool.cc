@@ -9,10 +9,10 @@
 
 namespace partiemc::server {
 
-// Runners are plain threads and not tasks of the arena, so that a thread that waits for the pieces
-// of one frame can pick up pieces of another, but never another frame as a whole. There are as many
-// runners as the arena has places: small frames then run side by side, and a large one that is
-// alone gets every place for its pieces.
+// Runners are plain threads, not tasks of the arena. A thread of the arena that waits for parallel
+// parts of one frame may run parts of another frame; a task would make it begin a whole frame. The
+// number of runners equals the number of the arena's slots, so small frames run concurrently, and a
+// single large frame uses all slots.
 ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
                          FrameObserver* observer, MemoryBudget* budget)
     : threads_(std::max(threads, 1u)),
@@ -56,9 +56,9 @@ std::size_t ComputePool::QueueLength() const {
 }
 
 void ComputePool::Run() {
-  // Threads that oneTBB starts for the pieces of a frame have it from this one.
+  // Threads that oneTBB starts inherit the name.
   pthread_setname_np(pthread_self(), "compute");
-  std::optional<Arena> narrow;  // For jobs of callers who share.
+  std::optional<Arena> narrow;  // For jobs of competing callers.
   std::unique_lock lock(mutex_);
   while (std::optional<Task> task = WaitForTask(lock)) {
     Begin(*task);
@@ -66,29 +66,29 @@ void ComputePool::Run() {
     std::unique_ptr<Worker> worker = TakeWorker();
     lock.unlock();
     if (shares && !narrow) narrow.emplace(threads_ - 1);
-    // Outside of the arena, whose threads must not wait for each other's frames.
+    // May block, so it must not run on a thread of the arena, which other frames use too.
     worker->memory.BeginFrame(task->frame_bytes);
     (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
-    if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for it.
+    if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for this memory.
     worker->memory.EndFrame();
     lock.lock();
     PutBack(std::move(worker), task->stream);
     End(*task);
     lock.unlock();
     task->afterwards();
-    task.reset();  // With all that it holds, without the lock.
+    task.reset();  // Destructors of captured objects run without the lock.
     lock.lock();
     GiveBack(TakeOutlived(), WarmSize::Clock::now() - gave_back_ >= warm_time_, lock);
   }
 }
 
-// Returns when there is a task that may run, or with none when there never will be.
+// Waits for a task that may run. Returns none when the pool stops and no task is left.
 std::optional<ComputePool::Task> ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
   for (;;) {
     if (auto task = NextTask()) return task;
     if (stopping_) return std::nullopt;
     const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
-    if (waiting_ > 0) {  // For a thread that may be kept free of nobody by then.
+    if (waiting_ > 0) {  // By then the callers may no longer compete, so a task may run.
       task_came_.wait_for(lock, kSharingTime);
     } else if (warm) {
       task_came_.wait_for(lock, warm_time_);
@@ -99,7 +99,7 @@ std::optional<ComputePool::Task> ComputePool::WaitForTask(std::unique_lock<std::
   }
 }
 
-// The first whose caller may have one more, if any.
+// The first task whose caller may run one more job.
 std::optional<ComputePool::Task> ComputePool::NextTask() {
   auto task = tasks_.PopOf([this](const CallerAccount* caller) {
     const auto running = std::ranges::count(running_, caller);
@@ -109,7 +109,7 @@ std::optional<ComputePool::Task> ComputePool::NextTask() {
   return task;
 }
 
-// Whether a thread is to stay free of this caller.
+// Whether one thread must stay free for other callers.
 bool ComputePool::Shares(const CallerAccount* caller) const {
   return threads_ > 1 && recent_.AnybodyBut(caller, WarmSize::Clock::now() - kSharingTime);
 }
@@ -119,7 +119,7 @@ void ComputePool::Begin(const Task& task) { running_.push_back(task.caller); }
 void ComputePool::End(const Task& task) {
   running_.erase(std::ranges::find(running_, task.caller));
   recent_.Came(task.caller, WarmSize::Clock::now());
-  // Its caller may have one more, and, once alone, all threads.
+  // This caller may now run one more job.
   if (waiting_ > 0) task_came_.notify_one();
 }
 
@@ -166,7 +166,8 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   return outlived;
 }
 
-// Where `due`, or where there are `workers` to drop. Lets `lock` go meanwhile.
+// Frees `workers` and returns freed memory to the system, if there are any or if `due`. Unlocks the
+// mutex while it works.
 void ComputePool::GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock) {
   if (workers.empty() && !due) return;
   gave_back_ = WarmSize::Clock::now();

@@ -35,7 +35,7 @@ void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
   held_ += bytes;
 }
 
-// Whether nobody who came before is to have it first.
+// As Fits, but also checks that no earlier claim has to be granted first.
 Fit MemoryBudget::FitsNow(const Claim& claim) const {
   for (const Claim& before : claims_) {
     const Fit fit = Fits(before);
@@ -81,7 +81,7 @@ void MemoryBudget::StopWaiting(const std::shared_ptr<Waiter>& waiter) {
       return !claim.waiter.owner_before(waiter) && !waiter.owner_before(claim.waiter);
     });
   }
-  Grant();  // It may have stood before somebody who wants less.
+  Grant();  // The removed claim may have blocked a smaller one.
 }
 
 void MemoryBudget::GiveBack(std::uint64_t bytes, const CallerAccount* caller) {
