@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// For as long one that comes only now cannot have waited for too long.
+// A call that begins now cannot exceed a limit before this time has passed.
 milliseconds ShortestLimit(const ServerLimits& limits) {
   milliseconds shortest = std::chrono::hours(1);
   for (const milliseconds limit :

@@ -1,4 +1,4 @@
-// The one thread that ends calls whose clients keep them waiting.
+// The thread that ends idle calls.
 #pragma once
 
 #include <condition_variable>
@@ -12,10 +12,11 @@
 
 namespace partiemc::server {
 
-/// Sleeps until the first of them may have waited for too long.
+/// Ends streams, watchers and unary calls that exceed their idle limits. Its thread sleeps until
+/// the earliest deadline of a call.
 class IdleTimer {
  public:
-  /// The registries live longer.
+  /// The registries outlive the timer.
   IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
             const ServerLimits& limits);
   ~IdleTimer();

@@ -33,7 +33,7 @@ absl::Status TooManyWatchers() {
 
 OpeningCalls::Place::~Place() {
   if (calls_ == nullptr) return;
-  GiveWay forgotten;  // What it holds goes without the lock.
+  GiveWay forgotten;  // Destroyed after the lock is released.
   const std::lock_guard lock(calls_->mutex_);
   forgotten = lines_->Remove(caller_, number_);
 }
@@ -132,7 +132,7 @@ OpeningCalls::Place OpeningCalls::Enter(const CallerAccount& caller, GiveWay giv
   GiveWay other;
   {
     const std::lock_guard lock(mutex_);
-    // First out, then in: who comes does not count as one of its caller's.
+    // Evicts before it adds, so that the new call does not count against its caller.
     if (opening_.count() >= std::max<std::size_t>(places_, 1)) other = opening_.RemoveNext();
     place = Take(opening_, caller, std::move(give_way));
   }

@@ -25,7 +25,7 @@ absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-// Text of a client as it may stand in a message or in a log: short, and one line.
+// Makes a client's text safe for messages and the log: escaped and at most 40 characters.
 std::string Quoted(const std::string& text) {
   constexpr std::size_t kShown = 40;
   return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
@@ -126,7 +126,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
   if (former == nullptr) return opened;
   former->taken_over = true;
   const std::shared_ptr<StreamStateMachine> former_machine = former->machine;
-  lock.unlock();  // A machine may leave at once.
+  lock.unlock();  // TakenOver may call Leave.
   former_machine->TakenOver();
   return opened;
 }
@@ -161,7 +161,7 @@ absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
   return place.status();
 }
 
-// Before anybody can find the stream to watch it.
+// Called before the stream can be found, so that no watcher misses a result.
 void StreamRegistry::BeginHistory(const StreamDescription& description, const Entry* former) {
   if (history_ == nullptr || description.broadcaster == nullptr) return;
   ResultBroadcaster* const before =
@@ -198,7 +198,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
     entries_.at(&machine).sends_part = true;
     if (tell_earlier_look_) tell_earlier_look_();
   }
-  // Without the lock: a call that had the part leaves.
+  // Without the lock: Join may end a call that sent this part before, and that call then leaves.
   const auto& assembler = stream->description.assembler;
   const auto seat = assembler->Join(terms.part, member);
   if (!seat.ok()) return seat.status();
@@ -207,7 +207,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
 
 absl::Status StreamRegistry::CheckPart(const StreamDescription& stream,
                                        const PartTerms& terms) const {
-  // First, so that only who knows it learns of the rest.
+  // Checked first, so that a caller without the token learns nothing about the stream.
   if (!SameToken(stream.parts_token, terms.token)) {
     return Refused(absl::StatusCode::kPermissionDenied, kReasonPartsToken, "open.parts_token",
                    absl::StrCat(terms.token.size(), " characters"), "must be that of part 0");
@@ -250,9 +250,9 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& mac
 void StreamRegistry::Leave(const StreamStateMachine& machine) {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(&machine);
-  if (found == entries_.end()) return;  // It was not let in.
+  if (found == entries_.end()) return;  // The machine was not admitted.
   entries_.erase(found);
-  // With the lock held: whoever waits for the last machine may take the registry away after that.
+  // Notifies under the lock: a thread in WaitUntilEmpty may destroy the registry afterwards.
   left_.notify_all();
 }
 
@@ -332,7 +332,7 @@ void StreamRegistry::Drain() {
     draining_ = true;
     machines = Machines();
   }
-  // Without the lock: a machine that drains may leave at once.
+  // Without the lock, because a machine that drains may call Leave.
   for (const auto& machine : machines) machine->Drain();
 }
 

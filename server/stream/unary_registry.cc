@@ -52,7 +52,7 @@ void UnaryRegistry::GiveBackPlace(const UnaryStateMachine& call) {
 
 void UnaryRegistry::FreePlace(const UnaryStateMachine& call) {
   const auto found = calls_.find(&call);
-  if (found == calls_.end()) return;  // It was not let in.
+  if (found == calls_.end()) return;  // The call was not admitted.
   Entry& entry = found->second;
   if (entry.caller != nullptr) places_[IndexOf(entry.kind)].GiveBack(entry.caller, 1);
   entry.caller = nullptr;
@@ -60,9 +60,9 @@ void UnaryRegistry::FreePlace(const UnaryStateMachine& call) {
 
 void UnaryRegistry::Leave(const UnaryStateMachine& call) {
   const std::lock_guard lock(mutex_);
-  FreePlace(call);  // A request may come, and take one, while the call ends.
+  FreePlace(call);  // A request that arrives while the call ends may have taken a slot.
   calls_.erase(&call);
-  // With the lock held: whoever waits for the last one may take the registry away after that.
+  // Notifies under the lock: a thread in WaitForFrames may destroy the registry afterwards.
   left_.notify_all();
 }
 
@@ -74,7 +74,7 @@ std::size_t UnaryRegistry::count() const {
 std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
     const UnaryLimits& limits, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Without the lock: one that ends may leave at once.
+  // Without the lock, because a call that ends may call Leave.
   for (const auto& call : All()) look_again = std::min(look_again, call->EndIfIdle(limits, now));
   return look_again;
 }
@@ -86,7 +86,7 @@ std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
   return all;
 }
 
-// Calls are told without the lock: one that ends may leave at once.
+// Ends the calls without the lock, because a call that ends may call Leave.
 void UnaryRegistry::Drain() {
   {
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,4 @@
-// The calls of one request and one answer that are going on: how many may come in, and how all are
-// sent home.
+// The unary calls of this server: limits their number and drains them.
 #pragma once
 
 #include <array>
@@ -19,50 +18,51 @@
 
 namespace partiemc::server {
 
-/// The reason of RESOURCE_EXHAUSTED for a call too many (proto/PROTOCOL.md).
+/// The violation's reason if there are too many calls (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 
-/// Safe from any thread.
+/// Limits the calls of each kind by slots. Thread-safe.
 class UnaryRegistry {
  public:
-  /// What one caller may have of calls that ask for information alone: they take next to no time.
+  /// Slots of one caller for calls that return information, and for probes. They take little time.
   static constexpr std::uint32_t kInformationCalls = 64;
 
-  /// For one caller. There are twice as many places of each kind, and a caller has no more of them
-  /// than are free (FairShare).
+  /// `max_frame_calls`: slots of one caller for calls with a frame. The number of slots of each
+  /// kind is twice this limit: a caller may only use half of them (FairShare).
   explicit UnaryRegistry(std::uint32_t max_frame_calls)
       : places_{FairShare(2 * std::uint64_t{max_frame_calls}), FairShare(2 * kInformationCalls),
                 FairShare(2 * kInformationCalls)} {}
 
-  /// A call comes in, without a request yet: those are counted elsewhere (OpeningCalls). Errors,
-  /// each with a Violation: UNAVAILABLE (DRAINING), for frames only.
+  /// Registers a call that has not sent its request. OpeningCalls limits these calls.
+  /// Errors, each with a Violation: UNAVAILABLE (DRAINING), for calls with a frame only.
   absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind);
-  /// Its request has come, and it gets a place; the account lives until it gives that back.
+  /// Takes a slot when the call's request has arrived. The account lives until GiveBackPlace.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
   absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller);
-  /// It has its last word, and its place is free for others. It may have had none.
+  /// Frees the call's slot, if it has one. Called when the call's status is known.
   void GiveBackPlace(const UnaryStateMachine& call);
-  /// The connection has taken its last word.
+  /// Removes the call. Called when its status was sent.
   void Leave(const UnaryStateMachine& call);
 
-  /// Of all kinds.
+  /// Number of calls of all kinds.
   std::size_t count() const;
 
-  /// Ends those that have waited for their clients for too long. Gives the time before which none
-  /// of those that are here now will have.
+  /// Ends the calls that exceed an idle limit at `now`. Returns the earliest time at which another
+  /// present call may exceed one.
   std::chrono::steady_clock::time_point EndIdle(const UnaryLimits& limits,
                                                 std::chrono::steady_clock::time_point now);
 
-  /// Lets no frame in any more and ends the calls whose request has not come.
+  /// Admits no further calls with a frame, and ends the calls without a request.
   void Drain();
-  /// Whether all that have frames have left before the deadline. Calls for information may go on.
+  /// Blocks until all calls with a frame have left; false if `deadline` passes first. Other calls
+  /// may continue.
   bool WaitForFrames(std::chrono::steady_clock::time_point deadline);
 
  private:
   struct Entry {
     std::shared_ptr<UnaryStateMachine> call;
     UnaryKind kind;
-    const CallerAccount* caller = nullptr;  // Whose place it has; null: none yet.
+    const CallerAccount* caller = nullptr;  // The caller charged for its slot; null: no slot.
   };
 
   std::vector<std::shared_ptr<UnaryStateMachine>> All() const;
