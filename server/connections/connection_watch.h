@@ -1,4 +1,4 @@
-// Watches the connections that gRPC has, and ends those that flood.
+// Watches gRPC's connections and cuts floods.
 #pragma once
 
 #include <array>
@@ -22,30 +22,30 @@
 
 namespace partiemc::server {
 
-/// Reads counts of streams, which gRPC alone knows.
+/// Reads counts of streams from gRPC.
 class StreamCounter {
  public:
   virtual ~StreamCounter() = default;
-  /// Fills in the streams and messages of the connection of `peer`; false if it is not known yet.
-  /// `socket` is 0 at first; Read keeps its own number of the connection there.
+  /// Sets the streams and messages in `reading`; false if gRPC does not list the peer's connection
+  /// yet. `socket`: memory of Read for this connection, 0 before the first call.
   virtual bool Read(const std::string& peer, std::int64_t& socket, ConnectionReading& reading) = 0;
 };
 
-/// Keeps a duplicate of each descriptor, by which it counts the bytes of a connection and ends it.
-/// No byte passes through it. One thread examines the connections every 20 ms.
+/// Holds a duplicate of each connection's descriptor, to count its bytes and to end it. It does not
+/// read the bytes itself. One thread examines the connections every 20 ms.
 class ConnectionWatch {
  public:
   using Clock = std::chrono::steady_clock;
   /// Takes the descriptor of a connection, and does not block.
   using HandOver = std::function<void(Descriptor)>;
 
-  /// Counted since the start.
+  /// Totals since the start.
   struct Counters {
     std::atomic<std::uint64_t> accepted = 0, health_only = 0, evicted = 0;
     std::array<std::atomic<std::uint64_t>, 3> floods{};  ///< By Flood.
   };
 
-  /// `table` lives longer.
+  /// `table` outlives the watch.
   ConnectionWatch(const ConnectionLimits& limits, const ConnectionRules& rules,
                   ConnectionTable& table);
   /// Ends all connections.
@@ -53,21 +53,20 @@ class ConnectionWatch {
   ConnectionWatch(const ConnectionWatch&) = delete;
   ConnectionWatch& operator=(const ConnectionWatch&) = delete;
 
-  /// `streams` lives longer; without it streams are not counted. `give_back_memory` is called some
-  /// time after connections were cut.
+  /// `streams` outlives the watch; null: streams are not counted. `give_back_memory` is called half
+  /// a second after a connection was cut.
   void Start(StreamCounter* streams, std::function<void()> give_back_memory = nullptr);
 
-  /// Watches a connection that was accepted, and calls `hand_over` with its descriptor, at once or
-  /// from the watching thread, unless the connection is not to be served.
+  /// Watches an accepted connection, or refuses it. Unless it is refused, calls `hand_over` with
+  /// its descriptor, at once or later from the watching thread.
   void Add(Descriptor socket, const HandOver& hand_over);
-  /// Ends a connection without a call, so that its descriptors are free. False if all have calls.
+  /// Ends a connection without a call, to free its descriptors. False if all have calls.
   bool EvictIdle();
-  /// Ends what is still connected at `deadline`, so that a peer that does not answer holds up no
-  /// drain.
+  /// Ends the remaining connections at `deadline`, so that a silent peer does not delay the drain.
   void EndAllAt(Clock::time_point deadline);
 
   const Counters& counters() const { return counters_; }
-  /// Connections now.
+  /// Number of open connections.
   std::size_t count() const { return count_; }
 
  private:
@@ -80,9 +79,9 @@ class ConnectionWatch {
     ConnectionReading reading;
     bool counts_bytes = false;
     std::int64_t grpc_socket = 0;
-    std::uint64_t bytes_at_count = 0;  // Bytes read when streams were counted last.
+    std::uint64_t bytes_at_count = 0;  // `bytes_read` when the streams were last counted.
     Clock::time_point counted;
-    // Of a connection for health checks alone, until it has shown that it does not flood.
+    // Set while a connection for health checks only waits to be handed over (kHealthOnlyDelay).
     Descriptor waiting;
     HandOver hand_over;
   };
@@ -91,7 +90,7 @@ class ConnectionWatch {
   void Run();
   int TimeToWait(Clock::time_point now);
   void HandleEvents(int timeout_ms);
-  // All below: with the lock held.
+  // With the lock held:
   bool EvictIdleLocked();
   void EvictHealthOnly(const std::string& address);
   void ExamineAll(Clock::time_point now);
@@ -108,7 +107,7 @@ class ConnectionWatch {
   ConnectionTable& table_;
   StreamCounter* streams_ = nullptr;
   std::function<void()> give_back_memory_;
-  Clock::time_point give_back_at_ = Clock::time_point::max();  // Of the thread.
+  Clock::time_point give_back_at_ = Clock::time_point::max();  // Used by thread_ only.
   const Descriptor events_, wake_;
   Counters counters_;
   std::atomic<std::size_t> count_ = 0;
@@ -116,11 +115,11 @@ class ConnectionWatch {
 
   std::mutex mutex_;  // Guards all below.
   ConnectionCounts counts_;
-  Connections connections_;  // In the order in which they came.
+  Connections connections_;  // In the order of arrival.
   std::unordered_map<std::uint64_t, Connections::iterator> by_key_;
   std::uint64_t next_key_ = 0;
-  std::size_t turn_ = 0;         // Where the next period begins among quiet connections.
-  std::size_t counts_left_ = 0;  // Of this period.
+  std::size_t turn_ = 0;         // Index of the first quiet connection to examine next.
+  std::size_t counts_left_ = 0;  // How often streams may still be counted in this period.
   Clock::time_point examine_at_{}, all_at_{}, forget_at_{}, end_all_at_ = Clock::time_point::max();
   RateLimit log_limit_;
   std::thread thread_;

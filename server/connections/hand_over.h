@@ -1,4 +1,4 @@
-// Hands connections to gRPC on threads of its own.
+// Passes connections to gRPC on separate threads.
 #pragma once
 
 #include <condition_variable>
@@ -11,19 +11,19 @@
 
 namespace partiemc::server {
 
-/// gRPC may read a connection in the thread that hands it over, for as long as bytes arrive without
-/// a pause. Then the next connection takes another thread. Threads are started when needed, up to a
-/// limit; beyond it connections wait.
+/// gRPC may read a connection in the thread that passes it, for as long as bytes arrive without a
+/// pause. The next connection then needs another thread. Threads are started when needed, up to
+/// kMostThreads; then connections wait.
 class HandOverThreads {
  public:
   explicit HandOverThreads(std::function<void(int descriptor)> hand_over)
       : hand_over_(std::move(hand_over)) {}
-  /// Waits until every hand-over has returned. Connections that still wait are closed.
+  /// Waits until every hand-over has returned. Closes waiting connections.
   ~HandOverThreads();
   HandOverThreads(const HandOverThreads&) = delete;
   HandOverThreads& operator=(const HandOverThreads&) = delete;
 
-  /// Safe from any thread.
+  /// Thread-safe.
   void Add(int descriptor);
 
  private:
