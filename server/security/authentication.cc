@@ -21,7 +21,7 @@ absl::Status TurnedAway(std::string_view reason, std::string value) {
                          "must be \"Bearer \" and a token of this server's --token-file"});
 }
 
-// `asked`, completed by `otherwise`.
+// The terms' quota; values that it lacks are taken from `otherwise`.
 CallerQuota Completed(const CallerQuota& asked, const CallerQuota& otherwise) {
   const auto either = [](const auto& one, const auto& other) { return one ? one : other; };
   return {.calls = either(asked.calls, otherwise.calls),

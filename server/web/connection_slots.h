@@ -14,14 +14,14 @@
 
 namespace partiemc::server {
 
-/// A connection is idle unless the first request of a call has arrived and the call goes on. A
-/// handshake without a message, an incomplete body and a closing handshake are idle.
+/// A connection is idle unless it has a call whose first request has arrived and which has not
+/// ended. A handshake without a message, an incomplete body and a closing handshake are idle.
 ///
-/// If the server or the address of a new connection is at its limit, the new connection evicts an
-/// idle one: the oldest of that address, or else the oldest of the address with the most idle
-/// connections. If none is idle, the new connection gets a reserved slot, in which the gateway
-/// answers health checks only. Connections in reserved slots are always idle and are evicted by the
-/// same rule, so each new connection gets a slot. Thread-safe.
+/// A new connection evicts an idle one if its address or the whole server is at the limit. In the
+/// first case it is the oldest of this address, in the second the oldest of the address with the
+/// most idle connections. If none is idle, the new connection gets a reserved slot, in which the
+/// gateway answers health checks only. Connections in reserved slots are always idle and are
+/// evicted by the same rule, so each new connection gets a slot. Thread-safe.
 class ConnectionSlots {
  public:
   struct Limits {
@@ -87,12 +87,12 @@ class ConnectionSlots {
     bool evicted = false;  // Being closed; no longer counted.
   };
 
-  // Require the lock:
+  // With the lock held:
   Connection* NextToEvict(bool reserved, const std::string* address);
   void Count(const Connection& connection);
   void Uncount(const Connection& connection);
   std::size_t CountOf(const std::string& address) const;
-  // Requires that the lock is not held:
+  // Without the lock:
   void EndSome(bool all);
 
   const Limits limits_;
