@@ -4,15 +4,14 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
+#include "common/mutex.h"
 #include "partiemc/arena.h"
 #include "server/compute/busy_streams.h"
 #include "server/compute/recent_callers.h"
@@ -75,10 +74,11 @@ class ComputePool {
   /// Does not wait for jobs. Thread-safe; jobs may call it.
   void Submit(
       Job job, Afterwards afterwards = [] {}, BusyStreams::Mark* stream = nullptr,
-      const CallerAccount* caller = nullptr, std::uint64_t frame_bytes = 0);
+      const CallerAccount* caller = nullptr, std::uint64_t frame_bytes = 0)
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of jobs that have not begun.
-  std::size_t QueueLength() const;
+  std::size_t QueueLength() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   unsigned threads() const { return threads_; }
 
@@ -93,18 +93,18 @@ class ComputePool {
   using LinesOfCaller = RoundRobin<BusyStreams::Mark*, Line<Task>>;
   using Workers = std::vector<std::unique_ptr<Worker>>;
 
-  void Run();
-  // With the lock held; those that get it let it go for a while:
-  std::optional<Task> WaitForTask(std::unique_lock<std::mutex>& lock);
-  std::optional<Task> NextTask();
-  bool Shares(const CallerAccount* caller) const;
-  void Begin(const Task& task);
-  void End(const Task& task);
-  std::unique_ptr<Worker> TakeWorker();
-  void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream);
-  void MemoryIsShort();
-  Workers TakeOutlived();
-  void GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock);
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_);
+  std::optional<Task> WaitForTask() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::optional<Task> NextTask() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool Shares(const CallerAccount* caller) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Begin(const Task& task) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void End(const Task& task) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::unique_ptr<Worker> TakeWorker() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void MemoryIsShort() ABSL_LOCKS_EXCLUDED(mutex_);
+  Workers TakeOutlived() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void GiveBack(Workers workers, bool due) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const unsigned threads_;
   const WarmSize::Clock::duration warm_time_;
@@ -112,20 +112,20 @@ class ComputePool {
   MemoryBudget* const budget_;
   oneapi::tbb::global_control parallelism_;
   Arena arena_;
-  mutable std::mutex mutex_;
-  std::condition_variable task_came_;
-  // Guarded by mutex_:
-  RoundRobin<const CallerAccount*, LinesOfCaller> tasks_;
-  std::size_t waiting_ = 0;                    // Number of tasks in tasks_.
-  std::vector<const CallerAccount*> running_;  // The caller of each running job.
-  RecentCallers recent_;
-  Workers idle_;             // The last one was used last.
-  std::size_t working_ = 0;  // Number of workers that are not idle.
-  BusyStreams busy_;
+  mutable Mutex mutex_;
+  CondVar task_came_;
+  RoundRobin<const CallerAccount*, LinesOfCaller> tasks_ ABSL_GUARDED_BY(mutex_);
+  std::size_t waiting_ ABSL_GUARDED_BY(mutex_) = 0;  // Number of tasks in tasks_.
+  // The caller of each running job.
+  std::vector<const CallerAccount*> running_ ABSL_GUARDED_BY(mutex_);
+  RecentCallers recent_ ABSL_GUARDED_BY(mutex_);
+  Workers idle_ ABSL_GUARDED_BY(mutex_);             // The last one was used last.
+  std::size_t working_ ABSL_GUARDED_BY(mutex_) = 0;  // Number of workers that are not idle.
+  BusyStreams busy_ ABSL_GUARDED_BY(mutex_);
   // Time of the last shortage. Idle workers that were made before it are dropped.
-  WarmSize::Clock::time_point memory_was_short_{};
-  WarmSize::Clock::time_point gave_back_ = WarmSize::Clock::now();
-  bool stopping_ = false;
+  WarmSize::Clock::time_point memory_was_short_ ABSL_GUARDED_BY(mutex_){};
+  WarmSize::Clock::time_point gave_back_ ABSL_GUARDED_BY(mutex_) = WarmSize::Clock::now();
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 
   std::vector<std::thread> runners_;
 };

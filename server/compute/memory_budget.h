@@ -1,17 +1,16 @@
 // Limits the memory that the requests and responses of all streams hold together.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "server/compute/fair_share.h"
 #include "server/compute/read_permits.h"
 #include "server/security/caller.h"
@@ -50,7 +49,10 @@ class MemoryBudget {
   };
 
   explicit MemoryBudget(std::uint64_t bytes, const BeyondBudget& beyond = {})
-      : most_of_worker_(beyond.worker_bytes), share_(bytes), reads_(*this, beyond.reads) {}
+      : most_of_worker_(beyond.worker_bytes),
+        bytes_(bytes),
+        share_(bytes),
+        reads_(*this, beyond.reads) {}
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
@@ -58,38 +60,40 @@ class MemoryBudget {
   ReadPermits& reads() { return reads_; }
 
   /// Counts bytes that are held already, even if they do not fit.
-  void Take(std::uint64_t bytes, const CallerAccount* caller = nullptr);
+  void Take(std::uint64_t bytes, const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Takes the bytes if they fit and no earlier claim waits. Returns kYes, or why they do not fit.
-  FairShare::Fit TryTake(std::uint64_t bytes, const CallerAccount* caller = nullptr);
+  FairShare::Fit TryTake(std::uint64_t bytes, const CallerAccount* caller = nullptr)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// As TryTake. If the bytes do not fit, `Granted` follows as soon as they do, provided that
   /// `waiter` still exists. The waiter keeps the caller's account alive.
   bool TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
-                  const CallerAccount* caller = nullptr);
+                  const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes the claims of `waiter`. A `Granted` that another thread has begun still arrives.
-  void StopWaiting(const std::shared_ptr<Waiter>& waiter);
+  void StopWaiting(const std::shared_ptr<Waiter>& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Grants waiting claims. Requires: the calling thread holds no lock.
-  void GiveBack(std::uint64_t bytes, const CallerAccount* caller = nullptr);
+  void GiveBack(std::uint64_t bytes, const CallerAccount* caller = nullptr)
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Takes bytes for a worker, and blocks until they fit or no other worker computes beyond the
   /// budget. In the second case it takes them beyond the budget, BeyondBudget::worker_bytes at
   /// most. Returns the bytes taken.
-  std::uint64_t TakeForWorker(std::uint64_t bytes, const void* worker);
+  std::uint64_t TakeForWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Takes bytes beyond the budget. Returns false if another worker computes beyond it, or this one
   /// would exceed BeyondBudget::worker_bytes.
-  bool TryTakeBeyond(std::uint64_t bytes, const void* worker);
+  bool TryTakeBeyond(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Whether the worker computes beyond the budget.
-  bool IsBeyond(const void* worker) const;
+  bool IsBeyond(const void* worker) const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Gives back all `bytes` that a worker holds, within the budget and beyond it.
-  void GiveBackOfWorker(std::uint64_t bytes, const void* worker);
+  void GiveBackOfWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Sets the function that is called when a claim does not fit into the budget. Claims beyond a
   /// caller's share do not count. Empty: none is called. `tell` must not call MemoryBudget.
-  void OnShortage(std::function<void()> tell);
+  void OnShortage(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  std::uint64_t held() const;
+  std::uint64_t held() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Held and planned bytes.
-  std::uint64_t planned() const;
-  std::uint64_t bytes() const { return share_.room(); }
+  std::uint64_t planned() const ABSL_LOCKS_EXCLUDED(mutex_);
+  std::uint64_t bytes() const { return bytes_; }
 
  private:
   friend class ReadPermits;
@@ -100,39 +104,41 @@ class MemoryBudget {
     std::uint64_t most = FairShare::kNoLimit;  // The caller's quota when the claim was made.
   };
 
-  // With the lock held:
-  FairShare::Fit Fits(const Claim& claim) const {
+  FairShare::Fit Fits(const Claim& claim) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     return share_.Fits(claim.caller, claim.bytes, claim.most);
   }
-  FairShare::Fit FitsNow(const Claim& claim) const;
-  void TellShortage() const;
-  void TakeBeyond(std::uint64_t bytes, const void* worker);
-  // Without:
-  void Grant();
+  FairShare::Fit FitsNow(const Claim& claim) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void TellShortage() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void TakeBeyond(std::uint64_t bytes, const void* worker) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Grant() ABSL_LOCKS_EXCLUDED(mutex_);
   // Called by ReadPermits, which holds its lock:
-  void Plan(std::uint64_t bytes, const CallerAccount* caller);
-  bool TryPlan(std::uint64_t bytes, const CallerAccount* caller);
-  void Unplan(std::uint64_t bytes, const CallerAccount* caller);
+  void Plan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool TryPlan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
+  void Unplan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
   // Permits `after` bytes beyond the budget instead of `before`.
-  void ChangeBeyond(std::uint64_t before, std::uint64_t after);
+  void ChangeBeyond(std::uint64_t before, std::uint64_t after) ABSL_LOCKS_EXCLUDED(mutex_);
   // Whether the caller's bytes still fit if `beyond` fewer bytes are permitted beyond the budget.
-  bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const;
+  bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
   // An error if all bytes, including these held ones, exceed the budget or the caller's quota.
-  absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const;
-  std::uint64_t PlannedBy(const CallerAccount* caller) const;
+  absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  std::uint64_t PlannedBy(const CallerAccount* caller) const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  const std::uint64_t most_of_worker_;
+  const std::uint64_t most_of_worker_, bytes_;
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable may_compute_;
-  const void* worker_beyond_ = nullptr;       // The worker that computes beyond the budget.
-  std::uint64_t bytes_of_worker_beyond_ = 0;  // Its bytes beyond the budget.
-  FairShare share_;                           // Held and planned bytes; may exceed the budget.
-  std::uint64_t held_ = 0;
-  std::list<Claim> claims_;
-  std::function<void()> tell_shortage_;
+  mutable Mutex mutex_;
+  CondVar may_compute_;
+  // The worker that computes beyond the budget.
+  const void* worker_beyond_ ABSL_GUARDED_BY(mutex_) = nullptr;
+  // Its bytes beyond the budget.
+  std::uint64_t bytes_of_worker_beyond_ ABSL_GUARDED_BY(mutex_) = 0;
+  FairShare share_ ABSL_GUARDED_BY(mutex_);  // Held and planned bytes; may exceed the budget.
+  std::uint64_t held_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::list<Claim> claims_ ABSL_GUARDED_BY(mutex_);
+  std::function<void()> tell_shortage_ ABSL_GUARDED_BY(mutex_);
 
-  ReadPermits reads_;  // Locked before mutex_ if both are locked.
+  ReadPermits reads_;  // Its mutex is locked before mutex_.
 };
 
 }  // namespace partiemc::server

@@ -49,7 +49,7 @@ ReadPermits::Permit& ReadPermits::Renew(const std::shared_ptr<Reader>& reader, R
 bool ReadPermits::Begin(const std::shared_ptr<Reader>& reader, Read read) {
   bool begins = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     Renew(reader, std::move(read));
     begins = TryPermit(*permits_.find(reader.get()), /*may_open_slot=*/waiting_ == 1);
   }
@@ -58,7 +58,7 @@ bool ReadPermits::Begin(const std::shared_ptr<Reader>& reader, Read read) {
 }
 
 void ReadPermits::BeginNow(const std::shared_ptr<Reader>& reader, Read read) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Permit& permit = Renew(reader, std::move(read));
   permit.state = State::kReading;
   permit.planned = Expected(permit.read);
@@ -68,7 +68,7 @@ void ReadPermits::BeginNow(const std::shared_ptr<Reader>& reader, Read read) {
 }
 
 absl::Status ReadPermits::Came(const Reader& reader, std::uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = permits_.find(&reader);
   if (found == permits_.end() || found->second.state != State::kReading) return absl::OkStatus();
   Permit& permit = found->second;
@@ -88,7 +88,7 @@ absl::Status ReadPermits::Came(const Reader& reader, std::uint64_t bytes) {
 }
 
 void ReadPermits::End(const Reader& reader) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = permits_.find(&reader);
   if (found == permits_.end()) return;
   Finish(*found);
@@ -178,6 +178,7 @@ std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
   }
   // Streams that already have a slot come first: their reads complete frames.
   const auto rank = [&](const Permits::value_type* item) {
+    mutex_.AssertHeld();
     const Permit& permit = item->second;
     const CallerAccount* const caller = permit.read.caller;
     return std::tuple(!slots_.contains(permit.read.stream), slots_of[caller],
@@ -201,7 +202,7 @@ void ReadPermits::ServeWaiting() {
   if (waiting_ == 0) return;
   std::vector<std::shared_ptr<Reader>> permitted;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     FreeSlots();
     while (waiting_ > 0) {
       auto reader = PermitNext();
@@ -221,12 +222,12 @@ bool ReadPermits::NeedsLook() const {
 }
 
 void ReadPermits::OnWaiting(std::function<void()> tell) {
-  const std::lock_guard lock(tell_mutex_);
+  const MutexLock lock(tell_mutex_);
   tell_waiting_ = std::move(tell);
 }
 
 void ReadPermits::TellWaiting() const {
-  const std::lock_guard lock(tell_mutex_);
+  const MutexLock lock(tell_mutex_);
   if (tell_waiting_) tell_waiting_();
 }
 
@@ -266,7 +267,7 @@ void ReadPermits::LapseOrCover(Permits::value_type& item, Clock::time_point now)
 
 void ReadPermits::Look(Clock::time_point now, const ReceivedBytes& received) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (auto& item : permits_) {
       if (item.second.state != State::kReading) continue;
       Measure(item.second, now, received);
@@ -285,7 +286,7 @@ bool ReadPermits::IsAtRisk(const Permit& permit) const {
 std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
   std::vector<std::shared_ptr<Reader>> revoked;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     // Sorts each caller's reads by received bytes, most first. Then takes the first read of every
     // caller, the second read of every caller, and so on. The first ones continue.
     std::map<const CallerAccount*, std::vector<const Permit*>> of_caller;
@@ -307,7 +308,7 @@ std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
 }
 
 std::size_t ReadPermits::streams_beyond() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return slots_.size();
 }
 

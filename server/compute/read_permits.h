@@ -8,13 +8,13 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
@@ -77,15 +77,15 @@ class ReadPermits {
   // For readers. A reader may hold its own lock in these calls; it calls Serve after releasing it.
 
   /// Requests a permit for a reader that has nothing in flight. If false, ReadPermitted follows.
-  bool Begin(const std::shared_ptr<Reader>& reader, Read read);
+  bool Begin(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
   /// As Begin, but always permits the read. Requires: the expected bytes fit into the budget.
-  void BeginNow(const std::shared_ptr<Reader>& reader, Read read);
+  void BeginNow(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
   /// The read is complete: it has brought `bytes`, which the budget counts as held. Errors, each
   /// with a Violation: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed
   /// and the bytes do not fit.
-  absl::Status Came(const Reader& reader, std::uint64_t bytes);
+  absl::Status Came(const Reader& reader, std::uint64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Forgets the reader: it neither reads nor waits and has nothing in flight. Idempotent.
-  void End(const Reader& reader);
+  void End(const Reader& reader) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Permits waiting reads that fit now. Requires: the calling thread holds no lock.
   void Serve();
@@ -98,17 +98,17 @@ class ReadPermits {
   bool NeedsBytes() const { return waiting_ > 0 || lapsed_ > 0; }
   /// Sets the function that is called when a read begins to wait or NeedsLook becomes true. The
   /// thread that calls it may hold a reader's lock. Empty: none is called.
-  void OnWaiting(std::function<void()> tell);
+  void OnWaiting(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(tell_mutex_);
   /// Lets permits of idle connections lapse, and plans bytes that arrived beyond the plan.
-  void Look(Clock::time_point now, const ReceivedBytes& received);
+  void Look(Clock::time_point now, const ReceivedBytes& received) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Memory is exhausted: ends streams whose reads receive more than was planned. One such read
   /// continues for each largest message that fits into `free_bytes`; callers take turns. Returns
   /// the number of ended streams.
-  std::size_t Revoke(std::uint64_t free_bytes);
+  std::size_t Revoke(std::uint64_t free_bytes) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const ReadTerms& terms() const { return terms_; }
   std::size_t waiting() const { return waiting_; }
-  std::size_t streams_beyond() const;
+  std::size_t streams_beyond() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   enum class State { kWaiting, kReading, kHolding };
@@ -134,23 +134,26 @@ class ReadPermits {
     std::set<const Reader*> open;  // Connections that use it still.
   };
 
-  // With the lock held:
-  std::uint64_t Expected(const Read& read) const;
-  Permit& Renew(const std::shared_ptr<Reader>& reader, Read read);
-  bool TryPermit(Permits::value_type& item, bool may_open_slot);
-  Slot* FindSlot(const Permits::value_type& item, bool may_open_slot);
-  void Unplan(Permit& permit);
-  void SetBeyond(Permit& permit, std::uint64_t bytes);
-  void Finish(Permits::value_type& item);
-  void FreeSlots();
-  void LeaveSlot(const Reader* reader, Permit& permit);
-  std::shared_ptr<Reader> PermitNext();
-  void Measure(Permit& permit, Clock::time_point now, const ReceivedBytes& received);
-  void LapseOrCover(Permits::value_type& item, Clock::time_point now);
-  bool IsAtRisk(const Permit& permit) const;
-  // Without:
-  void ServeWaiting();
-  void TellWaiting() const;
+  std::uint64_t Expected(const Read& read) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Permit& Renew(const std::shared_ptr<Reader>& reader, Read read)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool TryPermit(Permits::value_type& item, bool may_open_slot)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Slot* FindSlot(const Permits::value_type& item, bool may_open_slot)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Unplan(Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void SetBeyond(Permit& permit, std::uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Finish(Permits::value_type& item) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void FreeSlots() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void LeaveSlot(const Reader* reader, Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::shared_ptr<Reader> PermitNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Measure(Permit& permit, Clock::time_point now, const ReceivedBytes& received)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void LapseOrCover(Permits::value_type& item, Clock::time_point now)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool IsAtRisk(const Permit& permit) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ServeWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
+  void TellWaiting() const ABSL_LOCKS_EXCLUDED(tell_mutex_);
 
   friend class MemoryBudget;
 
@@ -159,13 +162,13 @@ class ReadPermits {
   std::atomic<std::size_t> waiting_ = 0, reading_ = 0, lapsed_ = 0;
   std::atomic<bool> changed_ = false;  // Since the last Serve.
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  Permits permits_;
-  std::map<const void*, Slot> slots_;  // The key is Read::stream.
-  std::uint64_t numbers_ = 0;
+  mutable Mutex mutex_;
+  Permits permits_ ABSL_GUARDED_BY(mutex_);
+  std::map<const void*, Slot> slots_ ABSL_GUARDED_BY(mutex_);  // The key is Read::stream.
+  std::uint64_t numbers_ ABSL_GUARDED_BY(mutex_) = 0;
 
-  mutable std::mutex tell_mutex_;  // Guards tell_waiting_.
-  std::function<void()> tell_waiting_;
+  mutable Mutex tell_mutex_;
+  std::function<void()> tell_waiting_ ABSL_GUARDED_BY(tell_mutex_);
 };
 
 }  // namespace partiemc::server
