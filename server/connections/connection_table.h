@@ -4,10 +4,10 @@
 #include <atomic>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 
+#include "common/mutex.h"
 #include "server/connections/connection_ledger.h"
 #include "server/connections/connection_limits.h"
 
@@ -53,18 +53,21 @@ class ConnectionTable {
  public:
   /// False if the peer has a connection already. A client may use one port for connections to two
   /// addresses of the server; calls of these cannot be distinguished.
-  bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection);
-  void Remove(const std::string& peer);
+  bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void Remove(const std::string& peer) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Finds the connection of a new call; null if it is unknown. Marks the connection as misused if
   /// it may not make this call. `peer` has gRPC's format.
-  std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const;
+  std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
-  std::size_t size() const;
+  std::size_t size() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<TrackedConnection>, std::less<>> connections_;  // Guarded.
+  mutable Mutex mutex_;
+  std::map<std::string, std::shared_ptr<TrackedConnection>, std::less<>> connections_
+      ABSL_GUARDED_BY(mutex_);
 };
 
 /// Normalises a peer: "ipv6:%5Bfe80::1%25eth0%5D:50051" becomes "ipv6:[fe80::1]:50051".

@@ -78,7 +78,7 @@ ConnectionWatch::~ConnectionWatch() {
   stop_ = true;
   eventfd_write(wake_.get(), 1);
   if (thread_.joinable()) thread_.join();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   while (!connections_.empty()) {
     Abort(connections_.front().socket.get());
     Remove(connections_.begin());
@@ -99,7 +99,7 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   connection.peer = *std::move(peer);
   const std::string& address = connection.peer.address;
   const auto now = Clock::now();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (counts_.IsFull()) EvictIdleLocked();
   const Admission admission = counts_.Add(address, now);
   if (admission == Admission::kRefused) return Abort(socket.get());
@@ -129,7 +129,7 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
 }
 
 void ConnectionWatch::EndAllAt(Clock::time_point deadline) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   end_all_at_ = deadline;
   eventfd_write(wake_.get(), 1);
 }
@@ -143,7 +143,7 @@ void ConnectionWatch::Run() {
       give_back_at_ = Clock::time_point::max();
       give_back_memory_();
     }
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (now >= end_all_at_) {
       for (const Connection& connection : connections_) Abort(connection.socket.get());
     }
@@ -157,7 +157,7 @@ void ConnectionWatch::Run() {
 
 // The timeout of epoll_wait in milliseconds; -1: none.
 int ConnectionWatch::TimeToWait(Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (connections_.empty() && counts_.addresses() == 0) return -1;
   const auto next = connections_.empty() ? forget_at_ : examine_at_;
   const auto wait = std::chrono::ceil<milliseconds>(std::min(next, end_all_at_) - now);
@@ -169,7 +169,7 @@ void ConnectionWatch::HandleEvents(int timeout_ms) {
   std::array<epoll_event, 64> events;
   const int count =
       epoll_wait(events_.get(), events.data(), static_cast<int>(events.size()), timeout_ms);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (int k = 0; k < count; ++k) {
     const auto& event = events[static_cast<std::size_t>(k)];
     if (event.data.u64 == kWakeKey) {
@@ -194,7 +194,7 @@ std::vector<ExaminedConnection> ConnectionWatch::Examined() const {
 }
 
 bool ConnectionWatch::EvictIdle() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return EvictIdleLocked();
 }
 

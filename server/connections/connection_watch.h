@@ -8,12 +8,12 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <unordered_map>
 #include <vector>
 
+#include "common/mutex.h"
 #include "server/base/rate_limit.h"
 #include "server/connections/connection_limits.h"
 #include "server/connections/connection_table.h"
@@ -59,11 +59,11 @@ class ConnectionWatch {
 
   /// Watches an accepted connection, or refuses it. Unless it is refused, calls `hand_over` with
   /// its descriptor, at once or later from the watching thread.
-  void Add(Descriptor socket, const HandOver& hand_over);
+  void Add(Descriptor socket, const HandOver& hand_over) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Ends a connection without a call, to free its descriptors. False if all have calls.
-  bool EvictIdle();
+  bool EvictIdle() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Ends the remaining connections at `deadline`, so that a silent peer does not delay the drain.
-  void EndAllAt(Clock::time_point deadline);
+  void EndAllAt(Clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Counters& counters() const { return counters_; }
   /// Number of open connections.
@@ -87,21 +87,24 @@ class ConnectionWatch {
   };
   using Connections = std::list<Connection>;
 
-  void Run();
-  int TimeToWait(Clock::time_point now);
-  void HandleEvents(int timeout_ms);
-  // With the lock held:
-  bool EvictIdleLocked();
-  void EvictHealthOnly(const std::string& address);
-  void ExamineAll(Clock::time_point now);
-  bool IsTurn(std::size_t index) const;
-  void Examine(Connections::iterator connection, Clock::time_point now);
-  bool ExamineHealthOnly(Connection& connection, Clock::time_point now);
-  bool CountStreams(Connection& connection, Clock::time_point now);
-  void ExamineTogether(Clock::time_point now);
-  void Cut(Connections::iterator connection, Flood flood, Clock::time_point now);
-  void Remove(Connections::iterator connection);
-  std::vector<ExaminedConnection> Examined() const;
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_);
+  int TimeToWait(Clock::time_point now) ABSL_LOCKS_EXCLUDED(mutex_);
+  void HandleEvents(int timeout_ms) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool EvictIdleLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void EvictHealthOnly(const std::string& address) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ExamineAll(Clock::time_point now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool IsTurn(std::size_t index) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Examine(Connections::iterator connection, Clock::time_point now)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool ExamineHealthOnly(Connection& connection, Clock::time_point now)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool CountStreams(Connection& connection, Clock::time_point now)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ExamineTogether(Clock::time_point now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Cut(Connections::iterator connection, Flood flood, Clock::time_point now)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Remove(Connections::iterator connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::vector<ExaminedConnection> Examined() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const ConnectionRules rules_;
   ConnectionTable& table_;
@@ -113,15 +116,20 @@ class ConnectionWatch {
   std::atomic<std::size_t> count_ = 0;
   std::atomic<bool> stop_ = false;
 
-  std::mutex mutex_;  // Guards all below.
-  ConnectionCounts counts_;
-  Connections connections_;  // In the order of arrival.
-  std::unordered_map<std::uint64_t, Connections::iterator> by_key_;
-  std::uint64_t next_key_ = 0;
-  std::size_t turn_ = 0;         // Index of the first quiet connection to examine next.
-  std::size_t counts_left_ = 0;  // How often streams may still be counted in this period.
-  Clock::time_point examine_at_{}, all_at_{}, forget_at_{}, end_all_at_ = Clock::time_point::max();
-  RateLimit log_limit_;
+  Mutex mutex_;
+  ConnectionCounts counts_ ABSL_GUARDED_BY(mutex_);
+  Connections connections_ ABSL_GUARDED_BY(mutex_);  // In the order of arrival.
+  std::unordered_map<std::uint64_t, Connections::iterator> by_key_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t next_key_ ABSL_GUARDED_BY(mutex_) = 0;
+  // Index of the first quiet connection to examine next.
+  std::size_t turn_ ABSL_GUARDED_BY(mutex_) = 0;
+  // How often streams may still be counted in this period.
+  std::size_t counts_left_ ABSL_GUARDED_BY(mutex_) = 0;
+  Clock::time_point examine_at_ ABSL_GUARDED_BY(mutex_){};
+  Clock::time_point all_at_ ABSL_GUARDED_BY(mutex_){};
+  Clock::time_point forget_at_ ABSL_GUARDED_BY(mutex_){};
+  Clock::time_point end_all_at_ ABSL_GUARDED_BY(mutex_) = Clock::time_point::max();
+  RateLimit log_limit_ ABSL_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

@@ -1,13 +1,13 @@
 // Passes connections to gRPC on separate threads.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <mutex>
 #include <queue>
 #include <thread>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
@@ -24,7 +24,7 @@ class HandOverThreads {
   HandOverThreads& operator=(const HandOverThreads&) = delete;
 
   /// Thread-safe.
-  void Add(int descriptor);
+  void Add(int descriptor) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   static constexpr std::size_t kMostThreads = 8;
@@ -32,12 +32,12 @@ class HandOverThreads {
   void Run();
 
   const std::function<void(int)> hand_over_;
-  std::mutex mutex_;  // Guards all below.
-  std::condition_variable came_;
-  std::queue<int> waiting_;
-  std::size_t idle_ = 0;
-  bool stop_ = false;
-  std::vector<std::thread> threads_;
+  Mutex mutex_;
+  CondVar came_;
+  std::queue<int> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::size_t idle_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool stop_ ABSL_GUARDED_BY(mutex_) = false;
+  std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server
