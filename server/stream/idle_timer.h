@@ -1,10 +1,9 @@
 // The thread that ends idle calls.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 
+#include "common/mutex.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
 #include "server/stream/unary_registry.h"
@@ -24,16 +23,18 @@ class IdleTimer {
   IdleTimer& operator=(const IdleTimer&) = delete;
 
  private:
-  void Run();
-  void Look();
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_);
+  std::chrono::steady_clock::time_point EndIdleCalls() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Look() ABSL_LOCKS_EXCLUDED(mutex_);
 
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
   UnaryRegistry& calls_;
   const ServerLimits limits_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool stopping_ = false, look_ = false;  // Guarded by mutex_.
+  Mutex mutex_;
+  CondVar changed_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  bool look_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -2,19 +2,18 @@
 // after the whole message has arrived.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "server/security/caller.h"
 
 namespace partiemc::server {
@@ -44,7 +43,7 @@ class OpeningCalls {
     GiveWay Remove(const CallerAccount* caller, std::uint64_t number);
     /// Removes the oldest call of the caller with the most calls. Requires: not empty.
     GiveWay RemoveNext();
-    /// Removes the older half, rounded up, of that caller's calls. Requires: not empty.
+    /// Removes the older half, rounded up, of that caller's calls.
     std::vector<GiveWay> RemoveHalf();
     std::size_t count() const { return count_; }
 
@@ -90,36 +89,39 @@ class OpeningCalls {
 
   /// Tracks an opening call, and may evict another one. Requires: the calling thread holds no lock.
   /// The account and this object outlive the returned Place.
-  Place Enter(const CallerAccount& caller, GiveWay give_way);
+  Place Enter(const CallerAccount& caller, GiveWay give_way) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Tracks a watcher that may send another request from now on. Evicts none.
-  Place EnterWatcher(const CallerAccount& caller, GiveWay give_way);
+  Place EnterWatcher(const CallerAccount& caller, GiveWay give_way) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Memory is exhausted: evicts the older half (at least one) of the opening calls of the caller
   /// with the most opening calls. Requires: the calling thread holds no lock.
-  void GiveWayToAll();
+  void GiveWayToAll() ABSL_LOCKS_EXCLUDED(mutex_);
   /// As GiveWayToAll, for watchers.
-  void WatchersGiveWay();
+  void WatchersGiveWay() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Blocks until a call is tracked or `also` returns true; then returns true. Returns false after
   /// StopWaiting. Used by one thread.
-  bool WaitForOne(const std::function<bool()>& also = [] { return false; });
+  bool WaitForOne(const std::function<bool()>& also = [] { return false; })
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// WaitForOne calls `also` again.
-  void LookAgain();
-  void StopWaiting();
+  void LookAgain() ABSL_LOCKS_EXCLUDED(mutex_);
+  void StopWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of opening calls; watchers do not count.
-  std::size_t count() const;
+  std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  Place Take(Lines& lines, const CallerAccount& caller, GiveWay give_way);  // With the lock held.
-  void HalfGivesWay(Lines& lines, const absl::Status& status);              // Without.
+  Place Take(Lines& lines, const CallerAccount& caller, GiveWay give_way)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::size_t places_;
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable one_came_;
-  bool waits_for_one_ = false, stopped_ = false;
-  std::uint64_t came_ = 0;
-  Lines opening_, watchers_;
+  mutable Mutex mutex_;
+  CondVar one_came_;
+  bool waits_for_one_ ABSL_GUARDED_BY(mutex_) = false;
+  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
+  std::uint64_t came_ ABSL_GUARDED_BY(mutex_) = 0;
+  Lines opening_ ABSL_GUARDED_BY(mutex_);
+  Lines watchers_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

@@ -3,12 +3,10 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +14,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
 #include "partiemc/parameters.h"
 #include "server/security/caller.h"
 #include "server/stream/stream_state_machine.h"
@@ -88,7 +87,8 @@ class StreamRegistry {
 
   /// Registers the machine of a new call, which has not sent its `open`. OpeningCalls limits these.
   /// Errors: UNAVAILABLE (DRAINING).
-  absl::Status Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller = {});
+  absl::Status Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller = {})
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Opens the stream of a registered machine. If an open stream has the same `token`, the new
   /// stream continues it with the same slot and history. It also keeps the name if `description`
@@ -97,55 +97,59 @@ class StreamRegistry {
   /// ALREADY_EXISTS (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS),
   /// UNAVAILABLE (DRAINING).
   absl::StatusOr<StreamSummary> Open(const StreamStateMachine& machine,
-                                     StreamDescription description, std::string token);
+                                     StreamDescription description, std::string token)
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Lets a registered machine send one part of the frames of an open stream.
   /// Errors, each with a Violation: as Find; FAILED_PRECONDITION (PARTS_COUNT: the stream's frames
   /// have another number of parts); PERMISSION_DENIED (PARTS_TOKEN); RESOURCE_EXHAUSTED
   /// (TOO_MANY_PARTS); as FrameAssembler::Join.
-  absl::StatusOr<JoinedPart> JoinPart(const StreamStateMachine& machine, const PartTerms& terms);
+  absl::StatusOr<JoinedPart> JoinPart(const StreamStateMachine& machine, const PartTerms& terms)
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Ends the machine's stream: frees its name and its slot. Returns the stream's summary if it was
   /// open.
-  std::optional<StreamSummary> Close(const StreamStateMachine& machine);
+  std::optional<StreamSummary> Close(const StreamStateMachine& machine) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes the machine. Called when its status was sent.
-  void Leave(const StreamStateMachine& machine);
+  void Leave(const StreamStateMachine& machine) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The open stream of this name, for `caller` to watch. Errors: PERMISSION_DENIED (NOT_PERMITTED)
   /// if the caller may not use the name, whether or not the stream exists; NOT_FOUND
   /// (NO_SUCH_STREAM).
-  absl::StatusOr<StreamSummary> Find(const std::string& name, const Caller& caller = {}) const;
+  absl::StatusOr<StreamSummary> Find(const std::string& name, const Caller& caller = {}) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// The open streams whose names `caller` may use, sorted by number: at most `count` of those with
   /// a number above `after`.
   std::vector<StreamSummary> List(std::uint64_t after, std::size_t count,
-                                  const Caller& caller = {}) const;
-  std::size_t OpenCount() const;
+                                  const Caller& caller = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
+  std::size_t OpenCount() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Increases when a stream is opened or closed.
   std::uint64_t changes() const { return changes_; }
 
   /// Sets the addresses of other servers, which clients receive when this server drains.
-  void SetElsewhere(std::vector<std::string> addresses);
+  void SetElsewhere(std::vector<std::string> addresses) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Returns these addresses, rotated by one at each call, so that clients spread evenly.
-  std::vector<std::string> TakeElsewhere();
+  std::vector<std::string> TakeElsewhere() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Drains the present machines one after the other, evenly over the time `within`. Admits new
   /// machines.
-  void SendAway(std::chrono::milliseconds within);
+  void SendAway(std::chrono::milliseconds within) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Admits no further machine and drains every machine.
-  void Drain();
-  bool draining() const;
+  void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
+  bool draining() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// UNAVAILABLE (DRAINING) after Drain, otherwise OK.
-  absl::Status CheckServing();
+  absl::Status CheckServing() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Number of callers refused by CheckServing, Enter and Open. It grows while clients still come.
-  std::uint64_t turned_away() const;
+  std::uint64_t turned_away() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Ends the machines that exceed an idle limit at `now`. Returns the earliest time at which
   /// another present machine may exceed one.
   std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
-                                                std::chrono::steady_clock::time_point now);
+                                                std::chrono::steady_clock::time_point now)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Sets the function that is called when EndIdle must run earlier than it last returned, because
   /// of a new stream. Empty: none is called. `tell` must not call the registry.
-  void OnEarlierLook(std::function<void()> tell);
+  void OnEarlierLook(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Blocks until all machines have left; false if `deadline` passes first.
-  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
+  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   struct Entry {
@@ -160,30 +164,37 @@ class StreamRegistry {
     bool IsOpen() const { return stream && !taken_over; }
   };
 
-  // With the lock held:
-  absl::Status CheckServingLocked();
+  absl::StatusOr<StreamSummary> OpenLocked(const StreamStateMachine& machine,
+                                           StreamDescription description, std::string token,
+                                           std::shared_ptr<StreamStateMachine>& former_machine)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckServingLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // An error if no slot is free, or `name` is in use. Ignores the stream of `former`.
-  absl::Status CheckPlace(const Entry* former, const std::string& name) const;
+  absl::Status CheckPlace(const Entry* former, const std::string& name) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Moves the slot of `former` to `entry`, or else takes a new slot for the caller of `entry`.
   static absl::Status TakePlace(Entry& entry, Entry* former);
-  std::vector<std::shared_ptr<StreamStateMachine>> Machines() const;
-  Entry* FindOpen(std::string_view token);
-  absl::Status CheckPart(const StreamDescription& stream, const PartTerms& terms) const;
-  void BeginHistory(const StreamDescription& description, const Entry* former);
+  std::vector<std::shared_ptr<StreamStateMachine>> Machines() const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Entry* FindOpen(std::string_view token) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckPart(const StreamDescription& stream, const PartTerms& terms) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void BeginHistory(const StreamDescription& description, const Entry* former)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::uint32_t max_streams_, max_parts_;
   HistoryRoom* const history_;
   const std::string id_prefix_;  // Random, so that ids differ between runs of a server.
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable left_;
-  std::map<const StreamStateMachine*, Entry> entries_;
-  std::uint64_t opened_ = 0;
+  mutable Mutex mutex_;
+  CondVar left_;
+  std::map<const StreamStateMachine*, Entry> entries_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t opened_ ABSL_GUARDED_BY(mutex_) = 0;
   std::atomic<std::uint64_t> changes_ = 0;
-  std::vector<std::string> elsewhere_;
-  bool draining_ = false;
-  std::uint64_t turned_away_ = 0;
-  std::function<void()> tell_earlier_look_;
+  std::vector<std::string> elsewhere_ ABSL_GUARDED_BY(mutex_);
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
+  std::uint64_t turned_away_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::function<void()> tell_earlier_look_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

@@ -215,8 +215,9 @@ class StreamStateMachine final : public SerializedCall,
   std::uint64_t read_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t computed_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t written_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Bytes of the budget: held by each slot; to be returned.
+  // Bytes that each slot holds in the budget.
   std::vector<std::uint64_t> slot_bytes_ ABSL_GUARDED_BY(mutex_);
+  // Bytes that ReturnMemory gives back to the budget.
   std::uint64_t surplus_ ABSL_GUARDED_BY(mutex_) = 0;
   // Size of the last frame, at least 1: the estimate for the next one.
   std::uint64_t last_bytes_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -28,7 +28,7 @@ absl::Status TooMany(UnaryKind kind, const FairShare& places, const CallerAccoun
 }  // namespace
 
 absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (draining_ && kind == UnaryKind::kFrame) return DrainingError();
   const UnaryStateMachine* key = call.get();
   calls_[key] = {std::move(call), kind};
@@ -36,7 +36,7 @@ absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryStateMachine> call, Unary
 }
 
 absl::Status UnaryRegistry::TakePlace(const UnaryStateMachine& call, const CallerAccount& caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Entry& entry = calls_.at(&call);
   FairShare& places = places_[IndexOf(entry.kind)];
   if (places.Fits(&caller, 1) != FairShare::Fit::kYes) return TooMany(entry.kind, places, caller);
@@ -46,7 +46,7 @@ absl::Status UnaryRegistry::TakePlace(const UnaryStateMachine& call, const Calle
 }
 
 void UnaryRegistry::GiveBackPlace(const UnaryStateMachine& call) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   FreePlace(call);
 }
 
@@ -59,15 +59,15 @@ void UnaryRegistry::FreePlace(const UnaryStateMachine& call) {
 }
 
 void UnaryRegistry::Leave(const UnaryStateMachine& call) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   FreePlace(call);  // A request that arrives while the call ends may have taken a slot.
   calls_.erase(&call);
   // Notifies under the lock: a thread in WaitForFrames may destroy the registry afterwards.
-  left_.notify_all();
+  left_.NotifyAll();
 }
 
 std::size_t UnaryRegistry::count() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return calls_.size();
 }
 
@@ -81,7 +81,7 @@ std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
 
 std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
   std::vector<std::shared_ptr<UnaryStateMachine>> all;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [key, entry] : calls_) all.push_back(entry.call);
   return all;
 }
@@ -89,18 +89,22 @@ std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
 // Ends the calls without the lock, because a call that ends may call Leave.
 void UnaryRegistry::Drain() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
   }
   for (const auto& call : All()) call->GiveWay(DrainingError());
 }
 
 bool UnaryRegistry::WaitForFrames(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  return left_.wait_until(lock, deadline, [this] {
-    return std::ranges::none_of(
-        calls_, [](const auto& call) { return call.second.kind == UnaryKind::kFrame; });
-  });
+  const MutexLock lock(mutex_);
+  while (HasFrames() && left_.WaitUntil(mutex_, deadline)) {
+  }
+  return !HasFrames();
+}
+
+bool UnaryRegistry::HasFrames() const {
+  return std::ranges::any_of(
+      calls_, [](const auto& call) { return call.second.kind == UnaryKind::kFrame; });
 }
 
 }  // namespace partiemc::server

@@ -3,15 +3,14 @@
 
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "server/compute/fair_share.h"
 #include "server/security/caller.h"
 #include "server/stream/unary_state_machine.h"
@@ -35,17 +34,19 @@ class UnaryRegistry {
 
   /// Registers a call that has not sent its request. OpeningCalls limits these calls.
   /// Errors, each with a Violation: UNAVAILABLE (DRAINING), for calls with a frame only.
-  absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind);
+  absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Takes a slot when the call's request has arrived. The account lives until GiveBackPlace.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
-  absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller);
+  absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Frees the call's slot, if it has one. Called when the call's status is known.
-  void GiveBackPlace(const UnaryStateMachine& call);
+  void GiveBackPlace(const UnaryStateMachine& call) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes the call. Called when its status was sent.
-  void Leave(const UnaryStateMachine& call);
+  void Leave(const UnaryStateMachine& call) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of calls of all kinds.
-  std::size_t count() const;
+  std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Ends the calls that exceed an idle limit at `now`. Returns the earliest time at which another
   /// present call may exceed one.
@@ -53,10 +54,10 @@ class UnaryRegistry {
                                                 std::chrono::steady_clock::time_point now);
 
   /// Admits no further calls with a frame, and ends the calls without a request.
-  void Drain();
+  void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Blocks until all calls with a frame have left; false if `deadline` passes first. Other calls
   /// may continue.
-  bool WaitForFrames(std::chrono::steady_clock::time_point deadline);
+  bool WaitForFrames(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   struct Entry {
@@ -65,14 +66,15 @@ class UnaryRegistry {
     const CallerAccount* caller = nullptr;  // The caller charged for its slot; null: no slot.
   };
 
-  std::vector<std::shared_ptr<UnaryStateMachine>> All() const;
-  void FreePlace(const UnaryStateMachine& call);  // With the lock held.
+  std::vector<std::shared_ptr<UnaryStateMachine>> All() const ABSL_LOCKS_EXCLUDED(mutex_);
+  void FreePlace(const UnaryStateMachine& call) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool HasFrames() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable left_;
-  std::map<const UnaryStateMachine*, Entry> calls_;
-  std::array<FairShare, 3> places_;  // By kind.
-  bool draining_ = false;
+  mutable Mutex mutex_;
+  CondVar left_;
+  std::map<const UnaryStateMachine*, Entry> calls_ ABSL_GUARDED_BY(mutex_);
+  std::array<FairShare, 3> places_ ABSL_GUARDED_BY(mutex_);  // By kind.
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::server
