@@ -42,12 +42,12 @@ void Authentication::Set(BearerTokens tokens) {
     next->accounts.emplace(digest, std::move(account));
   }
   next->tokens = std::move(tokens);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   known_ = std::move(next);
 }
 
 std::shared_ptr<const Authentication::Known> Authentication::Current() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return known_;
 }
 
