@@ -19,13 +19,6 @@
 namespace partiemc::client {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using OptionalTime = std::optional<Clock::time_point>;
-
-OptionalTime Deadline(std::optional<std::chrono::milliseconds> wait) {
-  return wait ? OptionalTime(Clock::now() + *wait) : std::nullopt;
-}
-
 class Worker final : public LocalStream {
  public:
   Worker(Reconstructor reconstructor, const LocalStreamOptions& options)
@@ -63,6 +56,11 @@ class Worker final : public LocalStream {
  private:
   template <typename Particles>  // Frame or wire::FrameRows.
   absl::StatusOr<std::uint64_t> Submit(const Particles& frame, double time);
+  using OptionalTime = std::optional<CondVar::TimePoint>;
+
+  static OptionalTime Deadline(std::optional<std::chrono::milliseconds> wait) {
+    return wait ? OptionalTime(CondVar::TimePoint::clock::now() + *wait) : std::nullopt;
+  }
   // Waits for a change, and returns false once `give_up` has passed.
   bool WaitUntil(OptionalTime give_up) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Run();
@@ -95,7 +93,7 @@ bool Worker::WaitUntil(OptionalTime give_up) {
     changed_.Wait(mutex_);
     return true;
   }
-  if (Clock::now() >= *give_up) return false;
+  if (CondVar::TimePoint::clock::now() >= *give_up) return false;
   changed_.WaitUntil(mutex_, *give_up);
   return true;
 }
