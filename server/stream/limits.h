@@ -21,8 +21,8 @@ struct ServerLimits {
   /// Limits of one frame. Larger simulations need higher limits; memory grows with them.
   FrameLimits frame{.max_particles = 4'000'000, .max_tiles = 131'072};
 
-  /// Maximum size of a serialised ParticleFrame. The server's command line sets it to
-  /// DefaultFrameBytes(frame.max_particles), but at most to an eighth of the memory budget.
+  /// Maximum size of a serialised ParticleFrame. The default on the server's command line is
+  /// DefaultFrameBytes(frame.max_particles), but at most an eighth of the memory budget.
   std::uint64_t max_frame_bytes = DefaultFrameBytes(4'000'000);
 
   /// Maximum size of a client's message. A larger message ends the stream. It is a quarter more
