@@ -1,9 +1,7 @@
 #include "partiemc/client/local_stream.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
@@ -12,6 +10,7 @@
 #include "client/library/frame_request.h"
 #include "client/library/gather.h"
 #include "client/library/owned_frame.h"
+#include "common/mutex.h"
 #include "common/stage_clock.h"
 #include "partiemc/arena.h"
 #include "partiemc/reconstructor.h"
@@ -57,6 +56,13 @@ class Worker final : public LocalStream {
  private:
   template <typename Particles>  // Frame or wire::FrameRows.
   absl::StatusOr<std::uint64_t> Submit(const Particles& frame, double time);
+  using OptionalTime = std::optional<CondVar::TimePoint>;
+
+  static OptionalTime Deadline(std::optional<std::chrono::milliseconds> wait) {
+    return wait ? OptionalTime(CondVar::TimePoint::clock::now() + *wait) : std::nullopt;
+  }
+  // Waits for a change, and returns false once `give_up` has passed.
+  bool WaitUntil(OptionalTime give_up) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Run();
   void Process(const OwnedFrame& frame, Event& event);
 
@@ -69,28 +75,35 @@ class Worker final : public LocalStream {
   Workspace workspace_;            // Worker's thread only.
   std::vector<Attribute> chosen_;  // Worker's thread only.
 
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<OwnedFrame> frames_;        // Sent, not yet being computed.
-  std::vector<OwnedFrame> free_frames_;  // Buffers for later frames.
-  std::deque<Event> events_;             // Computed, not yet received.
-  std::vector<Event> free_events_;
-  std::size_t in_flight_ = 0;
-  std::uint64_t next_sequence_ = 1;  // Sender's thread only.
-  bool finished_ = false, cancelled_ = false;
+  mutable Mutex mutex_;
+  CondVar changed_;
+  std::deque<OwnedFrame> frames_ ABSL_GUARDED_BY(mutex_);        // Sent, not yet being computed.
+  std::vector<OwnedFrame> free_frames_ ABSL_GUARDED_BY(mutex_);  // Buffers for later frames.
+  std::deque<Event> events_ ABSL_GUARDED_BY(mutex_);             // Computed, not yet received.
+  std::vector<Event> free_events_ ABSL_GUARDED_BY(mutex_);
+  std::size_t in_flight_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t next_sequence_ ABSL_GUARDED_BY(mutex_) = 1;
+  bool finished_ ABSL_GUARDED_BY(mutex_) = false;
+  bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 
+bool Worker::WaitUntil(OptionalTime give_up) {
+  if (!give_up) {
+    changed_.Wait(mutex_);
+    return true;
+  }
+  if (CondVar::TimePoint::clock::now() >= *give_up) return false;
+  changed_.WaitUntil(mutex_, *give_up);
+  return true;
+}
+
 template <typename Particles>
 absl::StatusOr<std::uint64_t> Worker::Submit(const Particles& frame, double time) {
-  std::unique_lock lock(mutex_);
-  const auto ready = [this] {
-    return cancelled_ || finished_ || in_flight_ < info_.frames_in_flight;
-  };
-  if (!send_timeout_) {
-    changed_.wait(lock, ready);
-  } else if (!changed_.wait_for(lock, *send_timeout_, ready)) {
-    return SendTimeout(*send_timeout_);
+  const auto give_up = Deadline(send_timeout_);
+  const MutexLock lock(mutex_);
+  while (!cancelled_ && !finished_ && in_flight_ >= info_.frames_in_flight) {
+    if (!WaitUntil(give_up)) return SendTimeout(*send_timeout_);
   }
   if (cancelled_) return absl::CancelledError("the stream was cancelled");
   if (finished_) return absl::FailedPreconditionError("Send after FinishSending");
@@ -99,34 +112,32 @@ absl::StatusOr<std::uint64_t> Worker::Submit(const Particles& frame, double time
     owned = std::move(free_frames_.back());
     free_frames_.pop_back();
   }
-  lock.unlock();  // Safe: the only sender is this thread, so the slot in the window stays free.
   const std::uint64_t sequence = next_sequence_++;
-  owned.Assign(frame, time, sequence);
-  lock.lock();
+  {
+    // Safe: the only sender is this thread, so the slot in the window stays free.
+    const MutexUnlock unlock(mutex_);
+    owned.Assign(frame, time, sequence);
+  }
   ++in_flight_;
   frames_.push_back(std::move(owned));
-  changed_.notify_all();
+  changed_.NotifyAll();
   return sequence;
 }
 
 absl::Status Worker::FinishSending() {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   if (cancelled_) return absl::CancelledError("the stream was cancelled");
   finished_ = true;
-  changed_.notify_all();
+  changed_.NotifyAll();
   return absl::OkStatus();
 }
 
 absl::StatusOr<Received> Worker::Receive(Event& event,
                                          std::optional<std::chrono::milliseconds> wait) {
-  std::unique_lock lock(mutex_);
-  const auto ready = [this] {
-    return cancelled_ || !events_.empty() || (finished_ && in_flight_ == 0);
-  };
-  if (!wait) {
-    changed_.wait(lock, ready);
-  } else if (!changed_.wait_for(lock, *wait, ready)) {
-    return Received::kNothingYet;
+  const auto give_up = Deadline(wait);
+  const MutexLock lock(mutex_);
+  while (!cancelled_ && events_.empty() && !(finished_ && in_flight_ == 0)) {
+    if (!WaitUntil(give_up)) return Received::kNothingYet;
   }
   if (cancelled_) return absl::CancelledError("the stream was cancelled");
   if (events_.empty()) return Received::kEnd;
@@ -134,25 +145,25 @@ absl::StatusOr<Received> Worker::Receive(Event& event,
   free_events_.push_back(std::move(events_.front()));
   events_.pop_front();
   --in_flight_;
-  changed_.notify_all();
+  changed_.NotifyAll();
   return Received::kEvent;
 }
 
 std::size_t Worker::InFlight() const {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   return in_flight_;
 }
 
 void Worker::Cancel() {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   cancelled_ = true;
-  changed_.notify_all();
+  changed_.NotifyAll();
 }
 
 void Worker::Run() {
-  std::unique_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return cancelled_ || !frames_.empty() || finished_; });
+    while (!cancelled_ && frames_.empty() && !finished_) changed_.Wait(mutex_);
     if (cancelled_ || frames_.empty()) return;
     OwnedFrame frame = std::move(frames_.front());
     frames_.pop_front();
@@ -161,12 +172,13 @@ void Worker::Run() {
       event = std::move(free_events_.back());
       free_events_.pop_back();
     }
-    lock.unlock();
-    Process(frame, event);
-    lock.lock();
+    {
+      const MutexUnlock unlock(mutex_);
+      Process(frame, event);
+    }
     free_frames_.push_back(std::move(frame));
     events_.push_back(std::move(event));
-    changed_.notify_all();
+    changed_.NotifyAll();
   }
 }
 

@@ -14,7 +14,7 @@ class RejoiningWatch::Calls final : public Attempts {
   explicit Calls(RejoiningWatch& watch) : watch_(watch) {}
 
   bool Cancelled() override {
-    const std::lock_guard lock(watch_.mutex_);
+    const MutexLock lock(watch_.mutex_);
     return watch_.cancelled_;
   }
 
@@ -50,8 +50,9 @@ class RejoiningWatch::Calls final : public Attempts {
     if (watch_.call_ != nullptr) {
       news_ = watch_.call_->WaitUntilOpened(until);
     } else {
-      std::unique_lock lock(watch_.mutex_);
-      watch_.cancel_came_.wait_until(lock, until, [this] { return watch_.cancelled_; });
+      const MutexLock lock(watch_.mutex_);
+      while (!watch_.cancelled_ && watch_.cancel_came_.WaitUntil(watch_.mutex_, until)) {
+      }
     }
   }
 
@@ -212,17 +213,19 @@ absl::StatusOr<Received> RejoiningWatch::Rejoin(std::optional<Clock::time_point>
 }
 
 void RejoiningWatch::SetCall(std::shared_ptr<WatchCall> call) {
-  std::unique_lock lock(mutex_);
-  std::swap(call, call_);
-  if (cancelled_ && call_ != nullptr) call_->Cancel();
-  lock.unlock();  // Destroys the former call without the lock.
+  {
+    const MutexLock lock(mutex_);
+    shared_call_ = call;
+    if (cancelled_ && call != nullptr) call->Cancel();
+  }
+  call_ = std::move(call);  // Destroys the former call, without the lock.
 }
 
 void RejoiningWatch::Cancel() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   cancelled_ = true;
-  cancel_came_.notify_all();
-  if (call_ != nullptr) call_->Cancel();
+  cancel_came_.NotifyAll();
+  if (shared_call_ != nullptr) shared_call_->Cancel();
 }
 
 }  // namespace partiemc::client

@@ -3,10 +3,8 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "client/library/retry_loop.h"
 #include "client/library/watch_call.h"
+#include "common/mutex.h"
 #include "partiemc/client/watcher.h"
 
 namespace partiemc::client {
@@ -39,7 +38,7 @@ class RejoiningWatch final : public Watcher {
     return retry_.lost() && !joined_ ? std::optional(retry_.Progress()) : std::nullopt;
   }
   const WatchEnd& end() const override { return end_; }
-  void Cancel() override;
+  void Cancel() override ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   class Calls;
@@ -54,7 +53,7 @@ class RejoiningWatch final : public Watcher {
   // watch.
   absl::StatusOr<Received> Rejoin(std::optional<Clock::time_point> until);
   void Account(WatchedFrame& frame);
-  void SetCall(std::shared_ptr<WatchCall> call);
+  void SetCall(std::shared_ptr<WatchCall> call) ABSL_LOCKS_EXCLUDED(mutex_);
   const std::string& address() const { return retry_.address(); }
 
   const std::string stream_name_;
@@ -64,6 +63,7 @@ class RejoiningWatch final : public Watcher {
   std::string lineage_;
   WatchEnd end_;
   RetryLoop retry_;
+  std::shared_ptr<WatchCall> call_;
   bool joined_ = false;  // True if `call_` is the current watch, false if it is an attempt or null.
   std::optional<absl::StatusOr<Received>>
       lost_;  // Status of the lost call; returned if the watch gives up.
@@ -71,10 +71,10 @@ class RejoiningWatch final : public Watcher {
   std::uint64_t last_ = 0;                        // Number of the last delivered frame; 0: none.
   std::uint64_t unreported_drops_ = 0;  // Drops counted by ended calls and not yet reported.
 
-  std::mutex mutex_;  // Guards the members below. Only the receiver's thread changes `call_`.
-  std::condition_variable cancel_came_;
-  std::shared_ptr<WatchCall> call_;
-  bool cancelled_ = false;
+  Mutex mutex_;
+  CondVar cancel_came_;
+  std::shared_ptr<WatchCall> shared_call_ ABSL_GUARDED_BY(mutex_);  // call_, for Cancel.
+  bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::client

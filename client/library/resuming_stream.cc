@@ -88,24 +88,27 @@ absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string
     if (!channel.ok()) return channel.status();
   }
   std::unique_ptr<ResumingStream> stream(new ResumingStream(std::move(addresses), options));
-  Lock lock(stream->monitor_.mutex);
-  absl::Status status = stream->OpenFirst(lock);
-  lock.unlock();
+  absl::Status status;
+  {
+    const MutexLock lock(stream->monitor_.mutex);
+    status = stream->OpenFirst();
+  }
   if (!status.ok()) return status;
   return stream;
 }
 
-absl::Status ResumingStream::OpenFirst(Lock& lock) {
-  auto opened = connector_.OpenNew(lock);
+absl::Status ResumingStream::OpenFirst() {
+  AssertShared();
+  auto opened = connector_.OpenNew();
   if (!opened.ok()) return opened.status();
   auto info = ReadOpened(opened->message);
   if (!info.ok()) {
-    connector_.Drop(lock, std::move(opened->call));
+    connector_.Drop(std::move(opened->call));
     return info.status();
   }
   info_ = *std::move(info);
   if (options_.parts.parts > 0 && opened->message.limits().max_parts() == 0) {
-    connector_.Drop(lock, std::move(opened->call));
+    connector_.Drop(std::move(opened->call));
     return absl::UnimplementedError("the server does not support frames in parts: use a newer one");
   }
   survives_ = options_.reconnect.give_up_after.count() > 0 && options_.checkpoint_interval > 0 &&
@@ -114,7 +117,7 @@ absl::Status ResumingStream::OpenFirst(Lock& lock) {
   checkpoint_next_ = next_answer_ =
       sends_other_part() ? 1 : std::max<std::uint64_t>(1, opened->message.next_sequence());
   resend_ = ResendBuffer(next_answer_);
-  Adopt(lock, *std::move(opened), info_.frames_in_flight);
+  Adopt(*std::move(opened), info_.frames_in_flight);
   return absl::OkStatus();
 }
 
@@ -135,22 +138,26 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
                                                        std::size_t particles) {
   if (auto fits = CheckParticleCount(particles, info_.limits); !fits.ok()) return fits;
   const auto start = Clock::now();
-  Lock lock(monitor_.mutex);
-  if (auto ready = WaitToSend(lock, start, 0); !ready.ok()) return ready;
+  const MutexLock lock(monitor_.mutex);
+  AssertShared();
+  if (auto ready = WaitToSend(start, 0); !ready.ok()) return ready;
   const std::uint64_t sequence = resend_.end();
-  lock.unlock();
-  auto request = EncodeFrameRequest(frame, sequence, info_.limits);
+  absl::StatusOr<grpc::ByteBuffer> request;
+  {
+    const MutexUnlock unlock(monitor_.mutex);
+    request = EncodeFrameRequest(frame, sequence, info_.limits);
+  }
   if (!request.ok()) return request.status();
-  lock.lock();
-  if (auto ready = WaitToSend(lock, start, request->Length()); !ready.ok()) return ready;
+  if (auto ready = WaitToSend(start, request->Length()); !ready.ok()) return ready;
   if (all_answered()) due_since_ = Clock::now();
   resend_.Add(*request);
-  if (call_ != nullptr) call_->Queue(lock, *std::move(request));
+  if (call_ != nullptr) call_->Queue(*std::move(request));
   return sequence;
 }
 
 // True if a frame of `bytes` may be queued now.
 bool ResumingStream::MaySend(std::uint64_t bytes) const {
+  AssertShared();
   if (resend_.end() - next_answer_ >= info_.frames_in_flight) return false;
   if (resend_.bytes() + bytes > options_.max_held_bytes && !all_answered()) return false;
   // Only one frame at a time waits to be written. The queue of a lost call does not count.
@@ -159,6 +166,7 @@ bool ResumingStream::MaySend(std::uint64_t bytes) const {
 
 // The status that ended the stream; absent if its call continues or a retry can succeed.
 std::optional<absl::Status> ResumingStream::FatalEnd() const {
+  AssertShared();
   if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
   Loss loss = LossOf(*call_, LossPurpose(options_));
   if (survives_ && loss.retryable) return std::nullopt;
@@ -170,7 +178,7 @@ std::optional<absl::Status> ResumingStream::FatalEnd() const {
   return std::move(loss.status);
 }
 
-absl::Status ResumingStream::WaitToSend(Lock& lock, Clock::time_point start, std::uint64_t bytes) {
+absl::Status ResumingStream::WaitToSend(Clock::time_point start, std::uint64_t bytes) {
   const auto give_up = options_.send_timeout ? start + *options_.send_timeout : kNever;
   for (;;) {
     if (!failure_.ok()) return failure_;
@@ -181,9 +189,9 @@ absl::Status ResumingStream::WaitToSend(Lock& lock, Clock::time_point start, std
                                        : start + options_.reconnect.give_up_after) +
                      options_.deadline;
     const auto now = Clock::now();
-    if (now >= due) return Fail(lock, TooSlowToSend());
+    if (now >= due) return Fail(TooSlowToSend());
     if (now >= give_up) return SendTimeout(*options_.send_timeout);
-    monitor_.changed.wait_until(lock, std::min(due, give_up));
+    monitor_.changed.WaitUntil(monitor_.mutex, std::min(due, give_up));
   }
   if (resend_.bytes() + bytes <= options_.max_held_bytes) return absl::OkStatus();
   return ViolationError(
@@ -198,6 +206,7 @@ absl::Status ResumingStream::WaitToSend(Lock& lock, Clock::time_point start, std
 }
 
 absl::Status ResumingStream::TooSlowToSend() const {
+  AssertShared();
   const std::string deadline = Seconds(options_.deadline);
   if (call_ == nullptr || call_->ready() > 0 || call_->done()) {
     return absl::DeadlineExceededError(absl::StrCat(
@@ -210,31 +219,33 @@ absl::Status ResumingStream::TooSlowToSend() const {
 }
 
 absl::Status ResumingStream::FinishSending() {
-  Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
+  AssertShared();
   if (!failure_.ok()) return failure_;
   if (finished_) return absl::OkStatus();
   if (auto end = FatalEnd()) return *std::move(end);
   finished_ = true;
   if (all_answered()) due_since_ = Clock::now();
-  if (call_ != nullptr) call_->HalfClose(lock);
-  monitor_.changed.notify_all();
+  if (call_ != nullptr) call_->HalfClose();
+  monitor_.changed.NotifyAll();
   return absl::OkStatus();
 }
 
 absl::StatusOr<Received> ResumingStream::Receive(Event& event,
                                                  std::optional<std::chrono::milliseconds> wait) {
   const auto until = wait ? OptionalTime(Clock::now() + *wait) : std::nullopt;
-  Lock lock(monitor_.mutex);
-  auto received = Advance(lock, event, until);
-  if (!received.ok()) return Fail(lock, received.status());
+  const MutexLock lock(monitor_.mutex);
+  auto received = Advance(event, until);
+  if (!received.ok()) return Fail(received.status());
   return received;
 }
 
-absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, OptionalTime until) {
+absl::StatusOr<Received> ResumingStream::Advance(Event& event, OptionalTime until) {
+  AssertShared();
   for (;;) {
     if (!failure_.ok()) return failure_;
     if (call_ == nullptr) {
-      const auto gone_on = GoOn(lock, until);
+      const auto gone_on = GoOn(until);
       if (!gone_on.ok()) return gone_on.status();
       if (!*gone_on) return Received::kNothingYet;
       continue;
@@ -248,17 +259,17 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
     if (next_answer_ < over_below_) {
       event.kind = Event::Kind::kPartTaken;
       event.sequence = next_answer_++;
-      monitor_.changed.notify_all();
+      monitor_.changed.NotifyAll();
       return Received::kEvent;
     }
-    if (auto response = call_->Take(lock)) {
-      const auto delivered = Deliver(lock, std::move(response), event);
+    if (auto response = call_->Take()) {
+      const auto delivered = Deliver(std::move(response), event);
       if (!delivered.ok()) return delivered.status();
       if (*delivered) return Received::kEvent;
       continue;
     }
     if (call_->done()) {
-      const auto is_end = EndCall(lock);
+      const auto is_end = EndCall();
       if (!is_end.ok()) return is_end.status();
       if (*is_end) return Received::kEnd;
       continue;
@@ -276,16 +287,16 @@ absl::StatusOr<Received> ResumingStream::Advance(Lock& lock, Event& event, Optio
     }
     if (until && now >= *until) return Received::kNothingYet;
     if (due || until) {
-      monitor_.changed.wait_until(lock, due && until ? std::min(*due, *until)
-                                        : due        ? *due
-                                                     : *until);
+      monitor_.changed.WaitUntil(monitor_.mutex,
+                                 std::min(due.value_or(kNever), until.value_or(kNever)));
     } else {
-      monitor_.changed.wait(lock);
+      monitor_.changed.Wait(monitor_.mutex);
     }
   }
 }
 
 ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
+  AssertShared();
   if (call_->reads_over()) return call_->progress_at() + kEndTimeout;
   if (all_answered() && !finished_) return std::nullopt;
   if (sends_other_part()) return std::nullopt;  // Its responses wait for part 0.
@@ -293,22 +304,24 @@ ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
 }
 
 // Fills `event` if the response is new to the caller; otherwise drops it and returns false.
-absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response response,
-                                             Event& event) {
-  // Safe without the lock: only the receiver's thread changes these members.
+absl::StatusOr<bool> ResumingStream::Deliver(StreamCall::Response response, Event& event) {
+  AssertShared();
   const bool is_answer = IsAnswer(*response);
   const bool is_new = is_answer ? next_of_call_ == next_answer_ : !survives_;
-  lock.unlock();
-  if (response->has_notice()) connector_.Learn(response->notice());
+  const std::uint64_t due = next_of_call_;
+  const std::string& address = call_->address();  // Only the receiver's thread replaces the call.
   absl::Status status;
-  if (const auto sequence = AnsweredSequence(*response); is_answer && sequence != next_of_call_) {
-    status = absl::DataLossError(absl::StrCat("the server at ", call_->address(),
-                                              " answered frame ", sequence, " where frame ",
-                                              next_of_call_, " was due: it breaks the protocol"));
-  } else if (is_new || !is_answer) {
-    status = DecodeAnswer(*response, call_->address(), scratch_, event);
+  {
+    const MutexUnlock unlock(monitor_.mutex);
+    if (response->has_notice()) connector_.Learn(response->notice());
+    if (const auto sequence = AnsweredSequence(*response); is_answer && sequence != due) {
+      status = absl::DataLossError(absl::StrCat("the server at ", address, " answered frame ",
+                                                sequence, " where frame ", due,
+                                                " was due: it breaks the protocol"));
+    } else if (is_new || !is_answer) {
+      status = DecodeAnswer(*response, address, scratch_, event);
+    }
   }
-  lock.lock();
   if (!status.ok()) return status;
   if (is_answer) {
     Remember(*response);
@@ -319,8 +332,8 @@ absl::StatusOr<bool> ResumingStream::Deliver(Lock& lock, StreamCall::Response re
     }
     if (!survives_) resend_.DropBelow(next_answer_);
   }
-  call_->Recycle(lock, std::move(response));
-  monitor_.changed.notify_all();
+  call_->Recycle(std::move(response));
+  monitor_.changed.NotifyAll();
   return is_new;
 }
 
@@ -339,7 +352,8 @@ void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
 }
 
 // Handles the end of the call: true if the stream has ended, false if it reconnects.
-absl::StatusOr<bool> ResumingStream::EndCall(Lock& lock) {
+absl::StatusOr<bool> ResumingStream::EndCall() {
+  AssertShared();
   const Loss loss = LossOf(*call_, LossPurpose(options_));
   // Part 0 has finished.
   if (sends_other_part() && all_answered() && call_->end().ok()) finished_ = true;
@@ -347,32 +361,34 @@ absl::StatusOr<bool> ResumingStream::EndCall(Lock& lock) {
     return true;
   }
   if (auto end = FatalEnd()) return *std::move(end);
-  LoseCall(lock, std::move(call_), loss);
+  LoseCall(std::move(call_), loss);
   return false;
 }
 
-void ResumingStream::LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, const Loss& loss) {
+void ResumingStream::LoseCall(std::unique_ptr<StreamCall> call, const Loss& loss) {
+  AssertShared();
   v1::ResumeStream resume;
   resume.set_checkpoint(checkpoint_);
   resume.set_stream_token(token_);
   connector_.Lost(loss, std::move(resume));
-  monitor_.changed.notify_all();  // Wakes a sender that waits for the call's queue.
-  connector_.Drop(lock, std::move(call));
+  monitor_.changed.NotifyAll();  // Wakes a sender that waits for the call's queue.
+  connector_.Drop(std::move(call));
 }
 
 // Reconnects; false if no call is open at `until`.
-absl::StatusOr<bool> ResumingStream::GoOn(Lock& lock, OptionalTime until) {
-  auto opened = connector_.OpenAgain(lock, until);
+absl::StatusOr<bool> ResumingStream::GoOn(OptionalTime until) {
+  AssertShared();
+  auto opened = connector_.OpenAgain(until);
   if (!opened.ok()) return opened.status();
   if (!*opened) return false;
   const auto info = ReadOpened((*opened)->message);
   if (!info.ok()) return info.status();
   if (auto suits = CheckReplica(**opened, *info); !suits.ok()) {
-    LoseCall(lock, std::move((*opened)->call), {.status = suits, .why = "does not suit"});
+    LoseCall(std::move((*opened)->call), {.status = suits, .why = "does not suit"});
     return true;
   }
   owes_event_ = options_.reconnect.announce;
-  Adopt(lock, **std::move(opened), info->frames_in_flight);
+  Adopt(**std::move(opened), info->frames_in_flight);
   return true;
 }
 
@@ -408,43 +424,46 @@ std::uint64_t ResumingStream::FirstToSend(const StreamConnector::Opened& opened)
 }
 
 // Resends unanswered frames through the opened call and makes it the stream's call.
-void ResumingStream::Adopt(Lock& lock, StreamConnector::Opened opened, std::size_t window) {
+void ResumingStream::Adopt(StreamConnector::Opened opened, std::size_t window) {
   token_ = opened.message.stream_token();
   next_of_call_ = FirstToSend(opened);
   over_below_ = next_of_call_;
+  AssertShared();
   StreamCall& call = *opened.call;
-  call.SetWindow(lock, window);
+  call.AssertLocked();
+  call.SetWindow(window);
   // Until the call is the stream's, the sender only adds to the buffer, so frames stay in order.
-  for (std::uint64_t k = next_of_call_; k < resend_.end(); ++k) call.Queue(lock, resend_.at(k));
+  for (std::uint64_t k = next_of_call_; k < resend_.end(); ++k) call.Queue(resend_.at(k));
   due_since_ = adopted_at_ = Clock::now();
   call_ = std::move(opened.call);
   if (all_answered()) connector_.Recovered();
-  if (!failure_.ok()) call_->Cancel(lock);
-  if (finished_) call_->HalfClose(lock);
-  monitor_.changed.notify_all();
+  if (!failure_.ok()) call_->Cancel();
+  if (finished_) call_->HalfClose();
+  monitor_.changed.NotifyAll();
 }
 
 std::optional<Reconnecting> ResumingStream::reconnecting() const {
-  const Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   return call_ == nullptr ? connector_.Progress() : std::nullopt;
 }
 
 std::size_t ResumingStream::InFlight() const {
-  const Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   return resend_.end() - next_answer_;
 }
 
 void ResumingStream::Cancel() {
-  Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   if (FatalEnd()) return;  // Keeps the status that ended the stream.
-  Fail(lock, absl::CancelledError("the stream was cancelled")).IgnoreError();
+  Fail(absl::CancelledError("the stream was cancelled")).IgnoreError();
 }
 
-absl::Status ResumingStream::Fail(Lock& lock, absl::Status failure) {
+absl::Status ResumingStream::Fail(absl::Status failure) {
+  AssertShared();
   if (failure_.ok()) failure_ = std::move(failure);
-  connector_.Cancel(lock);
-  if (call_ != nullptr) call_->Cancel(lock);
-  monitor_.changed.notify_all();
+  connector_.Cancel();
+  if (call_ != nullptr) call_->Cancel();
+  monitor_.changed.NotifyAll();
   return failure_;
 }
 

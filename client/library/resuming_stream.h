@@ -39,41 +39,55 @@ class ResumingStream final : public Stream {
   const StreamInfo& info() const override { return info_; }
   absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
   absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles, double time) override;
-  absl::Status FinishSending() override;
+  absl::Status FinishSending() override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
   absl::StatusOr<Received> Receive(Event& event,
-                                   std::optional<std::chrono::milliseconds> wait) override;
-  std::optional<Reconnecting> reconnecting() const override;
-  std::size_t InFlight() const override;
-  void Cancel() override;
+                                   std::optional<std::chrono::milliseconds> wait) override
+      ABSL_LOCKS_EXCLUDED(monitor_.mutex);
+  std::optional<Reconnecting> reconnecting() const override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
+  std::size_t InFlight() const override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
+  void Cancel() override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
 
  private:
   using Clock = StreamCall::Clock;
-  using Lock = StreamCall::Lock;
   using OptionalTime = std::optional<Clock::time_point>;
 
   ResumingStream(std::vector<std::string> addresses, const StreamOptions& options);
 
-  // Require the lock and may release it while they wait. Receiver's thread:
-  absl::Status OpenFirst(Lock& lock);
-  absl::StatusOr<Received> Advance(Lock& lock, Event& event, OptionalTime until);
-  absl::StatusOr<bool> GoOn(Lock& lock, OptionalTime until);
-  absl::Status CheckReplica(const StreamConnector::Opened& opened, const StreamInfo& info) const;
-  void Adopt(Lock& lock, StreamConnector::Opened opened, std::size_t window);
-  absl::StatusOr<bool> Deliver(Lock& lock, StreamCall::Response response, Event& event);
-  void Remember(const v1::ReconstructResponse& answer);
-  absl::StatusOr<bool> EndCall(Lock& lock);
-  void LoseCall(Lock& lock, std::unique_ptr<StreamCall> call, const Loss& loss);
-  OptionalTime AnswerDue() const;
+  // Methods that require the mutex may release it while they wait. Receiver's thread:
+  absl::Status OpenFirst() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::StatusOr<Received> Advance(Event& event, OptionalTime until)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::StatusOr<bool> GoOn(OptionalTime until) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::Status CheckReplica(const StreamConnector::Opened& opened, const StreamInfo& info) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void Adopt(StreamConnector::Opened opened, std::size_t window)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::StatusOr<bool> Deliver(StreamCall::Response response, Event& event)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void Remember(const v1::ReconstructResponse& answer)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::StatusOr<bool> EndCall() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void LoseCall(std::unique_ptr<StreamCall> call, const Loss& loss)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  OptionalTime AnswerDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   // Any thread:
-  absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles);
-  absl::Status Fail(Lock& lock, absl::Status failure);
-  absl::Status WaitToSend(Lock& lock, Clock::time_point start, std::uint64_t bytes);
-  bool MaySend(std::uint64_t bytes) const;
-  absl::Status TooSlowToSend() const;
-  std::optional<absl::Status> FatalEnd() const;
-  bool all_answered() const { return next_answer_ == resend_.end(); }
+  absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles)
+      ABSL_LOCKS_EXCLUDED(monitor_.mutex);
+  absl::Status Fail(absl::Status failure) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::Status WaitToSend(Clock::time_point start, std::uint64_t bytes)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  bool MaySend(std::uint64_t bytes) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::Status TooSlowToSend() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  std::optional<absl::Status> FatalEnd() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  bool all_answered() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
+    return next_answer_ == resend_.end();
+  }
   bool sends_other_part() const { return options_.parts.part > 0; }
-  std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const;
+  std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  // States to the analysis that the connector and the call use the same monitor. Checks nothing.
+  void AssertShared() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
+      ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.mutex(), call_->mutex()) {}
 
   const StreamOptions options_;
   // Constant after opening:
@@ -85,17 +99,23 @@ class ResumingStream final : public Stream {
   wire::ReconstructedFrame scratch_;  // Receiver's thread only.
   bool owes_event_ = false;           // A kReconnected event is due. Receiver's thread only.
 
-  // Guarded by the monitor:
-  std::unique_ptr<StreamCall> call_;  // Null while reconnecting.
-  ResendBuffer resend_{1};
-  std::string token_, checkpoint_;
-  std::uint64_t checkpoint_next_ = 1;  // The first frame after the checkpoint.
-  std::uint64_t next_answer_ = 1;      // The next frame to deliver.
-  std::uint64_t next_of_call_ = 1;     // The next frame that call_ answers.
-  std::uint64_t over_below_ = 0;       // All parts below this frame are over, as reported by call_.
-  Clock::time_point due_since_, adopted_at_;  // Start of the deadline.
-  bool finished_ = false;                     // FinishSending was called.
-  absl::Status failure_;                      // Status that ended the stream.
+  // Null while reconnecting.
+  std::unique_ptr<StreamCall> call_ ABSL_GUARDED_BY(monitor_.mutex);
+  ResendBuffer resend_ ABSL_GUARDED_BY(monitor_.mutex){1};
+  std::string token_ ABSL_GUARDED_BY(monitor_.mutex);
+  std::string checkpoint_ ABSL_GUARDED_BY(monitor_.mutex);
+  // The first frame after the checkpoint.
+  std::uint64_t checkpoint_next_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
+  // The next frame to deliver, and the next frame that call_ answers.
+  std::uint64_t next_answer_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
+  std::uint64_t next_of_call_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
+  // All parts below this frame are over, as reported by call_.
+  std::uint64_t over_below_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
+  // Starts of deadlines.
+  Clock::time_point due_since_ ABSL_GUARDED_BY(monitor_.mutex);
+  Clock::time_point adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
+  bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // FinishSending was called.
+  absl::Status failure_ ABSL_GUARDED_BY(monitor_.mutex);   // Status that ended the stream.
 };
 
 }  // namespace partiemc::client

@@ -25,69 +25,69 @@ StreamCall::StreamCall(Monitor& monitor, std::shared_ptr<grpc::Channel> channel,
 }
 
 StreamCall::~StreamCall() {
-  Lock lock(monitor_.mutex);
-  Cancel(lock);
-  monitor_.changed.wait(lock, [this] { return done_ || !started_; });
+  const MutexLock lock(monitor_.mutex);
+  Cancel();
+  while (started_ && !done_) monitor_.changed.Wait(monitor_.mutex);
 }
 
 void StreamCall::Start(const v1::OpenStream& open) {
   v1::ReconstructRequest request;
   *request.mutable_open() = open;
   stub_.PrepareBidiStreamingCall(&context_, MethodName(), {}, this);
-  Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   started_ = hold_ = writing_ = true;
   request_ = wire::ToBytes(request);
   AddHold();
   StartCall();
-  ReadNext(lock);
-  RunOutside(lock, [this] { StartWrite(&request_); });
+  ReadNext();
+  RunOutside([this] { StartWrite(&request_); });
 }
 
-void StreamCall::SetWindow(Lock& lock, std::size_t frames) {
+void StreamCall::SetWindow(std::size_t frames) {
   window_ = frames;
   while (spare_.size() < frames + kSpareMessages) {
     spare_.push_back(std::make_unique<v1::ReconstructResponse>());
   }
-  if (reading_ == nullptr) ReadNext(lock);
-  WriteNext(lock);
+  if (reading_ == nullptr) ReadNext();
+  WriteNext();
 }
 
-void StreamCall::Queue(Lock& lock, grpc::ByteBuffer frame) {
+void StreamCall::Queue(grpc::ByteBuffer frame) {
   queue_.push_back(std::move(frame));
-  WriteNext(lock);
+  WriteNext();
 }
 
-void StreamCall::HalfClose(Lock& lock) {
+void StreamCall::HalfClose() {
   half_close_wanted_ = true;
-  WriteNext(lock);
+  WriteNext();
 }
 
-void StreamCall::Cancel(Lock& lock) {
+void StreamCall::Cancel() {
   if (!started_ || done_) return;
   cancelled_ = true;
   context_.TryCancel();
-  EndReadsIfCancelled(lock);
+  EndReadsIfCancelled();
 }
 
 // Without a pending read, no callback would report that the call has ended.
-void StreamCall::EndReadsIfCancelled(Lock& lock) {
+void StreamCall::EndReadsIfCancelled() {
   if (!cancelled_ || reading_ != nullptr) return;
   reads_over_ = true;
-  ReleaseHoldWhenIdle(lock);
+  ReleaseHoldWhenIdle();
 }
 
-StreamCall::Response StreamCall::Take(Lock&) {
+StreamCall::Response StreamCall::Take() {
   if (ready_.empty()) return nullptr;
   Response response = std::move(ready_.front());
   ready_.pop_front();
   return response;
 }
 
-void StreamCall::Recycle(Lock& lock, Response response) {
+void StreamCall::Recycle(Response response) {
   spare_.push_back(std::move(response));
   if (reading_ != nullptr || window_ == 0) return;
   progress_at_ = Clock::now();  // No read was pending, so the silence was not the server's.
-  ReadNext(lock);
+  ReadNext();
 }
 
 std::string StreamCall::reason() const {
@@ -96,7 +96,7 @@ std::string StreamCall::reason() const {
   return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
 }
 
-void StreamCall::WriteNext(Lock& lock) {
+void StreamCall::WriteNext() {
   if (writing_ || reads_over_ || half_closed_) return;
   if (!queue_.empty()) {
     if (written_ - answered_ >= window_) return;
@@ -104,71 +104,71 @@ void StreamCall::WriteNext(Lock& lock) {
     writing_ = true;
     request_.Swap(&queue_.front());
     queue_.pop_front();
-    RunOutside(lock, [this] { StartWrite(&request_); });
+    RunOutside([this] { StartWrite(&request_); });
   } else if (half_close_wanted_) {
     half_closed_ = true;
-    RunOutside(lock, [this] { StartWritesDone(); });
+    RunOutside([this] { StartWritesDone(); });
   }
 }
 
-void StreamCall::ReadNext(Lock& lock) {
+void StreamCall::ReadNext() {
   if (reads_over_ || spare_.empty()) return;
   reading_ = std::move(spare_.back());
   spare_.pop_back();
-  RunOutside(lock, [this, into = reading_.get()] { StartRead(into); });
+  RunOutside([this, into = reading_.get()] { StartRead(into); });
 }
 
 // Starts an operation without the lock, since gRPC may call back immediately. The hold stays until
 // it has started.
 template <typename Operation>
-void StreamCall::RunOutside(Lock& lock, Operation operation) {
+void StreamCall::RunOutside(Operation operation) {
   ++outside_operations_;
-  lock.unlock();
-  operation();
-  lock.lock();
+  {
+    const MutexUnlock unlock(monitor_.mutex);
+    operation();
+  }
   --outside_operations_;
-  ReleaseHoldWhenIdle(lock);
+  ReleaseHoldWhenIdle();
 }
 
-void StreamCall::ReleaseHoldWhenIdle(Lock& lock) {
+void StreamCall::ReleaseHoldWhenIdle() {
   if (!reads_over_ || outside_operations_ > 0 || !hold_) return;
   hold_ = false;
-  lock.unlock();
+  const MutexUnlock unlock(monitor_.mutex);
   RemoveHold();
-  lock.lock();
 }
 
 void StreamCall::OnWriteDone(bool ok) {
   // The end of the reads and OnDone report a failed write with its reason.
-  Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   writing_ = !ok;
   request_.Clear();
-  WriteNext(lock);
-  monitor_.changed.notify_all();
+  WriteNext();
+  monitor_.changed.NotifyAll();
 }
 
 void StreamCall::OnReadDone(bool ok) {
-  Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   progress_at_ = Clock::now();
   if (ok) {
     if (IsAnswer(*reading_)) ++answered_;
     ready_.push_back(std::move(reading_));
-    ReadNext(lock);
-    WriteNext(lock);
-    EndReadsIfCancelled(lock);
+    ReadNext();
+    WriteNext();
+    EndReadsIfCancelled();
   } else {
     spare_.push_back(std::move(reading_));
     reads_over_ = true;
-    ReleaseHoldWhenIdle(lock);
+    ReleaseHoldWhenIdle();
   }
-  monitor_.changed.notify_all();
+  monitor_.changed.NotifyAll();
 }
 
 void StreamCall::OnDone(const grpc::Status& status) {
-  const Lock lock(monitor_.mutex);
+  const MutexLock lock(monitor_.mutex);
   end_ = status;
   done_ = true;
-  monitor_.changed.notify_all();
+  monitor_.changed.NotifyAll();
 }
 
 }  // namespace partiemc::client

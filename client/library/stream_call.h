@@ -13,66 +13,72 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 
 namespace partiemc::client {
 
 /// Mutex shared by a stream and its calls, and the condition that signals changes.
 struct Monitor {
-  std::mutex mutex;
-  std::condition_variable changed;
+  Mutex mutex;
+  CondVar changed;
 };
 
 /// A call that takes longer to end after its last message is treated as broken.
 inline constexpr std::chrono::seconds kEndTimeout(1);
 
-/// Members with a `lock` require the monitor's lock and may release it while they run.
+/// Methods that require the monitor's mutex may release it while they run.
 class StreamCall final
     : private grpc::ClientBidiReactor<grpc::ByteBuffer, v1::ReconstructResponse> {
  public:
   using Clock = std::chrono::steady_clock;
-  using Lock = std::unique_lock<std::mutex>;
   using Response = std::unique_ptr<v1::ReconstructResponse>;
 
   /// `monitor` must outlive the call.
   StreamCall(Monitor& monitor, std::shared_ptr<grpc::Channel> channel, std::string address);
-  /// Cancels and waits until gRPC has finished with the call. Requires: the lock is not held.
+  /// Cancels and waits until gRPC has finished with the call. Requires: the mutex is not held.
   ~StreamCall() override;
 
-  /// Sends `open`. Call first and once. Requires: the lock is not held.
-  void Start(const v1::OpenStream& open);
+  Mutex& mutex() const ABSL_LOCK_RETURNED(monitor_.mutex) { return monitor_.mutex; }
+  /// States to the analysis that this thread holds the monitor's mutex. Checks nothing.
+  void AssertLocked() const ABSL_ASSERT_EXCLUSIVE_LOCK(monitor_.mutex) {}
+
+  /// Sends `open`. Call first and once.
+  void Start(const v1::OpenStream& open) ABSL_LOCKS_EXCLUDED(monitor_.mutex);
   /// Sets the number of frames that may be written ahead of their answers, and starts reading. Call
   /// once, after the first response; before, only that response is read.
-  void SetWindow(Lock& lock, std::size_t frames);
+  void SetWindow(std::size_t frames) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   /// Appends `frame` to the queue.
-  void Queue(Lock& lock, grpc::ByteBuffer frame);
+  void Queue(grpc::ByteBuffer frame) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   /// Half-closes the call after the queued frames.
-  void HalfClose(Lock& lock);
-  void Cancel(Lock& lock);
+  void HalfClose() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void Cancel() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   /// The next response; null if there is none.
-  Response Take(Lock& lock);
-  void Recycle(Lock& lock, Response response);
+  Response Take() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void Recycle(Response response) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   /// Frames in the queue whose write has not begun.
-  std::size_t backlog() const { return queue_.size(); }
+  std::size_t backlog() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
+    return queue_.size();
+  }
   /// Responses that can be taken.
-  std::size_t ready() const { return ready_.size(); }
+  std::size_t ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return ready_.size(); }
   /// Time of the last message from the server, or of the last resumed read.
-  Clock::time_point progress_at() const { return progress_at_; }
+  Clock::time_point progress_at() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
+    return progress_at_;
+  }
   /// No response will follow; the status may still be pending.
-  bool reads_over() const { return reads_over_; }
-  bool done() const { return done_; }
+  bool reads_over() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return reads_over_; }
+  bool done() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return done_; }
   const std::string& address() const { return address_; }
 
   // Valid when done():
@@ -81,36 +87,42 @@ class StreamCall final
   std::string reason() const;
 
  private:
-  void OnWriteDone(bool ok) override;
-  void OnReadDone(bool ok) override;
-  void OnDone(const grpc::Status& status) override;
+  void OnWriteDone(bool ok) override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
+  void OnReadDone(bool ok) override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
+  void OnDone(const grpc::Status& status) override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
 
-  void WriteNext(Lock& lock);
-  void ReadNext(Lock& lock);
+  void WriteNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void ReadNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   template <typename Operation>
-  void RunOutside(Lock& lock, Operation operation);
-  void ReleaseHoldWhenIdle(Lock& lock);
-  void EndReadsIfCancelled(Lock& lock);
+  void RunOutside(Operation operation) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void ReleaseHoldWhenIdle() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void EndReadsIfCancelled() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   Monitor& monitor_;
   const std::string address_;
   grpc::TemplatedGenericStub<grpc::ByteBuffer, v1::ReconstructResponse> stub_;
   grpc::ClientContext context_;
 
-  // Guarded by the monitor:
-  std::vector<Response> spare_;
-  Response reading_;
-  std::deque<Response> ready_;
-  grpc::ByteBuffer request_;  // The request being written.
-  std::deque<grpc::ByteBuffer> queue_;
-  std::size_t window_ = 0;
-  std::uint64_t written_ = 0, answered_ = 0;  // Numbers of frames.
-  Clock::time_point progress_at_ = Clock::now();
-  bool writing_ = false;
-  bool half_close_wanted_ = false, half_closed_ = false;
-  bool started_ = false, cancelled_ = false, reads_over_ = false, hold_ = false, done_ = false;
-  int outside_operations_ = 0;
-  grpc::Status end_;  // Valid when done_.
+  std::vector<Response> spare_ ABSL_GUARDED_BY(monitor_.mutex);
+  Response reading_ ABSL_GUARDED_BY(monitor_.mutex);
+  std::deque<Response> ready_ ABSL_GUARDED_BY(monitor_.mutex);
+  grpc::ByteBuffer request_ ABSL_GUARDED_BY(monitor_.mutex);  // The request being written.
+  std::deque<grpc::ByteBuffer> queue_ ABSL_GUARDED_BY(monitor_.mutex);
+  std::size_t window_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
+  // Numbers of frames.
+  std::uint64_t written_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
+  std::uint64_t answered_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
+  Clock::time_point progress_at_ ABSL_GUARDED_BY(monitor_.mutex) = Clock::now();
+  bool writing_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool half_close_wanted_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool half_closed_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool started_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool cancelled_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool reads_over_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool hold_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  bool done_ ABSL_GUARDED_BY(monitor_.mutex) = false;
+  int outside_operations_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
+  grpc::Status end_;  // Constant once done_ is set.
 };
 
 }  // namespace partiemc::client

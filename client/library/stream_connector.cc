@@ -50,23 +50,33 @@ absl::Status NotOpened(const std::string& address) {
 // Attempts to open the stream. Releases the monitor's lock while it waits.
 class StreamConnector::Calls final : public Attempts {
  public:
-  Calls(StreamConnector& connector, Lock& lock) : connector_(connector), lock_(lock) {}
+  explicit Calls(StreamConnector& connector) : connector_(connector) {}
 
-  bool Cancelled() override { return connector_.cancelled_; }
+  // States to the analysis that this thread holds the connector's mutex. Checks nothing.
+  void AssertLocked() const ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.monitor_.mutex) {}
 
-  absl::Status Start(const std::string& address) override {
-    lock_.unlock();
-    auto channel = MakeChannel(address, connector_.options_.credentials);
-    lock_.lock();
+  bool Cancelled() override ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
+    return connector_.cancelled_;
+  }
+
+  absl::Status Start(const std::string& address) override
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
+    absl::StatusOr<std::shared_ptr<grpc::Channel>> channel;
+    {
+      const MutexUnlock unlock(connector_.monitor_.mutex);
+      channel = MakeChannel(address, connector_.options_.credentials);
+    }
     if (!channel.ok()) return channel.status();
-    connector_.Start(lock_, *std::move(channel));
+    connector_.Start(*std::move(channel));
     return absl::OkStatus();
   }
 
-  absl::StatusOr<bool> Check(bool& retryable) override {
+  absl::StatusOr<bool> Check(bool& retryable) override
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
     StreamCall& call = *connector_.attempt_;
+    call.AssertLocked();
     retryable = false;
-    if (const auto response = call.Take(lock_)) {
+    if (const auto response = call.Take()) {
       if (!response->has_opened()) return NotOpened(call.address());
       message_ = response->opened();
       return true;
@@ -77,16 +87,21 @@ class StreamConnector::Calls final : public Attempts {
     return std::move(loss.status);
   }
 
-  void Drop() override { StreamConnector::Drop(lock_, std::move(connector_.attempt_)); }
+  void Drop() override ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
+    connector_.Drop(std::move(connector_.attempt_));
+  }
 
-  void Wait(TimePoint until) override { connector_.monitor_.changed.wait_until(lock_, until); }
+  void Wait(TimePoint until) override ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
+    connector_.monitor_.changed.WaitUntil(connector_.monitor_.mutex, until);
+  }
 
   // Requires: a call is open.
-  Opened TakeOpened() { return {std::move(connector_.attempt_), std::move(message_)}; }
+  Opened TakeOpened() ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
+    return {std::move(connector_.attempt_), std::move(message_)};
+  }
 
  private:
   StreamConnector& connector_;
-  Lock& lock_;
   v1::StreamOpened message_;
 };
 
@@ -96,35 +111,43 @@ StreamConnector::StreamConnector(Monitor& monitor, std::vector<std::string> addr
       options_(options),
       retry_(std::move(addresses), "stream", options.reconnect, options.connect_timeout) {}
 
-absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNew(Lock& lock) {
+absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNew() {
   // Part 0 may come later than the others.
   const auto give_up_at =
       Clock::now() + (options_.parts.part > 0 ? options_.deadline : options_.connect_timeout);
   for (;; retry_.UseNextAddress()) {
     bool retryable = true;
-    auto opened = OpenNewAt(lock, give_up_at, retryable);
+    auto opened = OpenNewAt(give_up_at, retryable);
     if (opened.ok() || !retryable || Clock::now() >= give_up_at) return opened;
-    monitor_.changed.wait_for(lock, kRest, [] { return false; });
+    const auto next = Clock::now() + kRest;
+    while (monitor_.changed.WaitUntil(monitor_.mutex, next)) {
+    }
   }
 }
 
-absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(Lock& lock,
-                                                                   Clock::time_point give_up_at,
+absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(Clock::time_point give_up_at,
                                                                    bool& retryable) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(give_up_at - Clock::now());
-  lock.unlock();
-  auto channel = MakeChannel(address(), options_.credentials);
-  absl::Status reached = channel.status();
-  if (channel.ok()) {
-    reached = Connect(*channel, address(),
-                      retry_.addresses().size() == 1 ? left : std::min(left, kShortConnect));
+  absl::StatusOr<std::shared_ptr<grpc::Channel>> channel;
+  absl::Status reached;
+  {
+    const MutexUnlock unlock(monitor_.mutex);
+    channel = MakeChannel(address(), options_.credentials);
+    reached = channel.status();
+    if (channel.ok()) {
+      reached = Connect(*channel, address(),
+                        retry_.addresses().size() == 1 ? left : std::min(left, kShortConnect));
+    }
   }
-  lock.lock();
   if (!reached.ok()) return reached;
-  Start(lock, *std::move(channel));
-  monitor_.changed.wait_for(lock, options_.deadline,
-                            [this] { return attempt_->ready() > 0 || attempt_->done(); });
-  Calls calls(*this, lock);
+  Start(*std::move(channel));
+  AssertAttemptLocked();
+  const auto due = Clock::now() + options_.deadline;
+  while (attempt_->ready() == 0 && !attempt_->done() &&
+         monitor_.changed.WaitUntil(monitor_.mutex, due)) {
+  }
+  Calls calls(*this);
+  calls.AssertLocked();
   const auto opened = calls.Check(retryable);
   if (opened.ok() && *opened) return calls.TakeOpened();
   calls.Drop();
@@ -151,8 +174,9 @@ void StreamConnector::Lost(const Loss& loss, v1::ResumeStream resume) {
 }
 
 absl::StatusOr<std::optional<StreamConnector::Opened>> StreamConnector::OpenAgain(
-    Lock& lock, std::optional<Clock::time_point> until) {
-  Calls calls(*this, lock);
+    std::optional<Clock::time_point> until) {
+  Calls calls(*this);
+  calls.AssertLocked();
   const auto outcome = retry_.Run(calls, until);
   if (!outcome.ok()) return outcome.status();
   switch (*outcome) {
@@ -175,26 +199,28 @@ CallPurpose StreamConnector::Purpose() const {
   return resuming_ ? CallPurpose::kResume : CallPurpose::kOpen;
 }
 
-void StreamConnector::Start(Lock& lock, std::shared_ptr<grpc::Channel> channel) {
+void StreamConnector::Start(std::shared_ptr<grpc::Channel> channel) {
   v1::OpenStream open = OpenMessage(options_);
   if (Purpose() == CallPurpose::kResume) *open.mutable_resume() = resume_;
-  lock.unlock();
-  auto call = std::make_unique<StreamCall>(monitor_, std::move(channel), address());
-  call->Start(open);
-  lock.lock();
+  std::unique_ptr<StreamCall> call;
+  {
+    const MutexUnlock unlock(monitor_.mutex);
+    call = std::make_unique<StreamCall>(monitor_, std::move(channel), address());
+    call->Start(open);
+  }
   attempt_ = std::move(call);
 }
 
-// Without the lock: gRPC's threads need it to end a call.
-void StreamConnector::Drop(Lock& lock, std::unique_ptr<StreamCall> call) {
-  lock.unlock();
+// Unlocks the mutex, because gRPC's threads need it to end a call.
+void StreamConnector::Drop(std::unique_ptr<StreamCall> call) {
+  const MutexUnlock unlock(monitor_.mutex);
   call.reset();
-  lock.lock();
 }
 
-void StreamConnector::Cancel(Lock& lock) {
+void StreamConnector::Cancel() {
   cancelled_ = true;
-  if (attempt_ != nullptr) attempt_->Cancel(lock);
+  AssertAttemptLocked();
+  if (attempt_ != nullptr) attempt_->Cancel();
 }
 
 }  // namespace partiemc::client

@@ -17,12 +17,11 @@
 
 namespace partiemc::client {
 
-/// Used by the receiver's thread only, except Cancel. Members with a `lock` require the monitor's
-/// lock and release it while they wait.
+/// Used by the receiver's thread only, except Cancel. Methods that require the monitor's mutex
+/// release it while they wait.
 class StreamConnector {
  public:
   using Clock = StreamCall::Clock;
-  using Lock = StreamCall::Lock;
 
   struct Opened {
     std::unique_ptr<StreamCall> call;
@@ -33,8 +32,10 @@ class StreamConnector {
   StreamConnector(Monitor& monitor, std::vector<std::string> addresses,
                   const StreamOptions& options);
 
+  Mutex& mutex() const ABSL_LOCK_RETURNED(monitor_.mutex) { return monitor_.mutex; }
+
   /// Opens a new stream at the first address that accepts it. Errors: see Stream::Open.
-  absl::StatusOr<Opened> OpenNew(Lock& lock);
+  absl::StatusOr<Opened> OpenNew() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   /// Adds addresses from a server's notice for failover, if the credentials suit them.
   void Learn(const v1::StreamNotice& notice);
@@ -43,8 +44,8 @@ class StreamConnector {
   void Lost(const Loss& loss, v1::ResumeStream resume);
   /// Continues to reconnect: waits, connects, opens. Returns nothing if no call is open at `until`.
   /// Errors: the server's refusal; UNAVAILABLE after ReconnectPolicy::give_up_after.
-  absl::StatusOr<std::optional<Opened>> OpenAgain(Lock& lock,
-                                                  std::optional<Clock::time_point> until);
+  absl::StatusOr<std::optional<Opened>> OpenAgain(std::optional<Clock::time_point> until)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   /// Ends the loss: a new result was delivered.
   void Recovered() { retry_.Recovered(); }
 
@@ -56,16 +57,20 @@ class StreamConnector {
   std::string LossDescription() const { return retry_.LossDescription(); }
 
   /// Ends a call. Receiver's thread only.
-  static void Drop(Lock& lock, std::unique_ptr<StreamCall> call);
+  void Drop(std::unique_ptr<StreamCall> call) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   /// Any thread. OpenAgain soon fails with CANCELLED.
-  void Cancel(Lock& lock);
+  void Cancel() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
  private:
   class Calls;
 
-  absl::StatusOr<Opened> OpenNewAt(Lock& lock, Clock::time_point give_up_at, bool& retryable);
-  void Start(Lock& lock, std::shared_ptr<grpc::Channel> channel);
+  absl::StatusOr<Opened> OpenNewAt(Clock::time_point give_up_at, bool& retryable)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  void Start(std::shared_ptr<grpc::Channel> channel) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  // States to the analysis that the attempt uses the same monitor. Checks nothing.
+  void AssertAttemptLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
+      ABSL_ASSERT_EXCLUSIVE_LOCK(attempt_->mutex()) {}
   const std::string& address() const { return retry_.address(); }
   CallPurpose Purpose() const;
 
@@ -73,8 +78,8 @@ class StreamConnector {
   const StreamOptions options_;
   RetryLoop retry_;
 
-  std::unique_ptr<StreamCall> attempt_;  // Guarded by the monitor.
-  bool cancelled_ = false;               // Guarded by the monitor.
+  std::unique_ptr<StreamCall> attempt_ ABSL_GUARDED_BY(monitor_.mutex);
+  bool cancelled_ ABSL_GUARDED_BY(monitor_.mutex) = false;
   v1::ResumeStream resume_;
   bool resuming_ = false;
 };

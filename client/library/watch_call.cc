@@ -58,11 +58,11 @@ void WatchCall::Start(std::string_view stream_name, const WatcherOptions& option
 
 void WatchCall::Run(v1::WatchStreamRequest open) {
   rpc_ = stub_->WatchStream(&context_);
-  rpc_->Write(open);  // Where it fails, the end of the call says why.
+  rpc_->Write(open);  // If it fails, the end of the call reports the reason.
   for (;;) {
     Message message;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!spare_.empty()) {
         message = std::move(spare_.back());
         spare_.pop_back();
@@ -70,22 +70,23 @@ void WatchCall::Run(v1::WatchStreamRequest open) {
     }
     if (message == nullptr) message = std::make_unique<v1::WatchStreamResponse>();
     if (!rpc_->Read(message.get())) break;
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ready_.push_back(std::move(message));
-    changed_.notify_all();
+    changed_.NotifyAll();
   }
   const grpc::Status status = rpc_->Finish();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   status_ = status;
   const auto& metadata = context_.GetServerTrailingMetadata();
   const auto reason = metadata.find("partiemc-reason");
   if (reason != metadata.end()) reason_.assign(reason->second.data(), reason->second.size());
-  changed_.notify_all();
+  changed_.NotifyAll();
 }
 
 absl::StatusOr<bool> WatchCall::WaitUntilOpened(Clock::time_point until) {
-  std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, until, [this] { return cancelled_ || !ready_.empty() || status_; });
+  const MutexLock lock(mutex_);
+  while (!HasNews() && changed_.WaitUntil(mutex_, until)) {
+  }
   if (cancelled_) return absl::CancelledError("the watch was cancelled");
   if (ready_.empty() && !status_) return false;
   if (ready_.empty()) {
@@ -108,43 +109,55 @@ absl::StatusOr<bool> WatchCall::WaitUntilOpened(Clock::time_point until) {
 
 absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
                                             std::optional<std::chrono::milliseconds> wait) {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    const auto something = [this] { return cancelled_ || !ready_.empty() || status_; };
+  absl::StatusOr<Received> received = Received::kNothingYet;
+  Message message = TakeNext(wait, received);
+  while (message != nullptr && message->has_ended()) {
+    end_ = {message->ended().reason(), message->ended().message(), message->ended().dropped()};
+    message = TakeNext(wait, received);  // The status of the call follows.
+  }
+  if (message == nullptr) return received;
+  const absl::Status status = Decode(*message, frame);
+  if (!status.ok()) {
+    context_.TryCancel();
+    return status;
+  }
+  {
+    const MutexLock lock(mutex_);
+    spare_.push_back(std::move(message));
+  }
+  v1::WatchStreamRequest credit;
+  credit.mutable_credit()->set_frames(1);
+  rpc_->Write(credit);  // If it fails, the end of the call reports the reason.
+  return Received::kEvent;
+}
+
+WatchCall::Message WatchCall::TakeNext(std::optional<std::chrono::milliseconds> wait,
+                                       absl::StatusOr<Received>& received) {
+  const auto until = Clock::now() + wait.value_or(std::chrono::milliseconds(0));
+  const MutexLock lock(mutex_);
+  while (!HasNews()) {
     if (!wait) {
-      changed_.wait(lock, something);
-    } else if (!changed_.wait_for(lock, *wait, something)) {
-      return Received::kNothingYet;
+      changed_.Wait(mutex_);
+    } else if (!changed_.WaitUntil(mutex_, until) && !HasNews()) {
+      received = Received::kNothingYet;
+      return nullptr;
     }
-    if (cancelled_) return absl::CancelledError("the watch was cancelled");
-    if (ready_.empty()) {
-      if (!status_->ok()) return FromGrpc(*status_, address_);
-      if (end_.reason.empty()) {
-        return absl::UnavailableError(
-            absl::StrCat("the server at ", address_, " ended the watch without a reason"));
-      }
-      return Received::kEnd;
-    }
+  }
+  if (cancelled_) {
+    received = absl::CancelledError("the watch was cancelled");
+  } else if (!ready_.empty()) {
     Message message = std::move(ready_.front());
     ready_.pop_front();
-    if (message->has_ended()) {
-      end_ = {message->ended().reason(), message->ended().message(), message->ended().dropped()};
-      continue;  // The status of the call follows.
-    }
-    lock.unlock();
-    const absl::Status status = Decode(*message, frame);
-    if (!status.ok()) {
-      context_.TryCancel();
-      return status;
-    }
-    lock.lock();
-    spare_.push_back(std::move(message));
-    lock.unlock();
-    v1::WatchStreamRequest credit;
-    credit.mutable_credit()->set_frames(1);
-    rpc_->Write(credit);  // Where it fails, the end of the call says why.
-    return Received::kEvent;
+    return message;
+  } else if (!status_->ok()) {
+    received = FromGrpc(*status_, address_);
+  } else if (end_.reason.empty()) {
+    received = absl::UnavailableError(
+        absl::StrCat("the server at ", address_, " ended the watch without a reason"));
+  } else {
+    received = Received::kEnd;
   }
+  return nullptr;
 }
 
 absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& frame) {
@@ -180,18 +193,18 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
 
 void WatchCall::Cancel() {
   context_.TryCancel();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   cancelled_ = true;
-  changed_.notify_all();
+  changed_.NotifyAll();
 }
 
 std::string WatchCall::reason() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return reason_;
 }
 
 bool WatchCall::lost() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!status_ || cancelled_) return false;
   if (!status_->ok()) {
     // The other one: the server was short of memory.
@@ -201,7 +214,7 @@ bool WatchCall::lost() {
 }
 
 std::string WatchCall::why() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (status_ && !status_->ok()) return Reason(*status_);
   return end_.message.empty() ? "ended without a reason" : end_.message;
 }

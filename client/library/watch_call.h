@@ -5,11 +5,9 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +16,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
 #include "partiemc/client/watcher.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 #include "wire/codec.h"
@@ -39,12 +38,13 @@ class WatchCall {
              std::optional<std::uint64_t> from_sequence);
   /// Waits at most until `until`; true if the server has accepted the watcher. Errors: the server's
   /// refusal.
-  absl::StatusOr<bool> WaitUntilOpened(Clock::time_point until);
+  absl::StatusOr<bool> WaitUntilOpened(Clock::time_point until) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Same as Watcher::Receive. Requires: open.
   absl::StatusOr<Received> Receive(WatchedFrame& frame,
-                                   std::optional<std::chrono::milliseconds> wait);
+                                   std::optional<std::chrono::milliseconds> wait)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Any thread. Current and later calls soon return CANCELLED.
-  void Cancel();
+  void Cancel() ABSL_LOCKS_EXCLUDED(mutex_);
 
   const std::string& address() const { return address_; }
   // Valid when open:
@@ -53,17 +53,23 @@ class WatchCall {
   // Valid when ended:
   const WatchEnd& end() const { return end_; }
   /// Reason in the status; empty if there is none.
-  std::string reason();
+  std::string reason() ABSL_LOCKS_EXCLUDED(mutex_);
   /// True if the connection, the server or the producer was lost. False if another call would be
   /// refused too.
-  bool lost();
+  bool lost() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Short cause of the end.
-  std::string why();
+  std::string why() ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   using Message = std::unique_ptr<v1::WatchStreamResponse>;
 
-  void Run(v1::WatchStreamRequest open);
+  bool HasNews() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return cancelled_ || !ready_.empty() || status_;
+  }
+  /// Takes the next message. Null if there is none in time; errors and ends are in `received`.
+  Message TakeNext(std::optional<std::chrono::milliseconds> wait,
+                   absl::StatusOr<Received>& received) ABSL_LOCKS_EXCLUDED(mutex_);
+  void Run(v1::WatchStreamRequest open) ABSL_LOCKS_EXCLUDED(mutex_);
   absl::Status Decode(v1::WatchStreamResponse& message, WatchedFrame& frame);
   absl::Status Broken(const char* what) const;
 
@@ -78,13 +84,13 @@ class WatchCall {
   wire::ReconstructedFrame decoded_;
   v1::ParticleFrame particles_;
 
-  std::mutex mutex_;  // Guards everything below.
-  std::condition_variable changed_;
-  std::deque<Message> ready_;
-  std::vector<Message> spare_;
-  std::optional<grpc::Status> status_;  // Set after the last read.
-  std::string reason_;                  // Reason in `status_`.
-  bool cancelled_ = false;
+  Mutex mutex_;
+  CondVar changed_;
+  std::deque<Message> ready_ ABSL_GUARDED_BY(mutex_);
+  std::vector<Message> spare_ ABSL_GUARDED_BY(mutex_);
+  std::optional<grpc::Status> status_ ABSL_GUARDED_BY(mutex_);  // Set after the last read.
+  std::string reason_ ABSL_GUARDED_BY(mutex_);                  // Reason in `status_`.
+  bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -15,6 +14,7 @@
 #include "client/python/parameters.h"
 #include "client/python/research.h"
 #include "client/python/results.h"
+#include "common/mutex.h"
 #include "common/stage_clock.h"
 #include "partiemc/arena.h"
 #include "partiemc/reconstructor.h"
@@ -48,7 +48,7 @@ class Sequence {
     absl::Status status;
     {
       const py::gil_scoped_release others_may_run;
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       status = Compute(particles.arrays(), time, *result);
     }
     RaiseUnlessOk(status);
@@ -57,7 +57,7 @@ class Sequence {
 
   void Reset() {
     const py::gil_scoped_release others_may_run;
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     state_ = {};
     frames_ = 0;
   }
@@ -65,9 +65,8 @@ class Sequence {
   py::dict parameters() const { return ToDict(reconstructor_->parameters()); }
 
  private:
-  // Requires the lock.
   absl::Status Compute(const client::ParticleArrays& particles, std::optional<double> time,
-                       PythonResult& result) {
+                       PythonResult& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     result.time = time.value_or(static_cast<double>(frames_));
     const auto rows = client::RowsOf(particles, result.time);
     if (!rows.ok()) return rows.status();
@@ -75,6 +74,7 @@ class Sequence {
     StageClock clock;
     absl::Status status;
     const auto compute = [&] {
+      mutex_.AssertHeld();
       status = reconstructor_->Reconstruct(gathered_.frame(), state_, workspace_,
                                            result.frame.result, {.observer = &clock});
     };
@@ -93,11 +93,11 @@ class Sequence {
   std::optional<Reconstructor> reconstructor_;
   std::unique_ptr<Arena> arena_;  // Null: all threads.
 
-  std::mutex mutex_;  // Guards everything below.
-  State state_;
-  Workspace workspace_;
-  client::OwnedFrame gathered_;
-  std::uint64_t frames_ = 0;
+  Mutex mutex_;
+  State state_ ABSL_GUARDED_BY(mutex_);
+  Workspace workspace_ ABSL_GUARDED_BY(mutex_);
+  client::OwnedFrame gathered_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t frames_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace

@@ -173,12 +173,12 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
 
 std::shared_ptr<PythonResult> ResultPool::Take() {
   const auto give_back = [pool = shared_from_this()](PythonResult* result) {
-    const std::scoped_lock lock(pool->mutex_);
+    const MutexLock lock(pool->mutex_);
     if (pool->kept_.size() < kMostKept) pool->kept_.push_back(std::move(result->frame));
     delete result;
   };
   std::shared_ptr<PythonResult> result(new PythonResult, give_back);
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!kept_.empty()) {
     result->frame = std::move(kept_.back());
     kept_.pop_back();

@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "common/mutex.h"
 #include "partiemc/client/frame_stream.h"
 
 namespace partiemc::python {
@@ -32,13 +32,13 @@ struct PythonResult {
 /// Reuses the buffers of results that Python has released. Thread-safe.
 class ResultPool : public std::enable_shared_from_this<ResultPool> {
  public:
-  std::shared_ptr<PythonResult> Take();
+  std::shared_ptr<PythonResult> Take() ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   static constexpr std::size_t kMostKept = 2;
 
-  std::mutex mutex_;
-  std::vector<client::FrameResult> kept_;
+  Mutex mutex_;
+  std::vector<client::FrameResult> kept_ ABSL_GUARDED_BY(mutex_);
 };
 
 void DefineResults(pybind11::module_& module);

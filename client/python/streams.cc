@@ -17,6 +17,7 @@
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
 #include "client/python/results.h"
+#include "common/mutex.h"
 #include "partiemc/client/latest_sender.h"
 #include "partiemc/client/server_info.h"
 #include "partiemc/client/stream.h"
@@ -103,7 +104,7 @@ class ProducerStream {
     absl::StatusOr<std::uint64_t> sent = 0;
     {
       const py::gil_scoped_release others_may_run;
-      const std::scoped_lock lock(sending_);
+      const MutexLock lock(sending_);
       const double instant = time.value_or(static_cast<double>(frames_));
       if (latest_ != nullptr) {
         const absl::Status offered = latest_->OfferArrays(particles.arrays(), instant);
@@ -156,7 +157,7 @@ class ProducerStream {
     absl::Status status;
     {
       const py::gil_scoped_release others_may_run;
-      const std::scoped_lock lock(sending_);
+      const MutexLock lock(sending_);
       if (!std::exchange(finished_, true)) {
         status = latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
       }
@@ -175,7 +176,7 @@ class ProducerStream {
       }
     });
     {
-      const std::scoped_lock lock(sending_);
+      const MutexLock lock(sending_);
       if (!std::exchange(finished_, true)) {
         const absl::Status status =
             latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
@@ -206,9 +207,9 @@ class ProducerStream {
   std::unique_ptr<client::Stream> stream_;
   std::unique_ptr<client::LatestSender> latest_;  // Destroyed before the stream.
   std::timed_mutex receiving_;                    // Held by the receiving thread.
-  std::mutex sending_;  // Held by the sending thread; guards the members below.
-  std::uint64_t frames_ = 0;
-  bool finished_ = false;
+  Mutex sending_;                                 // Held by the sending thread.
+  std::uint64_t frames_ ABSL_GUARDED_BY(sending_) = 0;
+  bool finished_ ABSL_GUARDED_BY(sending_) = false;
 };
 
 class Watch {

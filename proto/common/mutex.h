@@ -43,6 +43,8 @@ class ABSL_SCOPED_LOCKABLE MutexLock {
   explicit MutexLock(Mutex& mutex) ABSL_EXCLUSIVE_LOCK_FUNCTION(mutex) : mutex_(mutex) {
     mutex_.Lock();
   }
+  /// For a mutex that the caller has locked, by TryLock for example.
+  MutexLock(Mutex& mutex, std::adopt_lock_t) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) : mutex_(mutex) {}
   ~MutexLock() ABSL_UNLOCK_FUNCTION() { mutex_.Unlock(); }
   MutexLock(const MutexLock&) = delete;
   MutexLock& operator=(const MutexLock&) = delete;
@@ -50,6 +52,28 @@ class ABSL_SCOPED_LOCKABLE MutexLock {
  private:
   Mutex& mutex_;
 };
+
+// As ABSL_UNLOCK_FUNCTION, which Clang does not reverse in a destructor.
+#ifdef __clang__
+#define PARTIEMC_RELEASE(mutex) __attribute__((release_capability(mutex)))
+#else
+#define PARTIEMC_RELEASE(mutex)
+#endif
+
+/// Releases a mutex for a scope, and locks it again at its end.
+class ABSL_SCOPED_LOCKABLE MutexUnlock {
+ public:
+  explicit MutexUnlock(Mutex& mutex) PARTIEMC_RELEASE(mutex) : mutex_(mutex) { mutex_.Unlock(); }
+  // The analysis reverses the constructor here.
+  ~MutexUnlock() ABSL_UNLOCK_FUNCTION() { mutex_.Lock(); }
+  MutexUnlock(const MutexUnlock&) = delete;
+  MutexUnlock& operator=(const MutexUnlock&) = delete;
+
+ private:
+  Mutex& mutex_;
+};
+
+#undef PARTIEMC_RELEASE
 
 /// Waits may end without a notification, so that callers repeat them in a loop.
 class CondVar {

@@ -3,8 +3,9 @@
 
 #include <chrono>
 #include <cstdint>
-#include <mutex>
 #include <utility>
+
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
@@ -18,7 +19,7 @@ class RateLimit {
   /// Counts one event at `now`; true if it is within the limit. Each second begins with the first
   /// event after the previous one.
   bool Allow(Clock::time_point now) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (now - begin_ >= std::chrono::seconds(1)) {
       begin_ = now;
       passed_ = 0;
@@ -34,20 +35,21 @@ class RateLimit {
 
   /// Returns the number of events over the limit since the last call.
   std::uint64_t TakeHeldBack() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return std::exchange(held_back_, 0);
   }
   std::uint64_t held_back_in_all() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return held_back_in_all_;
   }
 
  private:
   const std::uint32_t per_second_;
-  mutable std::mutex mutex_;
-  Clock::time_point begin_;
-  std::uint32_t passed_ = 0;
-  std::uint64_t held_back_ = 0, held_back_in_all_ = 0;
+  mutable Mutex mutex_;
+  Clock::time_point begin_ ABSL_GUARDED_BY(mutex_);
+  std::uint32_t passed_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t held_back_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t held_back_in_all_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// How many streams are at work, which is how many workers may be needed at once.
+// Counts the active streams: the number of workers that may be needed at once.
 #pragma once
 
 #include <array>
@@ -9,40 +9,42 @@
 
 namespace partiemc::server {
 
-/// Counts the streams that have had a frame of some size of late. What it tells follows from what
-/// the streams send, not from whose frames happened to meet. Not thread-safe.
+/// Counts the streams that computed a frame of at least a given size recently. The count depends
+/// only on the frames sent, not on which frames were computed at the same time. Not thread-safe.
 class BusyStreams {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// What it remembers of one stream; belongs to the stream.
+  /// The data about one stream. The stream owns it.
   class Mark {
     friend class BusyStreams;
-    std::int64_t period_ = std::numeric_limits<std::int64_t>::min();  // The last one counted in.
-    std::size_t size_class_ = 0;                                      // As what.
+    // The last period in which the stream was counted, and the size class that counted it.
+    std::int64_t period_ = std::numeric_limits<std::int64_t>::min();
+    std::size_t size_class_ = 0;
   };
 
-  /// `late` is positive: how long ago "of late" goes back.
+  /// `late`: length of the period that counts as recent. Positive.
   explicit BusyStreams(Clock::duration late) : late_(late) {}
 
-  /// `stream` has had a frame of this size. `now` never goes back. Allocates nothing.
+  /// `stream` has computed a frame of this size. `now` never decreases. Allocates nothing.
   void Worked(Mark& stream, std::size_t size, Clock::time_point now);
 
-  /// How many had a frame of at least `size`, rounded down to a power of two, within this period of
-  /// `late` or the last one; 0 if nobody had for `late`.
+  /// Number of streams with a frame of at least `size` in the current period or in the previous
+  /// one, whichever is larger. `size` is rounded down to a power of two. 0 if the last such frame
+  /// is older than `late`.
   std::size_t Count(std::size_t size, Clock::time_point now) const;
 
  private:
   struct SizeClass {
     Clock::time_point last;
-    std::size_t streams = 0, streams_before = 0;  // In `period_`; in the one before.
+    std::size_t streams = 0, streams_before = 0;  // In this period; in the previous one.
   };
 
   std::int64_t Period(Clock::time_point now) const { return now.time_since_epoch() / late_; }
 
   const Clock::duration late_;
-  std::int64_t period_ = 0;  // The last one that Worked has seen.
-  // Number k: sizes of k bits.
+  std::int64_t period_ = 0;  // The current period, as of the last call of Worked.
+  // Class k counts sizes of k bits.
   std::array<SizeClass, std::numeric_limits<std::size_t>::digits + 1> classes_;
 };
 

@@ -9,10 +9,10 @@
 
 namespace partiemc::server {
 
-// Runners are plain threads and not tasks of the arena, so that a thread that waits for the pieces
-// of one frame can pick up pieces of another, but never another frame as a whole. There are as many
-// runners as the arena has places: small frames then run side by side, and a large one that is
-// alone gets every place for its pieces.
+// Runners are plain threads, not tasks of the arena. A thread of the arena that waits for parallel
+// parts of one frame may run parts of another frame; a task would make it begin a whole frame. The
+// number of runners equals the number of the arena's slots, so small frames run concurrently, and a
+// single large frame uses all slots.
 ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
                          FrameObserver* observer, MemoryBudget* budget)
     : threads_(std::max(threads, 1u)),
@@ -31,77 +31,80 @@ ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
 ComputePool::~ComputePool() {
   if (budget_ != nullptr) budget_->OnShortage({});
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  task_came_.notify_all();
+  task_came_.NotifyAll();
   for (std::thread& runner : runners_) runner.join();
 }
 
 void ComputePool::Submit(Job job, Afterwards afterwards, BusyStreams::Mark* stream,
                          const CallerAccount* caller, std::uint64_t frame_bytes) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     tasks_.Push(caller, stream,
                 Task{std::move(job), std::move(afterwards), stream, caller, frame_bytes});
     ++waiting_;
     recent_.Came(caller, WarmSize::Clock::now());
   }
-  task_came_.notify_one();
+  task_came_.NotifyOne();
 }
 
 std::size_t ComputePool::QueueLength() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return waiting_;
 }
 
 void ComputePool::Run() {
-  // Threads that oneTBB starts for the pieces of a frame have it from this one.
+  // Threads that oneTBB starts inherit the name.
   pthread_setname_np(pthread_self(), "compute");
-  std::optional<Arena> narrow;  // For jobs of callers who share.
-  std::unique_lock lock(mutex_);
-  while (std::optional<Task> task = WaitForTask(lock)) {
+  std::optional<Arena> narrow;  // For jobs of competing callers.
+  const MutexLock lock(mutex_);
+  while (std::optional<Task> task = WaitForTask()) {
     Begin(*task);
     const bool shares = Shares(task->caller);
     std::unique_ptr<Worker> worker = TakeWorker();
-    lock.unlock();
-    if (shares && !narrow) narrow.emplace(threads_ - 1);
-    // Outside of the arena, whose threads must not wait for each other's frames.
-    worker->memory.BeginFrame(task->frame_bytes);
-    (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
-    if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for it.
-    worker->memory.EndFrame();
-    lock.lock();
+    {
+      const MutexUnlock unlock(mutex_);
+      if (shares && !narrow) narrow.emplace(threads_ - 1);
+      // May block, so it must not run on a thread of the arena, which other frames use too.
+      worker->memory.BeginFrame(task->frame_bytes);
+      (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
+      if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for this memory.
+      worker->memory.EndFrame();
+    }
     PutBack(std::move(worker), task->stream);
     End(*task);
-    lock.unlock();
-    task->afterwards();
-    task.reset();  // With all that it holds, without the lock.
-    lock.lock();
-    GiveBack(TakeOutlived(), WarmSize::Clock::now() - gave_back_ >= warm_time_, lock);
+    {
+      const MutexUnlock unlock(mutex_);
+      task->afterwards();
+      task.reset();  // Destructors of captured objects run without the lock.
+    }
+    GiveBack(TakeOutlived(), WarmSize::Clock::now() - gave_back_ >= warm_time_);
   }
 }
 
-// Returns when there is a task that may run, or with none when there never will be.
-std::optional<ComputePool::Task> ComputePool::WaitForTask(std::unique_lock<std::mutex>& lock) {
+// Waits for a task that may run. Returns none when the pool stops and no task is left.
+std::optional<ComputePool::Task> ComputePool::WaitForTask() {
   for (;;) {
     if (auto task = NextTask()) return task;
     if (stopping_) return std::nullopt;
     const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
-    if (waiting_ > 0) {  // For a thread that may be kept free of nobody by then.
-      task_came_.wait_for(lock, kSharingTime);
+    if (waiting_ > 0) {  // By then the callers may no longer compete, so a task may run.
+      task_came_.WaitUntil(mutex_, WarmSize::Clock::now() + kSharingTime);
     } else if (warm) {
-      task_came_.wait_for(lock, warm_time_);
+      task_came_.WaitUntil(mutex_, WarmSize::Clock::now() + warm_time_);
     } else {
-      task_came_.wait(lock);
+      task_came_.Wait(mutex_);
     }
-    GiveBack(TakeOutlived(), false, lock);
+    GiveBack(TakeOutlived(), false);
   }
 }
 
-// The first whose caller may have one more, if any.
+// The first task whose caller may run one more job.
 std::optional<ComputePool::Task> ComputePool::NextTask() {
   auto task = tasks_.PopOf([this](const CallerAccount* caller) {
+    mutex_.AssertHeld();
     const auto running = std::ranges::count(running_, caller);
     return stopping_ || running < std::ptrdiff_t{threads_} - (Shares(caller) ? 1 : 0);
   });
@@ -109,7 +112,7 @@ std::optional<ComputePool::Task> ComputePool::NextTask() {
   return task;
 }
 
-// Whether a thread is to stay free of this caller.
+// Whether one thread must stay free for other callers.
 bool ComputePool::Shares(const CallerAccount* caller) const {
   return threads_ > 1 && recent_.AnybodyBut(caller, WarmSize::Clock::now() - kSharingTime);
 }
@@ -119,8 +122,8 @@ void ComputePool::Begin(const Task& task) { running_.push_back(task.caller); }
 void ComputePool::End(const Task& task) {
   running_.erase(std::ranges::find(running_, task.caller));
   recent_.Came(task.caller, WarmSize::Clock::now());
-  // Its caller may have one more, and, once alone, all threads.
-  if (waiting_ > 0) task_came_.notify_one();
+  // This caller may now run one more job.
+  if (waiting_ > 0) task_came_.NotifyOne();
 }
 
 std::unique_ptr<Worker> ComputePool::TakeWorker() {
@@ -142,10 +145,10 @@ void ComputePool::PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* str
 
 void ComputePool::MemoryIsShort() {
   const auto now = WarmSize::Clock::now();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (now - memory_was_short_ < kBetweenShortages) return;
   memory_was_short_ = now;
-  task_came_.notify_one();
+  task_came_.NotifyOne();
 }
 
 ComputePool::Workers ComputePool::TakeOutlived() {
@@ -153,6 +156,7 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   const auto now = WarmSize::Clock::now();
   std::size_t workers = working_ + idle_.size();
   std::erase_if(idle_, [&](std::unique_ptr<Worker>& worker) {
+    mutex_.AssertHeld();
     const WarmSize& particles = worker->particles;
     const bool is_wanted = worker->memory.counts() && worker->made < memory_was_short_;
     if (!is_wanted) {
@@ -166,14 +170,14 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   return outlived;
 }
 
-// Where `due`, or where there are `workers` to drop. Lets `lock` go meanwhile.
-void ComputePool::GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock) {
+// Frees `workers` and returns freed memory to the system, if there are any or if `due`. Unlocks the
+// mutex while it works.
+void ComputePool::GiveBack(Workers workers, bool due) {
   if (workers.empty() && !due) return;
   gave_back_ = WarmSize::Clock::now();
-  lock.unlock();
+  const MutexUnlock unlock(mutex_);
   workers.clear();
   GiveBackFreedMemory();
-  lock.lock();
 }
 
 }  // namespace partiemc::server

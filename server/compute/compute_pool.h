@@ -1,18 +1,17 @@
-// The threads that compute, shared by all streams.
+// The compute threads, which all streams share.
 #pragma once
 
 #include <oneapi/tbb/global_control.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
+#include "common/mutex.h"
 #include "partiemc/arena.h"
 #include "server/compute/busy_streams.h"
 #include "server/compute/recent_callers.h"
@@ -23,64 +22,63 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// For how long a worker keeps buffers that it has no use for.
+/// Time after which a worker with oversized buffers is dropped.
 inline constexpr std::chrono::seconds kWarmTime(10);
 
-/// For how long after its last job a caller counts as one who shares the threads.
+/// A caller competes for the threads until this long after its last job.
 inline constexpr std::chrono::seconds kSharingTime(1);
 
-/// Want of memory takes idle workers their buffers this often at most.
+/// Idle workers are dropped for lack of memory at most once in this time.
 inline constexpr std::chrono::seconds kBetweenShortages(1);
 
-/// Runs jobs, several at once. Callers take turns, and of a caller its streams, of which each has
-/// one job at a time, and the line of all its jobs that are of no stream. So a stream of large
-/// frames delays every other by one of its frames at most, never by its backlog; calls without a
-/// stream delay it by one of them, however many wait; and a caller delays others by one job,
-/// however many streams and calls it has.
+/// Runs jobs on several threads and divides these fairly between callers.
 ///
-/// A caller alone has all threads, and all parallel parts of its jobs are in one arena. Where
-/// others have had jobs within kSharingTime, one thread stays free of it, if there is more than
-/// one: it has one job less at a time, and each of its jobs one place less, in an arena of its own,
-/// where nobody else's pieces are waited for. So jobs of one caller, however long, delay another's
-/// by no more than it takes to wake a thread. Two callers with long jobs can still do so for one
-/// job.
+/// Order: callers take turns. Within a caller, its streams take turns; all its unary calls count as
+/// one stream. A stream has at most one job in the pool. Therefore a stream delays another stream
+/// of its caller by at most one frame, and a caller delays another caller by at most one job.
 ///
-/// Memory: a job gets the worker that was used last, so that one stream keeps one of them warm,
-/// however many threads there are. A worker that for `warm_time` has had no frame of at least a
-/// quarter of its largest is dropped with all of its buffers: after a large frame an idle server,
-/// or one with small frames, soon holds no more than it needs. It stays where as many streams as
-/// there are workers send such frames: how often these meet is luck, and may change by the minute,
-/// but they can at any time. What is free of the process's memory goes back to the system whenever
-/// a worker is dropped, and every `warm_time` while there is work: what requests and answers needed
-/// at some moment, and the gaps that they left, do not add up. Where the budget has no room for
-/// somebody, idle workers that hold some of it are dropped at once.
+/// Threads: a caller that does not compete with others uses all threads, and its jobs run their
+/// parallel parts in one shared arena. If another caller had a job within kSharingTime and there
+/// are at least two threads, one thread stays free for the others. Each caller then runs at most
+/// `threads - 1` jobs at once, each in its own arena of `threads - 1` slots, so that a job never
+/// waits for a part of another job. A job of a second caller then starts as soon as a thread wakes.
+/// If two callers run long jobs, a third caller may wait for one job.
+///
+/// Memory: a job gets the worker that was used last, so that a single stream always uses the same
+/// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: streams
+/// at least equal in number to the workers sent frames of that size recently. Such frames may need
+/// all workers at any time. Freed memory returns to the system when a worker is dropped, and every
+/// `warm_time` while jobs run. If the budget lacks memory, idle workers that use the budget are
+/// dropped at once.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
   using Afterwards = std::function<void()>;
 
-  /// `threads` is what all jobs together may use, at least 1. While it lives, the whole process
-  /// gives oneTBB no more than that.
-  /// `observer` and `budget`, in which the memory of workers counts (worker_memory.h), outlive the
-  /// pool.
+  /// `threads`: number of threads for all jobs together, at least 1. It also limits oneTBB in the
+  /// whole process while the pool exists. `budget`: counts the memory of workers
+  /// (worker_memory.h). `observer` and `budget` outlive the pool.
   explicit ComputePool(unsigned threads, WarmSize::Clock::duration warm_time = kWarmTime,
                        FrameObserver* observer = nullptr, MemoryBudget* budget = nullptr);
-  /// Runs what was submitted, then joins.
+  /// Runs all submitted jobs, then joins the threads.
   ~ComputePool();
   ComputePool(const ComputePool&) = delete;
   ComputePool& operator=(const ComputePool&) = delete;
 
-  /// Runs `job`, then `afterwards`, which has no worker any more: what it submits gets the same
-  /// one. `stream` is of the stream whose frame it is, if any, and lives as long as `job`; `caller`
-  /// is whose turn it takes, and no more than that. `frame_bytes` is the size of the frame's
-  /// message: while memory is short, large frames are computed one after the other (WorkerMemory).
-  /// Never blocks on computing. Neither may throw. Safe from any thread, jobs included.
+  /// Queues `job`. `afterwards` runs after it, when its worker is free again, so that a job which
+  /// `afterwards` submits gets the same worker. Neither may throw.
+  /// `stream`: the stream of the frame, or null for a unary call; lives as long as `job`.
+  /// `caller`: the caller whose turn the job uses; only compared, never dereferenced.
+  /// `frame_bytes`: size of the frame's message. While memory is short, large frames are computed
+  /// one after the other (WorkerMemory).
+  /// Does not wait for jobs. Thread-safe; jobs may call it.
   void Submit(
       Job job, Afterwards afterwards = [] {}, BusyStreams::Mark* stream = nullptr,
-      const CallerAccount* caller = nullptr, std::uint64_t frame_bytes = 0);
+      const CallerAccount* caller = nullptr, std::uint64_t frame_bytes = 0)
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Jobs that have been submitted and not begun.
-  std::size_t QueueLength() const;
+  /// Number of jobs that have not begun.
+  std::size_t QueueLength() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   unsigned threads() const { return threads_; }
 
@@ -89,24 +87,24 @@ class ComputePool {
     Job job;
     Afterwards afterwards;
     BusyStreams::Mark* stream;
-    const CallerAccount* caller;  // May be gone once `job` is.
+    const CallerAccount* caller;  // May dangle after `job` is destroyed.
     std::uint64_t frame_bytes;
   };
   using LinesOfCaller = RoundRobin<BusyStreams::Mark*, Line<Task>>;
   using Workers = std::vector<std::unique_ptr<Worker>>;
 
-  void Run();
-  // With the lock held; those that get it let it go for a while:
-  std::optional<Task> WaitForTask(std::unique_lock<std::mutex>& lock);
-  std::optional<Task> NextTask();
-  bool Shares(const CallerAccount* caller) const;
-  void Begin(const Task& task);
-  void End(const Task& task);
-  std::unique_ptr<Worker> TakeWorker();
-  void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream);
-  void MemoryIsShort();
-  Workers TakeOutlived();
-  void GiveBack(Workers workers, bool due, std::unique_lock<std::mutex>& lock);
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_);
+  std::optional<Task> WaitForTask() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::optional<Task> NextTask() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool Shares(const CallerAccount* caller) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Begin(const Task& task) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void End(const Task& task) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::unique_ptr<Worker> TakeWorker() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void MemoryIsShort() ABSL_LOCKS_EXCLUDED(mutex_);
+  Workers TakeOutlived() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void GiveBack(Workers workers, bool due) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const unsigned threads_;
   const WarmSize::Clock::duration warm_time_;
@@ -114,20 +112,20 @@ class ComputePool {
   MemoryBudget* const budget_;
   oneapi::tbb::global_control parallelism_;
   Arena arena_;
-  mutable std::mutex mutex_;
-  std::condition_variable task_came_;
-  // Guarded by mutex_:
-  RoundRobin<const CallerAccount*, LinesOfCaller> tasks_;
-  std::size_t waiting_ = 0;                    // Of tasks_.
-  std::vector<const CallerAccount*> running_;  // Whose jobs are.
-  RecentCallers recent_;
-  Workers idle_;             // The one that was used last is the last.
-  std::size_t working_ = 0;  // Workers that are not idle.
-  BusyStreams busy_;
-  // When somebody wanted what idle workers keep warm: those that are older go.
-  WarmSize::Clock::time_point memory_was_short_{};
-  WarmSize::Clock::time_point gave_back_ = WarmSize::Clock::now();
-  bool stopping_ = false;
+  mutable Mutex mutex_;
+  CondVar task_came_;
+  RoundRobin<const CallerAccount*, LinesOfCaller> tasks_ ABSL_GUARDED_BY(mutex_);
+  std::size_t waiting_ ABSL_GUARDED_BY(mutex_) = 0;  // Number of tasks in tasks_.
+  // The caller of each running job.
+  std::vector<const CallerAccount*> running_ ABSL_GUARDED_BY(mutex_);
+  RecentCallers recent_ ABSL_GUARDED_BY(mutex_);
+  Workers idle_ ABSL_GUARDED_BY(mutex_);             // The last one was used last.
+  std::size_t working_ ABSL_GUARDED_BY(mutex_) = 0;  // Number of workers that are not idle.
+  BusyStreams busy_ ABSL_GUARDED_BY(mutex_);
+  // Time of the last shortage. Idle workers that were made before it are dropped.
+  WarmSize::Clock::time_point memory_was_short_ ABSL_GUARDED_BY(mutex_){};
+  WarmSize::Clock::time_point gave_back_ ABSL_GUARDED_BY(mutex_) = WarmSize::Clock::now();
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 
   std::vector<std::thread> runners_;
 };

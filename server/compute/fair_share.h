@@ -1,4 +1,4 @@
-// Room of the server that its callers share.
+// Divides a limited capacity fairly between callers.
 #pragma once
 
 #include <cstddef>
@@ -10,44 +10,46 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// Counts what callers hold of a room, so that none of them can fill it: whoever holds something
-/// may take more only as long as no more of the room is its own than is free after that. One caller
-/// alone has half of the room, two greedy ones a third each, and there is always some for the next
-/// one. Not thread-safe.
+/// Counts the part of a capacity ("room", in bytes or slots) that each caller holds.
+///
+/// Rule: a caller that holds something may take more only if the free room afterwards is at least
+/// as large as its own holding. A single caller thus gets up to half of the room, two callers up to
+/// a third each, and some room always stays free for the next caller. Not thread-safe.
 class FairShare {
  public:
   static constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 
   enum class Fit {
     kYes,
-    kNoRoom,         ///< It holds nothing, and the room is too full all the same.
-    kMoreThanShare,  ///< It holds something, and would hold too much.
+    kNoRoom,         ///< Not enough room is free, although the caller holds nothing.
+    kMoreThanShare,  ///< The caller would exceed its share or its quota.
   };
 
   explicit FairShare(std::uint64_t room) : room_(room) {}
 
-  /// Whether `caller` may take `amount` more and hold at most `most` in all. Null is the server
-  /// itself, to which only the room applies.
+  /// Whether `caller` may take `amount` more. `most` is its quota. A null caller is the server
+  /// itself: only the room limits it.
   Fit Fits(const CallerAccount* caller, std::uint64_t amount, std::uint64_t most = kNoLimit) const {
     return FitsInto(room_ + beyond_, caller, amount, most);
   }
-  /// Whether what `caller` holds would fit if `beyond` less were permitted beyond the room.
+  /// Whether the holding of `caller` fits if the amount permitted beyond the room drops by
+  /// `beyond`.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller, std::uint64_t most) const {
     return FitsInto(room_ + beyond_ - beyond, caller, 0, most) == Fit::kYes;
   }
 
-  /// Of what is held, `amount` is permitted beyond the room: it takes no room from other callers.
+  /// Permits `amount` of the holdings beyond the room, so that it takes nothing from other callers.
   void AddBeyond(std::uint64_t amount) { beyond_ += amount; }
   void RemoveBeyond(std::uint64_t amount) { beyond_ -= amount; }
 
-  /// Counts what is held in any case, whether it fits or not.
+  /// Counts `amount` as held, even if it does not fit.
   void Take(const CallerAccount* caller, std::uint64_t amount);
   void GiveBack(const CallerAccount* caller, std::uint64_t amount);
 
   std::uint64_t held() const { return held_; }
   std::uint64_t held_by(const CallerAccount* caller) const;
   std::uint64_t room() const { return room_; }
-  /// Of whom anything is counted: it grows with those who hold something, not with those who came.
+  /// Number of callers that hold something.
   std::size_t callers() const { return held_by_.size(); }
 
  private:
@@ -56,8 +58,8 @@ class FairShare {
 
   const std::uint64_t room_;
   std::uint64_t beyond_ = 0;
-  std::uint64_t held_ = 0;                                 // May be more than both together.
-  std::map<const CallerAccount*, std::uint64_t> held_by_;  // None is 0.
+  std::uint64_t held_ = 0;                                 // May exceed room_ + beyond_.
+  std::map<const CallerAccount*, std::uint64_t> held_by_;  // No value is 0.
 };
 
 }  // namespace partiemc::server

@@ -15,15 +15,16 @@ namespace partiemc::server {
 #ifdef __GLIBC__
 
 void KeepFreedMemory() {
-  // Pieces below this come from the heap, larger ones from the system and at once back to it. The
-  // largest value that glibc takes.
+  // Allocations below this size come from the heap. Larger ones are mapped and unmapped each time.
+  // The largest value that glibc accepts.
   constexpr int kMappedBytes = 32 << 20;
-  // What the end of the heap may hold unused: some frames of a million particles.
+  // Free bytes that the heap's end may keep: some frames of a million particles.
   constexpr int kTopBytes = 64 << 20;
   mallopt(M_MMAP_THRESHOLD, kMappedBytes);
   mallopt(M_TRIM_THRESHOLD, kTopBytes);
-  // What one thread has freed serves the next. Warm threads allocate next to nothing, and what is
-  // small comes from their own caches, so that they do not wait for each other.
+  // One arena for all threads: memory that one thread has freed serves the next thread. Threads
+  // rarely contend for it: a warm worker allocates little, and glibc caches small blocks per
+  // thread.
   mallopt(M_ARENA_MAX, 1);
 }
 
@@ -45,7 +46,7 @@ std::uint64_t ResidentBytes() {
   if (size <= 0) return 0;
   text[size] = 0;
   char* end = nullptr;
-  std::strtoull(text, &end, 10);  // Pages: all, then the resident ones.
+  std::strtoull(text, &end, 10);  // The first number counts all pages, the second resident ones.
   return std::strtoull(end, nullptr, 10) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 

@@ -1,20 +1,20 @@
-// How this process holds memory that it has freed. Does nothing where the C library is not glibc.
+// Settings of the C library's heap: when freed memory returns to the system. glibc only.
 #pragma once
 
 #include <cstdint>
 
 namespace partiemc::server {
 
-/// Has freed memory stay at hand: a frame's bytes come and go at the pace of the stream, and pages
-/// that go back to the system each time cost more than the copying. To be called before the first
-/// thread is started.
+/// Keeps freed memory in the process. A stream allocates and frees its frames' bytes all the time,
+/// and returning the pages to the system each time costs more than copying the bytes. Requires: no
+/// thread was started yet.
 void KeepFreedMemory();
 
-/// Gives back what is free now: half a millisecond for 13 MiB, during which nobody else allocates.
+/// Returns all free memory to the system. Cost: half a millisecond for 13 MiB, during which no
+/// other thread can allocate.
 void GiveBackFreedMemory();
 
-/// What of the process is in memory now, in bytes; 0 where the system does not tell. Costs some
-/// microseconds.
+/// Resident memory of the process in bytes; 0 if unknown. Cost: some microseconds.
 std::uint64_t ResidentBytes();
 
 }  // namespace partiemc::server

@@ -30,12 +30,12 @@ absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_
 }
 
 void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   share_.Take(caller, bytes);
   held_ += bytes;
 }
 
-// Whether nobody who came before is to have it first.
+// As Fits, but also checks that no earlier claim has to be granted first.
 Fit MemoryBudget::FitsNow(const Claim& claim) const {
   for (const Claim& before : claims_) {
     const Fit fit = Fits(before);
@@ -48,7 +48,7 @@ Fit MemoryBudget::FitsNow(const Claim& claim) const {
 
 Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
   const std::uint64_t most = MostOf(caller);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const Fit fit = FitsNow({{}, bytes, caller, most});
   if (fit == Fit::kYes) {
     share_.Take(caller, bytes);
@@ -61,7 +61,7 @@ Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
 bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
                               const CallerAccount* caller) {
   Claim claim{waiter, bytes, caller, MostOf(caller)};
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const Fit fit = FitsNow(claim);
   const bool fits = fit == Fit::kYes;
   if (fits) {
@@ -76,27 +76,27 @@ bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>
 
 void MemoryBudget::StopWaiting(const std::shared_ptr<Waiter>& waiter) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     std::erase_if(claims_, [&](const Claim& claim) {
       return !claim.waiter.owner_before(waiter) && !waiter.owner_before(claim.waiter);
     });
   }
-  Grant();  // It may have stood before somebody who wants less.
+  Grant();  // The removed claim may have blocked a smaller one.
 }
 
 void MemoryBudget::GiveBack(std::uint64_t bytes, const CallerAccount* caller) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     share_.GiveBack(caller, bytes);
     held_ -= bytes;
   }
-  may_compute_.notify_all();
+  may_compute_.NotifyAll();
   Grant();
   reads_.ServeWaiting();
 }
 
 std::uint64_t MemoryBudget::TakeForWorker(std::uint64_t bytes, const void* worker) {
-  std::unique_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   while (FitsNow({{}, bytes, nullptr, FairShare::kNoLimit}) != Fit::kYes) {
     TellShortage();
     if (worker_beyond_ == nullptr || worker_beyond_ == worker) {
@@ -104,7 +104,7 @@ std::uint64_t MemoryBudget::TakeForWorker(std::uint64_t bytes, const void* worke
       TakeBeyond(bytes, worker);
       return bytes;
     }
-    may_compute_.wait(lock);
+    may_compute_.Wait(mutex_);
   }
   share_.Take(nullptr, bytes);
   held_ += bytes;
@@ -112,7 +112,7 @@ std::uint64_t MemoryBudget::TakeForWorker(std::uint64_t bytes, const void* worke
 }
 
 bool MemoryBudget::TryTakeBeyond(std::uint64_t bytes, const void* worker) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (worker_beyond_ != nullptr && worker_beyond_ != worker) return false;
   if (bytes > most_of_worker_ - bytes_of_worker_beyond_) return false;
   TakeBeyond(bytes, worker);
@@ -128,13 +128,13 @@ void MemoryBudget::TakeBeyond(std::uint64_t bytes, const void* worker) {
 }
 
 bool MemoryBudget::IsBeyond(const void* worker) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return worker_beyond_ == worker;
 }
 
 void MemoryBudget::GiveBackOfWorker(std::uint64_t bytes, const void* worker) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (worker_beyond_ == worker) {
       worker_beyond_ = nullptr;
       share_.RemoveBeyond(std::exchange(bytes_of_worker_beyond_, 0));
@@ -146,7 +146,7 @@ void MemoryBudget::GiveBackOfWorker(std::uint64_t bytes, const void* worker) {
 void MemoryBudget::Grant() {
   std::vector<std::pair<std::shared_ptr<Waiter>, std::uint64_t>> granted;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     std::set<const CallerAccount*> waiting;  // Callers whose first claim has to wait.
     for (auto claim = claims_.begin(); claim != claims_.end();) {
       auto waiter = claim->waiter.lock();
@@ -176,28 +176,28 @@ void MemoryBudget::TellShortage() const {
 }
 
 void MemoryBudget::OnShortage(std::function<void()> tell) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   tell_shortage_ = std::move(tell);
 }
 
 std::uint64_t MemoryBudget::held() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return held_;
 }
 
 std::uint64_t MemoryBudget::planned() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return share_.held();
 }
 
 void MemoryBudget::Plan(std::uint64_t bytes, const CallerAccount* caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   share_.Take(caller, bytes);
 }
 
 bool MemoryBudget::TryPlan(std::uint64_t bytes, const CallerAccount* caller) {
   const std::uint64_t most = MostOf(caller);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const Fit fit = share_.Fits(caller, bytes, most);
   if (fit == Fit::kYes) share_.Take(caller, bytes);
   if (fit == Fit::kNoRoom) TellShortage();
@@ -205,32 +205,32 @@ bool MemoryBudget::TryPlan(std::uint64_t bytes, const CallerAccount* caller) {
 }
 
 void MemoryBudget::Unplan(std::uint64_t bytes, const CallerAccount* caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   share_.GiveBack(caller, bytes);
 }
 
 absl::Status MemoryBudget::CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const {
   const std::uint64_t most = MostOf(caller);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (caller != nullptr && share_.held_by(caller) > most) return TooManyBytesOfCaller(bytes);
   if (share_.Fits(nullptr, 0) == Fit::kYes) return absl::OkStatus();
   return NoRoomInBudget("frame", bytes, share_.room());
 }
 
 void MemoryBudget::ChangeBeyond(std::uint64_t before, std::uint64_t after) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   share_.RemoveBeyond(before);
   share_.AddBeyond(after);
 }
 
 bool MemoryBudget::FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const {
   const std::uint64_t most = MostOf(caller);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return share_.FitsWithout(beyond, caller, most);
 }
 
 std::uint64_t MemoryBudget::PlannedBy(const CallerAccount* caller) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return share_.held_by(caller);
 }
 

@@ -9,13 +9,14 @@
 namespace partiemc::server {
 namespace {
 
-// A connection that brings less than this in the time that follows is idle: 16 kB/s, less than a
-// slow line has. The time is longer than a busy client needs to begin. Where the system does not
-// report what a connection has received, a read has more time.
+// A connection that receives fewer bytes than this in the time below is idle. 16 kB/s is less than
+// a slow connection reaches; one second is longer than a busy client needs to begin a message. The
+// longer time applies if the system does not report the bytes of a connection.
 constexpr std::uint64_t kMovingBytes = 16 << 10;
 constexpr std::chrono::milliseconds kQuiet(1000), kQuietUnknown(2000);
 
-// What a connection brings beside the message: frames of HTTP/2, pings, other calls.
+// Bytes that a connection may receive in addition to the message: frames of HTTP/2, pings, other
+// calls.
 constexpr std::uint64_t kBeside = 1 << 20;
 
 absl::Status OutOfMemoryForReads() {
@@ -41,14 +42,14 @@ ReadPermits::Permit& ReadPermits::Renew(const std::shared_ptr<Reader>& reader, R
   auto& item = *permits_.try_emplace(reader.get()).first;
   Finish(item);
   item.second = {.reader = reader, .read = std::move(read), .number = ++numbers_};
-  ++waiting_;  // Before the budget is asked: whoever gives back afterwards serves this one.
+  ++waiting_;  // Before TryPlan: a thread that frees memory after TryPlan then serves this read.
   return item.second;
 }
 
 bool ReadPermits::Begin(const std::shared_ptr<Reader>& reader, Read read) {
   bool begins = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     Renew(reader, std::move(read));
     begins = TryPermit(*permits_.find(reader.get()), /*may_open_slot=*/waiting_ == 1);
   }
@@ -57,7 +58,7 @@ bool ReadPermits::Begin(const std::shared_ptr<Reader>& reader, Read read) {
 }
 
 void ReadPermits::BeginNow(const std::shared_ptr<Reader>& reader, Read read) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Permit& permit = Renew(reader, std::move(read));
   permit.state = State::kReading;
   permit.planned = Expected(permit.read);
@@ -67,7 +68,7 @@ void ReadPermits::BeginNow(const std::shared_ptr<Reader>& reader, Read read) {
 }
 
 absl::Status ReadPermits::Came(const Reader& reader, std::uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = permits_.find(&reader);
   if (found == permits_.end() || found->second.state != State::kReading) return absl::OkStatus();
   Permit& permit = found->second;
@@ -87,7 +88,7 @@ absl::Status ReadPermits::Came(const Reader& reader, std::uint64_t bytes) {
 }
 
 void ReadPermits::End(const Reader& reader) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = permits_.find(&reader);
   if (found == permits_.end()) return;
   Finish(*found);
@@ -103,10 +104,10 @@ void ReadPermits::SetBeyond(Permit& permit, std::uint64_t bytes) {
   budget_.ChangeBeyond(std::exchange(permit.beyond, bytes), bytes);
 }
 
-// What the permit was for is over.
+// Ends the read or the frame of this permit.
 void ReadPermits::Finish(Permits::value_type& item) {
   Permit& permit = item.second;
-  if (permit.number == 0) return;  // It is new.
+  if (permit.number == 0) return;  // The permit was just created.
   changed_ = true;
   if (permit.state == State::kWaiting) --waiting_;
   if (permit.state == State::kReading) --reading_;
@@ -134,7 +135,7 @@ bool ReadPermits::TryPermit(Permits::value_type& item, bool may_open_slot) {
   return true;
 }
 
-// The slot in which this connection may be read from beyond the budget.
+// The slot with which this connection may read beyond the budget, or null.
 ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool may_open_slot) {
   const auto found = slots_.find(item.second.read.stream);
   if (found != slots_.end()) {
@@ -147,7 +148,7 @@ ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool m
   return &slots_[item.second.read.stream];
 }
 
-// Frames that fit into the budget and the share of their caller by now are not beyond them.
+// Frees the slots of frames that now fit into the budget and their caller's share.
 void ReadPermits::FreeSlots() {
   for (auto& [reader, permit] : permits_) {
     if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
@@ -165,7 +166,7 @@ void ReadPermits::LeaveSlot(const Reader* reader, Permit& permit) {
   if (slot->second.open.empty()) slots_.erase(slot);
 }
 
-// Gives the next permit, if there is room for one.
+// Permits the next waiting read that fits. Returns null if none fits.
 std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
   std::map<const CallerAccount*, std::size_t> slots_of;
   for (const auto& [reader, permit] : permits_) {
@@ -178,7 +179,7 @@ std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
     const Permit& permit = item.second;
     if (permit.state != State::kWaiting) continue;
     const CallerAccount* const caller = permit.read.caller;
-    // Connections that complete a frame beyond the budget come first.
+    // Streams that already have a slot come first: their reads complete frames.
     waiting.push_back({{!slots_.contains(permit.read.stream), slots_of[caller],
                         budget_.PlannedBy(caller), permit.number},
                        &item});
@@ -201,7 +202,7 @@ void ReadPermits::ServeWaiting() {
   if (waiting_ == 0) return;
   std::vector<std::shared_ptr<Reader>> permitted;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     FreeSlots();
     while (waiting_ > 0) {
       auto reader = PermitNext();
@@ -214,19 +215,19 @@ void ReadPermits::ServeWaiting() {
 
 bool ReadPermits::NeedsLook() const {
   if (NeedsBytes()) return true;
-  // All that reads can bring at once.
+  // Memory permitted to all streams.
   const std::uint64_t most = budget_.bytes() + terms_.streams_beyond * terms_.message_bytes;
   const std::uint64_t planned = budget_.planned();
   return planned > most || (most - planned) / terms_.message_bytes < reading_;
 }
 
 void ReadPermits::OnWaiting(std::function<void()> tell) {
-  const std::lock_guard lock(tell_mutex_);
+  const MutexLock lock(tell_mutex_);
   tell_waiting_ = std::move(tell);
 }
 
 void ReadPermits::TellWaiting() const {
-  const std::lock_guard lock(tell_mutex_);
+  const MutexLock lock(tell_mutex_);
   if (tell_waiting_) tell_waiting_();
 }
 
@@ -241,7 +242,7 @@ void ReadPermits::Measure(Permit& permit, Clock::time_point now, const ReceivedB
   if (bytes && (!permit.received || permit.grown >= kMovingBytes)) {
     permit.received = bytes;
   } else {
-    permit.came -= permit.grown;  // Too little yet: it is counted with what follows.
+    permit.came -= permit.grown;  // Too little so far. The next Look counts these bytes again.
   }
 }
 
@@ -266,7 +267,7 @@ void ReadPermits::LapseOrCover(Permits::value_type& item, Clock::time_point now)
 
 void ReadPermits::Look(Clock::time_point now, const ReceivedBytes& received) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (auto& item : permits_) {
       if (item.second.state != State::kReading) continue;
       Measure(item.second, now, received);
@@ -285,9 +286,9 @@ bool ReadPermits::IsAtRisk(const Permit& permit) const {
 std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
   std::vector<std::shared_ptr<Reader>> revoked;
   {
-    const std::lock_guard lock(mutex_);
-    // Of each caller, those that are nearest to their end come first; of all callers, the first
-    // ones, then the second ones.
+    const MutexLock lock(mutex_);
+    // Sorts each caller's reads by received bytes, most first. Then takes the first read of every
+    // caller, the second read of every caller, and so on. The first ones continue.
     std::map<const CallerAccount*, std::vector<const Permit*>> of_caller;
     for (const auto& [reader, permit] : permits_) {
       if (IsAtRisk(permit)) of_caller[permit.read.caller].push_back(&permit);
@@ -307,7 +308,7 @@ std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
 }
 
 std::size_t ReadPermits::streams_beyond() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return slots_.size();
 }
 

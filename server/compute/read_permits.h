@@ -8,13 +8,13 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
@@ -28,28 +28,27 @@ struct ReadTerms {
   std::uint64_t message_bytes = 1;
 };
 
-/// Gives permits to read. gRPC reports the size of a message only after the whole message has
-/// arrived, and a read that has begun cannot be stopped. So a stream that has nothing in flight
+/// Grants permits to read. gRPC reports the size of a message only after the whole message has
+/// arrived, and a read that has begun cannot be stopped. So a stream that has no frame in flight
 /// needs a permit for its next read:
 ///
-/// 1. A permit plans the bytes that the read can bring: the size of the stream's last frame, or of
-///    the largest message if there was none. The budget counts planned bytes like bytes that are
-///    held.
-/// 2. If the budget has no room for them, the read waits, unless fewer than `streams_beyond`
-///    streams have a frame beyond the budget. Such a stream keeps its slot until the frame is
-///    answered. The connections of a stream whose frames come in parts have one slot together: they
-///    are read from one after the other, once each, and not after they have brought one message.
-///    Its bytes are counted beside the budget, so that it takes no room from others.
-/// 3. Slots go to the caller that holds the least, and of one caller to the read that has waited
-///    longest.
-/// 4. While others wait, a permit lapses if its connection brings next to nothing: then the read
-///    goes on, but its bytes are planned no longer. So an idle stream keeps no other from being
-///    read. If a lapsed read brings bytes after all, or a read brings more than was planned, the
-///    difference is planned as soon as there is room. Where memory runs out before, `Revoke` ends
-///    such streams.
+/// 1. A permit plans the bytes that the read may bring: the size of the stream's last frame, or the
+///    largest message for the first frame. Planned bytes count in the budget like held bytes.
+/// 2. If they do not fit into the budget, the stream may get a slot, which permits one frame beyond
+///    the budget. There are `streams_beyond` slots. Without a slot the read waits. A stream keeps
+///    its slot until the response to the frame is sent. Bytes in a slot do not count in the
+///    budget, so they take nothing from other streams.
+/// 3. If a stream's frames arrive in parts, its connections share one slot. They read one after the
+///    other, each once, until they have brought one message's size.
+/// 4. Slots go to the caller with the fewest slots, then the fewest bytes. Within a caller the read
+///    that has waited longest comes first.
+/// 5. While other reads wait, a permit lapses if its connection is idle: the read continues, but
+///    its bytes are no longer planned. So an idle stream does not block others. If a lapsed read
+///    receives bytes after all, or a read receives more than planned, the difference is planned as
+///    soon as it fits. If memory is exhausted before that, `Revoke` ends such streams.
 ///
-/// Thus all streams together hold at most the budget and, for each slot, one message, or two if
-/// the stream comes in parts. Safe from any thread.
+/// So all streams together hold at most the budget, plus one message for each slot, or two if the
+/// stream's frames arrive in parts. Thread-safe.
 class ReadPermits {
  public:
   using Clock = std::chrono::steady_clock;
@@ -57,9 +56,9 @@ class ReadPermits {
   class Reader {
    public:
     virtual ~Reader() = default;
-    /// The read that waits may begin. Called without a lock.
+    /// The waiting read may begin. Called without a lock.
     virtual void ReadPermitted() = 0;
-    /// Memory is exhausted: ends the stream, whose read goes on. Called without a lock.
+    /// Memory is exhausted: ends the stream while its read is in progress. Called without a lock.
     virtual void ReadRevoked(const absl::Status& status) = 0;
   };
 
@@ -70,46 +69,46 @@ class ReadPermits {
     std::string peer;  ///< As CallChannel::peer.
   };
 
-  /// Bytes that the connection of a peer has received so far; nothing where this is unknown.
+  /// Bytes that the connection of a peer has received so far; none if unknown.
   using ReceivedBytes = std::function<std::optional<std::uint64_t>(const std::string& peer)>;
 
   ReadPermits(MemoryBudget& budget, const ReadTerms& terms);
 
-  // Of a reader, which may hold a lock of its own and calls Serve once it has released it:
+  // For readers. A reader may hold its own lock in these calls; it calls Serve after releasing it.
 
   /// Requests a permit for a reader that has nothing in flight. If false, ReadPermitted follows.
-  bool Begin(const std::shared_ptr<Reader>& reader, Read read);
-  /// As Begin, for a read that the budget has room for.
-  void BeginNow(const std::shared_ptr<Reader>& reader, Read read);
-  /// The read has brought `bytes`, which the budget counts already. Errors, each with a Violation:
-  /// RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed, and there is no
-  /// room for them.
-  absl::Status Came(const Reader& reader, std::uint64_t bytes);
-  /// The reader neither reads nor waits any more, and has nothing in flight. May be called again.
-  void End(const Reader& reader);
+  bool Begin(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// As Begin, but always permits the read. Requires: the expected bytes fit into the budget.
+  void BeginNow(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// The read is complete: it has brought `bytes`, which the budget counts as held. Errors, each
+  /// with a Violation: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed
+  /// and the bytes do not fit.
+  absl::Status Came(const Reader& reader, std::uint64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Forgets the reader: it neither reads nor waits and has nothing in flight. Idempotent.
+  void End(const Reader& reader) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Lets reads begin for which there is room now. To be called without a lock.
+  /// Permits waiting reads that fit now. Requires: the calling thread holds no lock.
   void Serve();
 
-  // Of the thread that watches the memory of the process (IntakeGuard):
+  // For the thread that watches the memory of the process (IntakeGuard):
 
-  /// Whether reads wait, or reads may bring more than the server has memory for.
+  /// Whether reads wait, or the reads in progress may bring more than the budget and slots permit.
   bool NeedsLook() const;
   /// Whether permits may lapse, or have lapsed.
   bool NeedsBytes() const { return waiting_ > 0 || lapsed_ > 0; }
-  /// From now on `tell` is called when a read begins to wait or NeedsLook becomes true. It may be
-  /// called with the lock of a reader held. Empty: nothing is called.
-  void OnWaiting(std::function<void()> tell);
-  /// Lets permits lapse, and plans what has come beyond them.
-  void Look(Clock::time_point now, const ReceivedBytes& received);
-  /// Memory is exhausted: of the reads that bring more than was planned, as many go on as can
-  /// bring a largest message each into `free_bytes`, callers in turn. The streams of the others
-  /// end. Returns their number.
-  std::size_t Revoke(std::uint64_t free_bytes);
+  /// Sets the function that is called when a read begins to wait or NeedsLook becomes true. The
+  /// thread that calls it may hold a reader's lock. Empty: none is called.
+  void OnWaiting(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(tell_mutex_);
+  /// Lets permits of idle connections lapse, and plans bytes that arrived beyond the plan.
+  void Look(Clock::time_point now, const ReceivedBytes& received) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Memory is exhausted: ends streams whose reads receive more than was planned. One such read
+  /// continues for each largest message that fits into `free_bytes`; callers take turns. Returns
+  /// the number of ended streams.
+  std::size_t Revoke(std::uint64_t free_bytes) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const ReadTerms& terms() const { return terms_; }
   std::size_t waiting() const { return waiting_; }
-  std::size_t streams_beyond() const;
+  std::size_t streams_beyond() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   enum class State { kWaiting, kReading, kHolding };
@@ -117,41 +116,44 @@ class ReadPermits {
     std::weak_ptr<Reader> reader;
     Read read;
     State state = State::kWaiting;
-    std::uint64_t number = 0;   // Rises in the order in which reads were requested.
-    std::uint64_t planned = 0;  // Bytes in the budget's plan.
+    std::uint64_t number = 0;   // Order of the requests; 0 if there was none yet.
+    std::uint64_t planned = 0;  // Bytes planned in the budget.
     std::uint64_t beyond = 0;   // Bytes in its slot, planned or held.
     bool has_slot = false, has_lapsed = false;
-    // Of its connection, since the first look at it.
-    std::optional<std::uint64_t> received;
-    std::uint64_t came = 0, grown = 0;  // In all, and between the last two looks.
-    std::optional<Clock::time_point> moved;
+    // Measured by Look:
+    std::optional<std::uint64_t> received;   // The connection's count when `came` last changed.
+    std::uint64_t came = 0, grown = 0;       // Bytes since the first Look; since `received`.
+    std::optional<Clock::time_point> moved;  // When the connection last was not idle.
   };
   using Permits = std::map<const Reader*, Permit>;
-  // A stream that may have a frame beyond the budget.
+  // Permits a stream to have a frame beyond the budget.
   struct Slot {
-    std::uint64_t bytes = 0;       // That came.
-    bool reading = false;          // One of its connections.
-    std::set<const Reader*> used;  // Connections that were read from.
-    std::set<const Reader*> open;  // Those of them whose frame is not answered.
+    std::uint64_t bytes = 0;       // Received bytes.
+    bool reading = false;          // Whether one of the stream's connections reads.
+    std::set<const Reader*> used;  // Connections that have used the slot.
+    std::set<const Reader*> open;  // Connections that use it still.
   };
 
-  // With the lock held:
-  std::uint64_t Expected(const Read& read) const;
-  Permit& Renew(const std::shared_ptr<Reader>& reader, Read read);
-  bool TryPermit(Permits::value_type& item, bool may_open_slot);
-  Slot* FindSlot(const Permits::value_type& item, bool may_open_slot);
-  void Unplan(Permit& permit);
-  void SetBeyond(Permit& permit, std::uint64_t bytes);
-  void Finish(Permits::value_type& item);
-  void FreeSlots();
-  void LeaveSlot(const Reader* reader, Permit& permit);
-  std::shared_ptr<Reader> PermitNext();
-  void Measure(Permit& permit, Clock::time_point now, const ReceivedBytes& received);
-  void LapseOrCover(Permits::value_type& item, Clock::time_point now);
-  bool IsAtRisk(const Permit& permit) const;
-  // Without:
-  void ServeWaiting();
-  void TellWaiting() const;
+  std::uint64_t Expected(const Read& read) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Permit& Renew(const std::shared_ptr<Reader>& reader, Read read)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool TryPermit(Permits::value_type& item, bool may_open_slot)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Slot* FindSlot(const Permits::value_type& item, bool may_open_slot)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Unplan(Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void SetBeyond(Permit& permit, std::uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Finish(Permits::value_type& item) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void FreeSlots() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void LeaveSlot(const Reader* reader, Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::shared_ptr<Reader> PermitNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Measure(Permit& permit, Clock::time_point now, const ReceivedBytes& received)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void LapseOrCover(Permits::value_type& item, Clock::time_point now)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool IsAtRisk(const Permit& permit) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ServeWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
+  void TellWaiting() const ABSL_LOCKS_EXCLUDED(tell_mutex_);
 
   friend class MemoryBudget;
 
@@ -160,13 +162,13 @@ class ReadPermits {
   std::atomic<std::size_t> waiting_ = 0, reading_ = 0, lapsed_ = 0;
   std::atomic<bool> changed_ = false;  // Since the last Serve.
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  Permits permits_;
-  std::map<const void*, Slot> slots_;  // By stream.
-  std::uint64_t numbers_ = 0;
+  mutable Mutex mutex_;
+  Permits permits_ ABSL_GUARDED_BY(mutex_);
+  std::map<const void*, Slot> slots_ ABSL_GUARDED_BY(mutex_);  // The key is Read::stream.
+  std::uint64_t numbers_ ABSL_GUARDED_BY(mutex_) = 0;
 
-  mutable std::mutex tell_mutex_;  // Guards what follows.
-  std::function<void()> tell_waiting_;
+  mutable Mutex tell_mutex_;
+  std::function<void()> tell_waiting_ ABSL_GUARDED_BY(tell_mutex_);
 };
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// Who has come lately, as far as one has to know whether anybody else has.
+// Remembers recent callers, to decide whether a caller competes with another one.
 #pragma once
 
 #include <chrono>
@@ -7,18 +7,17 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// Remembers two callers, the last one and the last other one, which is all that it takes. Not
-/// thread-safe.
+/// Remembers the last caller and the last different caller, which suffices. Not thread-safe.
 class RecentCallers {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// At times that never fall.
+  /// `now` never decreases.
   void Came(const CallerAccount* caller, TimePoint now) {
     if (!last_.came || last_.caller != caller) other_ = last_;
     last_ = {caller, now, true};
   }
-  /// Whether one other than `caller` came at `since` or after it.
+  /// Whether another caller than `caller` came at `since` or later.
   bool AnybodyBut(const CallerAccount* caller, TimePoint since) const {
     const Visit& visit = last_.caller == caller ? other_ : last_;
     return visit.came && visit.time >= since;
@@ -31,7 +30,7 @@ class RecentCallers {
     bool came = false;
   };
 
-  Visit last_, other_;  // Of two callers.
+  Visit last_, other_;  // Visits of two different callers.
 };
 
 }  // namespace partiemc::server

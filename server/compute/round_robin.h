@@ -1,4 +1,4 @@
-// Lines that take turns.
+// Queues that are served in turn.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace partiemc::server {
 
-/// First in, first out.
+/// A queue: first in, first out.
 template <typename T>
 class Line {
  public:
@@ -24,18 +24,18 @@ class Line {
   bool empty() const { return items_.empty(); }
 
  private:
-  std::list<T> items_;  // A deque allocates half a kilobyte when it is made.
+  std::list<T> items_;  // An empty deque already allocates half a kilobyte.
 };
 
-/// Each key has a line of its own, a Line or again a RoundRobin; those that are not empty take
-/// turns in the order in which they came, one item a turn. Costs log(lines) an item. Not
+/// A queue for each key; non-empty queues take turns, one item a turn, in the order in which they
+/// became non-empty. `Lines` is a Line, or again a RoundRobin. Cost: O(log(queues)) an item. Not
 /// thread-safe.
 template <typename Key, typename Lines>
 class RoundRobin {
  public:
   using Item = typename Lines::Item;
 
-  /// `where` are the keys within the line, if it has any, then the item.
+  /// `where`: the keys of inner RoundRobins, if any, then the item.
   template <typename... Where>
   void Push(const Key& key, Where&&... where) {
     auto [line, is_new] = lines_.try_emplace(key);
@@ -45,7 +45,8 @@ class RoundRobin {
 
   /// Requires: not empty.
   Item Pop() { return Take(turns_.begin()); }
-  /// Of the first whose key is `allowed`; who is not keeps its turn. None where nobody is.
+  /// Pops from the first queue whose key is `allowed`; queues before it keep their turn. None if no
+  /// key is allowed.
   template <typename Allowed>
   std::optional<Item> PopOf(Allowed allowed) {
     const auto turn = std::find_if(turns_.begin(), turns_.end(),
@@ -70,7 +71,7 @@ class RoundRobin {
     return item;
   }
 
-  Turns turns_;  // None is empty; the first is the next.
+  Turns turns_;  // Non-empty queues only, the next one first.
   std::map<Key, typename Turns::iterator> lines_;
 };
 

@@ -1,4 +1,4 @@
-// What a worker keeps warm from frame to frame, and for how long.
+// The buffers with which a compute thread computes frames.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 
 namespace partiemc::server {
 
-/// Tells when buffers have grown beyond what they are used for: nothing of at least a quarter of
-/// the largest size that they have seen has come for a while, or nothing at all.
+/// Decides when buffers are oversized. Buffers grow to the largest frame and keep that size; they
+/// are oversized if no frame of at least a quarter of it was computed for `warm_time`.
 class WarmSize {
  public:
   using Clock = std::chrono::steady_clock;
@@ -31,10 +31,10 @@ class WarmSize {
   }
   bool used() const { return largest_ > 0; }
   std::size_t largest() const { return largest_; }
-  /// Of the last use; 0 if there was none since this was asked.
+  /// The size of the last use since the previous call of this method, or 0.
   std::size_t TakeLast() { return std::exchange(last_, 0); }
 
-  /// Of what is smaller, buffers for `largest` are too large.
+  /// The smallest frame for which buffers of size `largest` are not oversized.
   static std::size_t LeastFor(std::size_t largest) { return largest / 4; }
 
  private:
@@ -43,22 +43,23 @@ class WarmSize {
   Clock::time_point needed_;
 };
 
-/// The buffers of whoever turns messages into frames and back; sessions know nothing of them.
+/// Buffers for parsing and writing messages. `server/calls` derives from it, because a session
+/// includes no messages.
 class MessageBuffers {
  public:
   virtual ~MessageBuffers() = default;
 };
 
-/// What a worker keeps warm from frame to frame, whichever stream they belong to.
+/// Buffers that are reused from frame to frame, for any stream.
 struct Worker {
-  WorkerMemory memory;  ///< What all of these hold; given back once they are gone.
+  WorkerMemory memory;  ///< Counts the bytes of all buffers below.
   Workspace workspace;
   Result result;
-  State next_state;  ///< Copied to the stream once the frame has been answered.
+  State next_state;  ///< Copied to the stream when the frame succeeds.
   std::unique_ptr<MessageBuffers> message_buffers;
-  WarmSize particles;  ///< Of the frames that it has worked on.
+  WarmSize particles;  ///< Sizes of the computed frames, in particles.
   const WarmSize::Clock::time_point made = WarmSize::Clock::now();
-  FrameObserver* observer = nullptr;  ///< Told of each frame; none: nobody asks.
+  FrameObserver* observer = nullptr;  ///< Receives measurements of each frame; may be null.
 
   explicit Worker(FrameObserver* told = nullptr, MemoryBudget* budget = nullptr)
       : memory(budget), observer(told) {}

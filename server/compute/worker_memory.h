@@ -1,4 +1,4 @@
-// What the buffers of a worker hold of the server's memory.
+// Counts the memory of a worker's buffers in the server's budget.
 #pragma once
 
 #include <cstddef>
@@ -8,53 +8,52 @@
 
 namespace partiemc::server {
 
-/// What every worker may hold outside of the budget: enough for frames of ordinary streams, so that
-/// a small budget does not refuse them.
+/// Bytes of each worker that do not count in the budget. Ordinary frames need no more, so that a
+/// small budget does not refuse them.
 inline constexpr std::uint64_t kWorkerBytes = std::uint64_t{16} << 20;
 
-/// What computing may take for each particle of a frame. A compact body needs a tenth of it, a
-/// thousand islands with ids need all of it; drops that lie far apart, each in tiles of its own,
-/// need a hundred times as much.
+/// Upper bound of a worker's bytes per particle. A compact body needs a tenth of it. A thousand
+/// islands with ids need all of it. Only drops in separate tiles exceed it, by a factor of 100.
 inline constexpr std::uint64_t kWorkerBytesPerParticle = 500;
 
-/// What computing usually takes for each byte of a frame's message: 80 bytes for a particle of a
-/// compact body, two float32.
+/// A worker's usual bytes per byte of the frame's message. A particle of a compact body takes 8
+/// bytes in the message (two float32) and 80 bytes in the worker.
 inline constexpr std::uint64_t kUsualBytesPerMessageByte = 10;
 
-/// The account of one worker. What it holds beyond kWorkerBytes counts in the budget, from the
-/// frame that needed it until the worker's buffers are freed. Used by one thread at a time.
+/// The account of one worker. Its bytes above kWorkerBytes count in the budget until the worker's
+/// buffers are freed. Used by one thread at a time.
 class WorkerMemory {
  public:
-  /// `budget` outlives the account; none: everything is granted, and nothing counted.
+  /// `budget` outlives the account. Null: every request is granted and nothing is counted.
   explicit WorkerMemory(MemoryBudget* budget = nullptr) : budget_(budget) {}
   ~WorkerMemory() { GiveBack(); }
   WorkerMemory(const WorkerMemory&) = delete;
   WorkerMemory& operator=(const WorkerMemory&) = delete;
 
-  /// A frame whose message has so many bytes is about to be computed. Reserves what it usually
-  /// needs. If the budget has no room for that, waits until no other worker computes beyond the
-  /// budget, and reserves it there (BeyondBudget::worker_bytes).
+  /// Reserves the memory that a frame with a message of this size usually needs. If it does not fit
+  /// into the budget, blocks until it fits or no other worker computes beyond the budget; then
+  /// reserves it beyond the budget, up to BeyondBudget::worker_bytes.
   void BeginFrame(std::uint64_t message_bytes);
-  /// Whether the buffers may hold `bytes` in all for a frame of so many particles: kWorkerBytes and
-  /// what BeginFrame has reserved always; more where the budget has room, and nobody waits for it.
-  /// Without room kWorkerBytesPerParticle for each particle are granted beyond the budget, to one
-  /// worker at a time.
+  /// Whether all buffers together may grow to `bytes` for a frame with this number of particles.
+  /// Granted: kWorkerBytes plus the bytes that BeginFrame has reserved; and more if they fit into
+  /// the budget and no claim waits. Otherwise the worker may take up to kWorkerBytesPerParticle per
+  /// particle beyond the budget, if no other worker computes beyond it.
   bool Reserve(std::uint64_t bytes, std::size_t particles);
-  /// The frame is computed: gives back what was reserved and not used.
+  /// Gives back reserved bytes that the frame did not use.
   void EndFrame();
 
-  /// The buffers were freed.
+  /// Gives back all bytes. Called after the buffers were freed.
   void GiveBack();
 
-  /// Whether it holds any of the budget.
+  /// Whether any bytes count in the budget.
   bool counts() const { return counted_ > 0; }
-  /// Whether it holds some beyond the budget: to be given back once the frame is computed.
+  /// Whether the worker computes beyond the budget. Its buffers are then freed after the frame.
   bool is_beyond() const { return is_beyond_; }
 
  private:
   MemoryBudget* const budget_;
-  std::uint64_t counted_ = 0;  // In the budget.
-  std::uint64_t used_ = 0;     // At most, since the buffers were freed.
+  std::uint64_t counted_ = 0;  // Bytes in the budget or beyond it.
+  std::uint64_t used_ = 0;     // Largest size of the buffers since they were freed.
   bool is_beyond_ = false;
 };
 

@@ -15,7 +15,7 @@
 namespace partiemc::server {
 namespace {
 
-// The process has no descriptor left: connections wait in the kernel for this time.
+// Pause if the process has no free descriptor. New connections wait in the kernel meanwhile.
 constexpr std::chrono::milliseconds kPause(100);
 
 }  // namespace
@@ -60,7 +60,7 @@ void Acceptor::Run() {
   for (const Descriptor& socket : sockets_) ready.push_back({socket.get(), POLLIN, 0});
   bool full = false;
   while (true) {
-    // Without descriptors a socket that listens is ready all the time.
+    // Without a free descriptor, the listening socket would stay ready and this loop would spin.
     const nfds_t count = full ? 1 : ready.size();
     if (poll(ready.data(), count, full ? static_cast<int>(kPause.count()) : -1) < 0) continue;
     if ((ready[0].revents & POLLIN) != 0) return;
@@ -71,7 +71,7 @@ void Acceptor::Run() {
   }
 }
 
-// False where the process has no descriptor for one more.
+// False if the process has no free descriptor.
 bool Acceptor::AcceptAll(int listener) {
   while (true) {
     Descriptor socket(accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));

@@ -16,15 +16,15 @@
 
 namespace partiemc::server {
 
-/// Owns the sockets that listen, and gives each connection to a ConnectionWatch and to gRPC.
+/// Owns the listening sockets, and passes each connection to a ConnectionWatch and to gRPC.
 class Acceptor {
  public:
   /// Takes the descriptor of a connection.
   using HandOver = std::function<void(int descriptor)>;
 
-  /// Listens when it returns, and accepts nothing before Start. `watch` lives longer. A connection
-  /// ends whose peer does not acknowledge for `dead_after`.
-  /// Errors: UNAVAILABLE where it cannot listen.
+  /// Opens the listening sockets. Accepts no connection before Start. `watch` outlives the
+  /// acceptor. A connection ends if its peer acknowledges nothing for `dead_after`. Errors:
+  /// UNAVAILABLE if it cannot listen.
   static absl::StatusOr<std::unique_ptr<Acceptor>> Listen(const Address& address,
                                                           std::chrono::milliseconds dead_after,
                                                           ConnectionWatch& watch);
@@ -37,7 +37,7 @@ class Acceptor {
 
   void Start(HandOver hand_over);
 
-  /// Refuses connections from now on.
+  /// Closes the listening sockets: further connections are refused.
   void StopListening();
 
  private:
@@ -48,7 +48,7 @@ class Acceptor {
   const Address address_;
   const std::uint16_t port_;
   ConnectionWatch& watch_;
-  std::vector<Descriptor> sockets_;  // Of the thread, once it runs.
+  std::vector<Descriptor> sockets_;  // Used by thread_ only, after Start.
   const Descriptor wake_;
   std::unique_ptr<HandOverThreads> hand_over_;
   std::thread thread_;

@@ -7,31 +7,30 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A message takes up to this part more on the wire: frames of HTTP/2 and records of TLS. Proxies
-// make frames of a kilobyte.
+// HTTP/2 frames and TLS records add up to an eighth to a message. Proxies use frames of 1 kB.
 constexpr std::uint64_t kOverheadPart = 8;
-// Of a message, whatever its size.
+// Constant overhead of a message, in bytes.
 constexpr std::uint64_t kMessageOverhead = 256;
-// Of a call: its headers, as they usually are, its end, and its window updates.
+// Overhead of a call: usual headers, the end of the stream, and window updates.
 constexpr std::uint64_t kCallOverhead = 1'024;
-// A client acknowledges what it receives by WINDOW_UPDATE: usually a thousandth of it.
+// A client acknowledges received bytes by WINDOW_UPDATE. It usually sends a thousandth of them.
 constexpr std::uint64_t kReplyPart = 16;
-// A message that is too large is received in full, so that its sender is told by how much: up to
-// twice what one may have, and at least this many bytes. Beyond that the connection is cut.
+// Minimum allowance of a pending read. A message up to twice the limit is received completely, so
+// that its error can state the size. A larger message cuts the connection.
 constexpr std::uint64_t kLeastReadAllowance = std::uint64_t{64} << 20;
-// PINGs and SETTINGS, which are nobody's.
+// Allowance for PING and SETTINGS frames, which belong to no call.
 constexpr double kBytesPerSecond = 16 * 1'024;
-// Bytes that a call may have under way unread: its window and that of the connection.
+// Unread bytes that a call may have in flight: its own window and the connection's window.
 constexpr std::uint64_t kWindowBytes = 320 << 10;
-// For so long an ended call's bytes may still arrive.
+// After a call has ended, its bytes may still arrive for this time.
 constexpr double kLingerSeconds = 5;
-// Windows of ended calls that linger at once, beside one message.
+// Maximum allowance of all ended calls: this number of windows, and one message.
 constexpr std::uint64_t kLingeringWindows = 64;
 
-// Headers that belong together arrive in one go. Where gRPC has read much more since a stream began
-// than its headers may have, and the stream is still no call after this time, they have no end.
+// A header block arrives without pauses. If a stream has not become a call after this time, and
+// gRPC has read more bytes than headers may have, the block has no end.
 constexpr milliseconds kHeaderTime(100);
-// Where it has read little. gRPC itself has no such limit.
+// The same limit if gRPC has read fewer bytes. gRPC itself has no such limit.
 constexpr std::chrono::seconds kSlowHeaderTime(10);
 
 std::uint64_t OnTheWire(std::uint64_t bytes) {
@@ -104,14 +103,15 @@ std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,
   return ExamineHeaders(counts, reading, now);
 }
 
-// Credits of before the debt would be lost, as the debt does not go below zero: bytes of a message
-// are received before the message is reported, so both come in this order.
+// Adds received bytes before it subtracts credits. In the other order credits would be lost,
+// because the debt does not become negative.
 void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& reading,
                                double seconds) {
   debt_ += static_cast<double>(reading.bytes_received - last_.bytes_received);
   const double most = static_cast<double>(ReadAllowance() + kLingeringWindows * kWindowBytes);
   lingering_ = std::min(most, lingering_ + static_cast<double>(counts.ended - last_counts_.ended));
-  // What an ended call allowed is forgiven step by step, so that it allows less and less.
+  // The allowance of ended calls decays. The decayed part is subtracted from the debt, because
+  // bytes that used it have arrived.
   const double forgiven = lingering_ * std::min(1.0, seconds / kLingerSeconds);
   lingering_ -= forgiven;
   debt_ -= static_cast<double>(counts.credit - last_counts_.credit) + forgiven +
@@ -120,8 +120,8 @@ void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& re
   debt_ = std::max(0.0, debt_);
 }
 
-// A stream that was reset is no longer open, but gRPC still makes a call of it and has its memory
-// until then. Some streams never become calls, so the number is forgiven step by step.
+// A stream that was reset is no longer open, but gRPC holds its memory until it has become a call.
+// Some streams never become calls, so the number decays.
 void ConnectionLedger::CountStreams(const Counts& counts, const ConnectionReading& reading,
                                     double seconds) {
   const double forgiven = static_cast<double>(rules_.max_streams) * seconds / kLingerSeconds;
@@ -140,7 +140,7 @@ std::optional<Flood> ConnectionLedger::ExamineHeaders(const Counts& counts,
                                                       Clock::time_point now) {
   if (!reading.has_streams) return std::nullopt;
   headers_pending_ = reading.streams_open > counts.calls_open;
-  // Between the headers of a block no other stream begins, and no message ends.
+  // Within a header block no other stream begins and no message ends, so either ends the suspicion.
   if (!headers_pending_ || reading.streams_started != pending_stream_ ||
       reading.messages != pending_messages_) {
     pending_since_ = now;

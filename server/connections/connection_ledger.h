@@ -1,4 +1,4 @@
-// Tells a flood in one connection from its calls: the bytes received against the bytes of messages.
+// Detects a flood in one connection: compares received bytes with the bytes of its messages.
 #pragma once
 
 #include <atomic>
@@ -11,47 +11,49 @@ namespace partiemc::server {
 
 /// Limits of one connection. Defaults are for a server without options.
 struct ConnectionRules {
-  /// Bytes of a connection that no call and no message accounts for. gRPC 1.51 takes up to 40 bytes
-  /// of memory for each of them (headers of four bytes). 0: not limited.
+  /// Maximum number of received bytes that belong to no call and no message. gRPC 1.51 needs up to
+  /// 40 bytes of memory for each such byte (headers of four bytes). 0: no limit.
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
-  /// Of one message.
+  /// Maximum size of a message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;
-  /// HTTP/2 streams that exist in gRPC at once, and streams that have not become calls yet, such as
-  /// those that were reset at once. Each takes 10 to 16 kB. 0: not limited.
+  /// Maximum number of open HTTP/2 streams, and of streams that have not become calls, such as
+  /// streams that the client resets at once. Each needs 10 to 16 kB. 0: no limit.
   std::uint64_t max_streams = 1'000;
 };
 
-/// Values that the system and gRPC report of a connection. All but `streams_open` only grow.
+/// Measurements of a connection by the system and gRPC. All but `streams_open` only grow.
 struct ConnectionReading {
   std::uint64_t bytes_received = 0;
-  std::uint64_t bytes_read = 0;  ///< Without those that wait in the kernel.
+  std::uint64_t bytes_read = 0;  ///< Received bytes that gRPC has read from the socket.
   std::uint64_t bytes_sent = 0;  ///< Acknowledged by the peer.
   std::uint64_t streams_started = 0;
   std::uint64_t streams_open = 0;
-  std::uint64_t messages = 0;  ///< Complete ones, whether their call has read them or not.
-  bool has_streams = false;    ///< Whether the three values above are known and of this moment.
+  std::uint64_t messages = 0;  ///< Complete messages, whether or not their call has read them.
+  bool has_streams = false;    ///< Whether the three values above are known and current.
 };
 
 /// Why a connection is cut.
 enum class Flood {
-  kUnaccountedBytes,  ///< More bytes than its calls and messages account for.
-  kStreams,           ///< More streams at once than it may have.
-  kHeaders,           ///< A block of headers without an end.
+  kUnaccountedBytes,  ///< Too many bytes that belong to no call and no message.
+  kStreams,           ///< Too many concurrent streams.
+  kHeaders,           ///< A header block without an end.
 };
 
 /// For the log: "unaccounted bytes".
 std::string_view FloodName(Flood flood);
 
-/// The account of one connection. DATA is bounded by HTTP/2's windows, and so by the calls that are
-/// open; every other frame is not. So the ledger keeps a debt: bytes received, less the credits of
-/// calls, messages and replies, never below zero. A connection is a flood when its debt exceeds the
-/// bytes that its open calls may have under way by more than `unaccounted_bytes`.
+/// The account of one connection.
 ///
-/// A client with an open call could hide a block of headers without an end in the bytes that the
-/// call allows. Such a block is a stream of gRPC that never becomes a call: where this state lasts,
-/// the bytes that gRPC reads meanwhile count in full.
+/// HTTP/2's flow control bounds DATA frames by the number of open calls, but no other frames.
+/// Therefore the ledger keeps a debt: received bytes minus the credits of calls, messages and
+/// replies, at least zero. The open calls allow some bytes in flight. A connection is a flood if
+/// its debt exceeds this allowance by more than `unaccounted_bytes`.
 ///
-/// Calls report from any thread. Examine is for one thread.
+/// A client with an open call could hide a header block without an end within that allowance. For
+/// gRPC such a block is a stream that never becomes a call. While this state lasts, all bytes that
+/// gRPC reads count.
+///
+/// The methods `On...` are thread-safe. Examine is called by one thread.
 class ConnectionLedger {
  public:
   using Clock = std::chrono::steady_clock;
@@ -60,31 +62,31 @@ class ConnectionLedger {
 
   void OnCallBegun();
   void OnReadBegun() { reads_open_.fetch_add(1, std::memory_order_relaxed); }
-  /// A read has brought a message of `bytes`.
+  /// A read has completed with a message of `bytes`.
   void OnReadDone(std::uint64_t bytes);
-  /// `reading`: a read that was begun is not over.
+  /// `reading`: whether a read is still pending.
   void OnCallEnded(bool reading);
 
-  /// Counts of calls, to be taken before the reading that they are compared with: what a call has
-  /// reported was received before.
+  /// Counts of the connection's calls.
   struct Counts {
     std::uint64_t calls_begun = 0, calls_open = 0, reads_open = 0;
-    std::uint64_t credit = 0;  ///< Bytes that calls and messages account for.
-    std::uint64_t ended = 0;   ///< Bytes that ended calls had allowed.
+    std::uint64_t credit = 0;  ///< Bytes of calls and messages.
+    std::uint64_t ended = 0;   ///< The allowance of ended calls, in bytes.
   };
   Counts Take() const;
 
-  /// Whether the connection is a flood. `counts` is of before `reading`.
+  /// Returns the kind of flood, if any. Requires: `counts` was taken before `reading`, so that all
+  /// bytes in `counts` are included in `reading`.
   std::optional<Flood> Examine(const Counts& counts, const ConnectionReading& reading,
                                Clock::time_point now);
 
-  /// Bytes beyond what open calls allow, as of the last Examine.
+  /// The debt beyond the allowance of open calls, in bytes, at the last Examine.
   std::uint64_t excess() const { return excess_; }
-  /// Streams that are open or have not become calls, as of the last reading that had them.
+  /// Streams that are open or have not become calls, at the last reading with `has_streams`.
   std::uint64_t streams() const { return streams_; }
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }
-  /// Whether a stream has not become a call: then its streams are worth another look.
+  /// Whether a stream has not become a call. The streams should then be counted again soon.
   bool headers_pending() const { return headers_pending_; }
 
  private:
@@ -99,14 +101,14 @@ class ConnectionLedger {
   std::atomic<std::uint64_t> calls_begun_ = 0, calls_open_ = 0, reads_open_ = 0;
   std::atomic<std::uint64_t> credit_ = 0, ended_ = 0;
 
-  // Of Examine alone.
+  // Used by Examine only:
   Clock::time_point examined_;
   Counts last_counts_;
   ConnectionReading last_;
   double debt_ = 0;       // Bytes.
-  double lingering_ = 0;  // Bytes that ended calls still allow.
+  double lingering_ = 0;  // Remaining allowance of ended calls, in bytes.
   std::uint64_t excess_ = 0, streams_ = 0;
-  // Streams that have not become calls, and the counts that they were computed from.
+  // Streams that have not become calls, and the counts of the last update.
   double waiting_streams_ = 0;
   std::uint64_t counted_started_ = 0, counted_begun_ = 0;
   bool headers_pending_ = false;

@@ -5,11 +5,11 @@
 namespace partiemc::server {
 namespace {
 
-// Of the connections of one second that an address may open at once: ranks of a simulation begin
-// together.
+// Capacity of the token bucket: new connections of this many seconds. The ranks of a simulation
+// connect at the same time.
 constexpr double kBurstSeconds = 2;
 
-// An attacker that is cut comes again at once, before gRPC has freed what the flood took.
+// An attacker reconnects at once, before gRPC has freed the memory of the flood.
 constexpr std::chrono::seconds kBan(10), kRefusal(1);
 
 }  // namespace
@@ -52,7 +52,8 @@ void ConnectionCounts::Remove(const std::string& address, Admission admission) {
 void ConnectionCounts::OnFlood(const std::string& address, Admission admission,
                                Clock::time_point now) {
   const auto found = addresses_.find(address);
-  // Behind a proxy all clients have one address, and it has no limits.
+  // Behind a proxy all clients have one address; then the operator sets no limit, and there is no
+  // ban.
   if (found == addresses_.end() || limits_.new_of_address == 0) return;
   found->second.banned_until = now + kBan;
   if (admission == Admission::kHealthOnly) found->second.refused_until = now + kRefusal;

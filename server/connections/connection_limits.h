@@ -1,4 +1,4 @@
-// How many connections there may be: of all addresses, of one, and new ones in a second.
+// Limits the connections: in total, per address, and new ones per second.
 #pragma once
 
 #include <chrono>
@@ -9,18 +9,18 @@
 
 namespace partiemc::server {
 
-/// 0: not limited.
+/// 0: no limit.
 struct ConnectionLimits {
-  std::uint32_t connections = 2'048;   ///< Of all addresses.
-  std::uint32_t of_address = 1'024;    ///< Of one address.
-  std::uint32_t new_of_address = 500;  ///< Of one address in a second, twice as many at once.
+  std::uint32_t connections = 2'048;   ///< Connections of all addresses.
+  std::uint32_t of_address = 1'024;    ///< Connections of one address.
+  std::uint32_t new_of_address = 500;  ///< New connections of one address per second; burst: twice.
 };
 
-/// Whether a connection that was accepted is kept.
+/// The decision about an accepted connection.
 enum class Admission {
   kKept,
-  /// Beyond a limit. It is kept for health checks alone, so that a server that is flooded is not
-  /// taken for dead by a probe from the same address.
+  /// A limit is exceeded. The connection may only make health checks, so that a probe from a
+  /// flooding address does not report the server as dead.
   kHealthOnly,
   /// Closed at once.
   kRefused,
@@ -33,22 +33,22 @@ class ConnectionCounts {
 
   explicit ConnectionCounts(const ConnectionLimits& limits) : limits_(limits) {}
 
-  /// Counts one more connection of `address`, as HostOfPeer writes it. Remove follows when it has
-  /// ended, with the same admission, unless it was refused.
+  /// Counts a connection of `address` (HostOfPeer). Unless it is refused, Remove must follow with
+  /// the same admission when it has ended.
   Admission Add(const std::string& address, Clock::time_point now);
   void Remove(const std::string& address, Admission admission);
 
-  /// A connection of `address` was cut for a flood. For ten seconds the address opens connections
-  /// for health checks alone. If it floods in one of these, its connections are refused for a
-  /// second: over TLS a peer shows only after the handshake that it floods. The open connections of
-  /// the address go on.
+  /// A connection of `address` was cut because of a flood. For ten seconds, new connections of the
+  /// address may only make health checks. If one of these floods too, new connections are refused
+  /// for a second, because over TLS the server must pay for a handshake before it can detect a
+  /// flood. Open connections of the address continue.
   void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
   /// Kept connections of all addresses.
   std::size_t count() const { return kept_; }
   /// Kept connections of `address`.
   std::size_t CountOf(const std::string& address) const;
-  /// Whether a connection of `limits.connections` must end before another one is kept.
+  /// Whether a connection must end before another one can be kept.
   bool IsFull() const { return limits_.connections > 0 && kept_ >= limits_.connections; }
 
   /// Forgets addresses that have no connection and whose rate has recovered.
@@ -58,7 +58,7 @@ class ConnectionCounts {
  private:
   struct Address {
     std::size_t kept = 0, health_only = 0;
-    double tokens = 0;  // New connections that it may open now.
+    double tokens = 0;  // Number of connections that it may open now (token bucket).
     Clock::time_point filled;
     Clock::time_point banned_until, refused_until;
   };

@@ -26,12 +26,12 @@ void CallTally::OnReadDone(std::uint64_t bytes) {
 }
 
 bool ConnectionTable::Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return connections_.try_emplace(peer, std::move(connection)).second;
 }
 
 void ConnectionTable::Remove(const std::string& peer) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   connections_.erase(peer);
 }
 
@@ -39,7 +39,7 @@ std::shared_ptr<TrackedConnection> ConnectionTable::BeginCall(std::string_view p
                                                               CallKind kind) const {
   std::shared_ptr<TrackedConnection> connection;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     auto found = connections_.find(peer);
     if (found == connections_.end() && peer.starts_with("ipv6:")) {
       found = connections_.find(NormalPeer(peer));
@@ -54,7 +54,7 @@ std::shared_ptr<TrackedConnection> ConnectionTable::BeginCall(std::string_view p
 }
 
 std::size_t ConnectionTable::size() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return connections_.size();
 }
 

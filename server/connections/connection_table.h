@@ -1,19 +1,19 @@
-// Finds the connection of a call, so that the call reports what it has received.
+// Finds the connection of a call, so that the call can report its messages to the ledger.
 #pragma once
 
 #include <atomic>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 
+#include "common/mutex.h"
 #include "server/connections/connection_ledger.h"
 #include "server/connections/connection_limits.h"
 
 namespace partiemc::server {
 
-/// A connection as its calls see it. Safe from any thread.
+/// The part of a connection that its calls use. Thread-safe.
 struct TrackedConnection {
   TrackedConnection(const ConnectionRules& rules, Admission as,
                     ConnectionLedger::Clock::time_point now)
@@ -21,14 +21,15 @@ struct TrackedConnection {
 
   ConnectionLedger ledger;
   const Admission admission;
-  /// A call that is no health check has come over a connection that is for health checks alone.
+  /// Whether a connection for health checks only has made another call.
   std::atomic<bool> misused = false;
 };
 
 enum class CallKind { kHealthCheck, kOther };
 
-/// One call's reports to the ledger of its connection. Not thread-safe. Without a connection it
-/// counts nothing: a call in process, or over a Unix socket, where all peers have one name.
+/// Reports one call to the ledger of its connection. Reports nothing if the connection is unknown:
+/// for calls within the process, and over Unix sockets, where all peers have the same name. Not
+/// thread-safe.
 class CallTally {
  public:
   CallTally() = default;
@@ -38,7 +39,8 @@ class CallTally {
   CallTally& operator=(const CallTally&) = delete;
 
   void OnReadBegun();
-  /// The read has brought a message of `bytes`. A read that fails stays open until the call ends.
+  /// The read has completed with a message of `bytes`. A failed read stays open until the call
+  /// ends.
   void OnReadDone(std::uint64_t bytes);
 
  private:
@@ -46,25 +48,29 @@ class CallTally {
   std::atomic<bool> reading_ = false;
 };
 
-/// The open connections by their peers. Safe from any thread.
+/// The open connections, by peer. Thread-safe.
 class ConnectionTable {
  public:
-  /// False if the peer has a connection already: a client may use one port for connections to two
-  /// addresses of the server, and their calls could not be told apart.
-  bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection);
-  void Remove(const std::string& peer);
+  /// False if the peer has a connection already. A client may use one port for connections to two
+  /// addresses of the server; calls of these cannot be distinguished.
+  bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void Remove(const std::string& peer) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// The connection of a call; null if it is not known. `peer` is as gRPC writes it.
-  std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const;
+  /// Finds the connection of a new call; null if it is unknown. Marks the connection as misused if
+  /// it may not make this call. `peer` has gRPC's format.
+  std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
 
-  std::size_t size() const;
+  std::size_t size() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<TrackedConnection>, std::less<>> connections_;  // Guarded.
+  mutable Mutex mutex_;
+  std::map<std::string, std::shared_ptr<TrackedConnection>, std::less<>> connections_
+      ABSL_GUARDED_BY(mutex_);
 };
 
-/// One spelling for each peer: "ipv6:%5Bfe80::1%25eth0%5D:50051" is "ipv6:[fe80::1]:50051".
+/// Normalises a peer: "ipv6:%5Bfe80::1%25eth0%5D:50051" becomes "ipv6:[fe80::1]:50051".
 std::string NormalPeer(std::string_view peer);
 
 }  // namespace partiemc::server

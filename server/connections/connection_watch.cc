@@ -18,39 +18,40 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// How often connections are examined, and how often while a few of them are new or have an excess:
-// gRPC begins 50 calls in a millisecond.
+// Interval of examinations. The shorter one applies while a few connections are new or have an
+// excess, because gRPC begins 50 calls in a millisecond.
 constexpr milliseconds kPeriod(20), kAlertPeriod(5);
 constexpr std::size_t kMostInAlert = 64;
 constexpr seconds kNew(1);
-// Connections neither new nor with an excess that are examined in one period.
+// Number of quiet connections (neither new nor with an excess) that are examined in one period.
 constexpr std::size_t kQuietInPeriod = 128;
-// gRPC renders the counts of streams as text, in 20 us. A stream takes 22 bytes at least, so that
-// there are at most 750 more of them than were counted last.
+// gRPC renders the counts of streams as text, which takes 20 us. They are read again after this
+// number of bytes. A stream needs at least 22 bytes, so at most 750 streams are not yet counted.
 constexpr std::uint64_t kBytesBetweenCounts = 16 << 10;
 constexpr std::size_t kCountsInPeriod = 64;
 constexpr milliseconds kPendingBetweenCounts(500);
 
-// Connections for health checks alone: of one address, of all, and how long one is kept.
+// Limits of connections for health checks only: per address, in total, and their duration.
 constexpr std::size_t kHealthOnlyOfAddress = 8;
 constexpr std::size_t kHealthOnly = 64;
 constexpr seconds kHealthOnlyTime(5);
-// What one may send beside its messages, and its streams.
+// Limits of one such connection: unaccounted bytes and streams.
 constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
 constexpr std::uint64_t kHealthOnlyStreams = 16;
-// gRPC receives such a connection after this time, unless the peer sends more than a health check
-// has before its first reply. So a peer that was cut and connects again costs next to nothing.
+// gRPC gets such a connection after this delay. The connection is ended instead if the peer has
+// sent more bytes than a health check sends before its first reply. So a flooding peer that
+// reconnects costs little.
 constexpr milliseconds kHealthOnlyDelay(20);
 constexpr std::uint64_t kFirstBytes = 4 << 10;
 
-// gRPC frees what a flood took soon after its connection has ended; to give it back to the system
-// takes some milliseconds, in which nothing is allocated.
+// gRPC frees a flood's memory soon after its connection has ended. Returning the memory to the
+// system takes some milliseconds, during which no thread can allocate.
 constexpr milliseconds kBetweenGivingBack(500);
 
 constexpr seconds kBetweenForgetting(1);
 constexpr std::uint32_t kLinesPerSecond = 10;
 
-constexpr std::uint64_t kWakeKey = 0;  // Of epoll; keys of connections are larger.
+constexpr std::uint64_t kWakeKey = 0;  // Key of wake_ in epoll; connections have larger keys.
 
 ConnectionRules RulesOf(Admission admission, ConnectionRules rules) {
   if (admission == Admission::kKept) return rules;
@@ -77,7 +78,7 @@ ConnectionWatch::~ConnectionWatch() {
   stop_ = true;
   eventfd_write(wake_.get(), 1);
   if (thread_.joinable()) thread_.join();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   while (!connections_.empty()) {
     Abort(connections_.front().socket.get());
     Remove(connections_.begin());
@@ -98,7 +99,7 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   connection.peer = *std::move(peer);
   const std::string& address = connection.peer.address;
   const auto now = Clock::now();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (counts_.IsFull()) EvictIdleLocked();
   const Admission admission = counts_.Add(address, now);
   if (admission == Admission::kRefused) return Abort(socket.get());
@@ -128,7 +129,7 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
 }
 
 void ConnectionWatch::EndAllAt(Clock::time_point deadline) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   end_all_at_ = deadline;
   eventfd_write(wake_.get(), 1);
 }
@@ -142,7 +143,7 @@ void ConnectionWatch::Run() {
       give_back_at_ = Clock::time_point::max();
       give_back_memory_();
     }
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (now >= end_all_at_) {
       for (const Connection& connection : connections_) Abort(connection.socket.get());
     }
@@ -154,9 +155,9 @@ void ConnectionWatch::Run() {
   }
 }
 
-// In milliseconds; -1 where there is nothing to do before an event.
+// The timeout of epoll_wait in milliseconds; -1: none.
 int ConnectionWatch::TimeToWait(Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (connections_.empty() && counts_.addresses() == 0) return -1;
   const auto next = connections_.empty() ? forget_at_ : examine_at_;
   const auto wait = std::chrono::ceil<milliseconds>(std::min(next, end_all_at_) - now);
@@ -168,14 +169,15 @@ void ConnectionWatch::HandleEvents(int timeout_ms) {
   std::array<epoll_event, 64> events;
   const int count =
       epoll_wait(events_.get(), events.data(), static_cast<int>(events.size()), timeout_ms);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (int k = 0; k < count; ++k) {
     const auto& event = events[static_cast<std::size_t>(k)];
     if (event.data.u64 == kWakeKey) {
       eventfd_t ignored = 0;
       eventfd_read(wake_.get(), &ignored);
     } else if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
-      // gRPC or the peer has ended it; until this descriptor is closed too, it takes memory.
+      // gRPC or the peer has ended the connection. The kernel frees it when this descriptor is
+      // closed too.
       const auto found = by_key_.find(event.data.u64);
       if (found != by_key_.end()) Remove(found->second);
     }
@@ -192,7 +194,7 @@ std::vector<ExaminedConnection> ConnectionWatch::Examined() const {
 }
 
 bool ConnectionWatch::EvictIdle() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return EvictIdleLocked();
 }
 
@@ -206,7 +208,8 @@ bool ConnectionWatch::EvictIdleLocked() {
   return true;
 }
 
-// Frees a slot for one more.
+// Ends the oldest connection for health checks only if their limit is reached, so that another one
+// fits: of this address if it is at its limit, otherwise of all.
 void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   const auto is_health_only = [](const Connection& connection) {
     return connection.tracked->admission == Admission::kHealthOnly;
@@ -226,7 +229,8 @@ void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   Remove(oldest);
 }
 
-// All connections where they are few; else those with an excess, and the others in turn.
+// Examines new connections and connections with an excess each time; of the quiet ones, up to
+// kQuietInPeriod in turn.
 void ConnectionWatch::ExamineAll(Clock::time_point now) {
   counts_left_ = kCountsInPeriod;
   const bool is_period = now >= all_at_;
@@ -268,7 +272,7 @@ void ConnectionWatch::Examine(Connections::iterator connection, Clock::time_poin
   }
 }
 
-// False if it is to end.
+// False if the connection must end.
 bool ConnectionWatch::ExamineHealthOnly(Connection& connection, Clock::time_point now) {
   const auto time = now - connection.came;
   if (connection.tracked->misused || time > kHealthOnlyTime) return false;

@@ -7,8 +7,8 @@ namespace {
 
 using Amount = std::uint64_t (*)(const TrackedConnection&);
 
-// Of the address with the largest sum, the connection with the largest amount, where the sum of all
-// is beyond `most`.
+// If the sum of all amounts exceeds `most`: the connection with the largest amount of the address
+// with the largest sum.
 std::optional<std::size_t> LargestOfLargest(const std::vector<ExaminedConnection>& connections,
                                             Amount amount, std::uint64_t most) {
   std::map<std::string_view, std::uint64_t> sums;

@@ -1,4 +1,4 @@
-// Examines all connections together and names those to cut.
+// Examines all connections together and selects connections to end.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,19 @@
 
 namespace partiemc::server {
 
-/// All connections together have this multiple of the limit of one. Otherwise many connections,
-/// each below its own limit, would fill the memory.
+/// All connections together may reach this multiple of the limit of one connection. Otherwise many
+/// connections, each below its own limit, would exhaust the memory.
 inline constexpr std::uint64_t kConnectionsAtLimit = 2;
 
-/// One connection as the guard sees it.
+/// A connection and its address.
 struct ExaminedConnection {
   const TrackedConnection* connection = nullptr;
   const std::string* address = nullptr;
 };
 
-/// The connection to cut where all of them are beyond `kConnectionsAtLimit` times the rules of one:
-/// of the address that has most, its largest. Nothing where they are within.
+/// The connection to cut if all connections together exceed a limit: the one with the largest
+/// excess (or most streams) of the address with the largest sum. None if they are within the
+/// limits.
 struct Excess {
   std::size_t index = 0;
   Flood flood = Flood::kUnaccountedBytes;
@@ -30,9 +31,8 @@ struct Excess {
 std::optional<Excess> LargestExcess(const std::vector<ExaminedConnection>& connections,
                                     const ConnectionRules& rules);
 
-/// The connection that ends where one more is to be kept: of the address that has most connections,
-/// the first without a call. `connections` in the order in which they came. Nothing where all have
-/// calls.
+/// The connection to evict for a new one: the oldest connection without a call, of the address with
+/// the most connections. None if all have calls. Requires: `connections` in the order of arrival.
 std::optional<std::size_t> IdleOfLargestAddress(const std::vector<ExaminedConnection>& connections,
                                                 const ConnectionCounts& counts);
 

@@ -1,30 +1,30 @@
-// Hands connections to gRPC on threads of its own.
+// Passes connections to gRPC on separate threads.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <mutex>
 #include <queue>
 #include <thread>
 #include <vector>
 
+#include "common/mutex.h"
+
 namespace partiemc::server {
 
-/// gRPC may read a connection in the thread that hands it over, for as long as bytes arrive without
-/// a pause. Then the next connection takes another thread. Threads are started when needed, up to a
-/// limit; beyond it connections wait.
+/// gRPC may read a connection in the thread that passes it, for as long as bytes arrive without a
+/// pause. The next connection then needs another thread. Threads are started when needed, up to
+/// kMostThreads; then connections wait.
 class HandOverThreads {
  public:
   explicit HandOverThreads(std::function<void(int descriptor)> hand_over)
       : hand_over_(std::move(hand_over)) {}
-  /// Waits until every hand-over has returned. Connections that still wait are closed.
+  /// Waits until every hand-over has returned. Closes waiting connections.
   ~HandOverThreads();
   HandOverThreads(const HandOverThreads&) = delete;
   HandOverThreads& operator=(const HandOverThreads&) = delete;
 
-  /// Safe from any thread.
-  void Add(int descriptor);
+  /// Thread-safe.
+  void Add(int descriptor) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   static constexpr std::size_t kMostThreads = 8;
@@ -32,12 +32,12 @@ class HandOverThreads {
   void Run();
 
   const std::function<void(int)> hand_over_;
-  std::mutex mutex_;  // Guards all below.
-  std::condition_variable came_;
-  std::queue<int> waiting_;
-  std::size_t idle_ = 0;
-  bool stop_ = false;
-  std::vector<std::thread> threads_;
+  Mutex mutex_;
+  CondVar came_;
+  std::queue<int> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::size_t idle_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool stop_ ABSL_GUARDED_BY(mutex_) = false;
+  std::vector<std::thread> threads_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

@@ -51,7 +51,7 @@ absl::StatusOr<Descriptor> Listen(SocketAddress address, std::chrono::millisecon
   Descriptor socket(::socket(address.family(), SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (socket.get() < 0) return absl::UnavailableError(ErrorText(errno));
   if (address.family() != AF_UNIX) {
-    // Connections that are accepted inherit all of these.
+    // Accepted connections inherit these options.
     SetOption(socket.get(), SOL_SOCKET, SO_REUSEADDR, 1);
     SetOption(socket.get(), IPPROTO_TCP, TCP_NODELAY, 1);
     SetOption(socket.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(dead_after.count()));
@@ -71,7 +71,7 @@ absl::StatusOr<Listeners> ListenOnPath(const std::string& path,
   if (path.size() >= sizeof(name.sun_path)) return absl::UnavailableError("the path is too long");
   std::memcpy(name.sun_path, path.data(), path.size());
   address.size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path.size() + 1);
-  unlink(path.c_str());  // Left behind by a server that is gone (CheckCanListen).
+  unlink(path.c_str());  // A stale file: CheckCanListen has found no running server.
   auto socket = Listen(address, dead_after);
   if (!socket.ok()) return socket.status();
   Listeners listeners;
@@ -98,7 +98,7 @@ absl::StatusOr<std::vector<SocketAddress>> Resolve(const Address& address) {
   return all;
 }
 
-// [::] receives IPv4 as well, where the machine has IPv6.
+// If the machine has IPv6, a socket on [::] also accepts IPv4.
 std::optional<SocketAddress> BothFamilies(SocketAddress address) {
   const bool any = address.family() == AF_INET ? address.v4().sin_addr.s_addr == htonl(INADDR_ANY)
                                                : IN6_IS_ADDR_UNSPECIFIED(&address.v6().sin6_addr);
@@ -177,7 +177,7 @@ bool ReadByteCounts(int socket, ConnectionReading& reading) {
   }
   int waiting = 0;
   if (ioctl(socket, SIOCINQ, &waiting) != 0 || waiting < 0) waiting = 0;
-  // Both move between the two calls, so that the difference is never to go back.
+  // Bytes arrive between the two calls, so the difference could decrease; std::max prevents this.
   const std::uint64_t received = info.tcpi_bytes_received;
   const auto unread = static_cast<std::uint64_t>(waiting);
   reading.bytes_received = received;
@@ -187,7 +187,7 @@ bool ReadByteCounts(int socket, ConnectionReading& reading) {
 }
 
 void Abort(int socket) {
-  // Resets a TCP connection and drops its unread bytes, although gRPC has the socket, too.
+  // Resets a TCP connection and drops its unread bytes, although gRPC also holds the socket.
   const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
   if (connect(socket, &nobody, sizeof(nobody)) == 0) return;
   shutdown(socket, SHUT_RDWR);

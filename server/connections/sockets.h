@@ -1,4 +1,4 @@
-// The system calls of the acceptor: sockets that listen, who the peer is, and bytes received.
+// System calls on sockets: listening, peers, byte counts, abort.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace partiemc::server {
 
-/// A file descriptor, closed when this goes out of scope.
+/// A file descriptor; the destructor closes it.
 class Descriptor {
  public:
   explicit Descriptor(int number = -1) : number_(number) {}
@@ -38,10 +38,9 @@ struct Listeners {
   std::uint16_t port = 0;  ///< The port that was bound; 0 for a Unix socket.
 };
 
-/// Listens as gRPC does: on every address of a host's name, on all addresses of IPv4 and IPv6 for
-/// 0.0.0.0 and [::], and in place of a Unix socket that is there. `dead_after`: a connection ends
-/// if bytes sent are not acknowledged for this time.
-/// Errors: UNAVAILABLE with the system's reason.
+/// Listens as gRPC does. A host name: every address of this name. 0.0.0.0 and [::]: all addresses
+/// of IPv4 and IPv6. A Unix socket: replaces an existing file. A connection ends if its peer does
+/// not acknowledge sent bytes for `dead_after`. Errors: UNAVAILABLE with the system's reason.
 absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::milliseconds dead_after);
 
 struct Peer {
@@ -49,11 +48,10 @@ struct Peer {
   std::string address;  ///< The unit of limits per address: HostOfPeer, or a user of this machine.
 };
 
-/// Nothing where the connection is gone already.
+/// None if the connection has ended.
 std::optional<Peer> PeerOf(int socket);
 
-/// Bytes received, read and sent. False for a socket that does not count them, as Unix sockets do
-/// not.
+/// Sets the bytes received, read and sent. False if the socket does not count them (Unix sockets).
 bool ReadByteCounts(int socket, ConnectionReading& reading);
 
 /// Ends a connection at once: the peer receives a reset, and unread bytes are dropped. After

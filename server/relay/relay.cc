@@ -334,8 +334,8 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
   }
   const auto now = Clock::now();
   if (directory_.Announced(replica, announcement, now)) changed_ = true;
-  // One announcement answers all who ask at once. While this server drains, the next one is that it
-  // leaves, after the ends of its streams.
+  // One announcement answers all pending requests. While this server drains, the next announcement
+  // reports that it leaves, after the ends of its streams.
   if (!announcement.asks() || draining_since_) return;
   if (registry_.changes() != local_changes_) LookAtLocalStreams();
   was_asked_ = true;

@@ -7,16 +7,16 @@
 namespace partiemc::server {
 
 void RelayQueue::Post(std::function<void()> action) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   work_.actions.push_back(std::move(action));
-  came_.notify_one();
+  came_.NotifyOne();
 }
 
 std::unique_ptr<MessageBus::Subscription> RelayQueue::Listen(MessageBus& bus,
                                                              const std::string& subject,
                                                              Lane lane) {
   return bus.Subscribe(subject, [queue = shared_from_this(), lane](std::string_view message) {
-    const std::lock_guard lock(queue->mutex_);
+    const MutexLock lock(queue->mutex_);
     if (queue->stopped_) return;
     if (queue->message_bytes_[lane] + message.size() > queue->max_bytes_[lane]) {
       ++queue->lost_messages_;
@@ -24,16 +24,17 @@ std::unique_ptr<MessageBus::Subscription> RelayQueue::Listen(MessageBus& bus,
     }
     queue->message_bytes_[lane] += message.size();
     queue->work_.messages[lane].emplace_back(message);
-    queue->came_.notify_one();
+    queue->came_.NotifyOne();
   });
 }
 
 bool RelayQueue::Take(std::chrono::milliseconds patience, Work& work) {
-  std::unique_lock lock(mutex_);
-  came_.wait_for(lock, patience, [this] {
-    return stopped_ || !work_.actions.empty() ||
-           !std::ranges::all_of(work_.messages, &std::deque<std::string>::empty);
-  });
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const MutexLock lock(mutex_);
+  while (!stopped_ && work_.actions.empty() &&
+         std::ranges::all_of(work_.messages, &std::deque<std::string>::empty) &&
+         came_.WaitUntil(mutex_, deadline)) {
+  }
   if (stopped_ && work_.actions.empty()) return false;
   std::swap(work.actions, work_.actions);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -48,13 +49,13 @@ bool RelayQueue::Take(std::chrono::milliseconds patience, Work& work) {
 }
 
 void RelayQueue::Stop() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   stopped_ = true;
-  came_.notify_all();
+  came_.NotifyAll();
 }
 
 std::uint64_t RelayQueue::lost_messages() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return lost_messages_;
 }
 

@@ -3,15 +3,14 @@
 
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "common/mutex.h"
 #include "server/relay/message_bus.h"
 
 namespace partiemc::server {
@@ -39,7 +38,7 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
   /// Drops messages of a lane while it holds its `max_bytes`.
   explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes) : max_bytes_(max_bytes) {}
 
-  void Post(std::function<void()> action);
+  void Post(std::function<void()> action) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Queues the messages of `subject`. Returns null if memory is exhausted.
   std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject,
                                                    Lane lane);
@@ -48,18 +47,18 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
   /// `patience`. Returns false after Stop if no action is left. Requires: `work` is empty.
   bool Take(std::chrono::milliseconds patience, Work& work);
   /// Drops all further messages.
-  void Stop();
+  void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  std::uint64_t lost_messages() const;
+  std::uint64_t lost_messages() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   const std::array<std::size_t, kLanes> max_bytes_;
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable came_;
-  Work work_;
-  std::array<std::size_t, kLanes> message_bytes_{};
-  std::uint64_t lost_messages_ = 0;
-  bool stopped_ = false;
+  mutable Mutex mutex_;
+  CondVar came_;
+  Work work_ ABSL_GUARDED_BY(mutex_);
+  std::array<std::size_t, kLanes> message_bytes_ ABSL_GUARDED_BY(mutex_){};
+  std::uint64_t lost_messages_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::server

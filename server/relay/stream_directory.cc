@@ -28,7 +28,7 @@ bool StreamDirectory::Announced(const std::string& replica,
   for (const auto& stream : announcement.streams()) {
     streams.insert_or_assign(stream.summary().stream_id(), stream);
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (replicas_.size() >= kMaxReplicas && !replicas_.contains(replica)) return false;
   Replica& known = replicas_[replica];
   known.heard = known.announced = now;
@@ -40,13 +40,13 @@ bool StreamDirectory::Announced(const std::string& replica,
 }
 
 void StreamDirectory::Left(const std::string& replica) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   replicas_.erase(replica);
 }
 
 std::vector<std::string> StreamDirectory::Expire(Clock::time_point before) {
   std::vector<std::string> gone;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (auto it = replicas_.begin(); it != replicas_.end();) {
     if (it->second.heard >= before) {
       ++it;
@@ -59,13 +59,13 @@ std::vector<std::string> StreamDirectory::Expire(Clock::time_point before) {
 }
 
 void StreamDirectory::Refresh(Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (auto& [name, replica] : replicas_) replica.heard = now;
 }
 
 std::vector<std::string> StreamDirectory::Addresses(std::size_t count) const {
   std::set<std::string> addresses;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [name, replica] : replicas_) {
     if (!replica.address.empty() && addresses.size() < count) addresses.insert(replica.address);
   }
@@ -73,7 +73,7 @@ std::vector<std::string> StreamDirectory::Addresses(std::size_t count) const {
 }
 
 bool StreamDirectory::HaveAllAnnouncedSince(Clock::time_point since) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return std::ranges::all_of(replicas_,
                              [since](const auto& item) { return item.second.announced >= since; });
 }
@@ -92,17 +92,17 @@ std::optional<RemoteStream> StreamDirectory::Latest(Matches matches) const {
 }
 
 std::optional<RemoteStream> StreamDirectory::FindName(std::string_view name) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return Latest([name](const auto& stream) { return stream.summary().stream_name() == name; });
 }
 
 std::optional<RemoteStream> StreamDirectory::FindLineage(std::string_view lineage) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return Latest([lineage](const auto& stream) { return stream.lineage() == lineage; });
 }
 
 bool StreamDirectory::Has(const std::string& replica, std::string_view stream_id) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = replicas_.find(replica);
   return found != replicas_.end() && found->second.streams.contains(std::string(stream_id));
 }
@@ -111,7 +111,7 @@ std::vector<relay::v1::LiveStream> StreamDirectory::List(
     const std::string& after, std::size_t count,
     absl::FunctionRef<bool(const relay::v1::LiveStream&)> wants) const {
   std::map<std::string, const relay::v1::LiveStream*> latest;  // Key: lineage.
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [name, replica] : replicas_) {
     for (const auto& [id, stream] : replica.streams) {
       if (!wants(stream)) continue;
@@ -132,12 +132,12 @@ std::vector<relay::v1::LiveStream> StreamDirectory::List(
 }
 
 std::size_t StreamDirectory::replicas() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return replicas_.size();
 }
 
 std::size_t StreamDirectory::streams() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::size_t streams = 0;
   for (const auto& [name, replica] : replicas_) streams += replica.streams.size();
   return streams;

@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
+#include "common/mutex.h"
 #include "partiemc/relay/v1/relay.pb.h"
 
 namespace partiemc::server {
@@ -32,30 +32,33 @@ class StreamDirectory {
 
   /// Replaces the streams of a replica. Returns whether they have changed.
   bool Announced(const std::string& replica, const relay::v1::Announcement& announcement,
-                 Clock::time_point now);
-  void Left(const std::string& replica);
+                 Clock::time_point now) ABSL_LOCKS_EXCLUDED(mutex_);
+  void Left(const std::string& replica) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes and returns the replicas without an announcement since `before`.
-  std::vector<std::string> Expire(Clock::time_point before);
+  std::vector<std::string> Expire(Clock::time_point before) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Treats all replicas as announced at `now`, after a disconnection of the bus.
-  void Refresh(Clock::time_point now);
+  void Refresh(Clock::time_point now) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// At most `count` distinct addresses. Draining replicas are left out.
-  std::vector<std::string> Addresses(std::size_t count) const;
+  std::vector<std::string> Addresses(std::size_t count) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Whether every known replica has announced its streams since `since`.
-  bool HaveAllAnnouncedSince(Clock::time_point since) const;
+  bool HaveAllAnnouncedSince(Clock::time_point since) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The stream of that name that was opened last.
-  std::optional<RemoteStream> FindName(std::string_view name) const;
+  std::optional<RemoteStream> FindName(std::string_view name) const ABSL_LOCKS_EXCLUDED(mutex_);
   /// The stream with this lineage that was opened last.
-  std::optional<RemoteStream> FindLineage(std::string_view lineage) const;
-  bool Has(const std::string& replica, std::string_view stream_id) const;
+  std::optional<RemoteStream> FindLineage(std::string_view lineage) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  bool Has(const std::string& replica, std::string_view stream_id) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// At most `count` streams that fulfil `wants`, with ids above `after`, in the order of ids.
   std::vector<relay::v1::LiveStream> List(
       const std::string& after, std::size_t count,
-      absl::FunctionRef<bool(const relay::v1::LiveStream&)> wants) const;
-  std::size_t replicas() const;
-  std::size_t streams() const;
+      absl::FunctionRef<bool(const relay::v1::LiveStream&)> wants) const
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  std::size_t replicas() const ABSL_LOCKS_EXCLUDED(mutex_);
+  std::size_t streams() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   struct Replica {
@@ -65,10 +68,10 @@ class StreamDirectory {
   };
 
   template <typename Matches>
-  std::optional<RemoteStream> Latest(Matches matches) const;
+  std::optional<RemoteStream> Latest(Matches matches) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::map<std::string, Replica> replicas_;
+  mutable Mutex mutex_;
+  std::map<std::string, Replica> replicas_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

@@ -21,7 +21,7 @@ absl::Status TurnedAway(std::string_view reason, std::string value) {
                          "must be \"Bearer \" and a token of this server's --token-file"});
 }
 
-// `asked`, completed by `otherwise`.
+// The terms' quota; values that it lacks are taken from `otherwise`.
 CallerQuota Completed(const CallerQuota& asked, const CallerQuota& otherwise) {
   const auto either = [](const auto& one, const auto& other) { return one ? one : other; };
   return {.calls = either(asked.calls, otherwise.calls),
@@ -42,12 +42,12 @@ void Authentication::Set(BearerTokens tokens) {
     next->accounts.emplace(digest, std::move(account));
   }
   next->tokens = std::move(tokens);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   known_ = std::move(next);
 }
 
 std::shared_ptr<const Authentication::Known> Authentication::Current() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return known_;
 }
 

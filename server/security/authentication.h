@@ -4,13 +4,13 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
 #include "server/security/bearer_tokens.h"
 #include "server/security/caller.h"
 #include "server/security/peer_accounts.h"
@@ -30,7 +30,7 @@ class Authentication {
   /// Replaces the tokens. Before the first call no token is required. A token that stays keeps its
   /// account: resources that it holds still count, and the new quota applies to further ones.
   /// Called by one thread at a time.
-  void Set(BearerTokens tokens);
+  void Set(BearerTokens tokens) ABSL_LOCKS_EXCLUDED(mutex_);
   bool required() const { return Current() != nullptr; }
 
   /// `authorization` is the header of this name, "Bearer TOKEN"; `peer` is the address in gRPC's
@@ -45,13 +45,13 @@ class Authentication {
     BearerTokens tokens;
     std::map<BearerTokens::Digest, std::shared_ptr<CallerAccount>> accounts;  // One per token.
   };
-  std::shared_ptr<const Known> Current() const;
+  std::shared_ptr<const Known> Current() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   const CallerQuota quota_;
   const std::shared_ptr<const CallerTerms> everything_ = std::make_shared<const CallerTerms>();
   mutable PeerAccounts peers_;
-  mutable std::mutex mutex_;
-  std::shared_ptr<const Known> known_;  // Guarded by mutex_; null: no token is required.
+  mutable Mutex mutex_;
+  std::shared_ptr<const Known> known_ ABSL_GUARDED_BY(mutex_);  // Null: no token is required.
 };
 
 }  // namespace partiemc::server

@@ -70,22 +70,22 @@ absl::Status CheckMay(bool may, const std::string& action) {
 
 CallerAccount::Place::~Place() {
   if (account_ == nullptr) return;
-  const std::lock_guard lock(account_->mutex_);
+  const MutexLock lock(account_->mutex_);
   --account_->held_[static_cast<std::size_t>(kind_)];
 }
 
 void CallerAccount::SetQuota(CallerQuota quota) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   quota_ = quota;
 }
 
 CallerQuota CallerAccount::quota() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return quota_;
 }
 
 absl::StatusOr<CallerAccount::Place> CallerAccount::Take(Kind kind) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::uint32_t& held = held_[static_cast<std::size_t>(kind)];
   const std::uint32_t most = LimitOf(quota_, kind);
   if (held >= most) {
@@ -98,7 +98,7 @@ absl::StatusOr<CallerAccount::Place> CallerAccount::Take(Kind kind) {
 }
 
 std::uint32_t CallerAccount::held(Kind kind) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return held_[static_cast<std::size_t>(kind)];
 }
 

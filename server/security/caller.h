@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
 #include "server/security/caller_terms.h"
 
 namespace partiemc::server {
@@ -56,20 +56,20 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
   explicit CallerAccount(CallerQuota quota = {}) : quota_(quota) {}
 
   /// Applies to further resources. Held resources stay, even above the quota.
-  void SetQuota(CallerQuota quota);
-  CallerQuota quota() const;
+  void SetQuota(CallerQuota quota) ABSL_LOCKS_EXCLUDED(mutex_);
+  CallerQuota quota() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Requires: this is held by shared_ptr.
   /// Errors: RESOURCE_EXHAUSTED (CALLER_CALLS, CALLER_STREAMS, CALLER_WATCHERS).
-  absl::StatusOr<Place> Take(Kind kind);
-  std::uint32_t held(Kind kind) const;
+  absl::StatusOr<Place> Take(Kind kind) ABSL_LOCKS_EXCLUDED(mutex_);
+  std::uint32_t held(Kind kind) const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   static constexpr std::size_t kKinds = 4;
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  CallerQuota quota_;
-  std::array<std::uint32_t, kKinds> held_{};
+  mutable Mutex mutex_;
+  CallerQuota quota_ ABSL_GUARDED_BY(mutex_);
+  std::array<std::uint32_t, kKinds> held_ ABSL_GUARDED_BY(mutex_){};
 };
 
 /// RESOURCE_EXHAUSTED (CALLER_BYTES) for a request of `bytes` beyond the caller's quota.

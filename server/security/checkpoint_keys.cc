@@ -74,12 +74,12 @@ bool CheckpointKeys::Verify(std::string_view bytes, std::string_view signature) 
 
 void CurrentCheckpointKeys::Set(CheckpointKeys keys) {
   auto next = std::make_shared<const CheckpointKeys>(std::move(keys));
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   keys_ = std::move(next);
 }
 
 std::shared_ptr<const CheckpointKeys> CurrentCheckpointKeys::Get() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return keys_;
 }
 

@@ -3,12 +3,12 @@
 
 #include <cstddef>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
@@ -36,13 +36,13 @@ class CheckpointKeys {
 /// The current keys. Thread-safe.
 class CurrentCheckpointKeys {
  public:
-  void Set(CheckpointKeys keys);
+  void Set(CheckpointKeys keys) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Null before the first Set: checkpoints are not signed.
-  std::shared_ptr<const CheckpointKeys> Get() const;
+  std::shared_ptr<const CheckpointKeys> Get() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  mutable std::mutex mutex_;
-  std::shared_ptr<const CheckpointKeys> keys_;  // Guarded by mutex_.
+  mutable Mutex mutex_;
+  std::shared_ptr<const CheckpointKeys> keys_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

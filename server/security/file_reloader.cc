@@ -31,10 +31,10 @@ std::string StampOf(const std::vector<std::string>& files) {
 
 FileReloader::~FileReloader() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  stop_asked_.notify_all();
+  stop_asked_.NotifyAll();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -51,11 +51,14 @@ void FileReloader::Start(std::chrono::milliseconds interval) {
 }
 
 void FileReloader::Run(std::chrono::milliseconds interval) {
-  std::unique_lock lock(mutex_);
-  while (!stop_asked_.wait_for(lock, interval, [this] { return stopping_; })) {
-    lock.unlock();
+  const MutexLock lock(mutex_);
+  while (!stopping_) {
+    const auto next = std::chrono::steady_clock::now() + interval;
+    while (!stopping_ && stop_asked_.WaitUntil(mutex_, next)) {
+    }
+    if (stopping_) return;
+    const MutexUnlock unlock(mutex_);
     for (Watched& watched : watched_) Look(watched);
-    lock.lock();
   }
 }
 

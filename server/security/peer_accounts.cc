@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <mutex>
+
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
 struct PeerAccounts::Known {
-  std::mutex mutex;
-  std::map<std::string, std::weak_ptr<CallerAccount>> accounts;  // Guarded by mutex.
+  Mutex mutex;
+  std::map<std::string, std::weak_ptr<CallerAccount>> accounts ABSL_GUARDED_BY(mutex);
 };
 
 namespace {
@@ -48,13 +49,13 @@ std::shared_ptr<PeerAccounts::Known> PeerAccounts::MakeKnown() { return std::mak
 
 std::shared_ptr<CallerAccount> PeerAccounts::Of(std::string_view peer) {
   std::string key = HostOfPeer(peer);
-  const std::lock_guard lock(known_->mutex);
+  const MutexLock lock(known_->mutex);
   std::weak_ptr<CallerAccount>& known = known_->accounts[key];
   if (auto account = known.lock()) return account;
   // The last holder removes the account, unless the peer has a new one.
   const auto forget = [all = known_, key = std::move(key)](CallerAccount* account) {
     delete account;
-    const std::lock_guard forgetting(all->mutex);
+    const MutexLock forgetting(all->mutex);
     const auto found = all->accounts.find(key);
     if (found != all->accounts.end() && found->second.expired()) all->accounts.erase(found);
   };
@@ -64,7 +65,7 @@ std::shared_ptr<CallerAccount> PeerAccounts::Of(std::string_view peer) {
 }
 
 std::size_t PeerAccounts::size() const {
-  const std::lock_guard lock(known_->mutex);
+  const MutexLock lock(known_->mutex);
   return known_->accounts.size();
 }
 

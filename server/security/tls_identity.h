@@ -4,12 +4,12 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "common/mutex.h"
 
 namespace partiemc::server {
 
@@ -40,17 +40,17 @@ class CurrentTlsIdentity {
 
   void Set(TlsIdentity identity) {
     auto next = std::make_shared<const TlsIdentity>(std::move(identity));
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     version_ = {version_.number + 1, std::move(next)};
   }
   Version Get() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return version_;
   }
 
  private:
-  mutable std::mutex mutex_;
-  Version version_;
+  mutable Mutex mutex_;
+  Version version_ ABSL_GUARDED_BY(mutex_);
 };
 
 /// Reads the files and checks that certificate and key match and that client_ca has an authority.

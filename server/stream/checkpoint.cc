@@ -14,10 +14,12 @@
 namespace partiemc::server {
 namespace {
 
-// Layout, little-endian: magic, version, version of the method, whether it is signed, lineage,
-// fingerprints of parameters and labels, outputs, checkpoint interval, next sequence number, bytes
-// of the name, name, checksum of all that; the state, which has a checksum of its own; the
-// signature of everything before it, if there is one.
+// Layout, little-endian:
+// - header: magic, version, method version, is_signed, lineage;
+// - fingerprint of the parameters, fingerprint of the labels, outputs, checkpoint interval;
+// - next sequence number, length of the name, name, checksum of all bytes so far;
+// - the state, with its own checksum;
+// - the signature of all bytes so far, if is_signed.
 constexpr std::uint32_t kMagic = 0x43504d45;  // "EMPC"
 constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kLineageBytes = 32;
@@ -29,9 +31,9 @@ static_assert(kHeaderBytes + kMaxStreamNameBytes + kChecksumBytes +
 
 constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 
-// The numbers that parameters are made of, one after the other.
+// A hash of all values of the parameters.
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
-  // Names each part, so that a new one does not compile until it is bound, too.
+  // Names each member: after a new member is added, this does not compile until it is hashed too.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
                surface_offset, normal_memory, clean, min_component_area, min_component_particles,
                plane, slice, isovalue, sections] = parameters;
@@ -51,8 +53,8 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   PutNumber(surface_offset, bytes);
   put_small(normal_memory);
   put_small(clean ? (*clean ? 2 : 1) : 0);
-  // The default placement: no request can change it, but a server with other constants refuses the
-  // checkpoint.
+  // Steps and constants of the default placement. Requests cannot change them, but a server built
+  // with other values refuses the checkpoint.
   const VirtualPlaneVariant method;
   for (const NamedStep& step : AllSteps()) put_small(method.steps.*step.value);
   for (const NamedConstant& constant : AllConstants()) {
@@ -66,7 +68,8 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     for (const double value : plane_of.normal) PutNumber(value, bytes);
   };
   if (slice) put_slice(*slice);
-  // Nothing where there are none: checkpoints of before there were any stay good.
+  // Absent values add no bytes, so that checkpoints from before these parameters existed stay
+  // valid.
   if (isovalue) PutNumber(*isovalue, bytes);
   for (const Section& section : sections) {
     put_small(section.slice.has_value());
@@ -118,7 +121,7 @@ absl::StatusOr<Header> TakeHeader(std::string_view& bytes) {
     return Corrupt(absl::StrCat(whole.size(), " bytes"));
   }
   if (TakeNumber<std::uint32_t>(bytes) != kMagic) return Corrupt("other bytes");
-  // First of all: other versions have other layouts.
+  // Checked first, because other versions have other layouts.
   if (const auto version = TakeNumber<std::uint32_t>(bytes); version != kVersion) {
     return Mismatch(absl::StrCat("version ", version),
                     absl::StrCat("must be of version ", kVersion, "; resume on the server's like"));

@@ -1,4 +1,5 @@
-// What a client needs to go on with a stream elsewhere: opaque to it, untrusted when it comes back.
+// Bytes with which a client resumes a stream on any server. Opaque to the client; untrusted input
+// for the server.
 #pragma once
 
 #include <cstddef>
@@ -14,18 +15,17 @@
 
 namespace partiemc::server {
 
-/// The reasons for which a checkpoint is refused (proto/PROTOCOL.md).
+/// Reasons of refused checkpoints (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonCorruptCheckpoint = "CORRUPT_CHECKPOINT";
 inline constexpr std::string_view kReasonCheckpointMismatch = "CHECKPOINT_MISMATCH";
 inline constexpr std::string_view kReasonCheckpointSignature = "CHECKPOINT_SIGNATURE";
 
-/// What a stream keeps through all its resumes, beside its parameters. Labels and outputs count by
-/// a number that is another for others.
+/// Properties of a stream that a resume must not change, in addition to the parameters.
 struct StreamTerms {
-  std::string lineage = {};  ///< LineageOf its token.
-  std::string name = {};     ///< As resolved.
-  std::uint64_t labels = 0;  ///< FingerprintOf them.
-  std::uint32_t outputs = 0;
+  std::string lineage = {};   ///< LineageOf the stream token.
+  std::string name = {};      ///< With the default resolved.
+  std::uint64_t labels = 0;   ///< FingerprintOf the labels.
+  std::uint32_t outputs = 0;  ///< A bit for each requested output.
   std::uint32_t checkpoint_interval = 0;
 };
 
@@ -34,30 +34,33 @@ std::uint64_t FingerprintOf(const std::map<std::string, std::string>& labels);
 /// A stream between two frames.
 struct Checkpoint {
   std::uint64_t next_sequence = 1;
-  std::string name = {};  ///< Of the stream.
+  std::string name = {};  ///< Name of the stream.
   State state = {};
 };
 
-/// The most bytes that a checkpoint has beside those of the state.
+/// Maximum size of a checkpoint without its state, in bytes.
 inline constexpr std::size_t kMaxCheckpointOverhead = 300;
 
-/// Bytes with a version and a checksum, bound to the method's version, to `parameters`, as
-/// resolved, and to `terms`: for others the same frames would be answered otherwise. Signed if
-/// there are `keys`. The same on every machine.
-/// Requires: a lineage and a name that a stream can have.
+/// Serialises a checkpoint. The bytes have a version and a checksum. They are bound to the method's
+/// version, to `parameters` with defaults resolved, and to `terms`, because other values would
+/// change the results. They are signed if `keys` is not null. Every machine writes the same bytes.
+/// Requires: `terms` has a valid lineage and name.
 std::string Serialize(std::uint64_t next_sequence, const State& state,
                       const ReconstructionParameters& parameters, const StreamTerms& terms,
                       const CheckpointKeys* keys);
 
-/// The checkpoint that Serialize wrote for the same parameters and terms; from no bytes at all,
-/// which are bound to nothing, the beginning of a stream. `terms.name` may be empty: then the name
-/// is the checkpoint's.
-/// With `keys` nothing of it is looked at before its signature holds. Without, a signature counts
-/// for nothing, and a checksum is none: whoever makes up a checkpoint gets the stream that he
-/// described, and every part of it has been checked.
-/// Errors, each with a Violation: FAILED_PRECONDITION (CHECKPOINT_SIGNATURE; CHECKPOINT_MISMATCH
-/// for another version or method, stream, parameters or terms, the value says which);
-/// INVALID_ARGUMENT (CORRUPT_CHECKPOINT, CORRUPT_STATE).
+/// Parses a checkpoint that Serialize wrote for the same parameters and terms. If `bytes` is empty,
+/// returns the beginning of a new stream. If `terms.name` is empty, any name matches.
+///
+/// Security: with `keys`, the signature is checked before anything else is read. Without `keys`, a
+/// signature is ignored, and the checksum detects accidents only. A client can then forge a
+/// checkpoint, but every part of it is checked, so it only affects the client's own stream.
+///
+/// Errors, each with a Violation:
+/// - FAILED_PRECONDITION (CHECKPOINT_SIGNATURE).
+/// - FAILED_PRECONDITION (CHECKPOINT_MISMATCH): another version, method, stream, parameters or
+///   terms. The violation's value names the difference.
+/// - INVALID_ARGUMENT (CORRUPT_CHECKPOINT, CORRUPT_STATE).
 absl::StatusOr<Checkpoint> ParseCheckpoint(std::string_view bytes,
                                            const ReconstructionParameters& parameters,
                                            const StreamTerms& terms, const CheckpointKeys* keys);

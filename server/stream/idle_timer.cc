@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// For as long one that comes only now cannot have waited for too long.
+// A call that begins now cannot exceed a limit before this time has passed.
 milliseconds ShortestLimit(const ServerLimits& limits) {
   milliseconds shortest = std::chrono::hours(1);
   for (const milliseconds limit :
@@ -30,33 +30,38 @@ IdleTimer::IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegi
 IdleTimer::~IdleTimer() {
   streams_.OnEarlierLook({});
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  changed_.notify_all();
+  changed_.NotifyAll();
   thread_.join();
 }
 
 void IdleTimer::Look() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     look_ = true;
   }
-  changed_.notify_all();
+  changed_.NotifyAll();
 }
 
 void IdleTimer::Run() {
-  std::unique_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   while (!stopping_) {
-    lock.unlock();
-    const auto now = std::chrono::steady_clock::now();
-    const auto next = std::min({streams_.EndIdle(limits_.idle, now),
-                                watchers_.EndSilent(limits_.idle.opening, now),
-                                calls_.EndIdle(limits_.unary, now), now + ShortestLimit(limits_)});
-    lock.lock();
-    changed_.wait_until(lock, next, [this] { return stopping_ || look_; });
+    const auto next = EndIdleCalls();
+    while (!stopping_ && !look_ && changed_.WaitUntil(mutex_, next)) {
+    }
     look_ = false;
   }
+}
+
+// Returns the time of the next check.
+std::chrono::steady_clock::time_point IdleTimer::EndIdleCalls() {
+  const MutexUnlock unlock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  return std::min({streams_.EndIdle(limits_.idle, now),
+                   watchers_.EndSilent(limits_.idle.opening, now),
+                   calls_.EndIdle(limits_.unary, now), now + ShortestLimit(limits_)});
 }
 
 }  // namespace partiemc::server

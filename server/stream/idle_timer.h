@@ -1,10 +1,9 @@
-// The one thread that ends calls whose clients keep them waiting.
+// The thread that ends idle calls.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 
+#include "common/mutex.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
 #include "server/stream/unary_registry.h"
@@ -12,10 +11,11 @@
 
 namespace partiemc::server {
 
-/// Sleeps until the first of them may have waited for too long.
+/// Ends streams, watchers and unary calls that exceed their idle limits. Its thread sleeps until
+/// the earliest deadline of a call.
 class IdleTimer {
  public:
-  /// The registries live longer.
+  /// The registries outlive the timer.
   IdleTimer(StreamRegistry& streams, WatchRegistry& watchers, UnaryRegistry& calls,
             const ServerLimits& limits);
   ~IdleTimer();
@@ -23,16 +23,18 @@ class IdleTimer {
   IdleTimer& operator=(const IdleTimer&) = delete;
 
  private:
-  void Run();
-  void Look();
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_);
+  std::chrono::steady_clock::time_point EndIdleCalls() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Look() ABSL_LOCKS_EXCLUDED(mutex_);
 
   StreamRegistry& streams_;
   WatchRegistry& watchers_;
   UnaryRegistry& calls_;
   const ServerLimits limits_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool stopping_ = false, look_ = false;  // Guarded by mutex_.
+  Mutex mutex_;
+  CondVar changed_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  bool look_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

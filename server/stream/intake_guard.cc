@@ -10,14 +10,15 @@
 namespace partiemc::server {
 namespace {
 
-// A fast connection brings 15 MB meanwhile.
+// In this time a fast connection brings 15 MB.
 constexpr std::chrono::milliseconds kPeriod(10);
 
-// Giving back a hundred megabytes takes 15 ms, in which nobody allocates.
+// Returning 100 MB of freed memory takes 15 ms, during which no other thread can allocate.
 constexpr std::chrono::milliseconds kBetweenGivingBack(250);
 
-// While memory is left: what connections have received costs two system calls each. More often if
-// streams wait, or if so much has come since the last look at the process.
+// Interval between looks at the received bytes of all connections, which cost two system calls for
+// each connection. It is shorter while streams wait. If memory is exhausted, or has grown by
+// kMuchMore since the last look, the next look does not wait.
 constexpr std::chrono::milliseconds kBetweenLooks(250), kBetweenLooksWhileWaiting(50);
 constexpr std::uint64_t kMuchMore = 16 << 20;
 
@@ -63,16 +64,17 @@ void IntakeGuard::LookAtReads(std::chrono::steady_clock::time_point now) {
 }
 
 void IntakeGuard::FreeMemory(std::chrono::steady_clock::time_point now) {
-  // First, as giving memory back takes a while.
+  // First, because returning freed memory takes milliseconds.
   if (reads_ != nullptr) RevokeReads();
   const bool gives_back = now - gave_back_ >= kBetweenGivingBack;
-  if (gives_back) {  // Some of it may be free already.
+  if (gives_back) {  // Part of the resident memory may be freed already.
     process_.give_back_freed();
     gave_back_ = now;
   }
   if (gives_back && !IsTooMuch()) return;
   opening_.GiveWayToAll();
-  // Not before it is sure that this is not free memory alone: watchers are there to stay.
+  // Watchers stay connected for long, so they are evicted only if freed memory was returned and the
+  // rest still exceeds the limit.
   if (gives_back && IsTooMuch()) opening_.WatchersGiveWay();
 }
 

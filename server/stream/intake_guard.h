@@ -1,4 +1,4 @@
-// Bounds what comes in before anybody has been told of it.
+// Bounds the memory of messages that have not arrived completely.
 #pragma once
 
 #include <chrono>
@@ -13,30 +13,31 @@
 
 namespace partiemc::server {
 
-/// gRPC puts a message together before it says how large it is, even one larger than it may
-/// receive, so nobody can count what calls without a request hold, nor what watchers send. This
-/// looks at the memory of the whole process instead, every few milliseconds and only while there
-/// are such calls: as long as it is too much, half of the calls of the caller that has most of them
-/// give way, the oldest first; whose request comes at once is next to never among them. Watchers
-/// give way only where giving free memory back has not been enough.
+/// gRPC collects a message before it reports its size, even if the message exceeds the limit. So
+/// the server cannot count the bytes of opening calls and of watchers' requests. While there are
+/// such calls (OpeningCalls), a thread checks the memory of the whole process every 10 ms. If it
+/// exceeds the limit, the thread returns freed memory to the system and evicts the older half of
+/// the opening calls of the caller with the most. A call that sends its request at once is hardly
+/// ever among them. Watchers are evicted only if returning freed memory did not suffice.
 ///
-/// Frames of open streams that are on their way count as planned (ReadPermits), and stay. Only
-/// where such a stream brings more than was planned, and that is too much, it is ended.
+/// Frames that are arriving at open streams are planned (ReadPermits), and these streams continue.
+/// Such a stream ends only if memory is exhausted and it has received more than was planned.
 class IntakeGuard {
  public:
-  /// What the process is asked for; another for tests.
+  /// The process's memory; tests replace it.
   struct Process {
     std::function<std::uint64_t()> resident_bytes;
-    /// What it may hold now, and what it may hold beside that; asked for where that is too little.
+    /// The process may have `most_bytes` + `more_bytes` resident now. `more_bytes` costs more to
+    /// compute and is only called if `most_bytes` alone is exceeded.
     std::function<std::uint64_t()> most_bytes, more_bytes;
     std::function<void()> give_back_freed;
-    /// The most that it may ever hold; asked for with `received_bytes`.
+    /// Upper limit of resident memory at any time.
     std::uint64_t limit_bytes = 0;
-    /// What each connection has received so far, by peer (ReceivedBytesOfConnections).
+    /// Bytes that each connection has received, by peer (ReceivedBytesOfConnections).
     std::function<std::map<std::string, std::uint64_t>()> received_bytes = {};
   };
 
-  /// `opening` and `reads` live longer. Without `reads` streams are not watched.
+  /// `opening` and `reads` outlive the guard. If `reads` is null, no streams are ended.
   IntakeGuard(OpeningCalls& opening, Process process, ReadPermits* reads = nullptr);
   ~IntakeGuard();
   IntakeGuard(const IntakeGuard&) = delete;

@@ -1,4 +1,4 @@
-// What memory a server takes at most, before it is started.
+// The maximum memory of a server, computed from its limits before it starts.
 #pragma once
 
 #include <cstdint>
@@ -9,27 +9,27 @@
 
 namespace partiemc::server {
 
+/// ReadPermits and WorkerMemory enforce it for counted bytes, IntakeGuard for the whole process.
 struct MemoryPlan {
   struct Part {
     std::uint64_t bytes = 0;
-    std::string what;  ///< And which flag decides on it.
+    std::string what;  ///< The use of the memory, and the flag that sets its size.
   };
 
-  /// `threads` that compute. ReadPermits and WorkerMemory keep what is counted within it,
-  /// IntakeGuard the process.
+  /// `threads`: number of compute threads.
   MemoryPlan(const ServerLimits& limits, unsigned threads);
 
   std::uint64_t bytes() const;
-  /// A table for a person; the last line is the sum.
+  /// A readable table. The last line is the sum.
   std::string ToString() const;
 
   std::vector<Part> parts;
 };
 
-/// What a call may send before it is read, in its connection.
+/// Bytes that a connection buffers before the server reads the call's messages.
 inline constexpr std::uint64_t kUnreadBytes = 256 << 10;
 
-/// Results that watchers have not taken refuse no caller up to one of so many parts of the budget.
+/// Results that watchers have not received may use 1/16 of the budget in addition to it.
 inline constexpr std::uint64_t kPartsOfBudgetBeyond = 16;
 
 }  // namespace partiemc::server

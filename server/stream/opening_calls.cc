@@ -33,8 +33,8 @@ absl::Status TooManyWatchers() {
 
 OpeningCalls::Place::~Place() {
   if (calls_ == nullptr) return;
-  GiveWay forgotten;  // What it holds goes without the lock.
-  const std::lock_guard lock(calls_->mutex_);
+  GiveWay forgotten;  // Destroyed after the lock is released.
+  const MutexLock lock(calls_->mutex_);
   forgotten = lines_->Remove(caller_, number_);
 }
 
@@ -74,45 +74,52 @@ OpeningCalls::GiveWay OpeningCalls::Lines::RemoveNext() {
 }
 
 std::vector<OpeningCalls::GiveWay> OpeningCalls::Lines::RemoveHalf() {
-  std::vector<GiveWay> gone;
+  std::vector<GiveWay> removed;
+  if (ranks_.empty()) return removed;
   const CallerAccount* const most = ranks_.rbegin()->second;
   for (std::size_t left = (lines_.at(most).size() + 1) / 2; left > 0; --left) {
-    gone.push_back(Remove(most, lines_.at(most).begin()->first));
+    removed.push_back(Remove(most, lines_.at(most).begin()->first));
   }
-  return gone;
+  return removed;
 }
 
-void OpeningCalls::HalfGivesWay(Lines& lines, const absl::Status& status) {
-  std::vector<GiveWay> gone;
+void OpeningCalls::GiveWayToAll() {
+  std::vector<GiveWay> evicted;
   {
-    const std::lock_guard lock(mutex_);
-    if (lines.count() > 0) gone = lines.RemoveHalf();
+    const MutexLock lock(mutex_);
+    evicted = opening_.RemoveHalf();
   }
-  for (const GiveWay& give_way : gone) give_way(status);
+  for (const GiveWay& evict : evicted) evict(TooManyOpening(kMoreThanMemory));
 }
 
-void OpeningCalls::GiveWayToAll() { HalfGivesWay(opening_, TooManyOpening(kMoreThanMemory)); }
-
-void OpeningCalls::WatchersGiveWay() { HalfGivesWay(watchers_, TooManyWatchers()); }
+void OpeningCalls::WatchersGiveWay() {
+  std::vector<GiveWay> evicted;
+  {
+    const MutexLock lock(mutex_);
+    evicted = watchers_.RemoveHalf();
+  }
+  for (const GiveWay& evict : evicted) evict(TooManyWatchers());
+}
 
 bool OpeningCalls::WaitForOne(const std::function<bool()>& also) {
-  std::unique_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   waits_for_one_ = true;
-  one_came_.wait(
-      lock, [&] { return stopped_ || opening_.count() > 0 || watchers_.count() > 0 || also(); });
+  while (!stopped_ && opening_.count() == 0 && watchers_.count() == 0 && !also()) {
+    one_came_.Wait(mutex_);
+  }
   waits_for_one_ = false;
   return !stopped_;
 }
 
 void OpeningCalls::LookAgain() {
-  const std::lock_guard lock(mutex_);
-  if (waits_for_one_) one_came_.notify_one();
+  const MutexLock lock(mutex_);
+  if (waits_for_one_) one_came_.NotifyOne();
 }
 
 void OpeningCalls::StopWaiting() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   stopped_ = true;
-  one_came_.notify_one();
+  one_came_.NotifyOne();
 }
 
 OpeningCalls::Place OpeningCalls::Take(Lines& lines, const CallerAccount& caller,
@@ -123,7 +130,7 @@ OpeningCalls::Place OpeningCalls::Take(Lines& lines, const CallerAccount& caller
   place.caller_ = &caller;
   place.number_ = ++came_;
   lines.Add(&caller, place.number_, std::move(give_way));
-  if (waits_for_one_) one_came_.notify_one();
+  if (waits_for_one_) one_came_.NotifyOne();
   return place;
 }
 
@@ -131,8 +138,8 @@ OpeningCalls::Place OpeningCalls::Enter(const CallerAccount& caller, GiveWay giv
   Place place;
   GiveWay other;
   {
-    const std::lock_guard lock(mutex_);
-    // First out, then in: who comes does not count as one of its caller's.
+    const MutexLock lock(mutex_);
+    // Evicts before it adds, so that the new call does not count against its caller.
     if (opening_.count() >= std::max<std::size_t>(places_, 1)) other = opening_.RemoveNext();
     place = Take(opening_, caller, std::move(give_way));
   }
@@ -141,12 +148,12 @@ OpeningCalls::Place OpeningCalls::Enter(const CallerAccount& caller, GiveWay giv
 }
 
 OpeningCalls::Place OpeningCalls::EnterWatcher(const CallerAccount& caller, GiveWay give_way) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return Take(watchers_, caller, std::move(give_way));
 }
 
 std::size_t OpeningCalls::count() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return opening_.count();
 }
 

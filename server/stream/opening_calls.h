@@ -1,67 +1,68 @@
-// The calls whose next request may be of any size: nobody knows before all of it has come.
+// Tracks the calls whose next request may hold unbounded memory. gRPC reports a message's size only
+// after the whole message has arrived.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "server/security/caller.h"
 
 namespace partiemc::server {
 
-/// The reason for which a call gives way (proto/PROTOCOL.md).
+/// The violation's reason if a call is evicted (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyOpening = "TOO_MANY_OPENING";
 
-/// Those that have begun and have not sent their first request yet, of which there is room for so
-/// many. When one more comes, another one gives way: the oldest of the caller that has most of
-/// them, and of the oldest such caller where several have. So nobody is kept out by calls that stay
-/// mute, whoever makes them, and who sends its request at once is never among the oldest for long.
+/// Limits the opening calls: calls that have not sent their first request. If one more begins than
+/// the limit permits, an opening call is evicted: the oldest of the caller with the most opening
+/// calls. If several callers have the most, it is the oldest of all their calls. So silent calls
+/// cannot block other callers, and a call that sends its request at once is hardly ever evicted.
 ///
-/// Beside them the watchers, which may send a further request at any time. They are counted
-/// elsewhere, and give way only where memory runs short. Safe from any thread.
+/// Also tracks watchers, because they may send another request at any time. WatchRegistry limits
+/// their number; here they are evicted only if memory is exhausted. Thread-safe.
 class OpeningCalls {
  public:
-  /// Ends the call with that status, unless its first request has come meanwhile. It may come when
-  /// the place has gone already, and from any thread.
+  /// Evicts the call: ends it with this status unless its first request has arrived. Called from
+  /// any thread, and possibly after the call's Place was destroyed.
   using GiveWay = std::function<void(const absl::Status&)>;
 
  private:
-  /// The calls of each caller, in the order in which they came. Not thread-safe.
+  /// The calls of each caller, oldest first. Not thread-safe.
   class Lines {
    public:
     void Add(const CallerAccount* caller, std::uint64_t number, GiveWay give_way);
-    /// Empty where it has gone already.
+    /// Empty if the call was removed already.
     GiveWay Remove(const CallerAccount* caller, std::uint64_t number);
-    /// Of the caller that has most the oldest. Requires: there is one.
+    /// Removes the oldest call of the caller with the most calls. Requires: not empty.
     GiveWay RemoveNext();
-    /// Of the caller that has most the older half, at least one. Requires: there is one.
+    /// Removes the older half, rounded up, of that caller's calls.
     std::vector<GiveWay> RemoveHalf();
     std::size_t count() const { return count_; }
 
    private:
-    // A caller's calls by their numbers, which rise.
+    // The key is the call's number; numbers increase.
     using Line = std::map<std::uint64_t, GiveWay>;
-    // How many a caller has, and its oldest call, negative where less is to come first.
+    // Number of a caller's calls, and the negated number of its oldest call. The caller with the
+    // highest rank loses a call first.
     using Rank = std::pair<std::size_t, std::int64_t>;
 
     static Rank RankOf(const Line& line);
 
     std::size_t count_ = 0;
-    std::map<const CallerAccount*, Line> lines_;  // None is empty.
-    std::map<Rank, const CallerAccount*> ranks_;  // The last one's first call is the next to go.
+    std::map<const CallerAccount*, Line> lines_;  // Non-empty lines only.
+    std::map<Rank, const CallerAccount*> ranks_;
   };
 
  public:
-  /// Of one call, until its next request has come or it is over.
+  /// A tracked call. Destroyed when the call's next request has arrived or the call ends.
   class Place {
    public:
     Place() = default;
@@ -83,40 +84,44 @@ class OpeningCalls {
     std::uint64_t number_ = 0;
   };
 
-  /// Has room for at least one.
+  /// `places`: maximum number of opening calls; 0 counts as 1.
   explicit OpeningCalls(std::size_t places) : places_(places) {}
 
-  /// To be called without a lock: it may end another call. The account and this outlive the place.
-  Place Enter(const CallerAccount& caller, GiveWay give_way);
-  /// As Enter, for a watcher that may send another request from now on.
-  Place EnterWatcher(const CallerAccount& caller, GiveWay give_way);
+  /// Tracks an opening call, and may evict another one. Requires: the calling thread holds no lock.
+  /// The account and this object outlive the returned Place.
+  Place Enter(const CallerAccount& caller, GiveWay give_way) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Tracks a watcher that may send another request from now on. Evicts none.
+  Place EnterWatcher(const CallerAccount& caller, GiveWay give_way) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// More has come in with them than the server has memory for: of the caller that has most of them
-  /// the older half gives way, at least one. To be called without a lock.
-  void GiveWayToAll();
-  /// The same for the watchers.
-  void WatchersGiveWay();
+  /// Memory is exhausted: evicts the older half (at least one) of the opening calls of the caller
+  /// with the most opening calls. Requires: the calling thread holds no lock.
+  void GiveWayToAll() ABSL_LOCKS_EXCLUDED(mutex_);
+  /// As GiveWayToAll, for watchers.
+  void WatchersGiveWay() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Returns true as soon as there is one, or `also` returns true; false from StopWaiting on. For
-  /// one thread.
-  bool WaitForOne(const std::function<bool()>& also = [] { return false; });
-  /// What `also` depends on has changed.
-  void LookAgain();
-  void StopWaiting();
+  /// Blocks until a call is tracked or `also` returns true; then returns true. Returns false after
+  /// StopWaiting. Used by one thread.
+  bool WaitForOne(const std::function<bool()>& also = [] { return false; })
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  /// WaitForOne calls `also` again.
+  void LookAgain() ABSL_LOCKS_EXCLUDED(mutex_);
+  void StopWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Without the watchers.
-  std::size_t count() const;
+  /// Number of opening calls; watchers do not count.
+  std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  Place Take(Lines& lines, const CallerAccount& caller, GiveWay give_way);  // With the lock held.
-  void HalfGivesWay(Lines& lines, const absl::Status& status);              // Without.
+  Place Take(Lines& lines, const CallerAccount& caller, GiveWay give_way)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::size_t places_;
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable one_came_;
-  bool waits_for_one_ = false, stopped_ = false;
-  std::uint64_t came_ = 0;
-  Lines opening_, watchers_;
+  mutable Mutex mutex_;
+  CondVar one_came_;
+  bool waits_for_one_ ABSL_GUARDED_BY(mutex_) = false;
+  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
+  std::uint64_t came_ ABSL_GUARDED_BY(mutex_) = 0;
+  Lines opening_ ABSL_GUARDED_BY(mutex_);
+  Lines watchers_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

@@ -10,7 +10,7 @@
 namespace partiemc::server {
 namespace {
 
-// The account of a worker, for one frame.
+// Passes the core's memory requests for one frame to the worker's account.
 class FrameMemory final : public MemoryGuard {
  public:
   FrameMemory(WorkerMemory& account, std::size_t particles)
@@ -85,7 +85,7 @@ absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Fra
   try {
     return Reconstruct(*frame, worker, deliver, cancelled);
   } catch (const std::bad_alloc&) {
-    worker.Empty();  // Its memory is wanted.
+    worker.Empty();
     return OutOfMemory(absl::StrCat(frame->ParticleCount(), " particles"));
   }
 }
@@ -93,7 +93,8 @@ absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Fra
 absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver,
                                   const std::atomic<bool>* cancelled) {
   worker.particles.Used(frame.ParticleCount(), WarmSize::Clock::now());
-  // The core commits a frame that it accepts, but `deliver` may still refuse it: work on a copy.
+  // The core commits an accepted frame to the state, but `deliver` may still refuse the frame.
+  // Therefore the core gets a copy.
   worker.next_state = state_;
   StageClock clock;
   FrameMemory memory(worker.memory, frame.ParticleCount());
@@ -102,8 +103,9 @@ absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver de
                                  {.observer = &clock, .memory = &memory, .cancelled = cancelled});
   if (status.ok()) status = deliver(worker.result, clock);
   if (!status.ok()) return status;
-  // Another copy: the worker's own has room for the largest stream that it served, which would pass
-  // from stream to stream. Memory that runs out here leaves the state as it was.
+  // A new copy, because the worker's buffers have the capacity of the largest stream that it has
+  // computed; moving them would pass that capacity to this stream. If the allocation fails, the
+  // state is unchanged.
   State next = worker.next_state;
   state_ = std::move(next);
   if (worker.observer != nullptr) {

@@ -1,5 +1,5 @@
-// A stream as the method sees it: parameters that are fixed, a state that moves from frame to
-// frame, and the rule that decides which frame may come next. Knows no messages and no threads.
+// The computation of one stream: fixed parameters, the state, and the check of sequence numbers.
+// Includes no messages and starts no threads.
 #pragma once
 
 #include <atomic>
@@ -22,49 +22,49 @@
 
 namespace partiemc::server {
 
-/// The reasons that sessions give, beside the core's (proto/PROTOCOL.md).
+/// Reasons of a session's violations, in addition to the core's (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonSequenceGap = "SEQUENCE_GAP";
 inline constexpr std::string_view kReasonSequenceDuplicate = "SEQUENCE_DUPLICATE";
 
-/// RESOURCE_EXHAUSTED with the Violation of a frame, of size `value`, that memory is lacking for.
+/// RESOURCE_EXHAUSTED (OUT_OF_MEMORY): there is no memory for a frame of size `value`.
 absl::Status OutOfMemory(std::string value);
 
-/// Not thread-safe: one frame at a time, as the method needs it anyway.
+/// Computes the frames of a stream, one at a time. Not thread-safe.
 class Session {
  public:
-  /// Writes a result where its reader wants it. An error refuses the frame.
+  /// Writes a result into the response. An error refuses the frame.
   using Deliver = absl::FunctionRef<absl::Status(const Result&, const StageClock&)>;
 
-  /// Errors: those of Reconstructor::Create.
+  /// Errors: as Reconstructor::Create.
   static absl::StatusOr<Session> Open(const ReconstructionParameters& parameters,
                                       const FrameLimits& limits);
 
-  /// Goes on after the frame that the checkpoint was made after, bit for bit as if the stream had
-  /// never stopped.
+  /// Continues the stream of the checkpoint. Results are bit-identical to an uninterrupted stream.
   void GoOnFrom(Checkpoint checkpoint);
 
-  /// What ParseCheckpoint takes, after the last frame. Costs and takes as much as the state. Empty
-  /// where it might have more than `max_bytes`.
+  /// Serialises the state after the last frame (see ParseCheckpoint). Cost and size: proportional
+  /// to the state. Empty if the checkpoint might exceed `max_bytes`.
   std::string MakeCheckpoint(const StreamTerms& terms, const CheckpointKeys* keys,
                              std::uint64_t max_bytes) const;
 
-  /// Reconstructs the frame and hands the result to `deliver`. `frame` is an error where the frame
-  /// could not be decoded.
-  /// Errors, each with a Violation, after which the state is as if the frame had never come:
-  ///   a `sequence` other than next_sequence() (SEQUENCE_GAP, SEQUENCE_DUPLICATE) uses up nothing;
-  ///   the error of `frame`, of the core or of `deliver`, or memory that ran out or that the worker
-  ///   may not have (OUT_OF_MEMORY) uses up the sequence number;
-  ///   CANCELLED, without a Violation, once `cancelled` is set (FrameControl), uses up nothing: the
-  ///   same frame may come again.
+  /// Reconstructs the frame and passes the result to `deliver`. `frame` is an error if decoding
+  /// failed.
+  ///
+  /// An error leaves the state unchanged. Each but CANCELLED has a Violation.
+  /// - SEQUENCE_GAP, SEQUENCE_DUPLICATE: `sequence` is not next_sequence(), which stays the same.
+  /// - OUT_OF_MEMORY, and errors of `frame`, the core or `deliver`: next_sequence() increases.
+  /// - CANCELLED: `cancelled` was set (FrameControl). next_sequence() stays the same, so that the
+  ///   frame may be sent again.
   absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
                       Deliver deliver, const std::atomic<bool>* cancelled = nullptr);
 
-  /// Refuses a frame whose number could not be read; it uses up none. Returns `why`.
+  /// Refuses a frame whose sequence number could not be decoded. next_sequence() stays the same.
+  /// Returns `why`.
   absl::Status Refuse(absl::Status why, Worker& worker) const;
 
   /// 1 for a new stream.
   std::uint64_t next_sequence() const { return next_sequence_; }
-  /// As resolved.
+  /// With defaults resolved.
   const ReconstructionParameters& parameters() const { return reconstructor_.parameters(); }
 
  private:

@@ -25,7 +25,7 @@ absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-// Text of a client as it may stand in a message or in a log: short, and one line.
+// Makes a client's text safe for messages and the log: escaped and at most 40 characters.
 std::string Quoted(const std::string& text) {
   constexpr std::size_t kShown = 40;
   return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
@@ -78,7 +78,7 @@ StreamRegistry::StreamRegistry(std::uint32_t max_streams, HistoryRoom* history,
       id_prefix_(absl::StrCat(absl::Hex(std::random_device{}(), absl::kZeroPad8), "-")) {}
 
 absl::Status StreamRegistry::Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
   const StreamStateMachine* key = machine.get();
   Entry& entry = entries_[key];
@@ -94,7 +94,20 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
   if (auto status = CheckLabels(description.labels); !status.ok()) return status;
   if (auto status = CheckStreamToken(token); !status.ok()) return status;
 
-  std::unique_lock lock(mutex_);
+  std::shared_ptr<StreamStateMachine> former_machine;
+  absl::StatusOr<StreamSummary> opened;
+  {
+    const MutexLock lock(mutex_);
+    opened = OpenLocked(machine, std::move(description), std::move(token), former_machine);
+  }
+  // Without the lock, because TakenOver may call Leave.
+  if (former_machine != nullptr) former_machine->TakenOver();
+  return opened;
+}
+
+absl::StatusOr<StreamSummary> StreamRegistry::OpenLocked(
+    const StreamStateMachine& machine, StreamDescription description, std::string token,
+    std::shared_ptr<StreamStateMachine>& former_machine) {
   if (auto status = CheckServingLocked(); !status.ok()) return status;
   Entry& entry = entries_.at(&machine);
   Entry* const former = FindOpen(token);
@@ -125,9 +138,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
   StreamSummary opened = *entry.stream;
   if (former == nullptr) return opened;
   former->taken_over = true;
-  const std::shared_ptr<StreamStateMachine> former_machine = former->machine;
-  lock.unlock();  // A machine may leave at once.
-  former_machine->TakenOver();
+  former_machine = former->machine;
   return opened;
 }
 
@@ -161,7 +172,7 @@ absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
   return place.status();
 }
 
-// Before anybody can find the stream to watch it.
+// Called before the stream can be found, so that no watcher misses a result.
 void StreamRegistry::BeginHistory(const StreamDescription& description, const Entry* former) {
   if (history_ == nullptr || description.broadcaster == nullptr) return;
   ResultBroadcaster* const before =
@@ -185,7 +196,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
   std::shared_ptr<StreamStateMachine> member;
   Caller caller;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     Entry& entry = entries_.at(&machine);
     member = entry.machine;
     caller = entry.caller;
@@ -193,12 +204,12 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
   const auto stream = Find(terms.stream_name, caller);
   if (!stream.ok()) return stream.status();
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (auto status = CheckPart(stream->description, terms); !status.ok()) return status;
     entries_.at(&machine).sends_part = true;
     if (tell_earlier_look_) tell_earlier_look_();
   }
-  // Without the lock: a call that had the part leaves.
+  // Without the lock: Join may end a call that sent this part before, and that call then leaves.
   const auto& assembler = stream->description.assembler;
   const auto seat = assembler->Join(terms.part, member);
   if (!seat.ok()) return seat.status();
@@ -207,7 +218,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
 
 absl::Status StreamRegistry::CheckPart(const StreamDescription& stream,
                                        const PartTerms& terms) const {
-  // First, so that only who knows it learns of the rest.
+  // Checked first, so that a caller without the token learns nothing about the stream.
   if (!SameToken(stream.parts_token, terms.token)) {
     return Refused(absl::StatusCode::kPermissionDenied, kReasonPartsToken, "open.parts_token",
                    absl::StrCat(terms.token.size(), " characters"), "must be that of part 0");
@@ -227,14 +238,14 @@ absl::Status StreamRegistry::CheckPart(const StreamDescription& stream,
 }
 
 void StreamRegistry::OnEarlierLook(std::function<void()> tell) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   tell_earlier_look_ = std::move(tell);
 }
 
 std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& machine) {
   std::optional<StreamSummary> summary;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = entries_.find(&machine);
     if (found != entries_.end()) {
       found->second.place = {};
@@ -248,18 +259,18 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& mac
 }
 
 void StreamRegistry::Leave(const StreamStateMachine& machine) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = entries_.find(&machine);
-  if (found == entries_.end()) return;  // It was not let in.
+  if (found == entries_.end()) return;  // The machine was not admitted.
   entries_.erase(found);
-  // With the lock held: whoever waits for the last machine may take the registry away after that.
-  left_.notify_all();
+  // Notifies under the lock: a thread in WaitUntilEmpty may destroy the registry afterwards.
+  left_.NotifyAll();
 }
 
 absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
                                                    const Caller& caller) const {
   if (auto status = caller.CheckMayUse(name); !status.ok()) return status;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [machine, entry] : entries_) {
     if (!entry.IsOpen() || entry.stream->description.name != name) continue;
     StreamSummary summary = *entry.stream;
@@ -272,7 +283,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
 std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t count,
                                                 const Caller& caller) const {
   std::vector<StreamSummary> summaries;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [machine, entry] : entries_) {
     if (!entry.IsOpen() || entry.stream->number <= after) continue;
     if (!caller.MayUse(entry.stream->description.name)) continue;
@@ -286,7 +297,7 @@ std::vector<StreamSummary> StreamRegistry::List(std::uint64_t after, std::size_t
 }
 
 std::size_t StreamRegistry::OpenCount() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return static_cast<std::size_t>(std::count_if(
       entries_.begin(), entries_.end(), [](const auto& item) { return item.second.IsOpen(); }));
 }
@@ -299,12 +310,12 @@ std::vector<std::shared_ptr<StreamStateMachine>> StreamRegistry::Machines() cons
 }
 
 void StreamRegistry::SetElsewhere(std::vector<std::string> addresses) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   elsewhere_ = std::move(addresses);
 }
 
 std::vector<std::string> StreamRegistry::TakeElsewhere() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!elsewhere_.empty())
     std::rotate(elsewhere_.begin(), elsewhere_.begin() + 1, elsewhere_.end());
   return elsewhere_;
@@ -314,7 +325,7 @@ void StreamRegistry::SendAway(std::chrono::milliseconds within) {
   const auto begin = std::chrono::steady_clock::now();
   std::vector<std::shared_ptr<StreamStateMachine>> machines;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     machines = Machines();
   }
   for (std::size_t k = 0; k < machines.size(); ++k) {
@@ -328,11 +339,11 @@ void StreamRegistry::SendAway(std::chrono::milliseconds within) {
 void StreamRegistry::Drain() {
   std::vector<std::shared_ptr<StreamStateMachine>> machines;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
     machines = Machines();
   }
-  // Without the lock: a machine that drains may leave at once.
+  // Without the lock, because a machine that drains may call Leave.
   for (const auto& machine : machines) machine->Drain();
 }
 
@@ -340,7 +351,7 @@ std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
     const IdleLimits& limits, std::chrono::steady_clock::time_point now) {
   std::vector<std::shared_ptr<StreamStateMachine>> machines;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     machines = Machines();
   }
   auto look_again = std::chrono::steady_clock::time_point::max();
@@ -350,7 +361,7 @@ std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
 }
 
 absl::Status StreamRegistry::CheckServing() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return CheckServingLocked();
 }
 
@@ -361,18 +372,20 @@ absl::Status StreamRegistry::CheckServingLocked() {
 }
 
 std::uint64_t StreamRegistry::turned_away() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return turned_away_;
 }
 
 bool StreamRegistry::draining() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return draining_;
 }
 
 bool StreamRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  return left_.wait_until(lock, deadline, [this] { return entries_.empty(); });
+  const MutexLock lock(mutex_);
+  while (!entries_.empty() && left_.WaitUntil(mutex_, deadline)) {
+  }
+  return entries_.empty();
 }
 
 }  // namespace partiemc::server

@@ -131,7 +131,7 @@ void StreamStateMachine::Cancelled() {
 
 void StreamStateMachine::Granted(std::uint64_t bytes) {
   const Event event(*this);
-  surplus_ += bytes;  // The read plans its memory itself.
+  surplus_ += bytes;  // Returned, because the read's permit plans the bytes.
   if (state_.reading == Reading::kMemory) ReadAhead();
 }
 
@@ -140,7 +140,7 @@ void StreamStateMachine::ReadPermitted() {
   if (state_.reading == Reading::kPermit) Read(Reading::kNext);
 }
 
-// The read fails with the stream.
+// Abandoning the stream also makes its pending read fail.
 void StreamStateMachine::ReadRevoked(const absl::Status& status) {
   const Event event(*this);
   if (state_.reading == Reading::kNext && state_.phase == Phase::kServing) AbandonAndCut(status);
@@ -197,7 +197,7 @@ TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now)
   const bool is_opening = state_.phase == Phase::kOpening;
   const auto limit = is_opening ? limits.opening : limits.streaming;
   if (limit <= limit.zero()) {
-    // An opening stream may come under the other limit at any time.
+    // The stream may begin to serve at any time, and the other limit then applies.
     if (is_opening && limits.streaming > limit.zero()) {
       look_again = std::min(look_again, now + limits.streaming);
     }
@@ -225,7 +225,7 @@ void StreamStateMachine::Compute(std::size_t slot, Worker& worker) {
 }
 
 void StreamStateMachine::Computed() {
-  // Taken before any other frame can be computed.
+  // Taken first: after the event below, another frame may be computed.
   std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
   {
     const Event event(*this);
@@ -237,7 +237,7 @@ void StreamStateMachine::Computed() {
     counts_.last_sequence = answered->last_sequence;
   }
   if (!answered->afterwards) return;
-  const Event event(*this);  // A second one, so that its action comes after the write.
+  const Event event(*this);  // A second event, so that its action runs after the write's action.
   Do(std::move(answered->afterwards));
 }
 
@@ -254,13 +254,13 @@ void StreamStateMachine::Abandon(absl::Status status) {
   cancelled_ = true;
 }
 
-// A write to a client that takes nothing would keep the stream from ending.
+// Cuts a pending write: a client that does not read would keep the stream from ending.
 void StreamStateMachine::AbandonAndCut(absl::Status status) {
   Abandon(std::move(status));
   if (state_.writing != Writing::kIdle) Do([this] { transport_.Cut(); });
 }
 
-// Replaces what frame number `frame`, from 0, holds of the budget.
+// Sets the bytes that the frame with this number, from 0, holds in the budget.
 void StreamStateMachine::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
   std::uint64_t& held = slot_bytes_[frame % window_];
   if (bytes > held) {
@@ -281,7 +281,7 @@ void StreamStateMachine::Decide() {
   DecideFinish();
 }
 
-// Comes first, so that the stream holds nothing when another action ends it.
+// Called first, so that the stream holds no memory when a later action ends it.
 void StreamStateMachine::DecideMemory() {
   const bool serves = state_.phase == Phase::kServing;
   if (state_.reading == Reading::kMemory && (!serves || read_ == written_)) {
@@ -320,7 +320,7 @@ void StreamStateMachine::DecideRead() {
   }
 }
 
-// Reads while frames are in flight: the budget has room, so the read needs no turn.
+// Reads another frame while frames are in flight. The bytes fit, so the read need not wait.
 void StreamStateMachine::ReadAhead() {
   budget_.reads().BeginNow(shared_from_this(), NextRead());
   Read(Reading::kNext);
@@ -331,7 +331,7 @@ void StreamStateMachine::Read(Reading what) {
   Do([this, slot = read_ % window_] { transport_.StartRead(slot); });
 }
 
-// A frame may be somewhat larger than the one before.
+// Expects the next frame to be at most an eighth larger than the last one.
 ReadPermits::Read StreamStateMachine::NextRead() const {
   const void* const assembly = handler_.Assembly();
   return {.stream = assembly != nullptr ? assembly : this,

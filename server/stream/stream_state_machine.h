@@ -1,4 +1,5 @@
-// When a stream reads, computes and writes. A handler knows the messages, a transport carries them.
+// Decides when a stream reads, computes and writes. A handler interprets the messages; a transport
+// carries them.
 #pragma once
 
 #include <atomic>
@@ -25,7 +26,7 @@ namespace partiemc::server {
 
 enum class RequestKind { kMalformed, kEmpty, kOpen, kFrame };
 
-/// What StreamTransport::StartWrite sends.
+/// The messages that StreamTransport::StartWrite sends.
 enum class Outgoing { kOpened, kAnswer, kDraining };
 
 struct Answered {
@@ -36,7 +37,7 @@ struct Answered {
   std::function<void()> afterwards = {};
 };
 
-/// A worker opens a stream whose `open` is larger, because it brings a checkpoint.
+/// A larger `open` contains a checkpoint; a compute thread opens the stream then.
 inline constexpr std::uint64_t kQuickOpenBytes = 64 << 10;
 
 class StreamStateMachine;
@@ -61,7 +62,7 @@ class StreamTransport {
   virtual std::string peer() const { return {}; }
 };
 
-/// Knows the messages of a stream, and the session behind them.
+/// Interprets the messages of a stream and computes its frames.
 class StreamHandler {
  public:
   virtual ~StreamHandler() = default;
@@ -206,18 +207,19 @@ class StreamStateMachine final : public SerializedCall,
   const std::size_t window_;
 
   BusyStreams::Mark busy_mark_;       // The pool's.
-  std::optional<Answered> answered_;  // From Compute to Computed, which it precedes.
+  std::optional<Answered> answered_;  // Passed from Compute to Computed, which runs after it.
   std::atomic<bool> cancelled_ = false;
 
-  absl::Status status_ ABSL_GUARDED_BY(mutex_);  // Of the end, from kEnding on.
-  // Frames so far: written_ <= computed_ <= read_ <= written_ + window_.
+  absl::Status status_ ABSL_GUARDED_BY(mutex_);  // The stream's final status, once it is ending.
+  // Numbers of frames: written_ <= computed_ <= read_ <= written_ + window_.
   std::uint64_t read_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t computed_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t written_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Bytes of the budget: held by each slot; to be returned.
+  // Bytes that each slot holds in the budget.
   std::vector<std::uint64_t> slot_bytes_ ABSL_GUARDED_BY(mutex_);
+  // Bytes that ReturnMemory gives back to the budget.
   std::uint64_t surplus_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Of the last frame, at least 1: an estimate for the next one.
+  // Size of the last frame, at least 1: the estimate for the next one.
   std::uint64_t last_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   StreamCounts counts_ ABSL_GUARDED_BY(mutex_);
 };

@@ -20,7 +20,7 @@ constexpr std::size_t kDigits = 32;
 }  // namespace
 
 std::string NewStreamToken() {
-  std::random_device random;  // The system's own generator.
+  std::random_device random;  // The operating system's generator.
   std::string token;
   while (token.size() < kDigits) absl::StrAppend(&token, absl::Hex(random(), absl::kZeroPad8));
   return token;
@@ -34,7 +34,7 @@ bool IsStreamToken(std::string_view text) {
 
 absl::Status CheckStreamToken(std::string_view text) {
   if (IsStreamToken(text)) return absl::OkStatus();
-  // What was given is nobody's business, and may be a secret of something else.
+  // The error omits the text, which may be another secret, sent by mistake.
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
       {std::string(kReasonStreamToken), "open.resume.stream_token",

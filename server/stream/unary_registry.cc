@@ -28,7 +28,7 @@ absl::Status TooMany(UnaryKind kind, const FairShare& places, const CallerAccoun
 }  // namespace
 
 absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (draining_ && kind == UnaryKind::kFrame) return DrainingError();
   const UnaryStateMachine* key = call.get();
   calls_[key] = {std::move(call), kind};
@@ -36,7 +36,7 @@ absl::Status UnaryRegistry::Enter(std::shared_ptr<UnaryStateMachine> call, Unary
 }
 
 absl::Status UnaryRegistry::TakePlace(const UnaryStateMachine& call, const CallerAccount& caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Entry& entry = calls_.at(&call);
   FairShare& places = places_[IndexOf(entry.kind)];
   if (places.Fits(&caller, 1) != FairShare::Fit::kYes) return TooMany(entry.kind, places, caller);
@@ -46,61 +46,65 @@ absl::Status UnaryRegistry::TakePlace(const UnaryStateMachine& call, const Calle
 }
 
 void UnaryRegistry::GiveBackPlace(const UnaryStateMachine& call) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   FreePlace(call);
 }
 
 void UnaryRegistry::FreePlace(const UnaryStateMachine& call) {
   const auto found = calls_.find(&call);
-  if (found == calls_.end()) return;  // It was not let in.
+  if (found == calls_.end()) return;  // The call was not admitted.
   Entry& entry = found->second;
   if (entry.caller != nullptr) places_[IndexOf(entry.kind)].GiveBack(entry.caller, 1);
   entry.caller = nullptr;
 }
 
 void UnaryRegistry::Leave(const UnaryStateMachine& call) {
-  const std::lock_guard lock(mutex_);
-  FreePlace(call);  // A request may come, and take one, while the call ends.
+  const MutexLock lock(mutex_);
+  FreePlace(call);  // A request that arrives while the call ends may have taken a slot.
   calls_.erase(&call);
-  // With the lock held: whoever waits for the last one may take the registry away after that.
-  left_.notify_all();
+  // Notifies under the lock: a thread in WaitForFrames may destroy the registry afterwards.
+  left_.NotifyAll();
 }
 
 std::size_t UnaryRegistry::count() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return calls_.size();
 }
 
 std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
     const UnaryLimits& limits, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Without the lock: one that ends may leave at once.
+  // Without the lock, because a call that ends may call Leave.
   for (const auto& call : All()) look_again = std::min(look_again, call->EndIfIdle(limits, now));
   return look_again;
 }
 
 std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
   std::vector<std::shared_ptr<UnaryStateMachine>> all;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [key, entry] : calls_) all.push_back(entry.call);
   return all;
 }
 
-// Calls are told without the lock: one that ends may leave at once.
+// Ends the calls without the lock, because a call that ends may call Leave.
 void UnaryRegistry::Drain() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
   }
   for (const auto& call : All()) call->GiveWay(DrainingError());
 }
 
 bool UnaryRegistry::WaitForFrames(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  return left_.wait_until(lock, deadline, [this] {
-    return std::ranges::none_of(
-        calls_, [](const auto& call) { return call.second.kind == UnaryKind::kFrame; });
-  });
+  const MutexLock lock(mutex_);
+  while (HasFrames() && left_.WaitUntil(mutex_, deadline)) {
+  }
+  return !HasFrames();
+}
+
+bool UnaryRegistry::HasFrames() const {
+  return std::ranges::any_of(
+      calls_, [](const auto& call) { return call.second.kind == UnaryKind::kFrame; });
 }
 
 }  // namespace partiemc::server

@@ -1,78 +1,80 @@
-// The calls of one request and one answer that are going on: how many may come in, and how all are
-// sent home.
+// The unary calls of this server: limits their number and drains them.
 #pragma once
 
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "server/compute/fair_share.h"
 #include "server/security/caller.h"
 #include "server/stream/unary_state_machine.h"
 
 namespace partiemc::server {
 
-/// The reason of RESOURCE_EXHAUSTED for a call too many (proto/PROTOCOL.md).
+/// The violation's reason if there are too many calls (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 
-/// Safe from any thread.
+/// Limits the calls of each kind by slots. Thread-safe.
 class UnaryRegistry {
  public:
-  /// What one caller may have of calls that ask for information alone: they take next to no time.
+  /// Slots of one caller for calls that return information, and for probes. They take little time.
   static constexpr std::uint32_t kInformationCalls = 64;
 
-  /// For one caller. There are twice as many places of each kind, and a caller has no more of them
-  /// than are free (FairShare).
+  /// `max_frame_calls`: slots of one caller for calls with a frame. The number of slots of each
+  /// kind is twice this limit: a caller may only use half of them (FairShare).
   explicit UnaryRegistry(std::uint32_t max_frame_calls)
       : places_{FairShare(2 * std::uint64_t{max_frame_calls}), FairShare(2 * kInformationCalls),
                 FairShare(2 * kInformationCalls)} {}
 
-  /// A call comes in, without a request yet: those are counted elsewhere (OpeningCalls). Errors,
-  /// each with a Violation: UNAVAILABLE (DRAINING), for frames only.
-  absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind);
-  /// Its request has come, and it gets a place; the account lives until it gives that back.
+  /// Registers a call that has not sent its request. OpeningCalls limits these calls.
+  /// Errors, each with a Violation: UNAVAILABLE (DRAINING), for calls with a frame only.
+  absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Takes a slot when the call's request has arrived. The account lives until GiveBackPlace.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
-  absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller);
-  /// It has its last word, and its place is free for others. It may have had none.
-  void GiveBackPlace(const UnaryStateMachine& call);
-  /// The connection has taken its last word.
-  void Leave(const UnaryStateMachine& call);
+  absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Frees the call's slot, if it has one. Called when the call's status is known.
+  void GiveBackPlace(const UnaryStateMachine& call) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Removes the call. Called when its status was sent.
+  void Leave(const UnaryStateMachine& call) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Of all kinds.
-  std::size_t count() const;
+  /// Number of calls of all kinds.
+  std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends those that have waited for their clients for too long. Gives the time before which none
-  /// of those that are here now will have.
+  /// Ends the calls that exceed an idle limit at `now`. Returns the earliest time at which another
+  /// present call may exceed one.
   std::chrono::steady_clock::time_point EndIdle(const UnaryLimits& limits,
                                                 std::chrono::steady_clock::time_point now);
 
-  /// Lets no frame in any more and ends the calls whose request has not come.
-  void Drain();
-  /// Whether all that have frames have left before the deadline. Calls for information may go on.
-  bool WaitForFrames(std::chrono::steady_clock::time_point deadline);
+  /// Admits no further calls with a frame, and ends the calls without a request.
+  void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Blocks until all calls with a frame have left; false if `deadline` passes first. Other calls
+  /// may continue.
+  bool WaitForFrames(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   struct Entry {
     std::shared_ptr<UnaryStateMachine> call;
     UnaryKind kind;
-    const CallerAccount* caller = nullptr;  // Whose place it has; null: none yet.
+    const CallerAccount* caller = nullptr;  // The caller charged for its slot; null: no slot.
   };
 
-  std::vector<std::shared_ptr<UnaryStateMachine>> All() const;
-  void FreePlace(const UnaryStateMachine& call);  // With the lock held.
+  std::vector<std::shared_ptr<UnaryStateMachine>> All() const ABSL_LOCKS_EXCLUDED(mutex_);
+  void FreePlace(const UnaryStateMachine& call) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool HasFrames() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable left_;
-  std::map<const UnaryStateMachine*, Entry> calls_;
-  std::array<FairShare, 3> places_;  // By kind.
-  bool draining_ = false;
+  mutable Mutex mutex_;
+  CondVar left_;
+  std::map<const UnaryStateMachine*, Entry> calls_ ABSL_GUARDED_BY(mutex_);
+  std::array<FairShare, 3> places_ ABSL_GUARDED_BY(mutex_);  // By kind.
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::server

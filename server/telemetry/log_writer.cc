@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <condition_variable>
 #include <ctime>
-#include <mutex>
 #include <string>
 #include <utility>
+
+#include "common/mutex.h"
 
 namespace partiemc::server {
 namespace {
@@ -39,10 +39,11 @@ struct LogWriter::State {
   explicit State(Options given) : options(std::move(given)) {}
 
   const Options options;
-  mutable std::mutex mutex;
-  mutable std::condition_variable changed;
-  std::string waiting;  // Guarded by the mutex, like the next member.
-  bool stop = false, ended = false;
+  mutable Mutex mutex;
+  mutable CondVar changed;
+  std::string waiting ABSL_GUARDED_BY(mutex);
+  bool stop ABSL_GUARDED_BY(mutex) = false;
+  bool ended ABSL_GUARDED_BY(mutex) = false;
   std::atomic<bool> behind = false;  // Lines are buffered or being written.
   std::atomic<std::uint64_t> dropped = 0;
 };
@@ -54,12 +55,16 @@ LogWriter::LogWriter(Options options)
 void LogWriter::Stop() {
   if (!thread_.joinable()) return;
   Flush(kLastPatience);
-  std::unique_lock lock(state_->mutex);
-  state_->stop = true;
-  state_->changed.notify_all();
-  const bool ended =
-      state_->changed.wait_for(lock, kLastPatience, [this] { return state_->ended; });
-  lock.unlock();
+  bool ended = false;
+  {
+    const auto deadline = std::chrono::steady_clock::now() + kLastPatience;
+    const MutexLock lock(state_->mutex);
+    state_->stop = true;
+    state_->changed.NotifyAll();
+    while (!state_->ended && state_->changed.WaitUntil(state_->mutex, deadline)) {
+    }
+    ended = state_->ended;
+  }
   if (ended) {
     thread_.join();
   } else {
@@ -68,19 +73,22 @@ void LogWriter::Stop() {
 }
 
 void LogWriter::Write(std::string_view line) {
-  const std::lock_guard lock(state_->mutex);
+  const MutexLock lock(state_->mutex);
   if (state_->stop || state_->waiting.size() + line.size() > state_->options.capacity) {
     ++state_->dropped;
     return;
   }
   state_->waiting += line;
   state_->behind = true;
-  state_->changed.notify_all();
+  state_->changed.NotifyAll();
 }
 
 bool LogWriter::Flush(std::chrono::milliseconds patience) const {
-  std::unique_lock lock(state_->mutex);
-  return state_->changed.wait_for(lock, patience, [this] { return !state_->behind; });
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const MutexLock lock(state_->mutex);
+  while (state_->behind && state_->changed.WaitUntil(state_->mutex, deadline)) {
+  }
+  return !state_->behind;
 }
 
 void LogWriter::FlushInSignal(std::chrono::milliseconds patience) const {
@@ -93,27 +101,28 @@ std::uint64_t LogWriter::dropped() const { return state_->dropped; }
 void LogWriter::Run(const std::shared_ptr<State>& state) {
   auto next_tick = std::chrono::steady_clock::now() + kTick;
   std::string lines;
-  std::unique_lock lock(state->mutex);
+  const MutexLock lock(state->mutex);
   while (!state->stop) {
-    state->changed.wait_until(lock, next_tick,
-                              [&] { return state->stop || !state->waiting.empty(); });
+    while (!state->stop && state->waiting.empty() &&
+           state->changed.WaitUntil(state->mutex, next_tick)) {
+    }
     lines.swap(state->waiting);
-    lock.unlock();
-    const std::string_view left = WriteAll(state->options.file, lines);
-    state->dropped += static_cast<std::uint64_t>(std::count(left.begin(), left.end(), '\n'));
-    lines.clear();
-    lock.lock();
+    {
+      const MutexUnlock unlock(state->mutex);
+      const std::string_view left = WriteAll(state->options.file, lines);
+      state->dropped += static_cast<std::uint64_t>(std::count(left.begin(), left.end(), '\n'));
+      lines.clear();
+    }
     if (!state->stop && std::chrono::steady_clock::now() >= next_tick) {
-      lock.unlock();
+      const MutexUnlock unlock(state->mutex);
       if (state->options.every_second) state->options.every_second();
       next_tick = std::chrono::steady_clock::now() + kTick;
-      lock.lock();
     }
     state->behind = !state->waiting.empty();
-    state->changed.notify_all();
+    state->changed.NotifyAll();
   }
   state->ended = true;
-  state->changed.notify_all();
+  state->changed.NotifyAll();
 }
 
 }  // namespace partiemc::server

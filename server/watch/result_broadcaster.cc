@@ -31,7 +31,7 @@ void ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* forme
                                      std::uint64_t next_sequence) {
   std::vector<Published> frames;
   if (former != nullptr) frames = former->HandOver();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   history_.emplace(room);
   for (Published& published : frames) {
     if (published.sequence >= next_sequence) break;
@@ -45,7 +45,7 @@ void ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* forme
 
 std::vector<Published> ResultBroadcaster::HandOver() {
   std::vector<Published> frames;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Collect();
   if (!history_) return frames;
   frames.reserve(history_->size());
@@ -62,7 +62,10 @@ bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::ui
   }
   mailbox_.Put(std::move(published));
   // If the lock is taken, its holder or the next frame collects this one.
-  if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) Collect();
+  if (mutex_.TryLock()) {
+    const MutexLock lock(mutex_, std::adopt_lock);
+    Collect();
+  }
   // A watcher that joined in between may have found the mailbox empty.
   return watcher_count_ != 0;
 }
@@ -79,7 +82,7 @@ void ResultBroadcaster::Announce() {
 
 void ResultBroadcaster::End(WatchEnd end) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!end_) end_ = std::move(end);
   }
   dispatcher_.Wake(*this);
@@ -89,7 +92,7 @@ ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMach
                                                   std::optional<std::uint64_t> from) {
   Joined joined;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     // All results published from here on are offered.
     ++watcher_count_;
     watchers_.push_back(std::move(watcher));
@@ -113,7 +116,7 @@ void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
   std::shared_ptr<WatchStateMachine> left;  // Released after the lock, like the frames.
   std::vector<Published> news;
   Published newest;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = std::ranges::find_if(
       watchers_, [&](const auto& machine) { return machine.get() == &watcher; });
   if (found == watchers_.end()) return;
@@ -126,14 +129,14 @@ void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
 }
 
 Published ResultBroadcaster::Held(std::uint64_t number) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (number > collected_) Collect();  // The dispatcher may not have collected it yet.
   const Published* const held = history_ ? history_->FromNumber(number) : nullptr;
   return held != nullptr ? *held : Published();
 }
 
 Published ResultBroadcaster::HeldFrom(std::uint64_t sequence) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Collect();
   const Published* const held = history_ ? history_->FromSequence(sequence) : nullptr;
   if (held != nullptr) return *held;
@@ -141,19 +144,20 @@ Published ResultBroadcaster::HeldFrom(std::uint64_t sequence) {
 }
 
 Published ResultBroadcaster::Newest() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Collect();
   return newest_;
 }
 
 std::uint64_t ResultBroadcaster::LastNumber() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Collect();
   return collected_;
 }
 
 void ResultBroadcaster::Collect() {
   mailbox_.Take([this](Published published) {
+    mutex_.AssertHeld();
     collected_ = published.number;
     if (history_) history_->Add(published);
     if (!watchers_.empty()) news_.push_back(published);
@@ -176,7 +180,7 @@ void ResultBroadcaster::Serve() {
   std::vector<std::shared_ptr<WatchStateMachine>> watchers;
   std::optional<WatchEnd> end;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (history_) history_->Shrink();
     Collect();
     news = std::exchange(news_, {});
@@ -196,7 +200,7 @@ void ResultBroadcaster::DropHistoryOf(
   if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {
     return;
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (watchers_ != watchers) return;
   history_.reset();
   NoteOldest();

@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
+#include "common/mutex.h"
 #include "server/watch/result_history.h"
 #include "server/watch/result_mailbox.h"
 #include "server/watch/watch_dispatcher.h"
@@ -33,14 +33,16 @@ class ResultBroadcaster final : public Dispatched {
   /// Starts a history within the limits of `room`. If the stream resumes from `former`, the history
   /// takes its frames before `next_sequence`; later ones are computed again. Requires: one call,
   /// before Publish and Join; `room` outlives this.
-  void BeginHistory(HistoryRoom& room, ResultBroadcaster* former, std::uint64_t next_sequence);
+  void BeginHistory(HistoryRoom& room, ResultBroadcaster* former, std::uint64_t next_sequence)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Shrinks the history after other histories have started. Does not block.
   void ShareRoom() { dispatcher_.Wake(*this); }
 
   /// Publishes the result of the frame `sequence`. Wait-free: takes a lock only if it is free.
   /// Returns whether there are watchers; then the caller must call Announce. Requires: `sequence`
   /// increases.
-  [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence);
+  [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Publishes and announces a result with the number of another server. Requires: numbers
   /// increase; skipped numbers never follow.
   void PublishNumbered(Published published);
@@ -51,7 +53,7 @@ class ResultBroadcaster final : public Dispatched {
   /// same locks of gRPC.
   void Announce();
   /// Ends the stream. Watchers receive the published results, then `end`.
-  void End(WatchEnd end);
+  void End(WatchEnd end) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The start of a watch.
   struct Joined {
@@ -63,17 +65,18 @@ class ResultBroadcaster final : public Dispatched {
   };
   /// Adds a watcher that starts at sequence number `from` or the oldest frame after it; without
   /// `from` at the newest frame. All results published after this call are offered to it.
-  Joined Join(std::shared_ptr<WatchStateMachine> watcher, std::optional<std::uint64_t> from);
-  void Leave(const WatchStateMachine& watcher);
+  Joined Join(std::shared_ptr<WatchStateMachine> watcher, std::optional<std::uint64_t> from)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void Leave(const WatchStateMachine& watcher) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The first frame of the history with at least this number; empty if all are older.
-  Published Held(std::uint64_t number);
+  Published Held(std::uint64_t number) ABSL_LOCKS_EXCLUDED(mutex_);
   /// The first frame of the history with at least this sequence number; empty if all are older.
-  Published HeldFrom(std::uint64_t sequence);
+  Published HeldFrom(std::uint64_t sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   /// The newest frame, if it is kept.
-  Published Newest();
+  Published Newest() ABSL_LOCKS_EXCLUDED(mutex_);
   /// The number of the last result.
-  std::uint64_t LastNumber();
+  std::uint64_t LastNumber() ABSL_LOCKS_EXCLUDED(mutex_);
   /// The oldest sequence number that watchers can request; 0: none.
   std::uint64_t oldest_sequence() const {
     const std::uint64_t elsewhere = oldest_elsewhere_, here = oldest_sequence_;
@@ -87,12 +90,12 @@ class ResultBroadcaster final : public Dispatched {
   std::uint64_t producer_waits() const { return producer_waits_; }
 
  private:
-  void Serve() override;
-  std::vector<Published> HandOver();
-  void DropHistoryOf(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers);
-  // With the lock held:
-  void Collect();
-  void NoteOldest();
+  void Serve() override ABSL_LOCKS_EXCLUDED(mutex_);
+  std::vector<Published> HandOver() ABSL_LOCKS_EXCLUDED(mutex_);
+  void DropHistoryOf(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void Collect() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void NoteOldest() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   template <typename Action>
   void CountWaits(Action action);
 
@@ -104,13 +107,15 @@ class ResultBroadcaster final : public Dispatched {
   std::atomic<std::uint32_t> watcher_count_ = 0;
   std::atomic<std::uint64_t> oldest_sequence_ = 0, oldest_elsewhere_ = 0;
 
-  std::mutex mutex_;  // Guards everything below. Publish never waits for it.
-  std::vector<std::shared_ptr<WatchStateMachine>> watchers_;
-  std::uint64_t collected_ = 0;  // Number of the last frame taken from the mailbox.
-  std::vector<Published> news_;  // Frames taken from the mailbox and not offered yet.
-  std::optional<ResultHistory> history_;
-  Published newest_;  // Kept if it is in the history, small, or watched.
-  std::optional<WatchEnd> end_;
+  Mutex mutex_;  // Publish never waits for it.
+  std::vector<std::shared_ptr<WatchStateMachine>> watchers_ ABSL_GUARDED_BY(mutex_);
+  // Number of the last frame taken from the mailbox.
+  std::uint64_t collected_ ABSL_GUARDED_BY(mutex_) = 0;
+  // Frames taken from the mailbox and not offered yet.
+  std::vector<Published> news_ ABSL_GUARDED_BY(mutex_);
+  std::optional<ResultHistory> history_ ABSL_GUARDED_BY(mutex_);
+  Published newest_ ABSL_GUARDED_BY(mutex_);  // Kept if it is in the history, small, or watched.
+  std::optional<WatchEnd> end_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::server

@@ -11,7 +11,7 @@
 namespace partiemc::server {
 
 absl::Status WatchRegistry::Enter(std::shared_ptr<WatchStateMachine> watcher) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (draining_) return DrainingError();
   const WatchStateMachine* key = watcher.get();
   watchers_[key] = std::move(watcher);
@@ -19,7 +19,7 @@ absl::Status WatchRegistry::Enter(std::shared_ptr<WatchStateMachine> watcher) {
 }
 
 absl::Status WatchRegistry::Open(const WatchStateMachine& watcher, const Caller& caller) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (placed_.size() >= max_watchers_) {
     return ViolationError(
         absl::StatusCode::kResourceExhausted,
@@ -35,20 +35,20 @@ absl::Status WatchRegistry::Open(const WatchStateMachine& watcher, const Caller&
 }
 
 void WatchRegistry::Close(const WatchStateMachine& watcher) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   placed_.erase(&watcher);
 }
 
 void WatchRegistry::Leave(const WatchStateMachine& watcher) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   placed_.erase(&watcher);
   watchers_.erase(&watcher);
   // Notifies with the lock held: the waiting thread may delete the registry afterwards.
-  left_.notify_all();
+  left_.NotifyAll();
 }
 
 std::size_t WatchRegistry::count() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return placed_.size();
 }
 
@@ -70,7 +70,7 @@ std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
 
 std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
   std::vector<std::shared_ptr<WatchStateMachine>> all;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   return all;
 }
@@ -78,7 +78,7 @@ std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
 // Calls machines without the lock, because a watch may call Leave at once.
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
   }
   for (const auto& watcher : All()) watcher->Drain();
@@ -87,8 +87,10 @@ void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
 }
 
 bool WatchRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  return left_.wait_until(lock, deadline, [this] { return watchers_.empty(); });
+  const MutexLock lock(mutex_);
+  while (!watchers_.empty() && left_.WaitUntil(mutex_, deadline)) {
+  }
+  return watchers_.empty();
 }
 
 }  // namespace partiemc::server

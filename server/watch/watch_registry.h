@@ -2,15 +2,14 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/mutex.h"
 #include "server/security/caller.h"
 #include "server/watch/watch_state_machine.h"
 
@@ -25,19 +24,20 @@ class WatchRegistry {
 
   /// Registers a watcher before its first request; OpeningCalls counts those. Errors, with a
   /// Violation: UNAVAILABLE (DRAINING).
-  absl::Status Enter(std::shared_ptr<WatchStateMachine> watcher);
+  absl::Status Enter(std::shared_ptr<WatchStateMachine> watcher) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Takes a slot for a watcher after its first request. Errors, with a Violation:
   /// RESOURCE_EXHAUSTED (TOO_MANY_WATCHERS, CALLER_WATCHERS).
-  absl::Status Open(const WatchStateMachine& watcher, const Caller& caller = {});
+  absl::Status Open(const WatchStateMachine& watcher, const Caller& caller = {})
+      ABSL_LOCKS_EXCLUDED(mutex_);
   /// Frees the slot of a watcher whose end is about to be sent.
-  void Close(const WatchStateMachine& watcher);
+  void Close(const WatchStateMachine& watcher) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes a watcher whose end has been sent.
-  void Leave(const WatchStateMachine& watcher);
+  void Leave(const WatchStateMachine& watcher) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of watchers with a slot.
-  std::size_t count() const;
+  std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Bytes of pending results, counted per watcher although watchers share them.
-  std::uint64_t held_bytes() const;
+  std::uint64_t held_bytes() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Ends watchers without a first request for `limit`. Returns the earliest time at which another
   /// one can reach the limit.
@@ -46,19 +46,21 @@ class WatchRegistry {
 
   /// Refuses new watchers and ends every watch. Cuts watches that do not accept their end by
   /// `patience`.
-  void Drain(std::chrono::steady_clock::time_point patience);
+  void Drain(std::chrono::steady_clock::time_point patience) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Waits until all watchers have left. Returns false at the deadline.
-  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
+  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  std::vector<std::shared_ptr<WatchStateMachine>> All() const;
+  std::vector<std::shared_ptr<WatchStateMachine>> All() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   const std::uint32_t max_watchers_;
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable left_;
-  std::map<const WatchStateMachine*, std::shared_ptr<WatchStateMachine>> watchers_;
-  std::map<const WatchStateMachine*, CallerAccount::Place> placed_;  // Open, not closed.
-  bool draining_ = false;
+  mutable Mutex mutex_;
+  CondVar left_;
+  std::map<const WatchStateMachine*, std::shared_ptr<WatchStateMachine>> watchers_
+      ABSL_GUARDED_BY(mutex_);
+  // Open, not closed.
+  std::map<const WatchStateMachine*, CallerAccount::Place> placed_ ABSL_GUARDED_BY(mutex_);
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::server

@@ -7,17 +7,17 @@ namespace partiemc::server {
 
 ConnectionSlots::Slot::~Slot() {
   if (slots_ == nullptr) return;
-  const std::lock_guard lock(slots_->mutex_);
+  const MutexLock lock(slots_->mutex_);
   const auto found = slots_->connections_.find(number_);
   if (!found->second.evicted) slots_->Uncount(found->second);
   slots_->connections_.erase(found);
   // Notifies under the lock: a thread that waits for the last connection may destroy the slots
   // afterwards.
-  slots_->left_.notify_all();
+  slots_->left_.NotifyAll();
 }
 
 void ConnectionSlots::Slot::SetState(State state) {
-  const std::lock_guard lock(slots_->mutex_);
+  const MutexLock lock(slots_->mutex_);
   slots_->connections_.find(number_)->second.state = state;
 }
 
@@ -25,7 +25,7 @@ ConnectionSlots::Slot ConnectionSlots::Enter(const std::string& address, End end
   Slot slot;
   End end_other;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const bool address_is_full = CountOf(address) >= limits_.per_address;
     const bool is_full = address_is_full || held_ >= limits_.connections;
     Connection* other =
@@ -86,14 +86,14 @@ std::size_t ConnectionSlots::CountOf(const std::string& address) const {
 }
 
 std::size_t ConnectionSlots::count() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return connections_.size();
 }
 
 void ConnectionSlots::EndSome(bool all) {
   std::vector<End> ends;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (const auto& [number, connection] : connections_) {
       if (all || connection.state == State::kNoCall) ends.push_back(connection.end);
     }
@@ -102,13 +102,15 @@ void ConnectionSlots::EndSome(bool all) {
 }
 
 bool ConnectionSlots::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  return left_.wait_until(lock, deadline, [this] { return connections_.empty(); });
+  const MutexLock lock(mutex_);
+  while (!connections_.empty() && left_.WaitUntil(mutex_, deadline)) {
+  }
+  return connections_.empty();
 }
 
 void ConnectionSlots::WaitUntilEmpty() {
-  std::unique_lock lock(mutex_);
-  left_.wait(lock, [this] { return connections_.empty(); });
+  const MutexLock lock(mutex_);
+  while (!connections_.empty()) left_.Wait(mutex_);
 }
 
 }  // namespace partiemc::server

@@ -2,26 +2,26 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <unordered_map>
 #include <utility>
 
+#include "common/mutex.h"
+
 namespace partiemc::server {
 
-/// A connection is idle unless the first request of a call has arrived and the call goes on. A
-/// handshake without a message, an incomplete body and a closing handshake are idle.
+/// A connection is idle unless it has a call whose first request has arrived and which has not
+/// ended. A handshake without a message, an incomplete body and a closing handshake are idle.
 ///
-/// If the server or the address of a new connection is at its limit, the new connection evicts an
-/// idle one: the oldest of that address, or else the oldest of the address with the most idle
-/// connections. If none is idle, the new connection gets a reserved slot, in which the gateway
-/// answers health checks only. Connections in reserved slots are always idle and are evicted by the
-/// same rule, so each new connection gets a slot. Thread-safe.
+/// A new connection evicts an idle one if its address or the whole server is at the limit. In the
+/// first case it is the oldest of this address, in the second the oldest of the address with the
+/// most idle connections. If none is idle, the new connection gets a reserved slot, in which the
+/// gateway answers health checks only. Connections in reserved slots are always idle and are
+/// evicted by the same rule, so each new connection gets a slot. Thread-safe.
 class ConnectionSlots {
  public:
   struct Limits {
@@ -68,9 +68,9 @@ class ConnectionSlots {
 
   /// Admits a connection from `address`. Sets `evicted` if another connection is closed for it. The
   /// slots must outlive the Slot.
-  Slot Enter(const std::string& address, End end, bool& evicted);
+  Slot Enter(const std::string& address, End end, bool& evicted) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  std::size_t count() const;
+  std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// EndUnused ends connections without a call, EndAll ends all.
   void EndUnused() { EndSome(false); }
   void EndAll() { EndSome(true); }
@@ -87,23 +87,24 @@ class ConnectionSlots {
     bool evicted = false;  // Being closed; no longer counted.
   };
 
-  // Require the lock:
-  Connection* NextToEvict(bool reserved, const std::string* address);
-  void Count(const Connection& connection);
-  void Uncount(const Connection& connection);
-  std::size_t CountOf(const std::string& address) const;
-  // Requires that the lock is not held:
-  void EndSome(bool all);
+  Connection* NextToEvict(bool reserved, const std::string* address)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Count(const Connection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Uncount(const Connection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::size_t CountOf(const std::string& address) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void EndSome(bool all) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Limits limits_;
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable left_;
-  std::map<std::uint64_t, Connection> connections_;  // In the order of admission.
+  mutable Mutex mutex_;
+  CondVar left_;
+  // In the order of admission.
+  std::map<std::uint64_t, Connection> connections_ ABSL_GUARDED_BY(mutex_);
   // Without evicted connections:
-  std::size_t held_ = 0, held_reserved_ = 0;
-  std::unordered_map<std::string, std::size_t>
-      held_by_;  // By address; excludes the reserved slots.
-  std::uint64_t next_ = 1;
+  std::size_t held_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::size_t held_reserved_ ABSL_GUARDED_BY(mutex_) = 0;
+  // By address; excludes the reserved slots.
+  std::unordered_map<std::string, std::size_t> held_by_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t next_ ABSL_GUARDED_BY(mutex_) = 1;
 };
 
 }  // namespace partiemc::server

@@ -76,7 +76,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   }
 
   void Do(const WebRefused& refused) {
-    closes_ = closes_ || refused.http_status == 400;  // The end of such a request is unknown.
+    closes_ = closes_ || refused.http_status == 400;  // The request's end is unknown.
     connection_->context.Refuse(refused.refusal, connection_->peer,
                                 absl::InvalidArgumentError("the request " + refused.rule));
     Send(ResponseTo(refused));

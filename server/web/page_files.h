@@ -42,7 +42,7 @@ class PageFiles {
 
   /// True if the page is installed.
   bool HasPage() const { return Find({.path = "index.html"}).has_value(); }
-  /// Opens a regular file of the folder. With takes_gzip, opens NAME.gz beside it if that exists.
+  /// Opens a regular file of the folder. With takes_gzip, opens NAME.gz instead if it exists.
   /// Never follows links.
   std::optional<PageFile> Find(const WebFile& wanted) const;
 

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <mutex>
 #include <utility>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace partiemc::client {
 
@@ -23,19 +24,19 @@ bool HaveSettled(const Percentiles& before, const Percentiles& after);
 /// Collects times from many threads.
 class Latencies {
  public:
-  void Add(double milliseconds) {
-    const std::lock_guard lock(mutex_);
+  void Add(double milliseconds) ABSL_LOCKS_EXCLUDED(mutex_) {
+    const MutexLock lock(mutex_);
     times_.push_back(milliseconds);
   }
   /// The times added since the last call.
-  std::vector<double> Take() {
-    const std::lock_guard lock(mutex_);
+  std::vector<double> Take() ABSL_LOCKS_EXCLUDED(mutex_) {
+    const MutexLock lock(mutex_);
     return std::exchange(times_, {});
   }
 
  private:
-  std::mutex mutex_;
-  std::vector<double> times_;
+  Mutex mutex_;
+  std::vector<double> times_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace partiemc::client

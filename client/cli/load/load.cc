@@ -13,7 +13,6 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
@@ -26,6 +25,7 @@
 #include "client/cli/load/server_figures.h"
 #include "client/output/text.h"
 #include "common/json_text.h"
+#include "common/mutex.h"
 #include "partiemc/client/stream.h"
 #include "partiemc/client/watcher.h"
 
@@ -62,16 +62,16 @@ struct Shared {
   Latencies answers, watches;
   std::atomic<std::uint64_t> answered = 0, late = 0, refused = 0;
   std::atomic<bool> stop = false;
-  std::mutex mutex;
-  absl::Status error;  // The first one.
+  Mutex mutex;
+  absl::Status error ABSL_GUARDED_BY(mutex);  // The first one.
 
-  void Fail(const absl::Status& status) {
-    const std::lock_guard lock(mutex);
+  void Fail(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mutex) {
+    const MutexLock lock(mutex);
     if (error.ok()) error = status;
     stop = true;
   }
-  absl::Status Error() {
-    const std::lock_guard lock(mutex);
+  absl::Status Error() ABSL_LOCKS_EXCLUDED(mutex) {
+    const MutexLock lock(mutex);
     return error;
   }
 };

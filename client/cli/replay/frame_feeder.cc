@@ -33,33 +33,33 @@ FrameFeeder::~FrameFeeder() {
 }
 
 std::unique_ptr<RecordedFrame> FrameFeeder::TakeAnswered() {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   FramePointer frame = std::move(unanswered_.front());
   unanswered_.pop_front();
   return frame;
 }
 
 void FrameFeeder::Recycle(FramePointer frame) {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   free_.push_back(std::move(frame));
 }
 
 std::vector<FrameFeeder::Refused> FrameFeeder::TakeRefused() {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   return std::exchange(refused_, {});
 }
 
 std::uint64_t FrameFeeder::skipped_count() const {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   return skipped_;
 }
 
 void FrameFeeder::Stop() {
   {
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     stop_ = true;
   }
-  stopped_.notify_all();
+  stopped_.NotifyAll();
   read_ahead_.Close();
   stream_.Cancel();
 }
@@ -75,7 +75,7 @@ void FrameFeeder::Read() {
   while (true) {
     FramePointer frame;
     {
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       if (stop_) break;
       if (!free_.empty()) {
         frame = std::move(free_.back());
@@ -106,12 +106,14 @@ void FrameFeeder::SendAll() {
 }
 
 bool FrameFeeder::Pace(std::size_t sent) {
-  std::unique_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!frames_per_second_) return !stop_;
   const auto due =
       start_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                    std::chrono::duration<double>(static_cast<double>(sent) / *frames_per_second_));
-  return !stopped_.wait_until(lock, due, [this] { return stop_; });
+  while (!stop_ && stopped_.WaitUntil(mutex_, due)) {
+  }
+  return !stop_;
 }
 
 Frame FrameFeeder::View(const RecordedFrame& recorded) {
@@ -151,7 +153,7 @@ bool FrameFeeder::SendOne(FramePointer owned) {
   const Frame frame = View(recorded);
   {
     // Before Send, because the response may arrive before Send returns.
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     unanswered_.push_back(std::move(owned));
   }
   const auto sequence = stream_.Send(frame, TimeOf(recorded));
@@ -167,7 +169,7 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
   const double time = TimeOf(recorded);
   {
     // Before Offer, because the response may arrive before Offer returns.
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     offered_.push_back(std::move(owned));
   }
   return sender.Offer(frame, time).ok();
@@ -177,13 +179,13 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
 OfferHooks FrameFeeder::Hooks() {
   return {.sending =
               [this](std::uint64_t) {
-                const std::scoped_lock lock(mutex_);
+                const MutexLock lock(mutex_);
                 unanswered_.push_back(std::move(offered_.front()));
                 offered_.pop_front();
               },
           .skipped =
               [this](std::uint64_t) {
-                const std::scoped_lock lock(mutex_);
+                const MutexLock lock(mutex_);
                 ++skipped_;
                 free_.push_back(std::move(offered_.front()));
                 offered_.pop_front();
@@ -192,7 +194,7 @@ OfferHooks FrameFeeder::Hooks() {
 }
 
 void FrameFeeder::RefuseLast(const absl::Status& status) {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   refused_.push_back({unanswered_.back()->source, OneLine(status)});
   free_.push_back(std::move(unanswered_.back()));
   unanswered_.pop_back();

@@ -7,12 +7,10 @@
 // Memory: the queue, the window of the stream, and one frame per thread.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -21,6 +19,7 @@
 #include "absl/status/status.h"
 #include "client/cli/replay/bounded_queue.h"
 #include "client/input/sequence.h"
+#include "common/mutex.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/client/latest_sender.h"
 
@@ -49,14 +48,14 @@ class FrameFeeder {
 
   /// The frame of the response received last. Requires: one call for each result or refusal, in
   /// order.
-  std::unique_ptr<RecordedFrame> TakeAnswered();
-  void Recycle(std::unique_ptr<RecordedFrame> frame);
-  std::vector<Refused> TakeRefused();
+  std::unique_ptr<RecordedFrame> TakeAnswered() ABSL_LOCKS_EXCLUDED(mutex_);
+  void Recycle(std::unique_ptr<RecordedFrame> frame) ABSL_LOCKS_EXCLUDED(mutex_);
+  std::vector<Refused> TakeRefused() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Number of frames that newer ones replaced before they were sent.
-  std::uint64_t skipped_count() const;
+  std::uint64_t skipped_count() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Cancels the stream and reads no further.
-  void Stop();
+  void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Waits for both threads. Requires: the stream has ended, or Stop was called.
   /// Errors: the error of the input.
   absl::Status Join();
@@ -64,15 +63,15 @@ class FrameFeeder {
  private:
   using FramePointer = std::unique_ptr<RecordedFrame>;
 
-  void Read();
+  void Read() ABSL_LOCKS_EXCLUDED(mutex_);
   void SendAll();
-  bool SendOne(FramePointer frame);
-  bool Offer(LatestSender& sender, FramePointer frame);
+  bool SendOne(FramePointer frame) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool Offer(LatestSender& sender, FramePointer frame) ABSL_LOCKS_EXCLUDED(mutex_);
   OfferHooks Hooks();
   Frame View(const RecordedFrame& recorded);
   void ViewAttributes(const RecordedFrame& recorded);
-  void RefuseLast(const absl::Status& status);
-  bool Pace(std::size_t sent);
+  void RefuseLast(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool Pace(std::size_t sent) ABSL_LOCKS_EXCLUDED(mutex_);
 
   Sequence& input_;
   FrameStream& stream_;
@@ -85,14 +84,14 @@ class FrameFeeder {
   std::vector<float> as_float32_;      // Owned by the sender thread.
   std::vector<Attribute> attributes_;  // Likewise.
 
-  mutable std::mutex mutex_;
-  std::condition_variable stopped_;
-  bool stop_ = false;
-  std::deque<FramePointer> offered_;  // Neither sent nor skipped yet.
-  std::deque<FramePointer> unanswered_;
-  std::uint64_t skipped_ = 0;
-  std::vector<FramePointer> free_;
-  std::vector<Refused> refused_;
+  mutable Mutex mutex_;
+  CondVar stopped_;
+  bool stop_ ABSL_GUARDED_BY(mutex_) = false;
+  std::deque<FramePointer> offered_ ABSL_GUARDED_BY(mutex_);  // Neither sent nor skipped yet.
+  std::deque<FramePointer> unanswered_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t skipped_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::vector<FramePointer> free_ ABSL_GUARDED_BY(mutex_);
+  std::vector<Refused> refused_ ABSL_GUARDED_BY(mutex_);
   std::thread reader_, sender_;
 };
 

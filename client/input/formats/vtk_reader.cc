@@ -17,7 +17,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <mutex>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -28,6 +27,7 @@
 #include "client/input/base/text.h"
 #include "client/input/formats/frame_reader.h"
 #include "client/input/formats/vtk_legacy.h"
+#include "common/mutex.h"
 
 namespace partiemc::client::input {
 namespace {
@@ -87,7 +87,7 @@ vtkStandardNewMacro(MessageCatcher)
 class CatchMessages {
  public:
   CatchMessages()
-      : lock_(Mutex()),
+      : lock_(GlobalMutex()),
         before_(vtkOutputWindow::GetInstance()),
         verbosity_before_(vtkLogger::GetCurrentVerbosityCutoff()) {
     vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
@@ -103,12 +103,12 @@ class CatchMessages {
   vtkNew<MessageCatcher> catcher;
 
  private:
-  static std::mutex& Mutex() {
-    static std::mutex mutex;
+  static Mutex& GlobalMutex() {
+    static Mutex mutex;
     return mutex;
   }
 
-  std::lock_guard<std::mutex> lock_;
+  const MutexLock lock_;
   vtkSmartPointer<vtkOutputWindow> before_;
   vtkLogger::Verbosity verbosity_before_;
 };

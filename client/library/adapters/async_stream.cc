@@ -1,10 +1,10 @@
 #include "partiemc/client/async_stream.h"
 
 #include <deque>
-#include <mutex>
 #include <thread>
 #include <utility>
 
+#include "common/mutex.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {
@@ -37,9 +37,9 @@ class AsyncStream::Receiving {
   /// next. The callback is queued before its frame is sent, because the answer may arrive before
   /// `send` returns.
   template <typename Sending>
-  void Send(Answered answered, const Sending& send) {
+  void Send(Answered answered, const Sending& send) ABSL_LOCKS_EXCLUDED(mutex_) {
     {
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       waiting_.push_back(std::move(answered));
     }
     const absl::StatusOr<std::uint64_t> sent = send();
@@ -88,8 +88,8 @@ class AsyncStream::Receiving {
     if (const auto answered = TakeOldest()) answered(std::move(answer));
   }
 
-  Answered TakeOldest() {
-    const std::scoped_lock lock(mutex_);
+  Answered TakeOldest() ABSL_LOCKS_EXCLUDED(mutex_) {
+    const MutexLock lock(mutex_);
     if (waiting_.empty()) return nullptr;
     Answered oldest = std::move(waiting_.front());
     waiting_.pop_front();
@@ -97,8 +97,8 @@ class AsyncStream::Receiving {
   }
 
   /// Null if the end of the stream has already answered it.
-  Answered TakeNewest() {
-    const std::scoped_lock lock(mutex_);
+  Answered TakeNewest() ABSL_LOCKS_EXCLUDED(mutex_) {
+    const MutexLock lock(mutex_);
     if (waiting_.empty()) return nullptr;
     Answered newest = std::move(waiting_.back());
     waiting_.pop_back();
@@ -107,9 +107,10 @@ class AsyncStream::Receiving {
 
   FrameStream& stream_;
   const Told told_;
-  std::mutex mutex_;
-  std::deque<Answered> waiting_;  // Guarded by the mutex; callbacks of sent frames, in order.
-  absl::Status ended_;            // Written by the thread; read after it has been joined.
+  Mutex mutex_;
+  // Callbacks of sent frames, in order.
+  std::deque<Answered> waiting_ ABSL_GUARDED_BY(mutex_);
+  absl::Status ended_;  // Written by the thread; read after it has been joined.
   std::thread thread_;
 };
 

@@ -1,12 +1,11 @@
 #include "partiemc/client/latest_sender.h"
 
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 #include <utility>
 
 #include "client/library/gather.h"
 #include "client/library/owned_frame.h"
+#include "common/mutex.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {
@@ -18,7 +17,7 @@ class LatestSender::Sending {
   ~Sending() {
     if (!thread_.joinable()) return;
     {
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       Stop(absl::CancelledError("the sender was destroyed"));
     }
     stream_.Cancel();
@@ -26,8 +25,8 @@ class LatestSender::Sending {
   }
 
   template <typename Particles>  // Frame or wire::FrameRows.
-  absl::Status Offer(const Particles& frame, double time) {
-    const std::scoped_lock lock(mutex_);
+  absl::Status Offer(const Particles& frame, double time) ABSL_LOCKS_EXCLUDED(mutex_) {
+    const MutexLock lock(mutex_);
     if (finishing_) return absl::FailedPreconditionError("frame: offered after Finish");
     if (!status_.ok()) return status_;
     if (std::exchange(is_waiting_, true)) {
@@ -35,41 +34,48 @@ class LatestSender::Sending {
       hooks_.skipped(waiting_.number());
     }
     waiting_.Assign(frame, time, ++offers_);
-    changed_.notify_all();
+    changed_.NotifyAll();
     return absl::OkStatus();
   }
 
-  absl::Status Finish() {
+  absl::Status Finish() ABSL_LOCKS_EXCLUDED(mutex_) {
     {
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       if (finishing_) return absl::FailedPreconditionError("Finish: called twice");
       finishing_ = true;
-      changed_.notify_all();
+      changed_.NotifyAll();
     }
     thread_.join();
-    return status_.ok() ? stream_.FinishSending() : status_;
+    absl::Status ended;
+    {
+      const MutexLock lock(mutex_);
+      ended = status_;
+    }
+    return ended.ok() ? stream_.FinishSending() : ended;
   }
 
-  OfferCounts counts() const {
-    const std::scoped_lock lock(mutex_);
+  OfferCounts counts() const ABSL_LOCKS_EXCLUDED(mutex_) {
+    const MutexLock lock(mutex_);
     return counts_;
   }
 
  private:
-  void Run() {
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_) {
     OwnedFrame in_hand;
-    std::unique_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     for (;;) {
-      changed_.wait(lock, [this] { return is_waiting_ || finishing_ || !status_.ok(); });
+      while (!is_waiting_ && !finishing_ && status_.ok()) changed_.Wait(mutex_);
       if (!status_.ok() || !is_waiting_) return;
       std::swap(in_hand, waiting_);
       is_waiting_ = false;
       ++counts_.sent;
       // Called before the frame is sent: its answer may arrive before Send returns.
       hooks_.sending(in_hand.number());
-      lock.unlock();
-      const absl::Status sent = stream_.Send(in_hand.frame(), in_hand.time()).status();
-      lock.lock();
+      absl::Status sent;
+      {
+        const MutexUnlock unlock(mutex_);
+        sent = stream_.Send(in_hand.frame(), in_hand.time()).status();
+      }
       if (sent.ok()) continue;
       --counts_.sent;
       if (FindViolation(sent)) {
@@ -81,21 +87,22 @@ class LatestSender::Sending {
     }
   }
 
-  void Stop(absl::Status status) {
+  void Stop(absl::Status status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     if (status_.ok()) status_ = std::move(status);
-    changed_.notify_all();
+    changed_.NotifyAll();
   }
 
   FrameStream& stream_;
   const OfferHooks hooks_;
 
-  mutable std::mutex mutex_;  // Guards everything below.
-  std::condition_variable changed_;
-  OwnedFrame waiting_;
-  bool is_waiting_ = false, finishing_ = false;
-  std::uint64_t offers_ = 0;
-  OfferCounts counts_;
-  absl::Status status_;  // Status that ended the stream.
+  mutable Mutex mutex_;
+  CondVar changed_;
+  OwnedFrame waiting_ ABSL_GUARDED_BY(mutex_);
+  bool is_waiting_ ABSL_GUARDED_BY(mutex_) = false;
+  bool finishing_ ABSL_GUARDED_BY(mutex_) = false;
+  std::uint64_t offers_ ABSL_GUARDED_BY(mutex_) = 0;
+  OfferCounts counts_ ABSL_GUARDED_BY(mutex_);
+  absl::Status status_ ABSL_GUARDED_BY(mutex_);  // Status that ended the stream.
   std::thread thread_;
 };
 
