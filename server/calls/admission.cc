@@ -24,7 +24,7 @@ absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const C
 }
 
 absl::StatusOr<AdmittedCall> AdmitProbe(const Authentication& authentication,
-                                          const CallOrigin& origin) {
+                                        const CallOrigin& origin) {
   return WithPlace(authentication.Anybody(origin.peer), CallerAccount::Kind::kProbe);
 }
 
