@@ -1,6 +1,6 @@
 // The server's end of a call, over any channel. Every method is served as a stream of bytes, unary
-// ones included: the server authenticates the caller before it reads a request, and checks the size
-// of a message before it parses it.
+// ones included. So the server authenticates the caller before it reads a request, and checks the
+// size of a message before it parses it.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -29,7 +29,7 @@ struct ArrivedCall {
 };
 
 /// Translates between a CallChannel and a state machine (StreamStateMachine, WatchStateMachine,
-/// UnaryStateMachine), which keeps the channel's rules. Never blocks. Thread-safe.
+/// UnaryStateMachine), which keeps the channel's rules. Never blocks. Any thread may call.
 class ByteCall {
  public:
   ByteCall(ArrivedCall call, const ServerContext& context);

@@ -161,7 +161,7 @@ void OtherPart::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   auto status =
       assembler()->Offer(joined_.seat, *sequence, request.Length(),
                          std::make_shared<PartMessage>(request), FrameAssembler::Clock::now());
-  // After this call has left the assembler, its status reports the reason.
+  // A call that has left the assembler ends with the reason as its status.
   if (!absl::IsCancelled(status)) slots_[slot].refusal = std::move(status);
 }
 

@@ -32,8 +32,9 @@ absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request
 /// Checks the fields of `open` about parts. Errors: INVALID_ARGUMENT (OUT_OF_RANGE).
 absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits);
 
-/// Whole frames, each in one message: nothing to add. Subclasses add the steps of parts. One slot
-/// for each frame in flight. Thread rules: as StreamHandler; OnFrame is called during the read.
+/// The steps that ReconstructCall adds for frames in parts. This class is for whole frames, each in
+/// one message, which need none. One slot for each frame in flight. Thread rules: as StreamHandler;
+/// OnFrame is called at the end of a read.
 class FrameArrival {
  public:
   explicit FrameArrival(std::shared_ptr<FrameAssembler> assembler = nullptr)

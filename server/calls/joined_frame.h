@@ -15,7 +15,7 @@ inline constexpr std::string_view kReasonPartMismatch = "PART_MISMATCH";
 
 /// Appends the particles of `parts` to `frame`, which is part 0. With ids, the particles are sorted
 /// by id, so the result does not depend on their distribution over parts; otherwise they stay in
-/// the order of the parts. Of the scalars it keeps those in `attributes`. Consumes the parts'
+/// the order of the parts. Keeps the scalars in `attributes` only. Consumes the parts'
 /// arrays. `frame` keeps its sequence and its time. Formats of parts without particles are ignored.
 /// Additional memory: at most the size of the arrays, and 8 bytes a particle.
 ///

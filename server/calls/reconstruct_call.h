@@ -38,6 +38,7 @@ class ReconstructCall final : public ByteCall, public StreamHandler, private Str
   void OnDone() override;
 
   // The steps of a frame. Public for the fuzz target, which replaces channel and state machine.
+
   grpc::ByteBuffer& Request(std::size_t slot) { return requests_[slot]; }
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
   /// The kind of the request that was read into `slot`.

@@ -45,8 +45,8 @@ struct FrameMessages final : MessageBuffers {
   v1::ReconstructResponse result;   ///< Never an error, which would free its buffers.
   wire::AttributeViews attributes;  ///< Into `request`.
 
-  /// Takes the messages from the worker, because a session that runs out of memory frees the
-  /// worker's buffers.
+  /// Takes the messages from the worker. A session without memory frees the buffers that the worker
+  /// still has.
   static std::unique_ptr<FrameMessages> Take(Worker& worker);
   /// Frees buffers that are far larger than the last request, of this size. Otherwise the buffers
   /// of fields that are large in turn would add up.

@@ -81,7 +81,7 @@ absl::StatusOr<WatchTerms> WatchCall::ReadTerms() const {
   return terms;
 }
 
-// Opened comes last on each path: the call may be deleted then.
+// Each path ends with `Opened`, after which the call may be deleted.
 void WatchCall::StartOpen() {
   auto terms = ReadTerms();
   if (!terms.ok()) return machine_->Opened(terms.status());
@@ -172,8 +172,8 @@ void WatchCall::Write(grpc::ByteBuffer response) {
 }
 
 void WatchCall::Finish(const absl::Status& status) {
-  context().watchers.Close(
-      *machine_);  // First: a client that sees the end may watch again at once.
+  // First: a client that sees the end may watch again at once.
+  context().watchers.Close(*machine_);
   LogEnd(status);
   End(status);
 }

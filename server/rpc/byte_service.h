@@ -12,8 +12,8 @@
 namespace partiemc::server {
 
 /// gRPC's generated services read and parse the request of a unary call before they call its
-/// method, and the server cannot end a call that waits for its request. On the wire a unary call is
-/// a stream of one message each way, so every method can be served as a stream.
+/// method, and the server cannot end a call that waits for its request. A unary call looks like a
+/// stream of one message each way on the wire, so every method can be served as a stream.
 class ByteService : public grpc::Service {
  protected:
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;

@@ -9,7 +9,7 @@
 
 namespace partiemc::server {
 
-/// Serves Check, whose calls have slots of their own (UnaryKind::kProbe). Does not serve Watch:
+/// Serves Check, whose calls have separate slots (UnaryKind::kProbe). Does not serve Watch:
 /// without it gRPC's clients derive the health from the connection, and streams receive drain
 /// notices. Thread-safe.
 class HealthService final : public ByteService {

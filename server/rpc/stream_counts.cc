@@ -11,7 +11,7 @@
 namespace partiemc::server {
 namespace {
 
-// Beyond this number all listed peers are forgotten, and listed again.
+// The list of peers is cleared, and read again, when it exceeds this number.
 constexpr std::size_t kMostListed = 20'000;
 
 using Text = std::unique_ptr<char, decltype(&gpr_free)>;
