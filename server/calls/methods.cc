@@ -14,8 +14,15 @@
 #include "server/calls/stream_messages.h"
 #include "server/calls/unary_call.h"
 #include "server/calls/watch_call.h"
+#include "server/compute/compute_pool.h"
+#include "server/compute/memory_budget.h"
+#include "server/relay/relay.h"
 #include "server/relay/stream_summary.h"
+#include "server/stream/limits.h"
 #include "server/stream/session.h"
+#include "server/stream/stream_registry.h"
+#include "server/watch/result_history.h"
+#include "server/watch/watch_registry.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {

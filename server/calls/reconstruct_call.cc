@@ -5,6 +5,8 @@
 #include "partiemc/status.h"
 #include "server/compute/memory_budget.h"
 #include "server/relay/watched_result.h"
+#include "server/stream/limits.h"
+#include "server/stream/stream_registry.h"
 #include "server/stream/stream_token.h"
 #include "server/telemetry/logging.h"
 #include "wire/message_bytes.h"
